@@ -1,0 +1,58 @@
+/// repose-phantom: writes a synthetic head of any resolution, with scenes to solve.
+///
+///     repose-phantom -skin_vertices 477 -output paper
+///     repose-phantom -skin_vertices 20000 -bone_edge 2 -output fine
+///
+/// Writes NAME_skin.ply, NAME_skull.ply, NAME_mandible.ply, NAME_landmarks.json, NAME.mrk.json
+/// (3D Slicer) and the scenes NAME_jaw_opening.yaml and NAME_jaw_advance.yaml. Exit status: 0 done,
+/// 1 bad input (nothing written), 3 internal error.
+#include <cstdio>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/surface/phantom.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+std::vector<base::Option> option_table() {
+  using namespace surface;
+  return {{"skin_vertices",
+           OptionKind::integer,
+           "2000",
+           "Vertices of the skin; 477 is the paper's mesh.",
+           {phantom_vertices_min, phantom_vertices_max}},
+          {"bone_edge",
+           OptionKind::number,
+           "auto",
+           "Edges of the bones at the face; auto: as the skin's, between 1 and 5.",
+           {phantom_bone_edge_min, phantom_bone_edge_max},
+           "mm",
+           {"auto"}},
+          {"output", OptionKind::path, "head", "Path of the files without ending."}};
+}
+
+void write_head(const base::Options& options) {
+  surface::PhantomOptions wanted;
+  wanted.skin_vertices = options.integer("skin_vertices");
+  if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
+  const surface::Phantom head = surface::make_phantom(wanted);
+  for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
+    std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),
+                part->triangles.size());
+  for (const auto& file : surface::write_phantom(options.text("output"), head))
+    std::printf("  wrote %s\n", file.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv, "Writes a synthetic head: skin, skull, mandible and scenes.",
+                        {}, option_table());
+  return base::run_program(options, [&] {
+    base::on_first_rank(MPI_COMM_WORLD, [&] { write_head(options); });
+    return base::Exit::done;
+  });
+}

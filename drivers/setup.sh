@@ -1,0 +1,66 @@
+# Sourced by drivers/demo.sh and tests/run.sh: what they need of a Debian 12 or 13 machine.
+
+build_packages=(
+  g++ cmake ninja-build ccache pkg-config
+  openmpi-bin libopenmpi-dev libpetsc-real-dev libhdf5-openmpi-dev
+  libopenblas0-serial # a fast BLAS, serial because MPI ranks already use the cores
+  libeigen3-dev libcgal-dev libyaml-cpp-dev libfmt-dev
+)
+test_packages=(
+  libgtest-dev libbenchmark-dev clang-format
+  python3 python3-pytest python3-numpy python3-scipy python3-h5py python3-meshio
+)
+
+# Prints those of the given Debian packages that are not installed.
+missing_packages() {
+  local package
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
+      echo "$package"
+  done
+}
+
+# Runs apt-get as root, directly or by sudo; a failure, often a mirror's, is retried once.
+run_apt() {
+  local command=(env DEBIAN_FRONTEND=noninteractive apt-get -q "$@")
+  [ "$(id -u)" = 0 ] || command=(sudo "${command[@]}")
+  "${command[@]}" || { sleep 5 && "${command[@]}"; }
+}
+
+# Installs those of the given packages that are missing; needs no network when none is.
+install_packages() {
+  local missing
+  if ! command -v dpkg-query >/dev/null; then
+    echo "set-up: this is not Debian (12 or 13); install the like of: $*" >&2
+    return 1
+  fi
+  mapfile -t missing < <(missing_packages "$@")
+  [ ${#missing[@]} -gt 0 ] || return 0
+  if [ "$(id -u)" != 0 ] && ! command -v sudo >/dev/null; then
+    echo "set-up: neither root nor sudo; have installed: apt-get install ${missing[*]}" >&2
+    return 1
+  fi
+  echo "set-up: installing ${missing[*]}"
+  if ! { run_apt update && run_apt install -y --no-install-recommends "${missing[@]}"; }; then
+    echo "set-up: apt-get could not install: ${missing[*]}" >&2
+    return 1
+  fi
+}
+
+# Exports what mpirun needs here, for Open MPI 4 (OMPI_) and 5 (PRTE_).
+mpi_environment() {
+  export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+  if [ "$(id -u)" = 0 ]; then
+    export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+    export PRTE_ALLOW_RUN_AS_ROOT=1 PRTE_ALLOW_RUN_AS_ROOT_CONFIRM=1
+  fi
+  # More ranks than cores are allowed, and then give way to each other.
+  export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
+  # Runs at the same time must not be pinned to the same cores.
+  export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+  # A container's system-call filter forbids ranks to read each other's memory directly.
+  if grep -q '^Seccomp:[[:space:]]*2' /proc/self/status 2>/dev/null; then
+    export OMPI_MCA_btl_vader_single_copy_mechanism=none
+    export OMPI_MCA_btl_sm_single_copy_mechanism=none
+  fi
+}

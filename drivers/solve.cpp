@@ -1,0 +1,205 @@
+/// repose-solve INPUT: from a scene (.yaml) or a model (.h5) to the rest position of the tissue.
+///
+///     repose-solve meshes/head_jaw_opening.yaml
+///     mpirun -n 2 repose-solve meshes/head_jaw_opening.yaml -accuracy 0.01 -output opening
+///     repose-solve opening.h5 -tao_type lmvm -tao_monitor
+///
+/// Writes NAME.h5 and one XDMF file a block for ParaView. Exit status: 0 converged, 1 bad input
+/// (nothing written), 2 not converged (result written), 3 internal error.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/model/build.h"
+#include "repose/results/model_file.h"
+#include "repose/results/restart.h"
+#include "repose/results/result_file.h"
+#include "repose/scene/scene.h"
+#include "repose/solve/report.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+
+// In the order of scene::Functional and scene::VolumeForm.
+const std::vector<std::string> functional_words = {"energy", "force"};
+const std::vector<std::string> volume_words = {"none", "paper", "penalty", "exact"};
+
+std::vector<base::Option> option_table() {
+  return {
+      {"output", OptionKind::path, "",
+       "Path of the result without ending; default: the input's name here."},
+      {"accuracy",
+       OptionKind::number,
+       "",
+       "Stop when the rest position is this near (default 0.1).",
+       {1e-12, 100},
+       "mm"},
+      {"functional", OptionKind::choice, "", "What is minimised.", {}, "", functional_words},
+      {"volume", OptionKind::choice, "", "Volume term.", {}, "", volume_words},
+      {"lambda",
+       OptionKind::number,
+       "",
+       "Weight of the energy, with volume term paper.",
+       {.min = 0, .max = 1, .min_excluded = true}},
+      {"bulk_modulus", OptionKind::number, "", "Of the penalty volume term.", {0, 1e9}, "N/mm²"},
+      {"load_steps",
+       OptionKind::integer,
+       "",
+       "Equal steps of the bones' motion, or auto.",
+       {1, 100000},
+       "",
+       {"auto"}},
+      {"dry_run", OptionKind::flag, "", "Build and report the model only."},
+      {"restart", OptionKind::path, "",
+       "Go on from the last step of this result of the same model."},
+      {"checkpoint_interval",
+       OptionKind::number,
+       "",
+       "Seconds between NAME_checkpoint.h5.",
+       {0, 1e9},
+       "s"},
+  };
+}
+
+/// The model on rank 0, with what the scene asks of the solver.
+struct Job {
+  model::Model model;
+  scene::Solve wanted;   // on all ranks
+  std::string building;  // what the builder has to say, on rank 0
+};
+
+Job read_job(const std::filesystem::path& input) {
+  Job job;
+  base::on_first_rank(comm, [&] {
+    if (results::is_hdf5(input)) {
+      job.model = results::read_model(input);
+      return;
+    }
+    const scene::Scene scene = scene::read_scene(input);
+    model::BuiltModel built = model::build_model(scene);
+    job.model = std::move(built.model);
+    job.building = solve::describe_build(built.report);
+    job.wanted = scene.solve;
+  });
+  if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
+    job.wanted.bulk_modulus = 10 * model::effective_modulus(job.model);
+  double bulk_modulus = job.wanted.bulk_modulus.value_or(0);
+  MPI_Bcast(&bulk_modulus, 1, MPI_DOUBLE, 0, comm);
+  job.wanted.bulk_modulus.reset();
+  static_assert(std::is_trivially_copyable_v<scene::Solve>);
+  MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);
+  job.wanted.bulk_modulus = bulk_modulus;
+  return job;
+}
+
+template <class Choice>
+void choose(const base::Options& options, const char* name, const std::vector<std::string>& words,
+            Choice& value) {
+  if (!options.has(name)) return;
+  const auto place = std::find(words.begin(), words.end(), options.text(name));
+  value = static_cast<Choice>(place - words.begin());
+}
+
+/// The command line beats the scene.
+void override_by(const base::Options& options, scene::Solve& wanted) {
+  choose(options, "functional", functional_words, wanted.functional);
+  choose(options, "volume", volume_words, wanted.volume);
+  if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
+  if (options.has("lambda")) wanted.lambda = options.number("lambda");
+  if (options.has("bulk_modulus")) wanted.bulk_modulus = options.number("bulk_modulus");
+  if (options.has("load_steps"))
+    wanted.load_steps =
+        options.text("load_steps") == "auto" ? 0 : static_cast<int>(options.integer("load_steps"));
+}
+
+solve::Settings settings_of(const scene::Solve& wanted) {
+  using scene::VolumeForm;
+  if (wanted.functional == scene::Functional::force || wanted.volume == VolumeForm::exact)
+    base::refuse(
+        "this version minimises energy with volume term none, paper or penalty; "
+        "functional force and volume exact are not modelled");
+  solve::Settings settings;
+  settings.volume = volume_words[static_cast<size_t>(wanted.volume)];
+  settings.path.accuracy = wanted.accuracy;
+  settings.path.load_steps = wanted.load_steps;
+  if (wanted.volume == VolumeForm::penalty)
+    settings.weights = {1, mechanics::VolumeTerm::penalty, *wanted.bulk_modulus};
+  if (wanted.volume == VolumeForm::paper) {
+    settings.lambda = wanted.lambda;
+    settings.weights = {wanted.lambda, mechanics::VolumeTerm::paper, 1 - wanted.lambda};
+  }
+  return settings;
+}
+
+void say(const std::string& text) {
+  if (base::rank(comm) == 0) std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+/// Writes every step to the result, and from time to time the latest to a checkpoint.
+class Writer {
+ public:
+  Writer(const std::filesystem::path& name, const model::Model& model, double interval)
+      : name_(name), model_(model), file_(comm, name, model), interval_(interval) {}
+
+  void operator()(const results::StepNumbers& numbers, const results::StepRows& rows) {
+    file_.append(numbers, rows);
+    int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
+    MPI_Bcast(&due, 1, MPI_INT, 0, comm);
+    if (!due || !numbers.converged) return;
+    results::ResultFile checkpoint(comm, name_.string() + "_checkpoint", model_);
+    checkpoint.append(numbers, rows);
+    checkpoint.commit();
+    last_ = MPI_Wtime();
+  }
+  void commit() { file_.commit(); }
+
+ private:
+  std::filesystem::path name_;
+  const model::Model& model_;
+  results::ResultFile file_;
+  double interval_, last_ = MPI_Wtime();
+};
+
+base::Exit run(const base::Options& options) {
+  base::Stages stages(comm);
+  const std::filesystem::path input = options.arguments()[0];
+  Job job = read_job(input);
+  override_by(options, job.wanted);
+  solve::Settings settings = settings_of(job.wanted);
+  stages.end("build");
+  if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));
+  if (options.flag("dry_run")) return base::Exit::done;
+
+  results::Restart restart;
+  if (options.has("restart")) {
+    restart = results::read_restart(comm, options.text("restart"), job.model);
+    settings.path.start_load = restart.load;
+  }
+  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  Writer writer(name, job.model,
+                options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
+  const solve::Summary summary =
+      solve::find_repose(comm, job.model, settings, restart.position, stages, std::ref(writer));
+  writer.commit();
+  stages.end("write");
+  say(solve::describe_run(summary, settings, base::size(comm), stages));
+  say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
+  return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv,
+                        "Finds the rest position of facial soft tissue after its bones moved.",
+                        {{"INPUT", "scene (.yaml) or model (.h5)"}}, option_table());
+  return base::run_program(options, [&] { return run(options); });
+}

@@ -1,0 +1,25 @@
+#pragma once
+#include <mpi.h>
+
+#include <functional>
+#include <string>
+
+namespace repose::base {
+
+int rank(MPI_Comm comm);
+int size(MPI_Comm comm);
+
+/// Runs `work` on every rank (or on rank 0 only) and agrees on the outcome: if it threw anywhere,
+/// every rank throws the same error (that of the lowest rank, InputError or InternalError kept).
+/// No rank is left waiting in a collective that another never reaches. Collective.
+void together(MPI_Comm comm, const std::function<void()>& work);
+void on_first_rank(MPI_Comm comm, const std::function<void()>& work);
+
+/// The part [begin, end) of n rows that a rank holds in natural order; sizes differ by at most one.
+struct Slab {
+  int64_t begin, end;
+  int64_t rows() const { return end - begin; }
+};
+Slab slab(int64_t n, int rank, int size);
+
+}  // namespace repose::base

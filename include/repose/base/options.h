@@ -1,0 +1,105 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "repose/base/text.h"
+
+/// The command line of a program, in PETSc's style: `program ARGUMENT … -name value`.
+namespace repose::base {
+
+/// A positional argument; all of a program's are required.
+struct Argument {
+  std::string name;  ///< as the help shows it, e.g. "INPUT"
+  std::string help;  ///< one sentence
+};
+
+enum class OptionKind { flag, number, integer, choice, text, path };
+
+/// One row of a program's table of options.
+struct Option {
+  std::string name;  ///< without the dash
+  OptionKind kind;
+  std::string default_text;  ///< what holds when it is not given; empty: nothing does
+  std::string help;          ///< one sentence
+  Range range{};             ///< number, integer
+  std::string unit{};        ///< number
+  /// choice: the words allowed; number, integer: words that may stand in place of the number.
+  std::vector<std::string> choices{};
+  int values = 1;  ///< how many values follow the name
+};
+
+/// Command-line options, checked against one table; the program's own are read from the command
+/// line or, where not given there, from PETSc's database (an -options_file, PETSC_OPTIONS). A
+/// program does
+///
+///     base::Options options(argc, argv, "Does this.", {{"INPUT", "…"}}, {…});
+///     base::Session session(options.petsc_argc(), options.petsc_argv(), nullptr);
+///     if (options.help_wanted()) …print options.help() from one rank and leave with status 0
+///     options.check();
+///
+/// so that every error comes when ranks can agree who prints it. As in PETSc a token is a name
+/// if a letter follows its dash (or two); "-300" and "-.5" are values. The last of several wins.
+/// Nothing here is collective; every rank sees the same command line.
+class Options {
+ public:
+  /// Sorts the command line into the program's own options, PETSc's and arguments. Never throws.
+  Options(int argc, char* const* argv, std::string description, std::vector<Argument> arguments,
+          std::vector<Option> table);
+  Options(const Options&) = delete;
+  Options& operator=(const Options&) = delete;
+
+  /// -help was given. With `-help petsc` or `-help intro` it goes to PETSc instead, and this is
+  /// false.
+  bool help_wanted() const { return help_wanted_; }
+  /// What the program does, its arguments and options: one screen, from the table.
+  std::string help() const;
+
+  /// The command line for PetscInitialize: the program's name and PETSc's options with their
+  /// values, followed by a null pointer. Valid as long as this object.
+  int petsc_argc() const { return static_cast<int>(petsc_tokens_.size()); }
+  char** petsc_argv() const { return petsc_pointers_.data(); }
+
+  /// Reads PETSc's database (where PETSc is initialised; what is ours is marked as used) and checks
+  /// everything. InputError, one line, for a name that is neither ours nor begins as PETSc's do
+  /// (with the nearest of ours), a missing value, a value of the wrong kind or out of range, a
+  /// missing or unexpected argument. Call once, before any of the functions below.
+  void check();
+
+  /// One value per Argument, in order.
+  const std::vector<std::string>& arguments() const { return positional_; }
+  /// The person gave it, on the command line or in PETSc's database.
+  bool has(std::string_view name) const;
+  /// The value given, else the default. InternalError for a name that is not in the table, and for
+  /// a number where a word stands or nothing does.
+  double number(std::string_view name) const;
+  int64_t integer(std::string_view name) const;
+  bool flag(std::string_view name) const;
+  std::string text(std::string_view name) const;  ///< text, path, choice; a number as typed
+  std::vector<std::string> texts(std::string_view name) const;  ///< all values; empty if none
+
+  /// The PETSc options of the command line that PETSc never asked for. PETSc must be initialised.
+  std::vector<std::string> unused() const;
+
+ private:
+  const Option* find(std::string_view name) const;
+  const Option& row(std::string_view name) const;
+  int sort_option(int position, const std::vector<std::string>& tokens);
+  int take_values(const Option& option, int position, const std::vector<std::string>& tokens);
+  void read_database();
+  void check_values(const Option& option, const std::vector<std::string>& values) const;
+  void check_arguments() const;
+  [[noreturn]] void refuse_unknown(const std::string& name) const;
+
+  std::string program_, description_;
+  std::vector<Argument> arguments_;
+  std::vector<Option> table_;
+  std::map<std::string, std::vector<std::string>, std::less<>> given_;
+  std::vector<std::string> positional_, unknown_, petsc_tokens_;
+  mutable std::vector<char*> petsc_pointers_;
+  bool help_wanted_ = false;
+};
+
+}  // namespace repose::base

@@ -1,0 +1,51 @@
+#pragma once
+#include <petscmat.h>
+#include <petscvec.h>
+
+#include <utility>
+
+#include "repose/base/error.h"
+
+/// PETSc objects as owners, and PETSc's error codes as exceptions.
+namespace repose::base {
+
+/// Throws InternalError with PETSc's own text when `code` is not zero. Not collective.
+void check(PetscErrorCode code);
+
+/// Owns one reference to a PETSc object; move-only. `Destroy` is the type's own destructor.
+template <class Object, PetscErrorCode (*Destroy)(Object*)>
+class Handle {
+ public:
+  Handle() = default;
+  explicit Handle(Object object) : object_(object) {}  ///< takes over the reference
+  Handle(Handle&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(object_, other.object_);
+    return *this;
+  }
+  ~Handle() {
+    if (object_) Destroy(&object_);
+  }
+  operator Object() const { return object_; }
+  Object* out() { return &object_; }  ///< for PETSc's creating functions; must be empty
+
+ private:
+  Object object_ = nullptr;
+};
+
+using VecHandle = Handle<Vec, VecDestroy>;
+using MatHandle = Handle<Mat, MatDestroy>;
+using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
+using IndexSetHandle = Handle<IS, ISDestroy>;
+
+/// PETSc and MPI for the life of a program: initialises both (root may run Open MPI), makes PETSc
+/// return its errors instead of aborting, finalises. Collective.
+class Session {
+ public:
+  Session(int argc, char** argv, const char* help);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+};
+
+}  // namespace repose::base

@@ -1,0 +1,79 @@
+#pragma once
+#include <cmath>
+
+#include "repose/mechanics/energy.h"
+#include "repose/mechanics/prism_volume.h"
+#include "repose/mechanics/spring_law.h"
+
+/// Analytic Hessians of the terms as 3×3 blocks.
+namespace repose::mechanics {
+
+/// Which Hessian: the exact one, or a positive semidefinite one that leaves out what can be
+/// negative (the transverse stiffness T/r of a compressed spring, the curvature of v itself).
+enum class Curvature { exact, convex };
+
+/// ∂²E/∂q∂q of a spring with d = q − p: T′ u uᵀ + (T/r)(1 − u uᵀ), N/mm. The blocks of its two
+/// points are +K, +K and −K, −K. Where r = 0 and the direction is undefined, T/r is taken as T′ so
+/// that the block stays finite and isotropic.
+struct SpringStiffness {
+  double along;   ///< T′
+  double across;  ///< T/r
+  Vec3 u;
+  Mat3 block() const {
+    const double more = along - across;
+    const double xy = more * u.x() * u.y(), xz = more * u.x() * u.z(), yz = more * u.y() * u.z();
+    Mat3 k;
+    k << across + more * u.x() * u.x(), xy, xz, xy, across + more * u.y() * u.y(), yz, xz, yz,
+        across + more * u.z() * u.z();
+    return k;
+  }
+};
+
+template <int p>
+SpringStiffness spring_stiffness(const Vec3& d, double k0, double rest_length,
+                                 double inverse_reference, Curvature curvature) {
+  const double r = d.norm(), s = r - rest_length;
+  const double along = spring_tangent<p>(s, k0, inverse_reference);
+  if (r == 0) return {along, along, Vec3::Zero()};
+  const double across = spring_tension<p>(s, k0, inverse_reference) / r;
+  const bool left_out = curvature == Curvature::convex && across < 0;
+  return {along, left_out ? 0.0 : across, d / r};
+}
+
+template <int p>
+Mat3 spring_block(const Vec3& d, double k0, double rest_length, double inverse_reference,
+                  Curvature curvature) {
+  return spring_stiffness<p>(d, k0, rest_length, inverse_reference, curvature).block();
+}
+
+/// Calls visit(spring number, K) for each spring of the loop.
+template <class Visit>
+void for_each_spring_block(const SpringLoop& loop, std::span<const Vec3> position, double scale,
+                           Curvature curvature, Visit&& visit) {
+  with_exponent(loop.exponent, [&]<int p>() {
+    for (int64_t e = 0; e < loop.size(); ++e) {
+      const auto [i, j] = loop.points[e];
+      visit(e, spring_block<p>(position[j] - position[i], scale * loop.stiffness[e],
+                               loop.rest_length[e], loop.inverse_reference[e], curvature));
+    }
+  });
+}
+
+/// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v.
+using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
+                         const Weights& weights, Curvature curvature);
+
+/// Calls visit(prism number, blocks) for each prism of the loop.
+template <class Visit>
+void for_each_prism_block(const PrismLoop& loop, std::span<const Vec3> position,
+                          const Weights& weights, Curvature curvature, Visit&& visit) {
+  if (weights.volume == VolumeTerm::none) return;
+  for (int64_t e = 0; e < loop.size(); ++e) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
+    visit(e, prism_blocks(corners, loop.rest_volume[e], weights, curvature));
+  }
+}
+
+}  // namespace repose::mechanics

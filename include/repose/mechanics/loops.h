@@ -1,0 +1,53 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "repose/model/model.h"
+
+/// Springs and prisms laid out for the kernels: one loop a law, no branch inside.
+namespace repose::mechanics {
+
+/// Springs of one law. Point numbers are local (rows of the position array given to the kernels).
+struct SpringLoop {
+  int exponent = 2;                            ///< p of the law
+  std::vector<std::array<int32_t, 2>> points;  ///< [S]
+  std::vector<double> stiffness;               ///< [S] k0, N/mm
+  std::vector<double> rest_length;             ///< [S] mm
+  std::vector<double> inverse_reference;       ///< [S] 1/s_ref, 1/mm
+  int64_t counted = 0;  ///< springs [0, counted) add to energies here, the rest elsewhere
+  int64_t size() const { return static_cast<int64_t>(points.size()); }
+};
+
+/// Prisms with at least one soft-tissue point.
+struct PrismLoop {
+  std::vector<std::array<int32_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
+  std::vector<double> rest_volume;             ///< [M] v_0, mm³
+  int64_t counted = 0;                         ///< as in SpringLoop
+  int64_t size() const { return static_cast<int64_t>(points.size()); }
+};
+
+/// All that a rank evaluates.
+struct Loops {
+  std::vector<SpringLoop> springs;  ///< one a law that occurs, by exponent
+  PrismLoop prisms;
+};
+
+/// The loops over the springs and prisms of `part` with a soft-tissue point. Of its rows the first
+/// `owned_springs` and `owned_prisms` are counted here.
+Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms);
+
+/// The volume term of an objective, a quadratic of each prism's v − v_0:
+///     paper    weight (v_0 − v)²             (MODEL.md Eq. 10, weight = 1 − λ)
+///     penalty  weight ½ (v − v_0)² / v_0     (weight = κ)
+enum class VolumeTerm { none, paper, penalty };
+
+/// Which parts of an objective are on: Φ = elastic (f_e + W) + volume term.
+struct Weights {
+  double elastic = 1;
+  VolumeTerm volume = VolumeTerm::none;
+  double volume_weight = 0;
+};
+
+}  // namespace repose::mechanics

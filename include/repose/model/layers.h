@@ -1,0 +1,24 @@
+#pragma once
+#include <vector>
+
+#include "repose/model/model.h"
+#include "repose/model/skin_mesh.h"
+#include "repose/scene/scene.h"
+
+namespace repose::model {
+
+/// Fractions of the thickness at which the layers lie, [layers], first 0, last 1: the scene's, or
+/// even. Throws InputError where there are fewer than 2 or more than 64 layers, or the scene's
+/// fractions are not as many, do not run from 0 to 1, or do not increase.
+std::vector<double> layer_depths(const scene::Tissue& tissue);
+
+/// Repeats the skin in layers (MODEL.md "Points", "Springs"): n layers of V vertices, E edges and F
+/// triangles give nV points, nE + (n−1)(V + 2E) springs and (n−1)F prisms. Point = column · n +
+/// layer; springs by set ("layer 0" … , "connecting 0" …, "diagonal 0" …), in a set by edge or
+/// column; prisms by gap, ordered so that their volume is positive inwards. Everything is soft
+/// tissue, without mass, force, stiffness or bone; rest lengths and volumes are the initial ones.
+/// `deep` [V] are the deepest points, mm.
+Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,
+                  const std::vector<double>& depths);
+
+}  // namespace repose::model

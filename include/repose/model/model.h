@@ -1,0 +1,65 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+#include "repose/surface/surface.h"
+
+/// The discrete model as flat arrays, exactly /model of the result file.
+namespace repose::model {
+
+/// What a point is (values as in the file).
+enum class PointSet : int8_t { soft_tissue = 0, boundary = 1, bone = 2, held = 3 };
+
+struct Points {
+  std::vector<Vec3> position;        ///< [N] mm, initial
+  std::vector<PointSet> set;         ///< [N]
+  std::vector<Vec3> target;          ///< [N] mm, where a bone or held point goes, else = position
+  std::vector<int32_t> layer;        ///< [N] 0 = skin
+  std::vector<int64_t> column;       ///< [N] skin vertex of its column
+  std::vector<int32_t> bone;         ///< [N] row of Model::bones, −1 for none
+  std::vector<double> mass;          ///< [N] kg
+  std::vector<Vec3> external_force;  ///< [N] N
+};
+
+struct Springs {
+  std::vector<std::array<int64_t, 2>> points;  ///< [S]
+  std::vector<int32_t> set;                    ///< [S] row of Model::spring_sets
+  std::vector<double> rest_length;             ///< [S] mm, ≥ 0
+  std::vector<double> stiffness;               ///< [S] k0, N/mm
+  std::vector<int8_t> exponent;                ///< [S] p of the law, 0, 1 or 2
+  std::vector<double> reference;               ///< [S] s_ref, mm, > 0
+};
+
+struct Prisms {
+  std::vector<std::array<int64_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
+  std::vector<double> rest_volume;             ///< [M] mm³, at Points::position
+};
+
+struct Model {
+  Vec3 gravity = Vec3::Zero();  ///< N/kg
+  Points points;
+  Springs springs;
+  Prisms prisms;
+  std::vector<Triangle> skin;                  ///< [K] for drawing, may be empty
+  std::vector<std::string> spring_sets;
+  std::vector<std::string> bones;
+  std::vector<surface::Surface> bone_surfaces;  ///< [bones] or empty; at the initial position
+  std::vector<Mat4> bone_transform;             ///< [bones] or empty: recovered from targets
+};
+
+/// The numbers a person asks for first.
+struct Counts {
+  int64_t points = 0, soft = 0, boundary = 0, bone = 0, held = 0, springs = 0, prisms = 0;
+};
+Counts count(const Model& model);
+
+/// Refuses a model that is not one: index out of range, value not finite, negative stiffness, mass
+/// or rest length, s_ref ≤ 0, unknown exponent or set, arrays of different length, a volume that is
+/// not the prism's, an unattached point, no point at all. InputError naming `file`, array and row.
+void validate(const Model& model, const std::string& file);
+
+}  // namespace repose::model

@@ -1,0 +1,34 @@
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include "repose/model/model.h"
+#include "repose/results/step.h"
+
+namespace repose::results {
+
+/// Reads /model of a model or result file, serially, and validates it. Refuses by name (InputError:
+/// file, dataset, row, value, remedy) everything the format lists: a missing or misshapen dataset,
+/// a lossy type, an index out of range, a value that is not finite, an unknown version, truncation.
+/// Numeric types that convert without loss are taken, and strings of variable length. What may be
+/// missing: point/mass and point/external_force (zero), the group prism, skin/points, bone,
+/// bone_surface and bone_transform (none).
+model::Model read_model(const std::filesystem::path& file);
+
+/// Whether the file is HDF5 by its signature (a scene is not).
+bool is_hdf5(const std::filesystem::path& file);
+
+/// One whole step of a result file, serially.
+struct StoredStep {
+  StepNumbers numbers;
+  StepRows rows;                   ///< all rows
+  std::vector<Vec3> displacement;  ///< [N] mm
+  std::vector<Vec3> bone_points;   ///< mm, of all bone surfaces in turn; empty: none, or not moved
+};
+
+/// How many steps a file has; 0 for a model. InputError where /step/0000 … are not in sequence.
+int64_t step_count(const std::filesystem::path& file);
+/// Step number `step` (from 0) of a file with `model`; InputError as read_model.
+StoredStep read_step(const std::filesystem::path& file, int64_t step, const model::Model& model);
+
+}  // namespace repose::results

@@ -1,0 +1,81 @@
+#pragma once
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+#include "repose/base/hdf5.h"
+
+namespace repose::results {
+
+/// Rows and columns a dataset must have; `any` rows: as many as there are. No columns: [rows].
+struct Shape {
+  static constexpr int64_t any = -1;
+  int64_t rows;
+  std::vector<int64_t> columns;
+};
+
+/// Reads named datasets and attributes of one HDF5 file, serially. Everything it refuses is an
+/// InputError that names file and dataset: missing, a group or other thing in its place, another
+/// shape, a type that would lose information, a number out of range or not finite, unreadable
+/// (truncated file, unknown filter). Numeric types that convert without loss are taken; strings
+/// may be of fixed or variable length.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file);
+
+  const std::string& file() const { return name_; }
+  /// Whether something of that path is there, at the end of links that lead somewhere.
+  bool has(const std::string& path) const;
+  /// How many links a group has.
+  int64_t links(const std::string& group) const;
+  [[noreturn]] void refuse(const std::string& path, const std::string& what) const;
+
+  std::vector<double> numbers(const std::string& path, const Shape& shape) const;
+  std::vector<Vec3> vectors(const std::string& path, int64_t rows) const;
+  std::vector<std::string> names(const std::string& path) const;
+
+  /// Whole numbers, each within the range of Int.
+  template <class Int>
+  std::vector<Int> integers(const std::string& path, int64_t rows) const {
+    return narrow<Int>(path, whole_numbers(path, {rows, {}}));
+  }
+  /// Rows of K indices.
+  template <size_t K>
+  std::vector<std::array<int64_t, K>> tuples(const std::string& path, int64_t rows) const {
+    const std::vector<int64_t> flat = whole_numbers(path, {rows, {static_cast<int64_t>(K)}});
+    std::vector<std::array<int64_t, K>> result(flat.size() / K);
+    for (size_t i = 0; i < flat.size(); ++i) result[i / K][i % K] = flat[i];
+    return result;
+  }
+
+  double number(const std::string& object, const char* attribute) const;
+  int64_t integer(const std::string& object, const char* attribute) const;
+  std::string text(const std::string& object, const char* attribute) const;
+  Vec3 vector(const std::string& object, const char* attribute) const;
+
+ private:
+  std::vector<int64_t> whole_numbers(const std::string& path, const Shape& shape) const;
+
+  template <class Int>
+  std::vector<Int> narrow(const std::string& path, const std::vector<int64_t>& wide) const {
+    std::vector<Int> result(wide.size());
+    for (size_t i = 0; i < wide.size(); ++i) {
+      if (wide[i] < std::numeric_limits<Int>::min() || wide[i] > std::numeric_limits<Int>::max())
+        refuse(path, fmt::format("row {} is {}, expected {} to {}", i, wide[i],
+                                 static_cast<int64_t>(std::numeric_limits<Int>::min()),
+                                 static_cast<int64_t>(std::numeric_limits<Int>::max())));
+      result[i] = static_cast<Int>(wide[i]);
+    }
+    return result;
+  }
+
+  std::string name_;
+  base::Hdf5File file_;
+};
+
+}  // namespace repose::results

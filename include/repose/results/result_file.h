@@ -1,0 +1,41 @@
+#pragma once
+#include <mpi.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "repose/model/model.h"
+#include "repose/results/step.h"
+
+namespace repose::results {
+
+/// Writes NAME.h5 in parallel: to NAME.h5.part first, renamed by commit(). Destroyed without
+/// commit(), the .part file is removed: the result is complete or absent. All members are
+/// collective. A folder that is missing or not writable and a full disk are an InputError on all
+/// ranks. The file's bytes do not depend on the number of ranks: datasets are contiguous (chunks
+/// with parallel gzip took twelve times as long for 28 % less space).
+class ResultFile {
+ public:
+  /// Opens NAME.h5.part (`name` is a path without the ending) and writes /model (`model` is looked
+  /// at on rank 0 only, and copied as far as it is needed later).
+  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model);
+  ~ResultFile();
+  ResultFile(const ResultFile&) = delete;
+  ResultFile& operator=(const ResultFile&) = delete;
+
+  /// Appends one /step/NNNN and flushes it to the disk. Each rank gives its slabs; the numbers are
+  /// rank 0's. Where bones have moved at this load their surfaces are stored where they are then
+  /// (bone_surface/points f64 [P,3], all bones' in turn).
+  void append(const StepNumbers& numbers, const StepRows& rows);
+
+  /// Closes, fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
+  /// NAME_skin.xdmf and NAME_bones.xdmf (each .part, then renamed) for what the model has; one of
+  /// an earlier run that would describe nothing is removed. Nothing may be appended afterwards.
+  void commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace repose::results

@@ -1,0 +1,64 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+
+namespace repose::results {
+
+/// The numbers of one load step, one attribute each in the result file (names as there).
+struct StepNumbers {
+  double load = 0;
+  std::string functional = "energy";
+  std::string volume = "none";
+  double lambda = 0;
+  double bulk_modulus = 0;
+  double epsilon = 0;
+  double f_e = 0, potential = 0, f_f = 0, f_v = 0, penalty = 0, objective = 0;
+  double gradient_max = 0;
+  double volume_error_max = 0;
+  int64_t inverted_prisms = 0;
+  double displacement_error = 0;
+  int64_t iterations = 0, evaluations = 0;
+  double seconds = 0;
+  std::string reason;
+  bool converged = false;
+};
+
+/// Calls visit(name, member) for every number of a step, in the order of the file.
+template <class Numbers, class Visit>
+void for_each_number(Numbers& numbers, Visit&& visit) {
+  visit("load", numbers.load);
+  visit("functional", numbers.functional);
+  visit("volume", numbers.volume);
+  visit("lambda", numbers.lambda);
+  visit("bulk_modulus", numbers.bulk_modulus);
+  visit("epsilon", numbers.epsilon);
+  visit("f_e", numbers.f_e);
+  visit("potential", numbers.potential);
+  visit("f_f", numbers.f_f);
+  visit("f_v", numbers.f_v);
+  visit("penalty", numbers.penalty);
+  visit("objective", numbers.objective);
+  visit("gradient_max", numbers.gradient_max);
+  visit("volume_error_max", numbers.volume_error_max);
+  visit("inverted_prisms", numbers.inverted_prisms);
+  visit("displacement_error", numbers.displacement_error);
+  visit("iterations", numbers.iterations);
+  visit("evaluations", numbers.evaluations);
+  visit("seconds", numbers.seconds);
+  visit("reason", numbers.reason);
+  visit("converged", numbers.converged);
+}
+
+/// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.
+struct StepRows {
+  std::vector<Vec3> position;        ///< mm
+  std::vector<Vec3> residual_force;  ///< N
+  std::vector<double> volume_ratio;
+  std::vector<double> elongation;  ///< mm
+  std::vector<double> tension;     ///< N
+};
+
+}  // namespace repose::results

@@ -1,0 +1,20 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "repose/results/xdmf.h"
+
+namespace repose::results {
+
+/// How much of everything a result file holds.
+struct FileCounts {
+  int64_t points = 0, springs = 0, prisms = 0, skin = 0;
+  int64_t bone_points = 0, bone_triangles = 0;  ///< of the merged bone surfaces
+};
+
+/// What ParaView is offered of a result file, one block a file: tissue (wedges), springs (lines),
+/// skin and bones (triangles). `bones_moved` [steps]: whether the step stores moved bone surfaces.
+/// Blocks without a cell are listed too.
+std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<bool>& bones_moved);
+
+}  // namespace repose::results

@@ -1,0 +1,33 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace repose::results {
+
+/// One array of numbers at the points or the cells of a block.
+struct XdmfArray {
+  std::string name;
+  std::string path;        ///< in the HDF5 file; "step/…" stands for /step/NNNN/…
+  bool at_points = false;  ///< else one a cell
+  bool vector = false;     ///< [.,3], else [.]
+  const char* type = "NumberType=\"Float\" Precision=\"8\"";
+};
+
+/// A mesh of one kind of cell that moves from step to step.
+struct XdmfBlock {
+  std::string name;           ///< last part of the file's name: tissue, springs, skin, bones
+  const char* topology = "";  ///< attributes of the Topology element but the number of cells
+  int corners = 0;            ///< points a cell
+  std::string connectivity;   ///< path of the i64 [cells, corners] dataset
+  int64_t points = 0, cells = 0;
+  std::vector<std::string> geometry;  ///< [steps] path of the f64 [points, 3] dataset
+  std::vector<XdmfArray> arrays;
+};
+
+/// The XDMF document of a block: a temporal collection of Uniform grids, one for each load (its
+/// time). `h5` is the name of the HDF5 file in the same folder.
+std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
+                          const std::vector<double>& loads);
+
+}  // namespace repose::results

@@ -1,0 +1,84 @@
+#pragma once
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+#include "repose/scene/rigid_motion.h"
+
+/// The scene file as data: what a person wrote, checked, with defaults filled in, units as in the
+/// file (mm, N, kg, degrees already turned into RigidMotion).
+namespace repose::scene {
+
+struct BoneEntry {
+  std::string name;
+  std::filesystem::path file;  ///< absolute, resolved against the scene's folder
+};
+
+enum class Law { linear = 0, quadratic = 1, quartic = 2 };  ///< value = exponent p of the law
+
+/// A spring rule; unset members fall through to the next less specific rule.
+struct SpringRule {
+  std::optional<double> stiffness;  ///< N/mm, excludes modulus
+  std::optional<double> modulus;    ///< N/mm²
+  std::optional<Law> law;
+  std::optional<double> reference;  ///< s_ref in mm; 0 means "initial": s_ref = r_0 of each spring
+};
+
+struct SphereRegion {
+  Vec3 center;    ///< mm
+  double radius;  ///< mm
+};
+
+struct Tissue {
+  int layers = 4;              ///< 2 … 64
+  std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; even when not given
+  double attach_within = 30;   ///< mm
+  double free_thickness = 12;  ///< mm
+  double release = 10;         ///< mm
+  std::vector<SphereRegion> unattached;
+  std::map<std::string, SpringRule> springs;  ///< "default", "layer", "layer 0", "connecting 1", …
+  double turgor = 0;                          ///< initial strain of the skin springs
+  std::vector<double> mass;                   ///< [layers] kg, or empty
+  std::optional<double> density;              ///< kg/mm³, excludes mass
+};
+
+enum class Functional { energy, force };
+enum class VolumeForm { none, paper, penalty, exact };
+
+struct Force {
+  Vec3 at;        ///< mm, on or near the skin
+  double radius;  ///< mm: spread over the skin points within, by area
+  Vec3 force;     ///< N, in total
+};
+
+struct Solve {
+  Functional functional = Functional::energy;
+  VolumeForm volume = VolumeForm::penalty;
+  std::optional<double> bulk_modulus;  ///< N/mm²; unset: 10 × the tissue's effective modulus
+  double lambda = 0.5;
+  double accuracy = 0.1;  ///< mm
+  int load_steps = 0;     ///< 0: automatic
+};
+
+struct Scene {
+  std::filesystem::path file;
+  std::filesystem::path skin;  ///< absolute
+  std::vector<BoneEntry> bones;
+  Tissue tissue;
+  std::optional<Vec3> gravity;     ///< N/kg
+  bool rim_fixed = true;           ///< the outermost border loop of an open skin
+  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
+  std::vector<Force> forces;
+  Solve solve;
+};
+
+/// Reads and checks a scene file. Every refusal is an InputError whose message starts with
+/// file:line:column and names the key, the value, the allowed range and, for an unknown key, the
+/// nearest known one. Files it names must exist.
+Scene read_scene(const std::filesystem::path& file);
+
+}  // namespace repose::scene

@@ -1,0 +1,25 @@
+#pragma once
+#include <filesystem>
+
+#include "repose/scene/rigid_motion.h"
+
+namespace repose::scene {
+
+/// Reads the motion of a bone from an ITK text transform (.tfm, .txt; "#Insight Transform File
+/// V1.0"), as 3D Slicer and ITK's registration programs save it.
+///
+/// Direction: an ITK transform maps points of the fixed space to the moving space, y = A (x − c) +
+/// t + c, because it is made for resampling. A bone goes the other way, from where it is (moving)
+/// to its planned place (fixed): the motion returned is the *inverse* of the stored one. A linear
+/// transform that moves the bone to its place in 3D Slicer's scene and is saved from there as .tfm
+/// therefore moves it to the same place here.
+///
+/// Frame: the coordinates are LPS, mm; so must be the scene's meshes (3D Slicer's default).
+///
+/// Kinds: AffineTransform, MatrixOffsetTransformBase (if rigid), Euler3DTransform,
+/// VersorRigid3DTransform, TranslationTransform, each in double or float, 3 to 3 dimensions; one in
+/// a file. Euler3D: R = Rz Rx Ry, or Rz Ry Rx where a fourth fixed parameter is not 0.
+/// Throws InputError that begins with file:line.
+RigidMotion read_transform(const std::filesystem::path& file);
+
+}  // namespace repose::scene

@@ -1,0 +1,60 @@
+#pragma once
+#include <functional>
+#include <optional>
+
+#include "repose/results/step.h"
+#include "repose/solve/minimiser.h"
+
+namespace repose::solve {
+
+/// How the bones are taken to their places.
+struct PathSettings {
+  double accuracy = 0.1;  ///< mm, of every step
+  int load_steps = 0;     ///< equal steps; 0: as many as the motion needs
+  double start_load = 0;  ///< of a restarted run
+};
+
+/// What a run came to.
+struct PathOutcome {
+  Outcome last;
+  double load = 0;    ///< reached
+  int64_t steps = 0;  ///< accepted
+  int64_t halvings = 0;
+  int64_t iterations = 0;
+  bool complete() const { return last.converged && load == 1; }
+};
+
+/// Follows the rest position from the initial state as the bones move: each step starts from a
+/// linear prediction, and one that fails, folds tissue or lands far from its prediction is halved.
+/// All members collective.
+class LoadPath {
+ public:
+  using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
+
+  LoadPath(Objective& objective, Minimiser& minimiser, const PathSettings& settings);
+
+  /// From `displacement` (changed in place, the start of a restarted run) to load 1. `on_step` is
+  /// called with the positions at each accepted step, and at the last one if it failed.
+  PathOutcome run(Vec displacement, const OnStep& on_step);
+
+  /// Steps an automatic path begins with: one for each `automatic_stride` mm of the fastest point.
+  static constexpr double automatic_stride = 2.5;
+
+ private:
+  struct Attempt {
+    Outcome outcome;
+    bool accepted;
+  };
+  double first_step() const;
+  int64_t inverted(Vec displacement);
+  Attempt attempt(Vec displacement, double load, bool last_chance);
+  void settle(Vec displacement, const OnStep& on_step);
+
+  Objective& objective_;
+  Minimiser& minimiser_;
+  PathSettings settings_;
+  base::VecHandle trial_, increment_;
+  PathOutcome result_;
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,31 @@
+#pragma once
+#include "repose/base/petsc.h"
+#include "repose/results/step.h"
+#include "repose/solve/objective.h"
+
+namespace repose::solve {
+
+/// Brings what each rank knows of its points, springs and prisms into the rows of the result file:
+/// slabs (base::slab) in natural order, whatever the distribution. All members collective.
+class NaturalRows {
+ public:
+  NaturalRows(MPI_Comm comm, const Part& part);
+
+  /// The arrays of a step at the objective's last update.
+  results::StepRows rows(Objective& objective) const;
+
+ private:
+  struct Route {  // from owned rows to natural slabs, `block` numbers a row
+    int block = 1;
+    base::VecHandle owned, natural;
+    base::ScatterHandle scatter;
+  };
+  static Route make_route(MPI_Comm comm, const std::vector<int64_t>& rows, int64_t total,
+                          int block);
+  static std::vector<double> bring(const Route& route, const double* values);
+
+  const Part& part_;
+  Route points_, springs_, prisms_;
+};
+
+}  // namespace repose::solve

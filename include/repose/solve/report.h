@@ -1,0 +1,21 @@
+#pragma once
+#include <string>
+
+#include "repose/model/build.h"
+#include "repose/solve/repose.h"
+
+/// What a person reads when a run ends.
+namespace repose::solve {
+
+/// Points, springs and prisms of a model, by set. Lines ending in a newline.
+std::string describe_model(const model::Model& model);
+
+/// What the builder did: columns, thickness, attachment, remarks.
+std::string describe_build(const model::BuildReport& report);
+
+/// How it ended: load, accuracy, reason, work, inverted prisms, and time and memory of each stage.
+/// An answer that is not converged, or folds tissue, says so first and loudly.
+std::string describe_run(const Summary& summary, const Settings& settings, int ranks,
+                         const base::Stages& stages);
+
+}  // namespace repose::solve

@@ -1,0 +1,38 @@
+#pragma once
+#include <functional>
+#include <string>
+
+#include "repose/base/stages.h"
+#include "repose/results/step.h"
+#include "repose/solve/load_path.h"
+
+namespace repose::solve {
+
+/// What is asked of a run.
+struct Settings {
+  mechanics::Weights weights;   ///< the objective
+  std::string volume = "none";  ///< name of the volume term, for the result
+  double lambda = 1;            ///< paper's weight, for the result
+  PathSettings path;
+};
+
+/// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
+using Receiver = std::function<void(const results::StepNumbers&, const results::StepRows&)>;
+
+/// What a run came to, for the closing table.
+struct Summary {
+  PathOutcome path;
+  results::StepNumbers last;
+  int64_t unknowns = 0;     ///< scalar
+  int64_t evaluations = 0;  ///< of objective and gradient
+  int64_t assemblies = 0;   ///< of the Hessian
+};
+
+/// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
+/// position along the load path, hands every step to `receive`. `start` gives the positions (this
+/// rank's slab, natural order) of a restarted run, or is empty. Ends the stages "distribute" and
+/// "solve". Throws InputError where nothing is free to move. Collective.
+Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
+                    const std::vector<Vec3>& start, base::Stages& stages, const Receiver& receive);
+
+}  // namespace repose::solve

@@ -1,0 +1,54 @@
+#pragma once
+#include <vector>
+
+#include "repose/mechanics/hessian.h"
+#include "repose/solve/objective.h"
+
+namespace repose::solve {
+
+/// The Hessian of an objective as assembled matrices of 3×3 blocks (MATAIJ, block size 3): the
+/// exact one, which acts, and the convex one, from which a positive definite preconditioner is
+/// made. Each rank assembles its own rows; nothing is added across ranks.
+class Tangent {
+ public:
+  explicit Tangent(Objective& objective);  ///< collective; O(elements) memory
+
+  /// Assembles both at `displacement`; nothing is done if that state is the one assembled last.
+  /// Collective.
+  void assemble(Vec displacement);
+
+  Mat exact() const { return exact_; }
+  Mat convex() const { return convex_; }
+  int64_t assemblies() const { return assemblies_; }
+
+ private:
+  /// The block columns of this rank's rows in one part of the matrix, in compressed rows.
+  struct BlockRows {
+    std::vector<int32_t> begin;   // [owned unknowns + 1]
+    std::vector<int32_t> column;  // global block numbers, ascending in each row
+  };
+  // Where a block goes: index of its first entry among the values of the diagonal part, or, beyond
+  // their end, of the off-diagonal part; −1 for a block that is not in this rank's rows.
+  using Slot = int32_t;
+
+  void make_pattern();
+  void make_matrices();
+  void find_slots();
+  bool owns(int32_t point) const;
+  Slot find(int32_t row_point, int32_t column_point) const;
+  void add(double* const values[2], Slot slot, int32_t row_point, const Mat3& block) const;
+  void fill(Mat matrix, mechanics::Curvature curvature);
+  void lift_diagonal();
+
+  Objective& objective_;
+  const Part& part_;
+  BlockRows rows_[2];  // diagonal part, off-diagonal part
+  base::MatHandle exact_, convex_;
+  base::VecHandle diagonal_;
+  std::vector<std::vector<std::array<Slot, 4>>> spring_slots_;  // [loop][spring] ii ij ji jj
+  std::vector<std::array<Slot, 36>> prism_slots_;
+  std::vector<Vec3> assembled_at_;  // [local points] of the last assembly
+  int64_t assemblies_ = 0;
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,36 @@
+#pragma once
+#include <filesystem>
+
+#include "repose/surface/surface.h"
+
+namespace repose::surface {
+
+/// What a surface is for, which decides what it must satisfy.
+enum class Role {
+  skin,  ///< may be open: a manifold patch or a closed surface, one component
+  bone   ///< closed, manifold, oriented outwards; several components are allowed
+};
+
+/// Reads PLY, STL, OBJ or OFF (binary or text, by content and ending) and returns its triangles as
+/// stored: polygons are triangulated, nothing is welded (but STL stores no vertices: its equal
+/// corners come as one). Throws InputError naming the file when it is missing, unreadable,
+/// truncated, empty, has no faces, or holds a coordinate that is not finite or an index out of
+/// range. Never asks for more memory than a small multiple of the file's size.
+Surface read_surface(const std::filesystem::path& file);
+
+/// Welds coincident vertices (distance ≤ 1e-9 of the bounding diagonal: STL, or duplicates),
+/// drops isolated vertices and degenerate or duplicate triangles (a flat triangle inside the mesh
+/// is flipped away, so that no slit opens), and orients the result consistently: outwards where it
+/// is closed (the wall of a cavity faces the cavity); an open patch keeps the majority orientation.
+Surface weld_and_orient(const Surface& raw);
+
+/// Writes a binary little-endian PLY (double coordinates) to NAME.part and renames it.
+void write_ply(const std::filesystem::path& file, const Surface& surface);
+
+/// read_surface, weld_and_orient, inspect (defects.h), then refuse what `role` does not allow, in
+/// one line naming file, defect, number and remedy. Self-intersections are not looked for: whoever
+/// cannot bear them inspects. A surface smaller than 20 mm or larger than
+/// 2000 mm across is refused as being in metres or in micrometres, saying so.
+Surface load_surface(const std::filesystem::path& file, Role role);
+
+}  // namespace repose::surface

@@ -1,0 +1,305 @@
+#include "repose/base/options.h"
+
+#include <petscsys.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+
+#include "petsc_option_names.h"
+#include "repose/base/error.h"
+#include "repose/base/nearest.h"
+#include "repose/base/petsc.h"
+
+namespace repose::base {
+
+namespace {
+
+std::optional<bool> parse_flag(std::string_view text) {
+  for (const char* word : {"true", "yes", "on", "1"})
+    if (text == word) return true;
+  for (const char* word : {"false", "no", "off", "0"})
+    if (text == word) return false;
+  return std::nullopt;
+}
+
+/// The name behind one or two dashes, or empty where the token is a value.
+std::string name_of(const std::string& token) {
+  const std::size_t dashes = token.starts_with("--") ? 2 : 1;
+  if (token.size() <= dashes || token[0] != '-') return {};
+  const bool letter = std::isalpha(static_cast<unsigned char>(token[dashes])) != 0;
+  const bool infinite = token == "-inf" || token == "-nan";
+  return letter && !infinite ? token.substr(dashes) : std::string{};
+}
+
+/// `-log_view scene.yaml`: what PETSc takes for these is a viewer (ascii:log.txt), never a bare
+/// path, so a path behind one of them is an argument of the program.
+bool is_argument_behind(const std::string& petsc_option, const std::string& token) {
+  const auto ends = [&](const char* end) { return petsc_option.ends_with(end); };
+  const bool viewer =
+      ends("_view") || ends("_monitor") || ends("_reason") || petsc_option == "info";
+  return viewer && token.find_first_of("./") != std::string::npos &&
+         token.find(':') == std::string::npos;
+}
+
+bool is_value(const std::vector<std::string>& tokens, int position) {
+  return position < static_cast<int>(tokens.size()) && name_of(tokens[position]).empty();
+}
+
+std::string wanted(const Option& option) {
+  switch (option.kind) {
+    case OptionKind::flag:
+      return "true or false";
+    case OptionKind::choice:
+      return fmt::format("one of {}", fmt::join(option.choices, ", "));
+    case OptionKind::text:
+    case OptionKind::path:
+      return option.kind == OptionKind::path ? "a path" : "a text";
+    case OptionKind::number:
+    case OptionKind::integer:
+      break;
+  }
+  return wanted_number(option.kind == OptionKind::integer, option.unit, option.range,
+                       option.choices);
+}
+
+bool is_word(const Option& option, const std::string& value) {
+  return std::find(option.choices.begin(), option.choices.end(), value) != option.choices.end();
+}
+
+bool is_valid(const Option& option, const std::string& value) {
+  if (is_word(option, value)) return true;
+  switch (option.kind) {
+    case OptionKind::flag:
+      return parse_flag(value).has_value();
+    case OptionKind::number: {
+      const auto number = parse_number(value);
+      return number && option.range.contains(*number);
+    }
+    case OptionKind::integer: {
+      const auto number = parse_integer(value);
+      return number && option.range.contains(static_cast<double>(*number));
+    }
+    case OptionKind::choice:
+      return false;
+    case OptionKind::text:
+    case OptionKind::path:
+      return !value.empty();
+  }
+  return false;
+}
+
+/// What stands behind the name in the help, e.g. "MM", "N|auto", "energy|force".
+std::string placeholder(const Option& option) {
+  switch (option.kind) {
+    case OptionKind::flag:
+      return "";
+    case OptionKind::choice:
+      return fmt::format("{}", fmt::join(option.choices, "|"));
+    case OptionKind::text:
+      return "TEXT";
+    case OptionKind::path:
+      return "FILE";
+    case OptionKind::number:
+    case OptionKind::integer:
+      break;
+  }
+  std::string text = option.unit.empty() ? "N" : option.unit;
+  for (const std::string& word : option.choices) text += "|" + word;
+  return text;
+}
+
+std::string help_line(const Option& option) {
+  std::string left = fmt::format("-{}", option.name);
+  for (int i = 0; i < option.values; ++i)
+    if (option.kind != OptionKind::flag) left.append(" ").append(placeholder(option));
+  std::string notes = option.range.text();
+  if (!option.default_text.empty() && option.kind != OptionKind::flag)
+    notes += fmt::format("{}default {}", notes.empty() ? "" : "; ", option.default_text);
+  return fmt::format("  {:<34} {}{}\n", left, option.help,
+                     notes.empty() ? "" : fmt::format(" [{}]", notes));
+}
+
+/// The names in PETSc's database that nobody has asked for so far.
+std::vector<std::string> left_in_database() {
+  PetscInt count = 0;
+  char **names = nullptr, **values = nullptr;
+  base::check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
+  std::vector<std::string> result(names, names + count);
+  base::check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
+  return result;
+}
+
+}  // namespace
+
+Options::Options(int argc, char* const* argv, std::string description,
+                 std::vector<Argument> arguments, std::vector<Option> table)
+    : program_(argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "program"),
+      description_(std::move(description)),
+      arguments_(std::move(arguments)),
+      table_(std::move(table)) {
+  const std::vector<std::string> tokens(argv, argv + argc);
+  petsc_tokens_.push_back(tokens.empty() ? program_ : tokens[0]);
+  for (int i = 1; i < argc;) {
+    if (is_value(tokens, i))
+      positional_.push_back(tokens[i++]);
+    else
+      i = sort_option(i, tokens);
+  }
+  for (std::string& token : petsc_tokens_) petsc_pointers_.push_back(token.data());
+  petsc_pointers_.push_back(nullptr);
+}
+
+/// Sorts the option at `position` and its values; returns the position behind them.
+int Options::sort_option(int position, const std::vector<std::string>& tokens) {
+  const std::string name = name_of(tokens[position]);
+  const int next = position + 1;
+  if (const Option* option = find(name)) return take_values(*option, next, tokens);
+  const bool help = name == "help" || name == "h";
+  const bool for_petsc =
+      is_value(tokens, next) && (tokens[next] == "petsc" || tokens[next] == "intro");
+  if (help && !for_petsc) {
+    help_wanted_ = true;
+    return next;
+  }
+  if (!help && !begins_as_petsc(name)) {
+    unknown_.push_back(name);
+    return is_value(tokens, next) ? next + 1 : next;
+  }
+  petsc_tokens_.push_back("-" + name);
+  if (!is_value(tokens, next) || is_argument_behind(name, tokens[next])) return next;
+  if (!help || tokens[next] == "intro") petsc_tokens_.push_back(tokens[next]);
+  return next + 1;
+}
+
+int Options::take_values(const Option& option, int position,
+                         const std::vector<std::string>& tokens) {
+  std::vector<std::string>& values = given_[option.name];
+  values.clear();
+  const auto more = [&] { return is_value(tokens, position); };
+  if (option.kind == OptionKind::flag) {
+    values.push_back(more() && parse_flag(tokens[position]) ? tokens[position++] : "true");
+    return position;
+  }
+  for (int i = 0; i < option.values && more(); ++i) values.push_back(tokens[position++]);
+  return position;
+}
+
+std::string Options::help() const {
+  std::string text = program_;
+  for (const Argument& argument : arguments_) text += " " + argument.name;
+  text += " [-option value ...]\n" + description_ + "\n\n";
+  for (const Argument& argument : arguments_)
+    text += fmt::format("  {:<34} {}\n", argument.name, argument.help);
+  for (const Option& option : table_) text += help_line(option);
+  text += fmt::format("  {:<34} {}\n", "-help", "This page; -help petsc lists PETSc's options.");
+  return text +
+         "\nEvery PETSc option (-tao_type, -ksp_type, -log_view, -options_file ...) works too.\n";
+}
+
+void Options::check() {
+  read_database();
+  if (!unknown_.empty()) refuse_unknown(unknown_.front());
+  for (const auto& [name, values] : given_) check_values(row(name), values);
+  check_arguments();
+}
+
+void Options::read_database() {
+  PetscBool initialised = PETSC_FALSE;
+  base::check(PetscInitialized(&initialised));
+  if (!initialised) return;
+  for (const Option& option : table_) {
+    std::array<char, 4096> value{};
+    PetscBool set = PETSC_FALSE;
+    base::check(PetscOptionsGetString(nullptr, nullptr, ("-" + option.name).c_str(), value.data(),
+                                      value.size(), &set));
+    if (!set || given_.contains(option.name)) continue;
+    const bool bare = value[0] == '\0';
+    std::vector<std::string>& values = given_[option.name];
+    if (!bare || option.kind == OptionKind::flag) values.push_back(bare ? "true" : value.data());
+  }
+  for (const std::string& name : left_in_database())
+    if (!begins_as_petsc(name) && name != "help") unknown_.push_back(name);
+}
+
+void Options::refuse_unknown(const std::string& name) const {
+  std::vector<std::string> known{"help"};
+  for (const Option& option : table_) known.push_back(option.name);
+  refuse("{}: unknown option {}; the nearest known one is -{} (-help lists all)", program_,
+         shown("-" + name), nearest(name, known));
+}
+
+void Options::check_values(const Option& option, const std::vector<std::string>& values) const {
+  if (static_cast<int>(values.size()) < option.values)
+    refuse("{}: -{} needs {} value{}: {}", program_, option.name, option.values,
+           option.values == 1 ? "" : "s", wanted(option));
+  for (const std::string& value : values) {
+    if (is_valid(option, value)) continue;
+    const bool words = option.kind == OptionKind::choice;
+    refuse("{}: -{} {} must be {}{}", program_, option.name, shown(value), wanted(option),
+           words ? fmt::format("; did you mean {}?", nearest(value, option.choices)) : "");
+  }
+}
+
+void Options::check_arguments() const {
+  if (positional_.size() > arguments_.size())
+    refuse("{}: unexpected argument {}; it takes {} (-help explains)", program_,
+           shown(positional_[arguments_.size()]),
+           arguments_.empty() ? "none" : fmt::format("{}", arguments_.size()));
+  if (positional_.size() == arguments_.size()) return;
+  const Argument& missing = arguments_[positional_.size()];
+  std::string hint;
+  for (std::size_t i = 2; i < petsc_tokens_.size(); ++i)
+    if (name_of(petsc_tokens_[i]).empty())
+      hint = fmt::format("; {} was taken as the value of {}: put {} first", shown(petsc_tokens_[i]),
+                         petsc_tokens_[i - 1], missing.name);
+  refuse("{}: {} is missing: {}{} (-help explains)", program_, missing.name, missing.help, hint);
+}
+
+const Option* Options::find(std::string_view name) const {
+  const auto found = std::find_if(table_.begin(), table_.end(),
+                                  [&](const Option& option) { return option.name == name; });
+  return found == table_.end() ? nullptr : &*found;
+}
+
+const Option& Options::row(std::string_view name) const {
+  if (const Option* option = find(name)) return *option;
+  throw InternalError(fmt::format("{}: the table of options has no -{}", program_, name));
+}
+
+bool Options::has(std::string_view name) const { return given_.contains(row(name).name); }
+
+std::vector<std::string> Options::texts(std::string_view name) const {
+  const Option& option = row(name);
+  if (const auto found = given_.find(name); found != given_.end()) return found->second;
+  return option.default_text.empty() ? std::vector<std::string>{}
+                                     : std::vector<std::string>{option.default_text};
+}
+
+std::string Options::text(std::string_view name) const {
+  const std::vector<std::string> values = texts(name);
+  return values.empty() ? std::string{} : values.front();
+}
+
+bool Options::flag(std::string_view name) const { return parse_flag(text(name)).value_or(false); }
+
+double Options::number(std::string_view name) const {
+  if (const auto value = parse_number(text(name))) return *value;
+  throw InternalError(fmt::format("{}: -{} holds no number", program_, name));
+}
+
+int64_t Options::integer(std::string_view name) const {
+  if (const auto value = parse_integer(text(name))) return *value;
+  throw InternalError(fmt::format("{}: -{} holds no whole number", program_, name));
+}
+
+std::vector<std::string> Options::unused() const {
+  const std::vector<std::string> left = left_in_database();
+  std::vector<std::string> result;
+  for (const std::string& token : petsc_tokens_)
+    if (std::find(left.begin(), left.end(), name_of(token)) != left.end()) result.push_back(token);
+  return result;
+}
+
+}  // namespace repose::base

@@ -1,0 +1,213 @@
+#include "repose/mechanics/energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "repose/mechanics/hessian.h"
+
+namespace repose::mechanics {
+
+namespace {
+
+std::array<Vec3, 6> corners_of(const PrismLoop& loop, int64_t e, std::span<const Vec3> position) {
+  std::array<Vec3, 6> corners;
+  for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
+  return corners;
+}
+
+/// Rows [begin, end) of a loop: the gradient, and the energy as a sum.
+template <int p>
+double spring_gradient(const SpringLoop& loop, int64_t begin, int64_t end,
+                       std::span<const Vec3> position, double scale, std::span<Vec3> gradient) {
+  double energy = 0;
+  for (int64_t e = begin; e < end; ++e) {
+    const auto [i, j] = loop.points[e];
+    const Vec3 d = position[j] - position[i];
+    const double r = d.norm(), s = r - loop.rest_length[e];
+    const double k0 = loop.stiffness[e], inverse = loop.inverse_reference[e];
+    const double tension = scale * spring_tension<p>(s, k0, inverse);
+    const Vec3 force = (tension / (r > 0 ? r : 1.0)) * d;
+    gradient[i] -= force;
+    gradient[j] += force;
+    energy += spring_energy<p>(s, k0, inverse);
+  }
+  return energy;
+}
+
+/// K w for the spring's exact block K, without forming it: across · w + (along − across) u (u·w).
+template <int p>
+void spring_action(const SpringLoop& loop, std::span<const Vec3> position, double scale,
+                   std::span<const Vec3> direction, std::span<Vec3> product) {
+  for (int64_t e = 0; e < loop.size(); ++e) {
+    const auto [i, j] = loop.points[e];
+    const auto [along, across, u] =
+        spring_stiffness<p>(position[j] - position[i], loop.stiffness[e], loop.rest_length[e],
+                            loop.inverse_reference[e], Curvature::exact);
+    const Vec3 w = scale * (direction[j] - direction[i]);
+    const Vec3 force = across * w + ((along - across) * u.dot(w)) * u;
+    product[i] -= force;
+    product[j] += force;
+  }
+}
+
+/// The prisms e and e + 1 of a range that ends at `end`: two, or the last one twice.
+class TwoPrisms {
+ public:
+  TwoPrisms(const PrismLoop& loop, int64_t e, int64_t end) : count_(e + 1 < end ? 2 : 1) {
+    const int64_t second = e + count_ - 1;
+    corner_ = {&loop.points[e], &loop.points[second]};
+    rest_volume = Pair{loop.rest_volume[e], loop.rest_volume[second]};
+  }
+  PrismTriples<Pair> gather(std::span<const Vec3> values) const {
+    PrismTriples<Pair> corners;
+    for (int c = 0; c < 6; ++c) {
+      const Vec3 &a = values[(*corner_[0])[c]], &b = values[(*corner_[1])[c]];
+      corners[c] = {Pair{a.x(), b.x()}, Pair{a.y(), b.y()}, Pair{a.z(), b.z()}};
+    }
+    return corners;
+  }
+  void scatter(const PrismTriples<Pair>& corners, std::span<Vec3> sums) const {
+    for (int k = 0; k < count_; ++k)
+      for (int c = 0; c < 6; ++c) {
+        double* sum = sums[(*corner_[k])[c]].data();
+        sum[0] += corners[c].x[k];
+        sum[1] += corners[c].y[k];
+        sum[2] += corners[c].z[k];
+      }
+  }
+  double sum(Pair values) const { return count_ == 2 ? values[0] + values[1] : values[0]; }
+
+  Pair rest_volume;
+
+ private:
+  int count_;
+  std::array<const std::array<int32_t, 6>*, 2> corner_;
+};
+
+/// k of the volume term ½ k (v − v_0)², of one prism or of two.
+template <class S>
+S volume_stiffness(const Weights& weights, const S& rest_volume) {
+  if (weights.volume == VolumeTerm::paper) return S{} + 2 * weights.volume_weight;
+  return weights.volume_weight / rest_volume;
+}
+
+double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
+                      std::span<const Vec3> position, const Weights& weights,
+                      std::span<Vec3> gradient) {
+  double value = 0;
+  for (int64_t e = begin; e < end; e += 2) {
+    const TwoPrisms prisms(loop, e, end);
+    const PrismSlope<Pair> v(PrismEdges<Pair>(prisms.gather(position)));
+    const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
+    const Pair change = v.volume - prisms.rest_volume, slope = stiffness * change;
+    PrismTriples<Pair> force;
+    for (int c = 0; c < 6; ++c) force[c] = slope * v.gradient[c];
+    prisms.scatter(force, gradient);
+    value += prisms.sum(0.5 * slope * change);
+  }
+  return value;
+}
+
+void prism_action(const PrismLoop& loop, std::span<const Vec3> position, const Weights& weights,
+                  std::span<const Vec3> direction, std::span<Vec3> product) {
+  for (int64_t e = 0; e < loop.size(); e += 2) {
+    const TwoPrisms prisms(loop, e, loop.size());
+    const PrismEdges<Pair> edges(prisms.gather(position));
+    const PrismTriples<Pair> moves = prisms.gather(direction);
+    const PrismSlope<Pair> v(edges);
+    const PrismTriples<Pair> turned = prism_slope_change(edges, PrismEdges<Pair>(moves));
+    const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
+    const Pair slope = stiffness * (v.volume - prisms.rest_volume);
+    Pair change{};
+    for (int c = 0; c < 6; ++c) change += v.gradient[c].dot(moves[c]);
+    const Pair bend = stiffness * change;
+    PrismTriples<Pair> force;
+    for (int c = 0; c < 6; ++c) force[c] = bend * v.gradient[c] + slope * turned[c];
+    prisms.scatter(force, product);
+  }
+}
+
+/// x yᵀ + [w]×, number by number: assembled from vectors it is three times slower.
+void set_block(Mat3& block, const Triple<double>& x, const Triple<double>& y,
+               const Triple<double>& w) {
+  double* k = block.data();
+  k[0] = x.x * y.x, k[1] = x.y * y.x + w.z, k[2] = x.z * y.x - w.y;
+  k[3] = x.x * y.y - w.z, k[4] = x.y * y.y, k[5] = x.z * y.y + w.x;
+  k[6] = x.x * y.z + w.y, k[7] = x.y * y.z - w.x, k[8] = x.z * y.z;
+}
+
+}  // namespace
+
+double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> position, double scale,
+                           std::span<Vec3> gradient) {
+  return with_exponent(loop.exponent, [&]<int p>() {
+    const double energy = spring_gradient<p>(loop, 0, loop.counted, position, scale, gradient);
+    spring_gradient<p>(loop, loop.counted, loop.size(), position, scale, gradient);
+    return energy;
+  });
+}
+
+VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume) {
+  const double stiffness = volume_stiffness(weights, rest_volume), change = volume - rest_volume;
+  return {0.5 * stiffness * change * change, stiffness * change, stiffness};
+}
+
+double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
+                          const Weights& weights, std::span<Vec3> gradient) {
+  if (weights.volume == VolumeTerm::none) return 0;
+  const double value = prism_gradient(loop, 0, loop.counted, position, weights, gradient);
+  prism_gradient(loop, loop.counted, loop.size(), position, weights, gradient);
+  return value;
+}
+
+void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
+                        std::span<const Vec3> direction, std::span<Vec3> product) {
+  for (const SpringLoop& loop : loops.springs)
+    with_exponent(loop.exponent, [&]<int p>() {
+      spring_action<p>(loop, position, weights.elastic, direction, product);
+    });
+  if (weights.volume != VolumeTerm::none)
+    prism_action(loops.prisms, position, weights, direction, product);
+}
+
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
+                         const Weights& weights, Curvature curvature) {
+  PrismTriples<double> x;
+  for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
+  const PrismEdges<double> edges(x);
+  const PrismSlope<double> v(edges);
+  const VolumeLaw law = volume_law(weights, v.volume, rest_volume);
+  const double turning = curvature == Curvature::exact ? law.slope : 0.0;
+  const auto skew = prism_volume_hessian(edges);
+  PrismBlocks blocks;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) {
+      const Triple<double> bend = law.curvature * v.gradient[i], turn = turning * skew[i][j];
+      set_block(blocks[i][j], bend, v.gradient[j], turn);
+      if (i != j) set_block(blocks[j][i], v.gradient[j], bend, -turn);
+    }
+  return blocks;
+}
+
+Totals totals(const Loops& loops, std::span<const Vec3> position) {
+  Totals sum;
+  for (const SpringLoop& loop : loops.springs)
+    with_exponent(loop.exponent, [&]<int p>() {
+      for (int64_t e = 0; e < loop.counted; ++e) {
+        const auto [i, j] = loop.points[e];
+        const double s = (position[j] - position[i]).norm() - loop.rest_length[e];
+        sum.spring_energy += spring_energy<p>(s, loop.stiffness[e], loop.inverse_reference[e]);
+      }
+    });
+  for (int64_t e = 0; e < loops.prisms.counted; ++e) {
+    const double v = prism_volume(corners_of(loops.prisms, e, position).data());
+    const double v0 = loops.prisms.rest_volume[e], change = v - v0;
+    sum.volume_squares += change * change;
+    sum.penalty_unit += 0.5 * change * change / v0;
+    sum.volume_error_max = std::max(sum.volume_error_max, std::abs(v / v0 - 1));
+    if (!(v > 0)) ++sum.inverted;
+  }
+  return sum;
+}
+
+}  // namespace repose::mechanics

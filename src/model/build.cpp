@@ -1,0 +1,118 @@
+#include "repose/model/build.h"
+
+#include <algorithm>
+
+#include "repose/base/error.h"
+#include "repose/model/attachment.h"
+#include "repose/model/columns.h"
+#include "repose/model/layers.h"
+#include "repose/model/loads.h"
+#include "repose/model/orientation.h"
+#include "repose/model/point_sets.h"
+#include "repose/model/release.h"
+#include "repose/model/stiffness.h"
+#include "repose/surface/read.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double kGapWorthSaying = 0.5;  // mm
+
+std::vector<BoneField::Nearest> nearest_bone(const SkinMesh& mesh, const BoneField& bones) {
+  std::vector<BoneField::Nearest> nearest;
+  nearest.reserve(mesh.points.size());
+  for (const Vec3& x : mesh.points) nearest.push_back(bones.nearest(x));
+  return nearest;
+}
+
+void require_one_of_each(const scene::Scene& scene, const std::vector<surface::Surface>& bones) {
+  if (bones.size() != scene.bones.size() || scene.moves.size() != scene.bones.size())
+    throw base::InternalError(fmt::format("{} bones, {} bone surfaces, {} moves: not one of each",
+                                          scene.bones.size(), bones.size(), scene.moves.size()));
+}
+
+/// Everything of the model but its geometry and point sets.
+void complete(const scene::Scene& scene, const SkinMesh& mesh,
+              const std::vector<surface::Surface>& bones, Model& model) {
+  set_stiffness(scene.tissue, mesh, model);
+  set_masses(scene.tissue, mesh, model);
+  spread_forces(scene.forces, mesh, model);
+  model.gravity = scene.gravity.value_or(Vec3::Zero());
+  model.bone_surfaces = bones;
+  for (size_t b = 0; b < bones.size(); ++b) {
+    model.bones.push_back(scene.bones[b].name);
+    model.bone_surfaces[b].name = scene.bones[b].name;
+    model.bone_transform.push_back(scene.moves[b].matrix());
+  }
+}
+
+void report_columns(const Columns& columns, const Attachment& attachment, BuildReport& report) {
+  std::vector<double> sorted = columns.thickness;
+  std::sort(sorted.begin(), sorted.end());
+  report.thickness_min = sorted.front();
+  report.thickness_median = sorted[sorted.size() / 2];
+  report.thickness_max = sorted.back();
+  report.shortened = columns.shortened;
+  report.released = attachment.released;
+  report.remarks.insert(report.remarks.end(), attachment.remarks.begin(), attachment.remarks.end());
+  if (columns.shortened > 0)
+    report.remarks.push_back(fmt::format(
+        "{} columns were shortened so that neighbours do not cross", columns.shortened));
+  if (attachment.largest_gap > kGapWorthSaying)
+    report.remarks.push_back(
+        fmt::format("deepest points attached to bone end up to {:.2f} mm short of it, where bone "
+                    "falls away steeply or columns were shortened",
+                    attachment.largest_gap));
+}
+
+void report_model(const SkinMesh& mesh, const std::vector<char>& rim, const Model& model,
+                  BuildReport& report) {
+  const auto columns = static_cast<int64_t>(mesh.points.size());
+  report.skin_vertices = columns;
+  report.skin_edges = static_cast<int64_t>(mesh.edges.size());
+  report.skin_triangles = static_cast<int64_t>(mesh.triangles.size());
+  report.attached = count(model).bone;
+  report.free_deep = columns - report.attached - std::count(rim.begin(), rim.end(), 1);
+  report.effective_modulus = effective_modulus(model);
+}
+
+}  // namespace
+
+BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
+                       const std::vector<surface::Surface>& bones) {
+  require_one_of_each(scene, bones);
+  const std::vector<double> depths = layer_depths(scene.tissue);
+  SkinMesh mesh = make_skin_mesh(skin);
+  const BoneField field(bones);
+  require_same_place(skin, bones, field);
+  const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);
+
+  BuiltModel built;
+  if (face_outwards(nearest, mesh))
+    built.report.remarks.push_back(
+        fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
+  const Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
+  const std::vector<char> rim = rim_columns(mesh, scene.rim_fixed);
+  Attachment attachment = attach_columns(columns, field, scene.tissue);
+  for (size_t c = 0; c < rim.size(); ++c)
+    if (rim[c]) attachment.bone[c] = -1;
+  release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
+
+  built.model = make_layers(mesh, columns.deep, depths);
+  set_points(rim, attachment, scene.moves, built.model);
+  require_held(scene, mesh, field, built.model, attachment);
+  complete(scene, mesh, bones, built.model);
+  report_columns(columns, attachment, built.report);
+  report_model(mesh, rim, built.model, built.report);
+  return built;
+}
+
+BuiltModel build_model(const scene::Scene& scene) {
+  const surface::Surface skin = surface::load_surface(scene.skin, surface::Role::skin);
+  std::vector<surface::Surface> bones;
+  for (const scene::BoneEntry& bone : scene.bones)
+    bones.push_back(surface::load_surface(bone.file, surface::Role::bone));
+  return build_model(scene, skin, bones);
+}
+
+}  // namespace repose::model

@@ -1,0 +1,107 @@
+#include "repose/model/fold.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "repose/base/error.h"
+#include "repose/model/smoothing.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double kMargin = 0.05;
+constexpr double kShortening = 0.9;
+constexpr double kSteepest = 1.0;
+constexpr double kThinnest = 0.05;  // mm, and as a part of the first thickness
+
+/// Least value of c[0] + c[1] s + c[2] s² for s in [0, 1].
+double least_on_unit_interval(const std::array<double, 3>& c) {
+  double least = std::min(c[0], c[0] + c[1] + c[2]);
+  if (c[2] > 0) {
+    const double s = std::clamp(-c[1] / (2 * c[2]), 0.0, 1.0);
+    least = std::min(least, c[0] + s * (c[1] + s * c[2]));
+  }
+  return least;
+}
+
+double margin_of(const SkinMesh& mesh, int64_t triangle, const std::vector<Vec3>& directions,
+                 const std::vector<double>& thickness) {
+  const auto [i, j, k] = mesh.triangles[triangle];
+  return fold_margin(
+      {mesh.points[i], mesh.points[j], mesh.points[k]},
+      {thickness[i] * directions[i], thickness[j] * directions[j], thickness[k] * directions[k]});
+}
+
+void refuse_thin(const SkinMesh& mesh, const std::string& skin_name, int64_t v, double from) {
+  const Vec3& at = mesh.points[v];
+  base::refuse(
+      "{}: no sound column of tissue fits under skin vertex {} ({:.2f}, {:.2f}, {:.2f}): of {:.2f} "
+      "mm less than {:.2f} mm would be left before neighbouring columns cross; smooth or coarsen "
+      "the "
+      "skin mesh there, or set tissue.free_thickness or attach_within smaller",
+      skin_name, v, at.x(), at.y(), at.z(), from, std::max(kThinnest, kThinnest * from));
+}
+
+std::vector<int64_t> corners(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
+  std::vector<int64_t> vertices;
+  for (const int64_t f : triangles)
+    vertices.insert(vertices.end(), mesh.triangles[f].begin(), mesh.triangles[f].end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
+}
+
+std::vector<int64_t> triangles_around(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
+  std::vector<int64_t> triangles;
+  for (const int64_t v : vertices) {
+    const auto around = mesh.triangles_of[v];
+    triangles.insert(triangles.end(), around.begin(), around.end());
+  }
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  return triangles;
+}
+
+}  // namespace
+
+double fold_margin(const std::array<Vec3, 3>& skin, const std::array<Vec3, 3>& column) {
+  const Vec3 a1 = skin[2] - skin[0], a2 = skin[1] - skin[0];  // inward order
+  const Vec3 b1 = column[2] - column[0], b2 = column[1] - column[0];
+  const Vec3 n0 = a1.cross(a2), n1 = a1.cross(b2) + b1.cross(a2), n2 = b1.cross(b2);
+  double margin = 1;
+  for (const Vec3& w : column) {
+    const double least = least_on_unit_interval({n0.dot(w), n1.dot(w), n2.dot(w)});
+    margin = std::min(margin, least / (n0.norm() * w.norm()));
+  }
+  return margin;
+}
+
+std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Vec3>& directions,
+                                      const std::vector<double>& thickness) {
+  std::vector<int64_t> folded;
+  for (size_t f = 0; f < mesh.triangles.size(); ++f)
+    if (!(margin_of(mesh, static_cast<int64_t>(f), directions, thickness) >= kMargin))
+      folded.push_back(static_cast<int64_t>(f));
+  return folded;
+}
+
+void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
+                    const std::string& skin_name, std::vector<double>& thickness) {
+  const std::vector<double> first = thickness;
+  std::vector<int64_t> folded = folded_triangles(mesh, directions, thickness);
+  while (!folded.empty()) {
+    std::vector<int64_t> changed = corners(mesh, folded);
+    for (const int64_t v : changed) {
+      thickness[v] *= kShortening;
+      if (!(thickness[v] > std::max(kThinnest, kThinnest * first[v])))
+        refuse_thin(mesh, skin_name, v, first[v]);
+    }
+    const std::vector<int64_t> drawn = limit_slope(mesh, kSteepest, changed, thickness);
+    changed.insert(changed.end(), drawn.begin(), drawn.end());
+    folded = triangles_around(mesh, changed);
+    std::erase_if(folded,
+                  [&](int64_t f) { return margin_of(mesh, f, directions, thickness) >= kMargin; });
+  }
+}
+
+}  // namespace repose::model

@@ -1,0 +1,121 @@
+#include "repose/model/layers.h"
+
+#include <fmt/format.h>
+
+#include "repose/base/error.h"
+#include "repose/model/prism_geometry.h"
+
+namespace repose::model {
+namespace {
+
+constexpr int kFewest = 2, kMost = 64;
+
+void add_points(const SkinMesh& mesh, const std::vector<Vec3>& deep,
+                const std::vector<double>& depths, Points& points) {
+  const size_t rows = deep.size() * depths.size();
+  points.position.reserve(rows);
+  points.layer.reserve(rows);
+  points.column.reserve(rows);
+  for (size_t c = 0; c < deep.size(); ++c)
+    for (size_t a = 0; a < depths.size(); ++a) {
+      points.position.push_back((1 - depths[a]) * mesh.points[c] + depths[a] * deep[c]);
+      points.layer.push_back(static_cast<int32_t>(a));
+      points.column.push_back(static_cast<int64_t>(c));
+    }
+  points.set.assign(rows, PointSet::soft_tissue);
+  points.target = points.position;
+  points.bone.assign(rows, -1);
+  points.mass.assign(rows, 0);
+  points.external_force.assign(rows, Vec3::Zero());
+}
+
+/// Adds the springs one set at a time.
+class SpringSets {
+ public:
+  explicit SpringSets(Model& model) : model_(model) {}
+
+  void open(const char* kind, int64_t number) {
+    model_.spring_sets.push_back(fmt::format("{} {}", kind, number));
+  }
+  void add(int64_t p, int64_t q) {
+    Springs& springs = model_.springs;
+    const std::vector<Vec3>& x = model_.points.position;
+    springs.points.push_back({p, q});
+    springs.set.push_back(static_cast<int32_t>(model_.spring_sets.size()) - 1);
+    springs.rest_length.push_back((x[q] - x[p]).norm());
+  }
+
+ private:
+  Model& model_;
+};
+
+void add_springs(const SkinMesh& mesh, int64_t layers, Model& model) {
+  SpringSets sets(model);
+  const auto columns = static_cast<int64_t>(mesh.points.size());
+  for (int64_t a = 0; a < layers; ++a) {
+    sets.open("layer", a);
+    for (const auto& [c, d] : mesh.edges) sets.add(c * layers + a, d * layers + a);
+  }
+  for (int64_t a = 0; a + 1 < layers; ++a) {
+    sets.open("connecting", a);
+    for (int64_t c = 0; c < columns; ++c) sets.add(c * layers + a, c * layers + a + 1);
+  }
+  for (int64_t a = 0; a + 1 < layers; ++a) {
+    sets.open("diagonal", a);
+    for (const auto& [c, d] : mesh.edges) {
+      sets.add(c * layers + a, d * layers + a + 1);
+      sets.add(d * layers + a, c * layers + a + 1);
+    }
+  }
+  const size_t rows = model.springs.points.size();
+  model.springs.stiffness.assign(rows, 0);
+  model.springs.exponent.assign(rows, 0);
+  model.springs.reference.assign(rows, 1);
+}
+
+void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {
+  for (int64_t a = 0; a + 1 < layers; ++a)
+    for (const Triangle& t : mesh.triangles) {
+      const int64_t i = t[0] * layers + a, j = t[2] * layers + a, k = t[1] * layers + a;
+      model.prisms.points.push_back({i, j, k, i + 1, j + 1, k + 1});
+      Vec3 corner[6];
+      for (int n = 0; n < 6; ++n) corner[n] = model.points.position[model.prisms.points.back()[n]];
+      model.prisms.rest_volume.push_back(prism_volume(corner));
+    }
+}
+
+}  // namespace
+
+std::vector<double> layer_depths(const scene::Tissue& tissue) {
+  const int layers = tissue.layers;
+  if (layers < kFewest || layers > kMost)
+    base::refuse("tissue.layers is {}, allowed are {} to {}", layers, kFewest, kMost);
+  std::vector<double> depths = tissue.depths;
+  if (depths.empty())
+    for (int a = 0; a < layers; ++a) depths.push_back(static_cast<double>(a) / (layers - 1));
+  if (static_cast<int>(depths.size()) != layers)
+    base::refuse("tissue.depths has {} fractions for {} layers; give one a layer", depths.size(),
+                 layers);
+  if (depths.front() != 0 || depths.back() != 1)
+    base::refuse("tissue.depths runs from {} to {}; the first must be 0 (skin), the last 1 (bone)",
+                 depths.front(), depths.back());
+  for (int a = 1; a < layers; ++a)
+    if (!(depths[a] > depths[a - 1]))
+      base::refuse("tissue.depths: {} after {}; each must be greater than the one before it",
+                   depths[a], depths[a - 1]);
+  return depths;
+}
+
+Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,
+                  const std::vector<double>& depths) {
+  Model model;
+  const auto layers = static_cast<int64_t>(depths.size());
+  add_points(mesh, deep, depths, model.points);
+  add_springs(mesh, layers, model);
+  add_prisms(mesh, layers, model);
+  for (const Triangle& t : mesh.triangles)
+    model.skin.push_back({t[0] * layers, t[1] * layers, t[2] * layers});
+  return model;
+}
+
+}  // namespace repose::model

@@ -1,0 +1,69 @@
+#include "repose/model/orientation.h"
+
+#include <Eigen/Geometry>
+
+#include "repose/base/error.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double kFarApart = 200, kNear = 50;  // mm
+
+using Box = Eigen::AlignedBox3d;
+
+Box box_of(const surface::Surface& surface) {
+  Box box;
+  for (const Vec3& x : surface.points) box.extend(x);
+  return box;
+}
+
+std::string corner_text(const Box& box) {
+  return fmt::format("({:.0f}, {:.0f}, {:.0f}) to ({:.0f}, {:.0f}, {:.0f}) mm", box.min().x(),
+                     box.min().y(), box.min().z(), box.max().x(), box.max().y(), box.max().z());
+}
+
+void refuse_far_apart(const surface::Surface& skin, const surface::Surface& bone,
+                      const Box& skin_box, const Box& bone_box) {
+  const Vec3 turn(-1, -1, 1);
+  Box turned;
+  turned.extend(turn.cwiseProduct(bone_box.min()));
+  turned.extend(turn.cwiseProduct(bone_box.max()));
+  const bool other_frame = skin_box.exteriorDistance(turned) <= kNear;
+  base::refuse("{} is at {}, but {} at {}: {:.0f} mm apart; {}", skin.name, corner_text(skin_box),
+               bone.name, corner_text(bone_box), skin_box.exteriorDistance(bone_box),
+               other_frame ? "one is in LPS and the other in RAS coordinates, export both in one"
+                           : "export both in the coordinates of one scan, in mm");
+}
+
+}  // namespace
+
+void require_same_place(const surface::Surface& skin, const std::vector<surface::Surface>& bones,
+                        const BoneField& field) {
+  const Box skin_box = box_of(skin);
+  for (const surface::Surface& bone : bones)
+    if (const Box box = box_of(bone); skin_box.exteriorDistance(box) > kFarApart)
+      refuse_far_apart(skin, bone, skin_box, box);
+  for (size_t v = 0; v < skin.points.size(); ++v)
+    if (const int32_t bone = field.containing(skin.points[v]); bone >= 0) {
+      const Vec3& at = skin.points[v];
+      base::refuse(
+          "{}: vertex {} ({:.2f}, {:.2f}, {:.2f}) lies inside {}; the skin must be outside all "
+          "bone, "
+          "check that both come from one scan and in one frame",
+          skin.name, v, at.x(), at.y(), at.z(), bones[bone].name);
+    }
+}
+
+bool face_outwards(const std::vector<BoneField::Nearest>& nearest, SkinMesh& mesh) {
+  double towards_bone = 0;
+  for (size_t v = 0; v < nearest.size(); ++v) {
+    if (nearest[v].bone < 0) continue;
+    const Vec3 towards = nearest[v].point - mesh.points[v];
+    towards_bone += mesh.vertex_area[v] * (mesh.vertex_normal[v].dot(towards) > 0 ? 1 : -1);
+  }
+  if (towards_bone >= 0) return false;
+  flip(mesh);
+  return true;
+}
+
+}  // namespace repose::model

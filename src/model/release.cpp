@@ -1,0 +1,40 @@
+#include "repose/model/release.h"
+
+#include <algorithm>
+
+namespace repose::model {
+namespace {
+
+constexpr double kSameMotion = 1e-9;  // largest difference of matrix entries, mm or none
+
+/// For each bone, the bones that move differently from it.
+std::vector<std::vector<int32_t>> others(const std::vector<scene::RigidMotion>& moves) {
+  std::vector<std::vector<int32_t>> differing(moves.size());
+  for (size_t own = 0; own < moves.size(); ++own)
+    for (size_t other = 0; other < moves.size(); ++other) {
+      const Mat4 difference = moves[own].matrix() - moves[other].matrix();
+      if (difference.cwiseAbs().maxCoeff() > kSameMotion)
+        differing[own].push_back(static_cast<int32_t>(other));
+    }
+  return differing;
+}
+
+}  // namespace
+
+void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
+                               const std::vector<scene::RigidMotion>& moves, double distance,
+                               Attachment& attachment) {
+  if (!(distance > 0)) return;
+  const std::vector<std::vector<int32_t>> differing = others(moves);
+  for (size_t v = 0; v < deep.size(); ++v) {
+    if (attachment.bone[v] < 0) continue;
+    const std::vector<int32_t>& pieces = differing[attachment.bone[v]];
+    if (std::none_of(pieces.begin(), pieces.end(),
+                     [&](int32_t piece) { return bones.distance(piece, deep[v]) <= distance; }))
+      continue;
+    attachment.bone[v] = -1;
+    ++attachment.released;
+  }
+}
+
+}  // namespace repose::model

@@ -1,0 +1,70 @@
+#include "repose/model/smoothing.h"
+
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCore>
+#include <queue>
+
+namespace repose::model {
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// diag(a w) + Σ_e c_e ℓ_e² (graph Laplacian of e).
+Sparse smoothing_matrix(const SkinMesh& mesh, const Eigen::VectorXd& data,
+                        const std::vector<double>& length) {
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(mesh.points.size() + 4 * mesh.edges.size());
+  for (int64_t v = 0; v < data.size(); ++v) entries.emplace_back(v, v, data[v]);
+  for (size_t e = 0; e < mesh.edges.size(); ++e) {
+    const auto [p, q] = mesh.edges[e];
+    const double over = 0.5 * (length[p] + length[q]) / mesh.edge_length(e);
+    const double c = 2.0 / 3.0 * mesh.edge_area[e] * over * over;
+    entries.emplace_back(p, p, c);
+    entries.emplace_back(q, q, c);
+    entries.emplace_back(p, q, -c);
+    entries.emplace_back(q, p, -c);
+  }
+  Sparse matrix(data.size(), data.size());
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+}  // namespace
+
+Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
+                             const std::vector<double>& weight, const std::vector<double>& length) {
+  const auto vertices = static_cast<int64_t>(mesh.points.size());
+  Eigen::VectorXd data(vertices);
+  for (int64_t v = 0; v < vertices; ++v) data[v] = mesh.vertex_area[v] * weight[v];
+  const Sparse matrix = smoothing_matrix(mesh, data, length);
+  Eigen::ConjugateGradient<Sparse, Eigen::Lower | Eigen::Upper> solver(matrix);
+  solver.setTolerance(1e-6);
+  Eigen::MatrixXd field(given.rows(), given.cols());
+  for (int64_t k = 0; k < given.cols(); ++k)
+    field.col(k) = solver.solveWithGuess(data.cwiseProduct(given.col(k)), given.col(k));
+  return field;
+}
+
+std::vector<int64_t> limit_slope(const SkinMesh& mesh, double slope,
+                                 const std::vector<int64_t>& seeds, std::vector<double>& values) {
+  using Entry = std::pair<double, int64_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (const int64_t v : seeds) queue.emplace(values[v], v);
+  std::vector<int64_t> lowered;
+  while (!queue.empty()) {
+    const auto [value, v] = queue.top();
+    queue.pop();
+    if (value > values[v]) continue;
+    for (const int64_t e : mesh.edges_of[v]) {
+      const int64_t other = mesh.other_end(e, v);
+      const double limit = value + slope * mesh.edge_length(e);
+      if (values[other] <= limit) continue;
+      values[other] = limit;
+      lowered.push_back(other);
+      queue.emplace(limit, other);
+    }
+  }
+  return lowered;
+}
+
+}  // namespace repose::model

@@ -1,0 +1,87 @@
+#include "repose/model/thickness.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "repose/model/smoothing.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double kDeeperThanNearest = 1.6, kDeeperBy = 2.0;  // mm
+constexpr double kBoneRoom = 0.95, kSkinRoom = 0.45;
+constexpr double kSteepest = 1.0;
+constexpr double kHeldWeight = 100.0;
+constexpr double kSpikeWidth = 1.5, kSpikeHeight = 0.2;  // mm
+
+/// Distance along a column to where it would leave the skin again, infinite within `reach`.
+double to_other_side(const surface::DistanceTree& skin, const Vec3& from, const Vec3& direction,
+                     double start, double reach) {
+  const auto hit = skin.first_hit(from + start * direction, direction, reach);
+  return hit ? start + hit->distance : std::numeric_limits<double>::infinity();
+}
+
+void flatten(const SkinMesh& mesh, std::vector<double>& thickness) {
+  std::vector<int64_t> all(thickness.size());
+  std::iota(all.begin(), all.end(), 0);
+  limit_slope(mesh, kSteepest, all, thickness);
+}
+
+/// Cuts off what stands out by more than kSpikeHeight from the field smoothed over kSpikeWidth:
+/// single columns that graze an edge of bone and meet it late.
+void cut_spikes(const SkinMesh& mesh, std::vector<double>& thickness) {
+  const auto vertices = static_cast<int64_t>(thickness.size());
+  const Eigen::MatrixXd given = Eigen::Map<const Eigen::VectorXd>(thickness.data(), vertices);
+  const std::vector<double> weight(vertices, 1.0), length(vertices, kSpikeWidth);
+  const Eigen::MatrixXd smooth = smooth_field(mesh, given, weight, length);
+  for (int64_t v = 0; v < vertices; ++v)
+    thickness[v] = std::min(thickness[v], smooth(v, 0) + kSpikeHeight);
+}
+
+}  // namespace
+
+Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
+                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
+                   const scene::Tissue& tissue) {
+  const size_t vertices = mesh.points.size();
+  const surface::DistanceTree skin({"skin", mesh.points, mesh.triangles});
+  const double farthest =
+      std::max(tissue.attach_within, tissue.free_thickness / std::min(kBoneRoom, kSkinRoom));
+  Reach reach{std::vector<double>(vertices), std::vector<double>(vertices),
+              std::vector<char>(vertices)};
+  for (size_t v = 0; v < vertices; ++v) {
+    const auto hit = bones.first_hit(mesh.points[v], directions[v], farthest);
+    reach.to_bone[v] = hit ? hit->distance : std::numeric_limits<double>::infinity();
+    const double start = 1e-3 * std::sqrt(mesh.vertex_area[v]);
+    const double skin_distance =
+        to_other_side(skin, mesh.points[v], directions[v], start, farthest);
+    const double deepest = std::min({tissue.attach_within, skin_distance,
+                                     kDeeperThanNearest * nearest[v].distance + kDeeperBy});
+    reach.holds[v] = reach.to_bone[v] <= deepest;
+    reach.room[v] = std::min(kBoneRoom * reach.to_bone[v], kSkinRoom * skin_distance);
+  }
+  return reach;
+}
+
+std::vector<double> column_thickness(const SkinMesh& mesh, const Reach& reach,
+                                     double free_thickness) {
+  const auto vertices = static_cast<int64_t>(mesh.points.size());
+  Eigen::MatrixXd given(vertices, 1);
+  std::vector<double> weight(vertices);
+  for (int64_t v = 0; v < vertices; ++v) {
+    given(v, 0) = reach.holds[v] ? reach.to_bone[v] : std::min(free_thickness, reach.room[v]);
+    weight[v] = reach.holds[v] ? kHeldWeight : 1.0;
+  }
+  const std::vector<double> length(vertices, free_thickness);
+  const Eigen::MatrixXd blended = smooth_field(mesh, given, weight, length);
+  std::vector<double> thickness(vertices);
+  for (int64_t v = 0; v < vertices; ++v)
+    thickness[v] = reach.holds[v] ? reach.to_bone[v] : std::min(blended(v, 0), reach.room[v]);
+  flatten(mesh, thickness);
+  cut_spikes(mesh, thickness);
+  flatten(mesh, thickness);
+  return thickness;
+}
+
+}  // namespace repose::model

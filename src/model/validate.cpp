@@ -1,0 +1,192 @@
+#include <cmath>
+
+#include "repose/base/error.h"
+#include "repose/model/model.h"
+#include "repose/model/prism_geometry.h"
+#include "repose/scene/rigid_motion.h"
+
+namespace repose::model {
+
+namespace {
+
+using base::refuse;
+
+/// Refuses what is wrong with one array, naming it as the file does.
+class Array {
+ public:
+  Array(const std::string& file, const char* name) : file_(file), name_(name) {}
+
+  void has_rows(size_t rows, size_t expected) const {
+    if (rows != expected)
+      refuse("{}: /model/{}: has {} rows, expected {}, one for each", file_, name_, rows, expected);
+  }
+  void is_finite(const std::vector<Vec3>& values) const {
+    for (size_t i = 0; i < values.size(); ++i)
+      if (!values[i].allFinite())
+        refuse("{}: /model/{}: row {} is ({}, {}, {}), expected finite numbers", file_, name_, i,
+               values[i][0], values[i][1], values[i][2]);
+  }
+  void is_not_negative(const std::vector<double>& values, const char* unit) const {
+    for (size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i]) || values[i] < 0)
+        refuse("{}: /model/{}: row {} is {} {}, expected a finite number, 0 or more", file_, name_,
+               i, values[i], unit);
+  }
+  void is_positive(const std::vector<double>& values, const char* unit, const char* remedy) const {
+    for (size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i]) || values[i] <= 0)
+        refuse("{}: /model/{}: row {} is {} {}, expected a finite number above 0: {}", file_, name_,
+               i, values[i], unit, remedy);
+  }
+  void is_within(int64_t value, size_t row, int64_t first, int64_t last) const {
+    if (value < first || value > last)
+      refuse("{}: /model/{}: row {} is {}, expected {} to {}", file_, name_, row, value, first,
+             last);
+  }
+  template <class Int>
+  void all_within(const std::vector<Int>& values, int64_t first, int64_t last) const {
+    for (size_t i = 0; i < values.size(); ++i)
+      is_within(static_cast<int64_t>(values[i]), i, first, last);
+  }
+  template <size_t K>
+  void all_index(const std::vector<std::array<int64_t, K>>& rows, size_t count) const {
+    for (size_t i = 0; i < rows.size(); ++i)
+      for (const int64_t index : rows[i]) is_within(index, i, 0, static_cast<int64_t>(count) - 1);
+  }
+
+ private:
+  const std::string& file_;
+  const char* name_;
+};
+
+void validate_points(const Points& p, int64_t bones, const std::string& file) {
+  const size_t n = p.position.size();
+  if (n == 0) refuse("{}: /model/point/position: has no row; a model has at least one point", file);
+  Array(file, "point/set").has_rows(p.set.size(), n);
+  Array(file, "point/target").has_rows(p.target.size(), n);
+  Array(file, "point/layer").has_rows(p.layer.size(), n);
+  Array(file, "point/column").has_rows(p.column.size(), n);
+  Array(file, "point/bone").has_rows(p.bone.size(), n);
+  Array(file, "point/mass").has_rows(p.mass.size(), n);
+  Array(file, "point/external_force").has_rows(p.external_force.size(), n);
+  Array(file, "point/position").is_finite(p.position);
+  Array(file, "point/target").is_finite(p.target);
+  Array(file, "point/external_force").is_finite(p.external_force);
+  Array(file, "point/mass").is_not_negative(p.mass, "kg");
+  Array(file, "point/set").all_within(p.set, 0, 3);
+  Array(file, "point/layer").all_within(p.layer, 0, INT32_MAX);
+  Array(file, "point/column").all_within(p.column, 0, INT64_MAX);
+  Array(file, "point/bone").all_within(p.bone, -1, bones - 1);
+  for (size_t i = 0; i < n; ++i)
+    if (p.set[i] == PointSet::bone && p.bone[i] < 0)
+      refuse(
+          "{}: /model/point/bone: row {} is -1, but point/set makes it a bone point; name its bone",
+          file, i);
+}
+
+void validate_springs(const Springs& s, size_t points, size_t sets, const std::string& file) {
+  const size_t n = s.points.size();
+  Array(file, "spring/set").has_rows(s.set.size(), n);
+  Array(file, "spring/rest_length").has_rows(s.rest_length.size(), n);
+  Array(file, "spring/stiffness").has_rows(s.stiffness.size(), n);
+  Array(file, "spring/exponent").has_rows(s.exponent.size(), n);
+  Array(file, "spring/reference").has_rows(s.reference.size(), n);
+  Array(file, "spring/points").all_index(s.points, points);
+  Array(file, "spring/set").all_within(s.set, 0, static_cast<int64_t>(sets) - 1);
+  Array(file, "spring/rest_length").is_not_negative(s.rest_length, "mm");
+  Array(file, "spring/stiffness").is_not_negative(s.stiffness, "N/mm");
+  Array(file, "spring/exponent").all_within(s.exponent, 0, 2);
+  Array(file, "spring/reference")
+      .is_positive(s.reference, "mm", "1 is the paper's, the initial length makes it a strain");
+}
+
+// A millionth, and what rounding the coordinates to single precision may do to the volume.
+double volume_tolerance(const Vec3 corners[6]) {
+  double coordinate = 0, extent = 0;
+  for (int i = 0; i < 6; ++i) {
+    coordinate = std::max(coordinate, corners[i].lpNorm<Eigen::Infinity>());
+    extent = std::max(extent, (corners[i] - corners[0]).norm());
+  }
+  return 1e-6 * std::abs(prism_volume(corners)) + 2e-7 * coordinate * extent * extent;
+}
+
+void refuse_wrong_volume(const Model& m, const std::string& file) {
+  for (size_t i = 0; i < m.prisms.points.size(); ++i) {
+    Vec3 corners[6];
+    for (int j = 0; j < 6; ++j) corners[j] = m.points.position[m.prisms.points[i][j]];
+    const double volume = prism_volume(corners), stored = m.prisms.rest_volume[i];
+    if (!(std::abs(volume - stored) <= volume_tolerance(corners)))
+      refuse(
+          "{}: /model/prism/rest_volume: row {} is {} mm³, but the prism's volume at "
+          "point/position is {} mm³; write that volume, order prism/points so that it is above 0",
+          file, i, stored, volume);
+  }
+}
+
+void validate_prisms(const Model& m, const std::string& file) {
+  const Prisms& p = m.prisms;
+  Array(file, "prism/rest_volume").has_rows(p.rest_volume.size(), p.points.size());
+  Array(file, "prism/points").all_index(p.points, m.points.position.size());
+  Array(file, "prism/rest_volume")
+      .is_positive(p.rest_volume, "mm³", "order prism/points so that it is, and mend flat prisms");
+  refuse_wrong_volume(m, file);
+}
+
+void validate_bones(const Model& m, const std::string& file) {
+  if (!m.bone_transform.empty())
+    Array(file, "bone_transform").has_rows(m.bone_transform.size(), m.bones.size());
+  for (size_t b = 0; b < m.bone_transform.size(); ++b) try {
+      scene::RigidMotion::from_matrix(m.bone_transform[b]);
+    } catch (const base::InputError& error) {
+      refuse("{}: /model/bone_transform: row {} (bone {}): {}", file, b, m.bones[b], error.what());
+    }
+  if (!m.bone_surfaces.empty())
+    Array(file, "bone_surface").has_rows(m.bone_surfaces.size(), m.bones.size());
+  for (size_t b = 0; b < m.bone_surfaces.size(); ++b) {
+    const std::string group = fmt::format("bone_surface/{}/", b);
+    Array(file, (group + "points").c_str()).is_finite(m.bone_surfaces[b].points);
+    Array(file, (group + "triangles").c_str())
+        .all_index(m.bone_surfaces[b].triangles, m.bone_surfaces[b].points.size());
+  }
+}
+
+void refuse_unattached(const Model& m, const std::string& file) {
+  std::vector<bool> held(m.points.position.size(), false);
+  for (const auto& ends : m.springs.points)
+    for (const int64_t end : ends) held[end] = true;
+  for (size_t i = 0; i < held.size(); ++i)
+    if (!held[i] && m.points.set[i] == PointSet::soft_tissue)
+      refuse(
+          "{}: /model/point: row {} is soft tissue and no spring holds it; remove it, join it with "
+          "a spring or make it a boundary point (set 1)",
+          file, i);
+}
+
+}  // namespace
+
+Counts count(const Model& model) {
+  Counts c;
+  c.points = static_cast<int64_t>(model.points.position.size());
+  for (const PointSet set : model.points.set) {
+    c.soft += set == PointSet::soft_tissue;
+    c.boundary += set == PointSet::boundary;
+    c.bone += set == PointSet::bone;
+    c.held += set == PointSet::held;
+  }
+  c.springs = static_cast<int64_t>(model.springs.points.size());
+  c.prisms = static_cast<int64_t>(model.prisms.points.size());
+  return c;
+}
+
+void validate(const Model& model, const std::string& file) {
+  const size_t points = model.points.position.size();
+  if (!model.gravity.allFinite()) refuse("{}: /model attribute gravity: is not finite", file);
+  validate_points(model.points, static_cast<int64_t>(model.bones.size()), file);
+  validate_springs(model.springs, points, model.spring_sets.size(), file);
+  validate_prisms(model, file);
+  Array(file, "skin/points").all_index(model.skin, points);
+  validate_bones(model, file);
+  refuse_unattached(model, file);
+}
+
+}  // namespace repose::model

@@ -1,0 +1,157 @@
+#include "repose/results/model_file.h"
+
+#include <fstream>
+
+#include "repose/results/reader.h"
+
+namespace repose::results {
+
+namespace {
+
+void require_format(const Reader& in) {
+  const std::string format = in.text("/", "format");
+  if (format != "tissue-model")
+    in.refuse("/ attribute format", fmt::format("is \"{}\", expected \"tissue-model\"", format));
+  const int64_t version = in.integer("/", "version");
+  if (version != 1)
+    in.refuse("/ attribute version", fmt::format("is {}, this program reads version 1", version));
+}
+
+model::Points read_points(const Reader& in) {
+  model::Points points;
+  points.position = in.vectors("/model/point/position", Shape::any);
+  const auto n = static_cast<int64_t>(points.position.size());
+  for (const int8_t set : in.integers<int8_t>("/model/point/set", n))
+    points.set.push_back(static_cast<model::PointSet>(set));
+  points.target = in.vectors("/model/point/target", n);
+  points.layer = in.integers<int32_t>("/model/point/layer", n);
+  points.column = in.integers<int64_t>("/model/point/column", n);
+  points.bone = in.integers<int32_t>("/model/point/bone", n);
+  points.mass.assign(n, 0.0);
+  points.external_force.assign(n, Vec3::Zero());
+  if (in.has("/model/point/mass")) points.mass = in.numbers("/model/point/mass", {n, {}});
+  if (in.has("/model/point/external_force"))
+    points.external_force = in.vectors("/model/point/external_force", n);
+  return points;
+}
+
+model::Springs read_springs(const Reader& in) {
+  model::Springs springs;
+  springs.points = in.tuples<2>("/model/spring/points", Shape::any);
+  const auto s = static_cast<int64_t>(springs.points.size());
+  springs.set = in.integers<int32_t>("/model/spring/set", s);
+  springs.rest_length = in.numbers("/model/spring/rest_length", {s, {}});
+  springs.stiffness = in.numbers("/model/spring/stiffness", {s, {}});
+  springs.exponent = in.integers<int8_t>("/model/spring/exponent", s);
+  springs.reference = in.numbers("/model/spring/reference", {s, {}});
+  return springs;
+}
+
+model::Prisms read_prisms(const Reader& in) {
+  model::Prisms prisms;
+  if (!in.has("/model/prism")) return prisms;
+  prisms.points = in.tuples<6>("/model/prism/points", Shape::any);
+  const auto m = static_cast<int64_t>(prisms.points.size());
+  prisms.rest_volume = in.numbers("/model/prism/rest_volume", {m, {}});
+  return prisms;
+}
+
+std::vector<Mat4> read_transforms(const Reader& in, int64_t bones) {
+  const std::vector<double> flat = in.numbers("/model/bone_transform", {bones, {4, 4}});
+  std::vector<Mat4> transforms(bones);
+  for (int64_t b = 0; b < bones; ++b)
+    transforms[b] = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>::Map(flat.data() + 16 * b);
+  return transforms;
+}
+
+std::vector<surface::Surface> read_bone_surfaces(const Reader& in,
+                                                 const std::vector<std::string>& bones) {
+  std::vector<surface::Surface> surfaces(bones.size());
+  for (size_t b = 0; b < bones.size(); ++b) {
+    surfaces[b].name = bones[b];
+    const std::string group = fmt::format("/model/bone_surface/{}", b);
+    if (!in.has(group)) continue;
+    surfaces[b].points = in.vectors(group + "/points", Shape::any);
+    surfaces[b].triangles = in.tuples<3>(group + "/triangles", Shape::any);
+  }
+  return surfaces;
+}
+
+}  // namespace
+
+model::Model read_model(const std::filesystem::path& file) {
+  if (!std::filesystem::is_directory(file) && std::filesystem::exists(file) && !is_hdf5(file))
+    base::refuse("{}: is not an HDF5 file; give a model or result file (.h5)", file.string());
+  const Reader in(file);
+  require_format(in);
+  model::Model model;
+  model.gravity = in.vector("/model", "gravity");
+  model.points = read_points(in);
+  model.springs = read_springs(in);
+  model.prisms = read_prisms(in);
+  model.spring_sets = in.names("/model/spring_set");
+  if (in.has("/model/skin/points")) model.skin = in.tuples<3>("/model/skin/points", Shape::any);
+  if (in.has("/model/bone")) model.bones = in.names("/model/bone");
+  if (in.has("/model/bone_transform"))
+    model.bone_transform = read_transforms(in, static_cast<int64_t>(model.bones.size()));
+  if (in.has("/model/bone_surface")) model.bone_surfaces = read_bone_surfaces(in, model.bones);
+  model::validate(model, file.string());
+  return model;
+}
+
+bool is_hdf5(const std::filesystem::path& file) {
+  const std::string signature = "\x89HDF\r\n\x1a\n";
+  std::ifstream in(file, std::ios::binary);
+  // The signature is at 0 or, after a user block, at 512, 1024, 2048, …
+  for (int64_t place = 0; in; place = place == 0 ? 512 : 2 * place) {
+    std::string found(signature.size(), '\0');
+    in.seekg(place);
+    if (in.read(found.data(), static_cast<std::streamsize>(found.size())) && found == signature)
+      return true;
+  }
+  return false;
+}
+
+int64_t step_count(const std::filesystem::path& file) {
+  const Reader in(file);
+  if (!in.has("/step")) return 0;
+  const int64_t count = in.links("/step");
+  for (int64_t step = 0; step < count; ++step)
+    if (!in.has(fmt::format("/step/{:04}", step)))
+      in.refuse("/step", fmt::format("has {} groups, but {:04} is missing", count, step));
+  return count;
+}
+
+namespace {
+
+struct ReadAttribute {
+  const Reader& in;
+  const std::string& group;
+  void operator()(const char* name, double& value) const { value = in.number(group, name); }
+  void operator()(const char* name, int64_t& value) const { value = in.integer(group, name); }
+  void operator()(const char* name, std::string& value) const { value = in.text(group, name); }
+  void operator()(const char* name, bool& value) const { value = in.integer(group, name) != 0; }
+};
+
+}  // namespace
+
+StoredStep read_step(const std::filesystem::path& file, int64_t step, const model::Model& model) {
+  const Reader in(file);
+  const std::string group = fmt::format("/step/{:04}", step);
+  if (!in.has(group)) in.refuse(group, "is missing");
+  const model::Counts counts = model::count(model);
+  StoredStep stored;
+  for_each_number(stored.numbers, ReadAttribute{in, group});
+  stored.rows.position = in.vectors(group + "/point/position", counts.points);
+  stored.displacement = in.vectors(group + "/point/displacement", counts.points);
+  stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);
+  stored.rows.elongation = in.numbers(group + "/spring/elongation", {counts.springs, {}});
+  stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});
+  if (in.has(group + "/prism/volume_ratio") || counts.prisms > 0)
+    stored.rows.volume_ratio = in.numbers(group + "/prism/volume_ratio", {counts.prisms, {}});
+  const std::string bones = group + "/bone_surface/points";
+  if (in.has(bones)) stored.bone_points = in.vectors(bones, Shape::any);
+  return stored;
+}
+
+}  // namespace repose::results

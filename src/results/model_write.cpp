@@ -1,0 +1,104 @@
+#include "repose/results/model_write.h"
+
+#include "repose/results/writer.h"
+
+namespace repose::results {
+
+namespace {
+
+void write_points(hid_t model, const model::Points& points) {
+  const base::Hdf5Group group = base::create_hdf5_group(model, "point");
+  const hsize_t n = points.position.size();
+  std::vector<int8_t> set;
+  for (const model::PointSet value : points.set) set.push_back(static_cast<int8_t>(value));
+  write_array(group, "position", {n, 3}, flat(points.position));
+  write_array(group, "set", {n}, set.data());
+  write_array(group, "target", {n, 3}, flat(points.target));
+  write_array(group, "layer", {n}, points.layer.data());
+  write_array(group, "column", {n}, points.column.data());
+  write_array(group, "bone", {n}, points.bone.data());
+  write_array(group, "mass", {n}, points.mass.data());
+  write_array(group, "external_force", {n, 3}, flat(points.external_force));
+}
+
+void write_springs(hid_t model, const model::Springs& springs) {
+  const base::Hdf5Group group = base::create_hdf5_group(model, "spring");
+  const hsize_t s = springs.points.size();
+  write_array(group, "points", {s, 2}, flat(springs.points));
+  write_array(group, "set", {s}, springs.set.data());
+  write_array(group, "rest_length", {s}, springs.rest_length.data());
+  write_array(group, "stiffness", {s}, springs.stiffness.data());
+  write_array(group, "exponent", {s}, springs.exponent.data());
+  write_array(group, "reference", {s}, springs.reference.data());
+}
+
+void write_prisms(hid_t model, const model::Prisms& prisms) {
+  const base::Hdf5Group group = base::create_hdf5_group(model, "prism");
+  const hsize_t m = prisms.points.size();
+  write_array(group, "points", {m, 6}, flat(prisms.points));
+  write_array(group, "rest_volume", {m}, prisms.rest_volume.data());
+}
+
+void write_skin(hid_t model, const std::vector<Triangle>& skin) {
+  if (skin.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "skin");
+  write_array(group, "points", {skin.size(), 3}, flat(skin));
+}
+
+void write_transforms(hid_t model, const std::vector<Mat4>& transforms) {
+  if (transforms.empty()) return;
+  std::vector<double> rows;
+  for (const Mat4& matrix : transforms)
+    for (int i = 0; i < 16; ++i) rows.push_back(matrix(i / 4, i % 4));
+  write_array(model, "bone_transform", {transforms.size(), 4, 4}, rows.data());
+}
+
+void write_bone_surfaces(hid_t model, const std::vector<surface::Surface>& surfaces) {
+  if (surfaces.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "bone_surface");
+  for (size_t b = 0; b < surfaces.size(); ++b) {
+    const base::Hdf5Group bone = base::create_hdf5_group(group, std::to_string(b).c_str());
+    write_array(bone, "points", {surfaces[b].points.size(), 3}, flat(surfaces[b].points));
+    write_array(bone, "triangles", {surfaces[b].triangles.size(), 3}, flat(surfaces[b].triangles));
+  }
+}
+
+void write_merged(hid_t model, const MergedBones& bones) {
+  if (bones.triangles.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "bone_surfaces");
+  write_array(group, "points", {bones.points.size(), 3}, flat(bones.points));
+  write_array(group, "triangles", {bones.triangles.size(), 3}, flat(bones.triangles));
+  write_array(group, "bone", {bones.bone.size()}, bones.bone.data());
+}
+
+}  // namespace
+
+void write_model(const base::Hdf5File& file, const model::Model& model, const MergedBones& bones) {
+  const base::Hdf5Group root(H5Gopen2(file, "/", H5P_DEFAULT));
+  write_attribute(root, "format", std::string("tissue-model"));
+  write_attribute(root, "version", int64_t{1});
+  const base::Hdf5Group group = base::create_hdf5_group(file, "model");
+  const Vec3& g = model.gravity;
+  write_attribute(group, "gravity", std::vector<double>{g.x(), g.y(), g.z()});
+  write_points(group, model.points);
+  write_springs(group, model.springs);
+  write_prisms(group, model.prisms);
+  write_skin(group, model.skin);
+  write_strings(group, "spring_set", model.spring_sets);
+  write_strings(group, "bone", model.bones);
+  write_bone_surfaces(group, model.bone_surfaces);
+  write_merged(group, bones);
+  write_transforms(group, model.bone_transform);
+}
+
+int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
+  const size_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
+  const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
+  const size_t bytes = descriptions + model.points.position.size() * point +
+                       model.springs.points.size() * spring + model.prisms.points.size() * 7 * 8 +
+                       model.skin.size() * 3 * 8 + bones.points.size() * 2 * 3 * 8 +
+                       bones.triangles.size() * (2 * 3 * 8 + 4);
+  return static_cast<int64_t>(bytes);
+}
+
+}  // namespace repose::results

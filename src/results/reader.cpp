@@ -1,0 +1,193 @@
+#include "repose/results/reader.h"
+
+#include "repose/results/stored_array.h"
+
+namespace repose::results {
+
+using base::check_hdf5;
+
+namespace {
+
+std::string in_words(const std::vector<int64_t>& shape) {
+  return fmt::format("[{}]", fmt::join(shape, ","));
+}
+
+// Whether `path` exists and its last link leads to an object.
+bool leads_somewhere(hid_t file, const std::string& path) {
+  for (size_t end = path.find('/', 1);; end = path.find('/', end + 1)) {
+    const std::string part = path.substr(0, end);
+    if (check_hdf5(H5Lexists(file, part.c_str(), H5P_DEFAULT)) == 0) return false;
+    if (H5Oexists_by_name(file, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    if (end == std::string::npos) return true;
+  }
+}
+
+base::Hdf5File open(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) base::refuse("{}: no such file", file.string());
+  if (std::filesystem::is_directory(file, error))
+    base::refuse("{}: is a folder, expected an HDF5 file", file.string());
+  try {
+    return base::open_hdf5(file);
+  } catch (const base::Hdf5Error& reason) {
+    base::refuse("{}: cannot be read as an HDF5 file: {}; make it anew if it is truncated",
+                 file.string(), reason.what());
+  }
+}
+
+}  // namespace
+
+Reader::Reader(const std::filesystem::path& file) : name_(file.string()), file_(open(file)) {}
+
+void Reader::refuse(const std::string& path, const std::string& what) const {
+  base::refuse("{}: {}: {}", name_, path, what);
+}
+
+bool Reader::has(const std::string& path) const {
+  try {
+    return leads_somewhere(file_, path);
+  } catch (const base::Hdf5Error&) {
+    return false;
+  }
+}
+
+int64_t Reader::links(const std::string& group) const {
+  try {
+    H5G_info_t info;
+    check_hdf5(H5Gget_info_by_name(file_, group.c_str(), &info, H5P_DEFAULT));
+    return static_cast<int64_t>(info.nlinks);
+  } catch (const base::Hdf5Error& reason) {
+    refuse(group, fmt::format("cannot be read as a group: {}", reason.what()));
+  }
+}
+
+namespace {
+
+/// Runs `read` and turns HDF5's and the memory's failures into a refusal that names the place.
+template <class Read>
+auto named(const Reader& reader, const std::string& path, Read&& read) {
+  try {
+    return read();
+  } catch (const base::Hdf5Error& reason) {
+    reader.refuse(path, fmt::format("cannot be read: {}", reason.what()));
+  } catch (const std::bad_alloc&) {
+    reader.refuse(path, "is larger than the memory");
+  } catch (const std::length_error&) {
+    reader.refuse(path, "is larger than the memory");
+  }
+}
+
+StoredArray open_dataset(hid_t file, const Reader& reader, const std::string& path) {
+  if (!reader.has(path)) reader.refuse(path, "is missing");
+  const base::Hdf5Object object(H5Oopen(file, path.c_str(), H5P_DEFAULT));
+  if (H5Iget_type(object) != H5I_DATASET)
+    reader.refuse(path, "is a group or a type, expected a dataset");
+  return StoredArray(base::Hdf5Dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT)),
+                     fmt::format("{}: {}", reader.file(), path));
+}
+
+void require_shape(const Reader& reader, const std::string& path, const StoredArray& array,
+                   const Shape& shape) {
+  std::vector<int64_t> expected = {shape.rows};
+  expected.insert(expected.end(), shape.columns.begin(), shape.columns.end());
+  if (shape.rows == Shape::any && !array.shape().empty()) expected[0] = array.shape()[0];
+  if (array.shape() == expected) return;
+  std::string words = in_words(expected);
+  if (shape.rows == Shape::any) words.replace(1, words.find_first_of(",]") - 1, "rows");
+  reader.refuse(path, fmt::format("has shape {}, expected {}", in_words(array.shape()), words));
+}
+
+template <class Numbers>
+void require_finite(const Reader& reader, const std::string& path, const Numbers& values,
+                    int64_t per_row) {
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      reader.refuse(path, fmt::format("row {} holds {}, expected finite numbers",
+                                      static_cast<int64_t>(i) / per_row, values[i]));
+}
+
+StoredArray open_attribute(hid_t file, const Reader& reader, const std::string& object,
+                           const char* name, const std::string& place) {
+  if (object != "/" && !reader.has(object)) reader.refuse(object, "is missing");
+  const auto exists = check_hdf5(H5Aexists_by_name(file, object.c_str(), name, H5P_DEFAULT));
+  if (exists == 0) reader.refuse(place, "is missing");
+  return StoredArray(
+      base::Hdf5Attribute(H5Aopen_by_name(file, object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT)),
+      fmt::format("{}: {}", reader.file(), place));
+}
+
+/// Opens attribute `name` of `object`, requires `count` values and reads them with `read`.
+template <class Read>
+auto attribute_values(hid_t file, const Reader& reader, const std::string& object, const char* name,
+                      int64_t count, Read&& read) {
+  const std::string place = fmt::format("{} attribute {}", object, name);
+  return named(reader, place, [&] {
+    const StoredArray array = open_attribute(file, reader, object, name, place);
+    if (array.size() != count)
+      reader.refuse(place, fmt::format("has {} values, expected {}", array.size(), count));
+    auto values = read(array);
+    if constexpr (std::is_same_v<decltype(values), std::vector<double>>)
+      require_finite(reader, place, values, count);
+    return values;
+  });
+}
+
+}  // namespace
+
+std::vector<double> Reader::numbers(const std::string& path, const Shape& shape) const {
+  return named(*this, path, [&] {
+    const StoredArray array = open_dataset(file_, *this, path);
+    require_shape(*this, path, array, shape);
+    std::vector<double> values = array.numbers();
+    const int64_t rows = std::max<int64_t>(array.shape()[0], 1);
+    require_finite(*this, path, values, std::max<int64_t>(values.size() / rows, 1));
+    return values;
+  });
+}
+
+std::vector<Vec3> Reader::vectors(const std::string& path, int64_t rows) const {
+  const std::vector<double> flat = numbers(path, {rows, {3}});
+  std::vector<Vec3> result(flat.size() / 3);
+  for (size_t i = 0; i < result.size(); ++i) result[i] = Vec3::Map(flat.data() + 3 * i);
+  return result;
+}
+
+std::vector<int64_t> Reader::whole_numbers(const std::string& path, const Shape& shape) const {
+  return named(*this, path, [&] {
+    const StoredArray array = open_dataset(file_, *this, path);
+    require_shape(*this, path, array, shape);
+    return array.whole_numbers();
+  });
+}
+
+std::vector<std::string> Reader::names(const std::string& path) const {
+  return named(*this, path, [&] {
+    const StoredArray array = open_dataset(file_, *this, path);
+    require_shape(*this, path, array, {Shape::any, {}});
+    return array.strings();
+  });
+}
+
+double Reader::number(const std::string& object, const char* attribute) const {
+  return attribute_values(file_, *this, object, attribute, 1,
+                          [](const StoredArray& array) { return array.numbers(); })[0];
+}
+
+int64_t Reader::integer(const std::string& object, const char* attribute) const {
+  return attribute_values(file_, *this, object, attribute, 1,
+                          [](const StoredArray& array) { return array.whole_numbers(); })[0];
+}
+
+std::string Reader::text(const std::string& object, const char* attribute) const {
+  return attribute_values(file_, *this, object, attribute, 1,
+                          [](const StoredArray& array) { return array.strings(); })[0];
+}
+
+Vec3 Reader::vector(const std::string& object, const char* attribute) const {
+  return Vec3::Map(
+      attribute_values(file_, *this, object, attribute, 3, [](const StoredArray& array) {
+        return array.numbers();
+      }).data());
+}
+
+}  // namespace repose::results

@@ -1,0 +1,248 @@
+#include "repose/results/result_file.h"
+
+#include <optional>
+
+#include "repose/base/agreement.h"
+#include "repose/base/hdf5.h"
+#include "repose/results/deal_out.h"
+#include "repose/results/model_write.h"
+#include "repose/results/unfinished_file.h"
+#include "repose/results/views.h"
+#include "repose/results/writer.h"
+
+namespace repose::results {
+
+namespace {
+
+std::filesystem::path with_ending(const std::filesystem::path& name, const std::string& ending) {
+  return name.string() + ending;
+}
+
+/// Makes HDF5's failures the user's: the disk is full, or gone.
+template <class Work>
+void say_where(const std::filesystem::path& file, Work&& work) {
+  try {
+    work();
+  } catch (const base::Hdf5Error& reason) {
+    base::refuse("{}: cannot be written: {}; free space or choose another -output", file.string(),
+                 reason.what());
+  }
+}
+
+struct PackNumbers {
+  std::vector<double> values;
+  std::string text;
+  void operator()(const char*, const std::string& value) { text += value + '\0'; }
+  template <class Number>
+  void operator()(const char*, Number value) {
+    values.push_back(static_cast<double>(value));
+  }
+};
+
+struct UnpackNumbers {
+  const PackNumbers& packed;
+  size_t value = 0, character = 0;
+  void operator()(const char*, std::string& text) {
+    text = packed.text.c_str() + character;
+    character += text.size() + 1;
+  }
+  template <class Number>
+  void operator()(const char*, Number& number) {
+    number = static_cast<Number>(packed.values[value++]);
+  }
+};
+
+/// Rank 0's numbers: attributes must be the same everywhere, and clocks are not.
+StepNumbers of_first_rank(MPI_Comm comm, const StepNumbers& mine) {
+  PackNumbers packed;
+  for_each_number(mine, packed);
+  int length = static_cast<int>(packed.text.size());
+  MPI_Bcast(&length, 1, MPI_INT, 0, comm);
+  packed.text.resize(length);
+  MPI_Bcast(packed.text.data(), length, MPI_CHAR, 0, comm);
+  MPI_Bcast(packed.values.data(), static_cast<int>(packed.values.size()), MPI_DOUBLE, 0, comm);
+  StepNumbers numbers;
+  for_each_number(numbers, UnpackNumbers{packed});
+  return numbers;
+}
+
+struct WriteAttribute {
+  hid_t group;
+  void operator()(const char* name, bool value) const {
+    write_attribute(group, name, static_cast<int64_t>(value));
+  }
+  template <class Value>
+  void operator()(const char* name, const Value& value) const {
+    write_attribute(group, name, value);
+  }
+};
+
+}  // namespace
+
+struct ResultFile::State {
+  MPI_Comm comm;
+  std::filesystem::path name;
+  std::optional<UnfinishedFile> unfinished;  // rank 0
+  base::Hdf5File file;                       // closed before `unfinished` is removed
+  FileCounts counts;
+  MergedBones bones;                              // rank 0
+  std::optional<model::PrescribedMotion> motion;  // rank 0
+  std::vector<Vec3> initial;                      // this rank's slab of point/position
+  std::vector<double> loads;                      // of the steps written
+  std::vector<bool> moved;                        // whether they hold bone surfaces
+
+  base::Slab slab(int64_t rows) const {
+    return base::slab(rows, base::rank(comm), base::size(comm));
+  }
+  std::filesystem::path part() const { return with_ending(name, ".h5.part"); }
+  /// Work on the open file that all ranks do, and all fail if one does.
+  void on_disk(const std::function<void()>& work) const {
+    base::together(comm, [&] { say_where(part(), work); });
+  }
+  /// Enough for a step, its descriptions included.
+  int64_t step_bytes() const {
+    return 72 * counts.points + 16 * counts.springs + 8 * counts.prisms + 24 * counts.bone_points +
+           (int64_t{1} << 16);
+  }
+  void create(const model::Model& model);
+  void require_rows(const StepRows& rows) const;
+  base::Hdf5Group create_group(hid_t place, const std::string& group) const;
+  void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
+                     const base::Slab& mine, const double* values) const;
+  void write_points(hid_t step, const StepRows& rows) const;
+  void write_elements(hid_t step, const StepRows& rows) const;
+  bool write_bones(hid_t step, double load) const;
+  void publish();
+};
+
+void ResultFile::State::create(const model::Model& model) {
+  unfinished.emplace(with_ending(name, ".h5"));
+  require_writable(unfinished->file());
+  bones = merge_bones(model.bone_surfaces);
+  motion.emplace(model);
+  say_where(part(), [&] {
+    base::Hdf5File whole = base::create_hdf5(part());
+    unfinished->reserve(model_bytes(model, bones));
+    write_model(whole, model, bones);
+    base::create_hdf5_group(whole, "step");
+    whole.close();
+  });
+  const model::Counts of = model::count(model);
+  counts = {of.points,
+            of.springs,
+            of.prisms,
+            static_cast<int64_t>(model.skin.size()),
+            static_cast<int64_t>(bones.points.size()),
+            static_cast<int64_t>(bones.triangles.size())};
+}
+
+void ResultFile::State::require_rows(const StepRows& rows) const {
+  const auto agrees = [this](size_t given, int64_t all) {
+    return static_cast<int64_t>(given) == slab(all).rows();
+  };
+  if (!agrees(rows.position.size(), counts.points) ||
+      !agrees(rows.residual_force.size(), counts.points) ||
+      !agrees(rows.volume_ratio.size(), counts.prisms) ||
+      !agrees(rows.elongation.size(), counts.springs) ||
+      !agrees(rows.tension.size(), counts.springs))
+    throw base::InternalError("a step's rows are not this rank's slab");
+}
+
+base::Hdf5Group ResultFile::State::create_group(hid_t place, const std::string& group) const {
+  base::Hdf5Group created;
+  on_disk([&] { created = base::create_hdf5_group(place, group.c_str()); });
+  return created;
+}
+
+void ResultFile::State::write_dataset(hid_t group, const char* dataset, int64_t rows,
+                                      int64_t columns, const base::Slab& mine,
+                                      const double* values) const {
+  base::Hdf5Dataset created;
+  on_disk([&] { created = create_rows(group, dataset, rows, columns); });
+  on_disk([&] { write_rows(comm, created, mine, values); });
+}
+
+void ResultFile::State::write_points(hid_t step, const StepRows& rows) const {
+  const base::Hdf5Group group = create_group(step, "point");
+  const base::Slab mine = slab(counts.points);
+  std::vector<Vec3> displacement(rows.position.size());
+  for (size_t i = 0; i < displacement.size(); ++i) displacement[i] = rows.position[i] - initial[i];
+  write_dataset(group, "position", counts.points, 3, mine, flat(rows.position));
+  write_dataset(group, "displacement", counts.points, 3, mine, flat(displacement));
+  write_dataset(group, "residual_force", counts.points, 3, mine, flat(rows.residual_force));
+}
+
+void ResultFile::State::write_elements(hid_t step, const StepRows& rows) const {
+  const base::Hdf5Group prism = create_group(step, "prism");
+  const base::Hdf5Group spring = create_group(step, "spring");
+  const base::Slab prisms = slab(counts.prisms), springs = slab(counts.springs);
+  write_dataset(prism, "volume_ratio", counts.prisms, 0, prisms, rows.volume_ratio.data());
+  write_dataset(spring, "elongation", counts.springs, 0, springs, rows.elongation.data());
+  write_dataset(spring, "tension", counts.springs, 0, springs, rows.tension.data());
+}
+
+/// Returns whether there was anything to write.
+bool ResultFile::State::write_bones(hid_t step, double load) const {
+  std::vector<Vec3> at_load;
+  if (motion) at_load = moved_points(bones, *motion, load);
+  int moved = !at_load.empty() && counts.bone_triangles > 0;
+  MPI_Bcast(&moved, 1, MPI_INT, 0, comm);
+  if (moved == 0) return false;
+  const base::Hdf5Group group = create_group(step, "bone_surface");
+  const base::Slab mine{0, static_cast<int64_t>(at_load.size())};
+  write_dataset(group, "points", counts.bone_points, 3, mine, flat(at_load));
+  return true;
+}
+
+void ResultFile::State::publish() {
+  std::vector<std::unique_ptr<UnfinishedFile>> documents;
+  for (const XdmfBlock& block : views(counts, moved)) {
+    const std::filesystem::path document = with_ending(name, "_" + block.name + ".xdmf");
+    if (block.cells == 0) {
+      std::error_code ignored;
+      std::filesystem::remove(document, ignored);
+      continue;
+    }
+    require_writable(document);
+    documents.push_back(std::make_unique<UnfinishedFile>(document));
+    documents.back()->write(xdmf_document(block, name.filename().string() + ".h5", loads));
+  }
+  unfinished->commit();
+  for (auto& document : documents) document->commit();
+}
+
+ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model)
+    : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.comm = comm;
+  // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
+  s.name = std::filesystem::absolute(name);
+  base::on_first_rank(comm, [&] { s.create(model); });
+  MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
+  s.initial = deal_out(comm, model.points.position);
+  s.on_disk([&] { s.file = base::open_hdf5(s.part(), comm); });
+}
+
+ResultFile::~ResultFile() = default;
+
+void ResultFile::append(const StepNumbers& numbers, const StepRows& rows) {
+  State& s = *state_;
+  base::together(s.comm, [&] { s.require_rows(rows); });
+  base::on_first_rank(s.comm, [&] { s.unfinished->reserve(s.step_bytes()); });
+  const StepNumbers same = of_first_rank(s.comm, numbers);
+  const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
+  s.on_disk([&] { for_each_number(same, WriteAttribute{step}); });
+  s.write_points(step, rows);
+  s.write_elements(step, rows);
+  s.moved.push_back(s.write_bones(step, same.load));
+  s.loads.push_back(same.load);
+  s.on_disk([&] { base::check_hdf5(H5Fflush(s.file, H5F_SCOPE_GLOBAL)); });
+}
+
+void ResultFile::commit() {
+  State& s = *state_;
+  s.on_disk([&] { s.file.close(); });
+  base::on_first_rank(s.comm, [&] { s.publish(); });
+}
+
+}  // namespace repose::results

@@ -1,0 +1,89 @@
+#include "repose/results/unfinished_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "repose/base/error.h"
+
+namespace repose::results {
+
+namespace {
+
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+void make_last(const std::filesystem::path& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool fine = descriptor >= 0 && fsync(descriptor) == 0;
+  const int reason = errno;
+  if (descriptor >= 0) close(descriptor);
+  // Some file systems cannot fsync a folder and say EINVAL.
+  if (!fine && reason != EINVAL)
+    base::refuse("{}: cannot be written: {}", path.string(), std::strerror(reason));
+}
+
+}  // namespace
+
+UnfinishedFile::UnfinishedFile(std::filesystem::path file)
+    : file_(std::move(file)), part_(file_.string() + ".part") {}
+
+UnfinishedFile::~UnfinishedFile() {
+  std::error_code ignored;
+  if (!committed_) std::filesystem::remove(part_, ignored);
+}
+
+void UnfinishedFile::write(const std::string& content) const {
+  std::ofstream out(part_, std::ios::binary | std::ios::trunc);
+  out << content << std::flush;
+  if (!out)
+    base::refuse("{}: cannot be written: {}; free space or choose another -output", part_.string(),
+                 std::strerror(errno));
+}
+
+void UnfinishedFile::reserve(int64_t bytes) const {
+  const int descriptor = open(part_.c_str(), O_WRONLY | O_CLOEXEC);
+  const off_t end = lseek(descriptor, 0, SEEK_END);
+  const bool reserved = fallocate(descriptor, FALLOC_FL_KEEP_SIZE, end, bytes) == 0;
+  const int reason = errno;
+  if (descriptor >= 0) close(descriptor);
+  if (reserved) return;
+  std::error_code error;
+  const auto left = static_cast<int64_t>(std::filesystem::space(folder_of(file_), error).available);
+  if (reason == ENOSPC || reason == EDQUOT || (!error && left < bytes))
+    base::refuse(
+        "{}: needs {:.2f} MB more, its disk has {:.2f} MB left; free space or choose another "
+        "-output",
+        file_.string(), 1e-6 * static_cast<double>(bytes), 1e-6 * static_cast<double>(left));
+}
+
+void UnfinishedFile::commit() {
+  std::error_code error;
+  // Gives back what was reserved and not used.
+  std::filesystem::resize_file(part_, std::filesystem::file_size(part_, error), error);
+  make_last(part_);
+  std::filesystem::rename(part_, file_, error);
+  if (error) base::refuse("{}: cannot be replaced: {}", file_.string(), error.message());
+  committed_ = true;
+  make_last(folder_of(file_));
+}
+
+void require_writable(const std::filesystem::path& file) {
+  const std::filesystem::path folder = folder_of(file);
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
+    base::refuse("{}: cannot be written: there is no folder {}; make it or choose another -output",
+                 file.string(), folder.string());
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    base::refuse("{}: cannot be written: folder {}: {}; choose another -output", file.string(),
+                 folder.string(), std::strerror(errno));
+  for (const std::string& path : {file.string(), file.string() + ".part"})
+    if (std::filesystem::is_directory(path, error))
+      base::refuse("{}: is a folder; remove it or choose another -output", path);
+}
+
+}  // namespace repose::results

@@ -1,0 +1,82 @@
+#include "repose/results/views.h"
+
+#include <fmt/format.h>
+
+namespace repose::results {
+
+namespace {
+
+constexpr const char* small_integer = "NumberType=\"Char\" Precision=\"1\"";
+constexpr const char* short_integer = "NumberType=\"Int\" Precision=\"4\"";
+
+std::vector<std::string> moving_points(size_t steps) {
+  std::vector<std::string> paths;
+  for (size_t step = 0; step < steps; ++step)
+    paths.push_back(fmt::format("/step/{:04}/point/position", step));
+  return paths;
+}
+
+XdmfBlock tissue(const FileCounts& counts, size_t steps) {
+  return {.name = "tissue",
+          .topology = "TopologyType=\"Wedge\"",
+          .corners = 6,
+          .connectivity = "/model/prism/points",
+          .points = counts.points,
+          .cells = counts.prisms,
+          .geometry = moving_points(steps),
+          .arrays = {{"displacement", "step/point/displacement", true, true},
+                     {"residual_force", "step/point/residual_force", true, true},
+                     {"set", "/model/point/set", true, false, small_integer},
+                     {"layer", "/model/point/layer", true, false, short_integer},
+                     {"volume_ratio", "step/prism/volume_ratio"}}};
+}
+
+XdmfBlock springs(const FileCounts& counts, size_t steps) {
+  return {.name = "springs",
+          .topology = "TopologyType=\"Polyline\" NodesPerElement=\"2\"",
+          .corners = 2,
+          .connectivity = "/model/spring/points",
+          .points = counts.points,
+          .cells = counts.springs,
+          .geometry = moving_points(steps),
+          .arrays = {{"elongation", "step/spring/elongation"},
+                     {"tension", "step/spring/tension"},
+                     {"set", "/model/spring/set", false, false, short_integer}}};
+}
+
+XdmfBlock skin(const FileCounts& counts, size_t steps) {
+  return {.name = "skin",
+          .topology = "TopologyType=\"Triangle\"",
+          .corners = 3,
+          .connectivity = "/model/skin/points",
+          .points = counts.points,
+          .cells = counts.skin,
+          .geometry = moving_points(steps),
+          .arrays = {{"displacement", "step/point/displacement", true, true}}};
+}
+
+XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
+  XdmfBlock block{.name = "bones",
+                  .topology = "TopologyType=\"Triangle\"",
+                  .corners = 3,
+                  .connectivity = "/model/bone_surfaces/triangles",
+                  .points = counts.bone_points,
+                  .cells = counts.bone_triangles,
+                  .geometry = {},
+                  .arrays = {{"bone", "/model/bone_surfaces/bone", false, false, short_integer},
+                             {"initial_position", "/model/bone_surfaces/points", true, true}}};
+  for (size_t step = 0; step < moved.size(); ++step)
+    block.geometry.push_back(moved[step] ? fmt::format("/step/{:04}/bone_surface/points", step)
+                                         : "/model/bone_surfaces/points");
+  return block;
+}
+
+}  // namespace
+
+std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<bool>& bones_moved) {
+  const size_t steps = bones_moved.size();
+  return {tissue(counts, steps), springs(counts, steps), skin(counts, steps),
+          bones(counts, bones_moved)};
+}
+
+}  // namespace repose::results

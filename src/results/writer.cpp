@@ -1,0 +1,156 @@
+#include "repose/results/writer.h"
+
+#include <algorithm>
+#include <exception>
+
+namespace repose::results {
+
+using base::check_hdf5;
+
+namespace {
+
+base::Hdf5Space make_space(const std::vector<hsize_t>& shape) {
+  return base::Hdf5Space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr));
+}
+
+base::Hdf5Dataset create_dataset(hid_t place, const std::string& name, hid_t type, hid_t space) {
+  const base::Hdf5Properties creation(H5Pcreate(H5P_DATASET_CREATE));
+  check_hdf5(H5Pset_layout(creation, H5D_CONTIGUOUS));
+  check_hdf5(H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER));
+  check_hdf5(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY));
+  check_hdf5(H5Pset_obj_track_times(creation, false));
+  return base::Hdf5Dataset(
+      H5Dcreate2(place, name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT));
+}
+
+void write_whole(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 hid_t file_type, hid_t memory_type, const void* values) {
+  const base::Hdf5Space space = make_space(shape);
+  const base::Hdf5Dataset dataset = create_dataset(place, name, file_type, space);
+  if (check_hdf5(H5Sget_simple_extent_npoints(space)) > 0)
+    check_hdf5(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values));
+}
+
+base::Hdf5Type fixed_string(size_t length) {
+  base::Hdf5Type type(H5Tcopy(H5T_C_S1));
+  check_hdf5(H5Tset_size(type, std::max<size_t>(length, 1)));
+  check_hdf5(H5Tset_strpad(type, H5T_STR_NULLPAD));
+  return type;
+}
+
+void write_attribute(hid_t object, const char* name, hid_t file_type, hid_t memory_type,
+                     hid_t space, const void* value) {
+  const base::Hdf5Attribute attribute(
+      H5Acreate2(object, name, file_type, space, H5P_DEFAULT, H5P_DEFAULT));
+  check_hdf5(H5Awrite(attribute, memory_type, value));
+}
+
+}  // namespace
+
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const double* values) {
+  write_whole(place, name, shape, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values);
+}
+
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const int64_t* values) {
+  write_whole(place, name, shape, H5T_STD_I64LE, H5T_NATIVE_INT64, values);
+}
+
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const int32_t* values) {
+  write_whole(place, name, shape, H5T_STD_I32LE, H5T_NATIVE_INT32, values);
+}
+
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const int8_t* values) {
+  write_whole(place, name, shape, H5T_STD_I8LE, H5T_NATIVE_INT8, values);
+}
+
+void write_strings(hid_t place, const std::string& name, const std::vector<std::string>& values) {
+  size_t width = 1;
+  for (const std::string& value : values) width = std::max(width, value.size());
+  std::string bytes;
+  for (const std::string& value : values) bytes += value + std::string(width - value.size(), '\0');
+  const base::Hdf5Type type = fixed_string(width);
+  write_whole(place, name, {values.size()}, type, type, bytes.data());
+}
+
+void write_attribute(hid_t object, const char* name, double value) {
+  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
+  write_attribute(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, one, &value);
+}
+
+void write_attribute(hid_t object, const char* name, int64_t value) {
+  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
+  write_attribute(object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, one, &value);
+}
+
+void write_attribute(hid_t object, const char* name, const std::string& value) {
+  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
+  const base::Hdf5Type type = fixed_string(value.size());
+  write_attribute(object, name, type, type, one, value.c_str());
+}
+
+void write_attribute(hid_t object, const char* name, const std::vector<double>& values) {
+  write_attribute(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, make_space({values.size()}),
+                  values.data());
+}
+
+namespace {
+
+constexpr int64_t piece_bytes = int64_t{1} << 28;
+
+/// Writes rows [begin, end) of the slab, possibly none; every rank calls it.
+void write_piece(hid_t dataset, hid_t file_space, hid_t transfer, const base::Slab& rows,
+                 int64_t columns, const double* values) {
+  const int dimensions = columns == 0 ? 1 : 2;
+  const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
+  const hsize_t count[2] = {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(columns)};
+  const base::Hdf5Space memory(H5Screate_simple(dimensions, count, nullptr));
+  if (rows.rows() == 0) {
+    check_hdf5(H5Sselect_none(file_space));
+    check_hdf5(H5Sselect_none(memory));
+  } else {
+    check_hdf5(H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start, nullptr, count, nullptr));
+  }
+  check_hdf5(H5Dwrite(dataset, H5T_NATIVE_DOUBLE, memory, file_space, transfer, values));
+}
+
+}  // namespace
+
+base::Hdf5Dataset create_rows(hid_t place, const std::string& name, int64_t rows, int64_t columns) {
+  std::vector<hsize_t> shape = {static_cast<hsize_t>(rows)};
+  if (columns > 0) shape.push_back(columns);
+  return create_dataset(place, name, H5T_IEEE_F64LE, make_space(shape));
+}
+
+void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Slab& mine,
+                const double* values) {
+  const base::Hdf5Space space(H5Dget_space(dataset));
+  if (check_hdf5(H5Sget_simple_extent_npoints(space)) == 0) return;
+  hsize_t shape[2] = {0, 0};
+  check_hdf5(H5Sget_simple_extent_dims(space, shape, nullptr));
+  const auto columns = static_cast<int64_t>(shape[1]), width = std::max<int64_t>(columns, 1);
+  const base::Hdf5Properties transfer(H5Pcreate(H5P_DATASET_XFER));
+  check_hdf5(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE));
+  // Slabs are contiguous: nothing to gather, and MPI-IO's own collective writes hang on a disk
+  // error.
+  check_hdf5(H5Pset_dxpl_mpio_collective_opt(transfer, H5FD_MPIO_INDIVIDUAL_IO));
+  const int64_t step = std::max<int64_t>(piece_bytes / (8 * width), 1);
+  int64_t longest = mine.rows();
+  MPI_Allreduce(MPI_IN_PLACE, &longest, 1, MPI_INT64_T, MPI_MAX, comm);
+  static const double nothing = 0;
+  std::exception_ptr failure;
+  for (int64_t done = 0; done < longest; done += step) try {
+      const base::Slab piece{std::min(mine.begin + done, mine.end),
+                             std::min(mine.begin + done + step, mine.end)};
+      write_piece(dataset, space, transfer, piece, columns,
+                  values ? values + (piece.begin - mine.begin) * width : &nothing);
+    } catch (const base::Hdf5Error&) {
+      failure = std::current_exception();
+    }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace repose::results

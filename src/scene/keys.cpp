@@ -1,0 +1,238 @@
+#include "repose/scene/keys.h"
+
+#include <algorithm>
+
+#include "repose/base/error.h"
+
+namespace repose::scene {
+
+namespace {
+
+using base::Range;
+using enum KeyKind;
+
+std::vector<Key> surface_keys() {
+  return {{"skin", file, "required", "Triangle mesh of the skin, open or closed."},
+          {"skin.volume", not_modelled, "", "give a triangle mesh of the skin"},
+          {"bones", list, "required", "The bones, each a triangle mesh; the list may be empty."},
+          {"bones[].name", text, "required",
+           "The bone's name: printable ASCII, 64 characters at most."},
+          {"bones[].file", file, "required", "Triangle mesh of the bone."},
+          {"bones[].volume", not_modelled, "", "give a triangle mesh of the bone"},
+          {"bones[].file.volume", not_modelled, "", "give a triangle mesh of the bone"}};
+}
+
+std::vector<Key> tissue_keys() {
+  return {{"tissue", map, "required", "The soft tissue between skin and bone."},
+          {"tissue.layers", integer, "required", "Point layers, skin and deepest included.", "",
+           Range::between(2, 64)},
+          {"tissue.depths", numbers, "",
+           "Where each layer lies, as fractions of the skin–bone distance: "
+           "one a layer, from 0 to 1, increasing; evenly spaced when not given.",
+           "", Range::between(0, 1)},
+          {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
+           "mm", Range::at_least(0)},
+          {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
+           Range::above(0)},
+          {"tissue.release", number, "10",
+           "Tissue lets go of bone this near to a piece that moves differently; 0 never does.",
+           "mm", Range::at_least(0)},
+          {"tissue.unattached", list, "",
+           "Regions that touch bone but do not hold to it (lips, cheeks)."},
+          {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
+          {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
+          {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
+           Range::above(0)},
+          {"tissue.turgor", number, "0", "Initial strain of the skin's springs.", "",
+           Range::between(0, 1)},
+          {"tissue.mass", numbers, "", "Mass of each layer, one a layer; excludes density.", "kg",
+           Range::at_least(0)},
+          {"tissue.density", number, "", "Density of the tissue; excludes mass.", "kg/mm³",
+           Range::above(0)}};
+}
+
+std::vector<Key> spring_keys() {
+  return {
+      {"tissue.springs", map, "",
+       "Rules for the springs, by set: default, layer, connecting, diagonal, or one of them with "
+       "its "
+       "number (\"layer 0\" is the skin, \"connecting 0\" joins layers 0 and 1). What a rule "
+       "leaves "
+       "out comes from the more general one."},
+      {"tissue.springs.*.stiffness", number, "", "Stiffness k0; excludes modulus.", "N/mm",
+       Range::above(0)},
+      {"tissue.springs.*.modulus", number, "",
+       "Modulus Y, from which k0 = Y · v / r_0²; excludes stiffness.", "N/mm²", Range::above(0)},
+      {"tissue.springs.*.law",
+       choice,
+       "",
+       "Spring law: T = k0 (1 + σ²)^p s with p = 0, 1, 2.",
+       "",
+       {},
+       {"linear", "quadratic", "quartic"}},
+      {"tissue.springs.*.reference",
+       number,
+       "",
+       "Elongation s_ref that makes σ = s / s_ref; initial means each spring's own initial length.",
+       "mm",
+       Range::above(0),
+       {"initial"}}};
+}
+
+std::vector<Key> load_keys() {
+  return {{"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
+          {"boundary", map, "", "What holds the skin where it ends."},
+          {"boundary.rim",
+           choice,
+           "fixed",
+           "The outermost border of an open skin.",
+           "",
+           {},
+           {"fixed", "free"}},
+          {"forces", list, "", "External forces on the skin."},
+          {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
+          {"forces[].radius", number, "required", "Spread over the skin points within, by area.",
+           "mm", Range::above(0)},
+          {"forces[].force", vector, "required", "The force in total.", "N"}};
+}
+
+/// The forms translate and rotate, below an entry of moves and below an item of a transform.
+std::vector<Key> form_keys(const std::string& above) {
+  return {{above + ".translate", vector, "", "Form: a translation.", "mm"},
+          {above + ".rotate", map, "", "Form: a rotation by the right-hand rule."},
+          {above + ".rotate.axis", vector, "required", "Direction of the axis, of any length."},
+          {above + ".rotate.center", vector, "required", "A point on the axis.", "mm"},
+          {above + ".rotate.angle", number, "required", "Angle.", "degrees",
+           Range::between(-180, 180)}};
+}
+
+std::vector<Key> move_keys() {
+  std::vector<Key> rows{{"moves", list, "",
+                         "Rigid motions of bones. Each entry has one form, or a list of that "
+                         "form's values applied in "
+                         "order; several entries of one bone apply in the order of the file."},
+                        {"moves[].bone", text, "required", "The name of a bone."}};
+  const std::vector<Key> forms = form_keys("moves[]"), listed = form_keys("moves[].transform[]");
+  rows.insert(rows.end(), forms.begin(), forms.end());
+  rows.push_back(
+      {"moves[].transform", transform, "",
+       "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four rows "
+       "of four numbers, or a list of forms."});
+  rows.push_back({"moves[].transform[]", transform, "",
+                  "One form of such a list: a file, a matrix, or one of the two below."});
+  rows.insert(rows.end(), listed.begin(), listed.end());
+  return rows;
+}
+
+std::vector<Key> solve_keys() {
+  return {{"solve", map, "", "How the rest position is found."},
+          {"solve.functional", choice, "energy", "What is minimised.", "", {}, {"energy", "force"}},
+          {"solve.volume", map, "", "How the tissue keeps its volume."},
+          {"solve.volume.form",
+           choice,
+           "penalty",
+           "Form of the volume term.",
+           "",
+           {},
+           {"none", "paper", "penalty", "exact"}},
+          {"solve.volume.bulk_modulus", number, "",
+           "Bulk modulus κ of the penalty; 10 × the tissue's effective modulus when not given.",
+           "N/mm²", Range::above(0)},
+          {"solve.lambda", number, "0.5",
+           "Weight λ of the volume form paper; no other form uses it.", "", Range::between(0, 1)},
+          {"solve.accuracy", number, "0.1", "Largest distance to the rest position allowed.", "mm",
+           Range::above(0)},
+          {"solve.load_steps",
+           integer,
+           "auto",
+           "Parts in which the bones are moved.",
+           "",
+           Range::between(1, 100000),
+           {"auto"}}};
+}
+
+std::vector<Key> later_keys() {
+  return {{"osteotomies", not_modelled, "", "give the cut pieces as bones of their own"},
+          {"collision", not_modelled, "", "plan the moves so that no bones touch"},
+          {"instruments", not_modelled, "", "press on the skin with forces"},
+          {"incisions", not_modelled, "", "cut the mesh of the skin beforehand"}};
+}
+
+/// The column "value" of the documentation.
+std::string value_column(const Key& key) { return key.kind == not_modelled ? "–" : wanted(key); }
+
+std::string sentence_column(const Key& key) {
+  if (key.kind != not_modelled) return key.sentence;
+  return fmt::format("Refused: this version does not model it; {}.", key.sentence);
+}
+
+}  // namespace
+
+const std::vector<Key>& all_keys() {
+  static const std::vector<Key> table = [] {
+    std::vector<Key> rows;
+    for (const auto& part : {surface_keys(), tissue_keys(), spring_keys(), load_keys(), move_keys(),
+                             solve_keys(), later_keys()})
+      rows.insert(rows.end(), part.begin(), part.end());
+    return rows;
+  }();
+  return table;
+}
+
+const Key& find_key(std::string_view path) {
+  const auto found = std::find_if(all_keys().begin(), all_keys().end(),
+                                  [&](const Key& key) { return key.path == path; });
+  if (found != all_keys().end()) return *found;
+  throw base::InternalError(fmt::format("the table of scene keys has no {}", path));
+}
+
+std::vector<const Key*> keys_below(std::string_view path) {
+  const std::string above = path.empty() ? "" : fmt::format("{}.", path);
+  std::vector<const Key*> result;
+  for (const Key& key : all_keys())
+    if (key.path.starts_with(above) &&
+        key.path.find_first_of(".[", above.size()) == std::string::npos)
+      result.push_back(&key);
+  return result;
+}
+
+std::string last_word(std::string_view path) {
+  return std::string(path.substr(path.rfind('.') + 1));
+}
+
+std::string wanted(const Key& key) {
+  switch (key.kind) {
+    case map:
+      return "a map";
+    case list:
+      return "a list";
+    case number:
+    case integer:
+      return base::wanted_number(key.kind == integer, key.unit, key.range, key.choices);
+    case numbers:
+      return fmt::format("a list, each {}", base::wanted_number(false, key.unit, key.range, {}));
+    case vector:
+      return fmt::format("three numbers [x, y, z]{}{}", key.unit.empty() ? "" : " of ", key.unit);
+    case choice:
+      return fmt::format("one of {}", fmt::join(key.choices, ", "));
+    case text:
+      return "a text";
+    case file:
+      return "a file, relative to the scene's folder";
+    case transform:
+      return "a file, a 4×4 matrix, or a list";
+    case not_modelled:
+      return "nothing";
+  }
+  return {};
+}
+
+std::string describe_keys() {
+  std::string text = "| key | value | default | meaning |\n|---|---|---|---|\n";
+  for (const Key& key : all_keys())
+    text += fmt::format("| `{}` | {} | {} | {} |\n", key.path, value_column(key),
+                        key.standard.empty() ? "–" : key.standard, sentence_column(key));
+  return text;
+}
+
+}  // namespace repose::scene

@@ -1,0 +1,196 @@
+#include <algorithm>
+
+#include "read_moves.h"
+#include "read_yaml.h"
+#include "repose/base/nearest.h"
+#include "repose/scene/scene.h"
+#include "value.h"
+
+namespace repose::scene {
+
+namespace {
+
+/// Sets `target` from an optional key by one of Value's functions; leaves its default otherwise.
+template <class Target, class Result>
+void set(Target& target, const Map& map, const char* name, Result (Value::*read)() const) {
+  if (const auto value = map.find(name)) target = ((*value).*read)();
+}
+
+/// The same for an enumeration whose values are numbered as the key's choices.
+template <class Enum>
+void set_choice(Enum& target, const Map& map, const char* name) {
+  if (const auto value = map.find(name)) target = static_cast<Enum>(value->choice());
+}
+
+std::string read_name(const Value& value) {
+  const std::string name = value.text();
+  const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
+  if (name.size() > 64 || !std::all_of(name.begin(), name.end(), printable))
+    value.refuse("{} must be printable ASCII, 64 characters at most", base::shown(name));
+  return name;
+}
+
+std::vector<BoneEntry> read_bones(const Value& value) {
+  std::vector<BoneEntry> bones;
+  for (const Value& item : value.items()) {
+    const Map map(item);
+    const Value name = map.at("name");
+    const BoneEntry bone{read_name(name), map.at("file").file()};
+    for (const BoneEntry& other : bones)
+      if (other.name == bone.name)
+        name.refuse("{} is the name of two bones; rename one", base::shown(bone.name));
+    bones.push_back(bone);
+  }
+  return bones;
+}
+
+std::vector<double> even_depths(int layers) {
+  std::vector<double> depths(layers);
+  for (int a = 0; a < layers; ++a) depths[a] = static_cast<double>(a) / (layers - 1);
+  return depths;
+}
+
+std::vector<double> read_one_a_layer(const Value& value, int layers) {
+  const std::vector<double> numbers = value.numbers();
+  if (numbers.size() != static_cast<std::size_t>(layers))
+    value.refuse("must have one number a layer: {} layers, it has {}", layers, numbers.size());
+  return numbers;
+}
+
+std::vector<double> read_depths(const Value& value, int layers) {
+  const std::vector<double> depths = read_one_a_layer(value, layers);
+  if (depths.front() != 0 || depths.back() != 1)
+    value.refuse(
+        "must begin with 0 (the skin) and end with 1 (the bone), it goes from {:g} to {:g}",
+        depths.front(), depths.back());
+  for (int a = 1; a < layers; ++a)
+    if (!(depths[a] > depths[a - 1]))
+      value.elements()[a].refuse("must be greater than the one before ({:g}), it is {:g}",
+                                 depths[a - 1], depths[a]);
+  return depths;
+}
+
+std::vector<SphereRegion> read_regions(const Value& value) {
+  std::vector<SphereRegion> regions;
+  for (const Value& item : value.items()) {
+    const Map sphere(Map(item).at("sphere"));
+    regions.push_back({sphere.at("center").vector(), sphere.at("radius").number()});
+  }
+  return regions;
+}
+
+/// Every name a spring rule may have in a model of so many layers.
+std::vector<std::string> rule_names(int layers) {
+  std::vector<std::string> names{"default"};
+  for (const char* kind : {"layer", "connecting", "diagonal"}) {
+    const int sets = std::string_view(kind) == "layer" ? layers : layers - 1;
+    names.push_back(kind);
+    for (int a = 0; a < sets; ++a) names.push_back(fmt::format("{} {}", kind, a));
+  }
+  return names;
+}
+
+SpringRule read_rule(const Value& value) {
+  const Map map(value);
+  SpringRule rule;
+  set(rule.stiffness, map, "stiffness", &Value::number);
+  set(rule.modulus, map, "modulus", &Value::number);
+  if (rule.stiffness && rule.modulus)
+    value.refuse("gives stiffness and modulus, which exclude each other; remove one");
+  if (const auto law = map.find("law")) rule.law = static_cast<Law>(law->choice());
+  if (const auto reference = map.find("reference"))
+    rule.reference = reference->is_word("initial") ? 0.0 : reference->number();
+  return rule;
+}
+
+std::map<std::string, SpringRule> read_rules(const Value& value, int layers) {
+  const std::vector<std::string> names = rule_names(layers);
+  std::map<std::string, SpringRule> rules;
+  for (const auto& [name, rule] : value.named()) {
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      rule.refuse(
+          "is no set of springs; the nearest is '{}' (layer 0 … {}, connecting and diagonal 0 … "
+          "{})",
+          base::nearest(name, names), layers - 1, layers - 2);
+    rules[name] = read_rule(rule);
+  }
+  return rules;
+}
+
+void read_mass(Tissue& tissue, const Map& map) {
+  const auto mass = map.find("mass");
+  if (mass) tissue.mass = read_one_a_layer(*mass, tissue.layers);
+  set(tissue.density, map, "density", &Value::number);
+  if (mass && tissue.density) mass->refuse("and tissue.density exclude each other; remove one");
+}
+
+Tissue read_tissue(const Value& value) {
+  const Map map(value);
+  Tissue tissue;
+  tissue.layers = map.at("layers").integer();
+  const auto depths = map.find("depths");
+  tissue.depths = depths ? read_depths(*depths, tissue.layers) : even_depths(tissue.layers);
+  set(tissue.attach_within, map, "attach_within", &Value::number);
+  set(tissue.free_thickness, map, "free_thickness", &Value::number);
+  set(tissue.release, map, "release", &Value::number);
+  if (const auto regions = map.find("unattached")) tissue.unattached = read_regions(*regions);
+  if (const auto springs = map.find("springs"))
+    tissue.springs = read_rules(*springs, tissue.layers);
+  set(tissue.turgor, map, "turgor", &Value::number);
+  read_mass(tissue, map);
+  return tissue;
+}
+
+std::vector<Force> read_forces(const Value& value) {
+  std::vector<Force> forces;
+  for (const Value& item : value.items()) {
+    const Map map(item);
+    forces.push_back({map.at("at").vector(), map.at("radius").number(), map.at("force").vector()});
+  }
+  return forces;
+}
+
+Solve read_solve(const Value& value) {
+  const Map map(value);
+  Solve solve;
+  set_choice(solve.functional, map, "functional");
+  if (const auto volume = map.find("volume")) {
+    const Map term(*volume);
+    set_choice(solve.volume, term, "form");
+    set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
+  }
+  set(solve.lambda, map, "lambda", &Value::number);
+  set(solve.accuracy, map, "accuracy", &Value::number);
+  if (const auto steps = map.find("load_steps"))
+    solve.load_steps = steps->is_word("auto") ? 0 : steps->integer();
+  return solve;
+}
+
+void read_surroundings(Scene& scene, const Map& map) {
+  if (const auto gravity = map.find("gravity")) {
+    scene.gravity = gravity->vector();
+    if (scene.tissue.mass.empty() && !scene.tissue.density)
+      gravity->refuse("needs a mass to pull; give tissue.mass or tissue.density, or remove it");
+  }
+  if (const auto boundary = map.find("boundary"))
+    if (const auto rim = Map(*boundary).find("rim")) scene.rim_fixed = rim->choice() == 0;
+  if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);
+}
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& file) {
+  const Map map(Value(file, read_yaml(file)));
+  Scene scene;
+  scene.file = file;
+  scene.skin = map.at("skin").file();
+  scene.bones = read_bones(map.at("bones"));
+  scene.tissue = read_tissue(map.at("tissue"));
+  read_surroundings(scene, map);
+  scene.moves.resize(scene.bones.size());
+  if (const auto moves = map.find("moves")) scene.moves = read_moves(*moves, scene.bones);
+  if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);
+  return scene;
+}
+
+}  // namespace repose::scene

@@ -1,0 +1,210 @@
+#include "value.h"
+
+#include <algorithm>
+
+#include "repose/base/nearest.h"
+
+namespace repose::scene {
+
+namespace {
+
+std::string joined(const std::string& above, const std::string& name) {
+  return above.empty() ? name : fmt::format("{}.{}", above, name);
+}
+
+}  // namespace
+
+Value::Value(std::filesystem::path file, YAML::Node root)
+    : file_(std::make_shared<const std::filesystem::path>(std::move(file))),
+      node_(root),
+      mark_(root.Mark()) {}
+
+Value::Value(const Value& parent, YAML::Node node, const YAML::Mark& mark, std::string path,
+             std::string place)
+    : file_(parent.file_),
+      node_(node),
+      mark_(mark),
+      path_(std::move(path)),
+      place_(std::move(place)) {}
+
+void Value::refuse_at(const YAML::Mark& mark, const std::string& text) const {
+  base::refuse("{}:{}:{}: {} {}", file_->string(), mark.line + 1, mark.column + 1,
+               place_.empty() ? "the scene" : place_, text);
+}
+
+void Value::refuse_kind() const {
+  refuse("must be {}, it is {}", wanted(find_key(path_)), shown());
+}
+
+double Value::number_as(const std::string& wanted) const {
+  const auto value = node_.IsScalar() ? base::parse_number(node_.Scalar()) : std::nullopt;
+  if (!value || !find_key(path_).range.contains(*value))
+    refuse("must be {}, it is {}", wanted, shown());
+  return *value;
+}
+
+std::string Value::shown() const {
+  if (is_map()) return "a map";
+  if (is_list()) return "a list";
+  return node_.IsScalar() ? base::shown(node_.Scalar()) : "empty";
+}
+
+double Value::number() const { return number_as(wanted(find_key(path_))); }
+
+int Value::integer() const {
+  const auto value = node_.IsScalar() ? base::parse_integer(node_.Scalar()) : std::nullopt;
+  if (!value || !find_key(path_).range.contains(static_cast<double>(*value))) refuse_kind();
+  return static_cast<int>(*value);
+}
+
+std::string Value::text() const {
+  if (!node_.IsScalar() || node_.Scalar().empty()) refuse_kind();
+  return node_.Scalar();
+}
+
+int Value::choice() const {
+  const std::vector<std::string>& choices = find_key(path_).choices;
+  const std::string word = node_.IsScalar() ? node_.Scalar() : std::string{};
+  const auto found = std::find(choices.begin(), choices.end(), word);
+  if (found == choices.end())
+    refuse("must be {}, it is {}; the nearest is {}", wanted(find_key(path_)), shown(),
+           base::nearest(word, choices));
+  return static_cast<int>(found - choices.begin());
+}
+
+Vec3 Value::vector() const {
+  if (!is_list() || node_.size() != 3) refuse_kind();
+  const std::vector<double> xyz = numbers();
+  return {xyz[0], xyz[1], xyz[2]};
+}
+
+std::vector<double> Value::numbers() const {
+  const Key& key = find_key(path_);
+  const std::string wanted = base::wanted_number(false, key.unit, key.range, {});
+  std::vector<double> result;
+  for (const Value& element : elements()) result.push_back(element.number_as(wanted));
+  return result;
+}
+
+std::filesystem::path Value::file() const {
+  if (is_map() && !keys_below(path_).empty()) Map{*this};
+  const std::filesystem::path name = text();
+  const auto path =
+      std::filesystem::absolute(std::filesystem::absolute(*file_).parent_path() / name)
+          .lexically_normal();
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    refuse("names the folder {}; a file is needed", base::shown(name.string()));
+  if (!std::filesystem::is_regular_file(path, error))
+    refuse("names {}, which is no file (paths are relative to the scene's folder)",
+           base::shown(name.string()));
+  return path;
+}
+
+std::vector<Value> Value::list(const std::string& path) const {
+  if (!is_list()) refuse_kind();
+  std::vector<Value> result;
+  for (std::size_t i = 0; i < node_.size(); ++i)
+    result.push_back({*this, node_[i], node_[i].Mark(), path, fmt::format("{}[{}]", place_, i)});
+  return result;
+}
+
+std::vector<Value> Value::items() const { return list(path_ + "[]"); }
+
+std::vector<Value> Value::elements() const { return list(path_); }
+
+std::vector<std::pair<std::string, Value>> Value::named() const {
+  std::vector<std::pair<std::string, Value>> result;
+  for (const Entry& entry : entries())
+    result.push_back({entry.name, Value(*this, entry.value, entry.mark, joined(path_, "*"),
+                                        fmt::format("{} \"{}\"", place_, entry.name))});
+  return result;
+}
+
+std::vector<Value::Entry> Value::entries() const {
+  std::vector<Entry> found;
+  if (!is_map()) refuse("must be a map, it is {}", shown());
+  add_entries(node_, false, 0, found);
+  return found;
+}
+
+void Value::add_entries(const YAML::Node& map, bool merged, int depth,
+                        std::vector<Entry>& found) const {
+  constexpr int deepest = 8;
+  if (depth > deepest) refuse("merges (<<) more than {} deep, or itself", deepest);
+  for (const auto& pair : map) {
+    if (!pair.first.IsScalar()) refuse_at(pair.first.Mark(), "has a key that is not a text");
+    const std::string& name = pair.first.Scalar();
+    if (name != "<<") {
+      add_entry({name, pair.first.Mark(), pair.second, merged}, found);
+    } else if (pair.second.IsMap()) {
+      add_entries(pair.second, true, depth + 1, found);
+    } else if (pair.second.IsSequence()) {
+      for (const auto& part : pair.second) add_entries(part, true, depth + 1, found);
+    } else {
+      refuse_at(pair.first.Mark(), "merges (<<) what is not a map");
+    }
+  }
+}
+
+/// What stands in the map itself beats what is merged into it, and an earlier merge a later one.
+void Value::add_entry(Entry entry, std::vector<Entry>& found) const {
+  const auto same = std::find_if(found.begin(), found.end(),
+                                 [&](const Entry& other) { return other.name == entry.name; });
+  if (same == found.end())
+    found.push_back(std::move(entry));
+  else if (!entry.merged && !same->merged)
+    refuse_at(entry.mark, fmt::format("has the key {} twice (first in line {}); remove one",
+                                      base::shown(entry.name), same->mark.line + 1));
+  else if (!entry.merged)
+    *same = std::move(entry);
+}
+
+Map::Map(const Value& value) : itself_(value), entries_(value.entries()) {
+  for (const Value::Entry& entry : entries_) check_known(entry);
+  for (const Key* key : keys_below(itself_.path_))
+    if (key->required() && !find(last_word(key->path)))
+      itself_.refuse("lacks the key '{}': {}", last_word(key->path), wanted(*key));
+}
+
+void Map::check_known(const Value::Entry& entry) const {
+  for (const Key* key : keys_below(itself_.path_)) {
+    if (last_word(key->path) != entry.name) continue;
+    if (key->kind == KeyKind::not_modelled)
+      base::refuse("{}:{}:{}: this version does not model {}; remove it or {}",
+                   itself_.file_->string(), entry.mark.line + 1, entry.mark.column + 1,
+                   joined(itself_.place_, entry.name), key->sentence);
+    if (!entry.value.IsNull()) return;
+    itself_.refuse_at(entry.mark, fmt::format("has no value for '{}': give {}, or remove the key",
+                                              entry.name, wanted(*key)));
+  }
+  refuse_unknown(entry);
+}
+
+void Map::refuse_unknown(const Value::Entry& entry) const {
+  std::vector<std::string> siblings;
+  for (const Key* key : keys_below(itself_.path_)) siblings.push_back(last_word(key->path));
+  std::string best = base::nearest(entry.name, siblings);
+  // A known key in the wrong place is likelier than a sibling with most of its letters wrong.
+  if (base::edit_distance(entry.name, best) > 2)
+    for (const Key& key : all_keys())
+      if (base::edit_distance(entry.name, last_word(key.path)) <= 1) best = key.path;
+  itself_.refuse_at(entry.mark, fmt::format("has an unknown key {}; the nearest known one is '{}'",
+                                            base::shown(entry.name), best));
+}
+
+std::optional<Value> Map::find(const std::string& name) const {
+  for (const Value::Entry& entry : entries_)
+    if (entry.name == name)
+      return Value(itself_, entry.value, entry.value.Mark(), joined(itself_.path_, name),
+                   joined(itself_.place_, name));
+  return std::nullopt;
+}
+
+Value Map::at(const std::string& name) const {
+  if (auto value = find(name)) return *value;
+  throw base::InternalError(
+      fmt::format("scene key {} is not required in the table", joined(itself_.path_, name)));
+}
+
+}  // namespace repose::scene

@@ -1,0 +1,215 @@
+#include "repose/solve/minimiser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "repose/base/petsc_versions.h"
+
+namespace repose::solve {
+
+using base::check;
+
+namespace {
+
+constexpr double safety = 1.5;  // the estimate is this many Newton steps long
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+bool uses_hessian(Tao tao) {
+  PetscBool newton = PETSC_FALSE;
+  check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(tao), &newton, TAONLS, TAONTR,
+                                  TAONTL, TAOBNLS, TAOBNTR, TAOBNTL, ""));
+  return newton;
+}
+
+std::string reason_text(TaoConvergedReason reason) {
+  switch (reason) {
+    case TAO_CONVERGED_USER:
+      return "rest position within the accuracy";
+    case TAO_CONVERGED_GATOL:
+    case TAO_CONVERGED_GRTOL:
+    case TAO_CONVERGED_GTTOL:
+      return "gradient below -tao tolerance";
+    case TAO_DIVERGED_MAXITS:
+      return "iteration limit (-tao_max_it)";
+    case TAO_DIVERGED_MAXFCN:
+      return "evaluation limit (-tao_max_funcs)";
+    case TAO_DIVERGED_LS_FAILURE:
+      return "line search failed";
+    case TAO_DIVERGED_TR_REDUCTION:
+      return "trust region vanished";
+    case TAO_DIVERGED_NAN:
+      return "values not finite";
+    default:
+      return std::string("TAO: ") + TaoConvergedReasons[reason];
+  }
+}
+
+}  // namespace
+
+/// The C functions TAO calls. Nothing is thrown through C: an exception is kept for run().
+struct Minimiser::Callbacks {
+  template <class Work>
+  static PetscErrorCode guarded(void* context, Work&& work) {
+    auto* self = static_cast<Minimiser*>(context);
+    try {
+      work(*self);
+      return PETSC_SUCCESS;
+    } catch (...) {
+      self->thrown_ = std::current_exception();
+      return PETSC_ERR_USER;
+    }
+  }
+
+  static PetscErrorCode value_and_gradient(Tao, Vec x, PetscReal* value, Vec gradient, void* me) {
+    return guarded(me, [&](Minimiser& self) { *value = self.objective_.evaluate(x, gradient); });
+  }
+
+  static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
+    return guarded(me, [&](Minimiser& self) { self.solver_.tangent().assemble(x); });
+  }
+
+  static PetscErrorCode converged(Tao tao, void* me) {
+    return guarded(me, [&](Minimiser& self) {
+      PetscInt iteration = 0;
+      PetscReal value = 0;
+      check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, nullptr, nullptr));
+      Vec x = nullptr, g = nullptr;
+      check(TaoGetSolution(tao, &x));
+      check(TaoGetGradient(tao, &g, nullptr, nullptr));
+      const double force = largest_block(g);
+      const bool done = self.near_enough(x, g, force);
+      if (self.watch_)
+        self.watch_({iteration, self.objective_.positions().load(), value, force, self.error_});
+      check(TaoDefaultConvergenceTest(tao, nullptr));
+      if (done) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+    });
+  }
+};
+
+Minimiser::Minimiser(Objective& objective, std::function<void(const Iteration&)> watch)
+    : objective_(objective),
+      solver_(objective),
+      watch_(std::move(watch)),
+      gradient_(objective.positions().make_vector()),
+      saved_(objective.positions().make_vector()) {
+  make_tao();
+}
+
+void Minimiser::make_tao() {
+  check(TaoCreate(objective_.positions().comm(), tao_.out()));
+  check(TaoSetType(tao_, TAONTR));
+  check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
+  check(TaoSetHessian(tao_, solver_.tangent().exact(), solver_.tangent().convex(),
+                      Callbacks::hessian, this));
+  check(TaoSetTolerances(tao_, 0, 0, 0));
+  check(TaoSetMaximumIterations(tao_, 5000));
+  check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
+  check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
+  check(TaoSetFromOptions(tao_));
+  newton_ = uses_hessian(tao_);
+  if (!newton_) return;
+  KSP inner = nullptr;
+  check(TaoGetKSP(tao_, &inner));
+  check(KSPSetPC(inner, solver_.preconditioner()));
+  check(KSPSetNormType(inner, KSP_NORM_NATURAL));
+  check(KSPSetTolerances(inner, 1e-2, 0.0, PETSC_DEFAULT, 200));
+  check(KSPSetFromOptions(inner));
+}
+
+double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
+  return safety * solver_.newton_distance(displacement, gradient);
+}
+
+bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
+  if (largest_force == 0) {
+    error_ = 0;
+    return true;
+  }
+  // A Newton method needs this state's Hessian anyway; others look only when the force that went
+  // with a distance at the last look says it is worth it.
+  constexpr double hopeful = 2;
+  if (!newton_ && softest_ > 0 && largest_force > hopeful * softest_ * accuracy_) {
+    error_ = largest_force / softest_;
+    return false;
+  }
+  error_ = strict_estimate(displacement, gradient);
+  if (std::isfinite(error_))
+    softest_ = largest_force / error_;
+  else
+    softest_ = 2 * std::max(softest_, largest_force / accuracy_);
+  return error_ <= accuracy_;
+}
+
+int Minimiser::polish(Vec displacement) {
+  constexpr int most = 8;
+  int corrections = 0;
+  while (corrections < most && error_ > accuracy_ && error_ <= std::max(1e-3, 10 * accuracy_)) {
+    const double before = error_;
+    check(VecCopy(displacement, saved_));
+    check(VecAXPY(displacement, -1.0, solver_.latest()));
+    measure(displacement);
+    if (error_ > 0.5 * before) {
+      check(VecCopy(saved_, displacement));
+      measure(displacement);
+      break;
+    }
+    ++corrections;
+  }
+  return corrections;
+}
+
+double Minimiser::measure(Vec displacement) {
+  const double objective = objective_.evaluate(displacement, gradient_);
+  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_);
+  return objective;
+}
+
+Outcome Minimiser::summary(Vec displacement) {
+  measure(displacement);
+  const int corrections = polish(displacement);
+  Outcome outcome;
+  outcome.objective = objective_.evaluate(displacement, gradient_);
+  outcome.gradient_max = largest_block(gradient_);
+  outcome.displacement_error = error_;
+  outcome.stable = std::isfinite(error_);
+  outcome.converged = error_ <= accuracy_;
+  TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
+  PetscInt iterations = 0;
+  check(TaoGetConvergedReason(tao_, &reason));
+  check(TaoGetIterationNumber(tao_, &iterations));
+  outcome.iterations = iterations + corrections;
+  outcome.reason = outcome.converged ? reason_text(TAO_CONVERGED_USER) : reason_text(reason);
+  if (corrections > 0)
+    outcome.reason += fmt::format(", {} Newton corrections at the rounding level", corrections);
+  if (!outcome.stable) outcome.reason += ", at a point that is not a minimum";
+  return outcome;
+}
+
+Outcome Minimiser::run(Vec displacement, double accuracy) {
+  accuracy_ = accuracy;
+  softest_ = 0;
+  thrown_ = nullptr;
+  check(TaoSetSolution(tao_, displacement));
+  const PetscErrorCode code = TaoSolve(tao_);
+  if (thrown_) std::rethrow_exception(thrown_);
+  check(code);
+  return summary(displacement);
+}
+
+bool Minimiser::predict(Vec displacement, double load, Vec increment) {
+  Positions& positions = objective_.positions();
+  positions.update(displacement);
+  const Part& part = positions.part();
+  std::vector<Vec3> direction(positions.local().size(), Vec3::Zero());
+  for (size_t i = 0; i < direction.size(); ++i)
+    if (part.unknown[i] < 0)
+      direction[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  base::VecHandle force = positions.make_vector();
+  objective_.hessian_action(direction, force);
+  check(VecScale(force, -1));
+  check(VecSet(increment, 0));
+  return solver_.solve(displacement, force, increment, 1e-2);
+}
+
+}  // namespace repose::solve

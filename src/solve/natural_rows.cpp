@@ -1,0 +1,99 @@
+#include "repose/solve/natural_rows.h"
+
+#include <algorithm>
+
+#include "repose/base/agreement.h"
+#include "repose/mechanics/prism_volume.h"
+#include "repose/mechanics/spring_law.h"
+
+namespace repose::solve {
+
+using base::check;
+
+namespace {
+
+double tension(const model::Springs& springs, int64_t e, double elongation) {
+  return mechanics::with_exponent(springs.exponent[e], [&]<int p>() {
+    return mechanics::spring_tension<p>(elongation, springs.stiffness[e],
+                                        1.0 / springs.reference[e]);
+  });
+}
+
+std::vector<Vec3> as_points(const std::vector<double>& numbers) {
+  std::vector<Vec3> points(numbers.size() / 3);
+  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
+  return points;
+}
+
+}  // namespace
+
+NaturalRows::Route NaturalRows::make_route(MPI_Comm comm, const std::vector<int64_t>& rows,
+                                           int64_t total, int block) {
+  Route route;
+  route.block = block;
+  const auto owned = static_cast<PetscInt>(rows.size());
+  const auto slab = base::slab(total, base::rank(comm), base::size(comm));
+  const auto mine = static_cast<PetscInt>(slab.rows());
+  check(VecCreateMPI(comm, block * owned, PETSC_DETERMINE, route.owned.out()));
+  check(VecCreateMPI(comm, block * mine, PETSC_DETERMINE, route.natural.out()));
+  PetscInt first = 0;
+  check(VecGetOwnershipRange(route.owned, &first, nullptr));
+  const std::vector<PetscInt> targets(rows.begin(), rows.end());
+  base::IndexSetHandle from, to;
+  check(ISCreateStride(comm, block * owned, first, 1, from.out()));
+  check(ISCreateBlock(comm, block, owned, targets.data(), PETSC_COPY_VALUES, to.out()));
+  check(VecScatterCreate(route.owned, from, route.natural, to, route.scatter.out()));
+  return route;
+}
+
+NaturalRows::NaturalRows(MPI_Comm comm, const Part& part)
+    : part_(part),
+      points_(make_route(comm, {part.point_row.begin(), part.point_row.begin() + part.owned_points},
+                         part.total_points, 3)),
+      springs_(make_route(comm, part.spring_row, part.total_springs, 1)),
+      prisms_(make_route(comm, part.prism_row, part.total_prisms, 1)) {}
+
+std::vector<double> NaturalRows::bring(const Route& route, const double* values) {
+  PetscInt owned = 0, mine = 0;
+  check(VecGetLocalSize(route.owned, &owned));
+  check(VecGetLocalSize(route.natural, &mine));
+  PetscScalar* target = nullptr;
+  check(VecGetArrayWrite(route.owned, &target));
+  std::copy(values, values + owned, target);
+  check(VecRestoreArrayWrite(route.owned, &target));
+  check(VecScatterBegin(route.scatter, route.owned, route.natural, INSERT_VALUES, SCATTER_FORWARD));
+  check(VecScatterEnd(route.scatter, route.owned, route.natural, INSERT_VALUES, SCATTER_FORWARD));
+  const PetscScalar* source = nullptr;
+  check(VecGetArrayRead(route.natural, &source));
+  std::vector<double> natural(source, source + mine);
+  check(VecRestoreArrayRead(route.natural, &source));
+  return natural;
+}
+
+results::StepRows NaturalRows::rows(Objective& objective) const {
+  const auto position = objective.positions().local();
+  const model::Springs& springs = part_.model.springs;
+  const model::Prisms& prisms = part_.model.prisms;
+  std::vector<double> elongation(part_.owned_springs), force(part_.owned_springs);
+  for (int64_t e = 0; e < part_.owned_springs; ++e) {
+    const auto& [p, q] = springs.points[e];
+    elongation[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
+    force[e] = tension(springs, e, elongation[e]);
+  }
+  std::vector<double> ratio(part_.owned_prisms);
+  for (int64_t e = 0; e < part_.owned_prisms; ++e) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
+    ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
+  }
+  const std::vector<Vec3> residual = objective.residual_force();
+  results::StepRows rows;
+  rows.position = as_points(bring(points_, position.data()->data()));
+  rows.residual_force = as_points(bring(points_, residual.data()->data()));
+  rows.volume_ratio = bring(prisms_, ratio.data());
+  rows.elongation = bring(springs_, elongation.data());
+  rows.tension = bring(springs_, force.data());
+  return rows;
+}
+
+}  // namespace repose::solve

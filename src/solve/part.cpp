@@ -1,0 +1,234 @@
+#include "repose/solve/part.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/model/motion.h"
+#include "repose/solve/message.h"
+#include "repose/solve/partition.h"
+
+namespace repose::solve {
+
+namespace {
+
+using model::Model;
+using model::PointSet;
+
+/// What rank 0 knows while it shares a model out.
+struct Plan {
+  const Model& model;
+  std::vector<int> owner;              // [N] rank of each point
+  std::vector<int64_t> order;          // [N] point rows, rank after rank, column after column
+  std::vector<int64_t> rank_begin;     // [ranks + 1] into order
+  std::vector<int64_t> unknown;        // [N] block number or −1
+  std::vector<int64_t> unknown_begin;  // [ranks + 1]
+  std::vector<PointSet> set;           // [N] with points of non-rigid bones as held
+  std::vector<Mat4> bone_transform;    // [bones]
+};
+
+void number_points(Plan& plan, const ColumnGraph& graph, int ranks) {
+  const int64_t n = static_cast<int64_t>(plan.owner.size());
+  plan.order.resize(n);
+  for (int64_t i = 0; i < n; ++i) plan.order[i] = i;
+  std::stable_sort(plan.order.begin(), plan.order.end(), [&](int64_t a, int64_t b) {
+    return std::pair(plan.owner[a], graph.column_of_point[a]) <
+           std::pair(plan.owner[b], graph.column_of_point[b]);
+  });
+  plan.rank_begin.assign(ranks + 1, n);
+  plan.unknown_begin.assign(ranks + 1, 0);
+  plan.unknown.assign(n, -1);
+  int64_t next = 0;
+  int rank = -1;
+  for (int64_t k = 0; k < n; ++k) {
+    const int64_t row = plan.order[k];
+    while (rank < plan.owner[row]) {
+      plan.rank_begin[++rank] = k;
+      plan.unknown_begin[rank] = next;
+    }
+    if (plan.set[row] == PointSet::soft_tissue) plan.unknown[row] = next++;
+  }
+  while (rank < ranks - 1) plan.unknown_begin[++rank] = next;
+  plan.unknown_begin[ranks] = next;
+}
+
+void plan_motion(Plan& plan) {
+  const Model& model = plan.model;
+  const model::PrescribedMotion motion(model);
+  plan.set = model.points.set;
+  for (size_t b = 0; b < model.bones.size(); ++b)
+    plan.bone_transform.push_back(motion.bone_matrix(static_cast<int32_t>(b), 1.0));
+  for (size_t p = 0; p < plan.set.size(); ++p)
+    if (plan.set[p] == PointSet::bone && motion.straight(model.points.bone[p]))
+      plan.set[p] = PointSet::held;
+}
+
+/// Gives local numbers to rows as they are met, owned points first.
+class LocalNumbers {
+ public:
+  explicit LocalNumbers(int64_t rows) : local_(rows, -1) {}
+  int64_t of(int64_t row) {
+    if (local_[row] < 0) {
+      local_[row] = static_cast<int64_t>(rows_.size());
+      rows_.push_back(row);
+    }
+    return local_[row];
+  }
+  /// Forgets all, in time proportional to what was met.
+  std::vector<int64_t> take() {
+    for (int64_t row : rows_) local_[row] = -1;
+    return std::exchange(rows_, {});
+  }
+
+ private:
+  std::vector<int64_t> local_, rows_;
+};
+
+template <size_t n>
+bool touches(const Plan& plan, const std::array<int64_t, n>& element, int rank) {
+  return std::any_of(element.begin(), element.end(), [&](int64_t row) {
+    return plan.owner[row] == rank && plan.unknown[row] >= 0;
+  });
+}
+
+/// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
+template <size_t n>
+std::vector<int64_t> element_rows(const Plan& plan,
+                                  const std::vector<std::array<int64_t, n>>& elements, int rank,
+                                  int64_t& owned) {
+  std::vector<int64_t> rows, others;
+  for (size_t e = 0; e < elements.size(); ++e) {
+    if (plan.owner[elements[e][0]] == rank)
+      rows.push_back(static_cast<int64_t>(e));
+    else if (touches(plan, elements[e], rank))
+      others.push_back(static_cast<int64_t>(e));
+  }
+  owned = static_cast<int64_t>(rows.size());
+  rows.insert(rows.end(), others.begin(), others.end());
+  return rows;
+}
+
+template <class T>
+std::vector<T> pick(const std::vector<T>& values, const std::vector<int64_t>& rows) {
+  std::vector<T> picked;
+  picked.reserve(rows.size());
+  for (int64_t row : rows) picked.push_back(values[row]);
+  return picked;
+}
+
+template <size_t n>
+std::vector<std::array<int64_t, n>> pick_elements(
+    const std::vector<std::array<int64_t, n>>& elements, const std::vector<int64_t>& rows,
+    LocalNumbers& local) {
+  std::vector<std::array<int64_t, n>> picked = pick(elements, rows);
+  for (auto& element : picked)
+    for (int64_t& point : element) point = local.of(point);
+  return picked;
+}
+
+void pick_points(const Plan& plan, Part& part) {
+  const model::Points& all = plan.model.points;
+  model::Points& mine = part.model.points;
+  mine.position = pick(all.position, part.point_row);
+  mine.set = pick(plan.set, part.point_row);
+  mine.target = pick(all.target, part.point_row);
+  mine.layer = pick(all.layer, part.point_row);
+  mine.column = pick(all.column, part.point_row);
+  mine.bone = pick(all.bone, part.point_row);
+  mine.mass = pick(all.mass, part.point_row);
+  mine.external_force = pick(all.external_force, part.point_row);
+  part.unknown = pick(plan.unknown, part.point_row);
+}
+
+Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
+  const Model& model = plan.model;
+  Part part;
+  part.owned_points = plan.rank_begin[rank + 1] - plan.rank_begin[rank];
+  for (int64_t k = plan.rank_begin[rank]; k < plan.rank_begin[rank + 1]; ++k)
+    local.of(plan.order[k]);
+  auto rows = element_rows(plan, model.springs.points, rank, part.owned_springs);
+  part.model.springs = {pick_elements(model.springs.points, rows, local),
+                        pick(model.springs.set, rows),
+                        pick(model.springs.rest_length, rows),
+                        pick(model.springs.stiffness, rows),
+                        pick(model.springs.exponent, rows),
+                        pick(model.springs.reference, rows)};
+  part.spring_row.assign(rows.begin(), rows.begin() + part.owned_springs);
+  rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms);
+  part.model.prisms = {pick_elements(model.prisms.points, rows, local),
+                       pick(model.prisms.rest_volume, rows)};
+  part.prism_row.assign(rows.begin(), rows.begin() + part.owned_prisms);
+  part.point_row = local.take();
+  pick_points(plan, part);
+  part.model.gravity = model.gravity;
+  part.model.bones = model.bones;
+  part.model.bone_transform = plan.bone_transform;
+  part.first_unknown = plan.unknown_begin[rank];
+  part.owned_unknowns = plan.unknown_begin[rank + 1] - plan.unknown_begin[rank];
+  part.total_points = static_cast<int64_t>(model.points.position.size());
+  part.total_springs = static_cast<int64_t>(model.springs.points.size());
+  part.total_prisms = static_cast<int64_t>(model.prisms.points.size());
+  part.total_unknowns = plan.unknown_begin.back();
+  return part;
+}
+
+/// Packs or unpacks a part: `archive` decides which.
+template <class Archive>
+void pass(Archive& archive, Part& part) {
+  model::Model& m = part.model;
+  archive(m.gravity, m.points.position, m.points.set, m.points.target, m.points.layer,
+          m.points.column, m.points.bone, m.points.mass, m.points.external_force);
+  archive(m.springs.points, m.springs.set, m.springs.rest_length, m.springs.stiffness,
+          m.springs.exponent, m.springs.reference);
+  archive(m.prisms.points, m.prisms.rest_volume, m.bone_transform);
+  archive(part.owned_points, part.owned_springs, part.owned_prisms, part.point_row, part.spring_row,
+          part.prism_row, part.unknown);
+  archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
+          part.total_prisms, part.total_unknowns);
+}
+
+Part share_out(MPI_Comm comm, Plan& plan, const ColumnGraph& graph,
+               const std::vector<int>& column_owner) {
+  const int ranks = base::size(comm);
+  plan.owner = pick(column_owner, graph.column_of_point);
+  plan_motion(plan);
+  number_points(plan, graph, ranks);
+  LocalNumbers local(static_cast<int64_t>(plan.owner.size()));
+  for (int r = 1; r < ranks; ++r) {
+    Part part = make_part(plan, local, r);
+    Packer packer;
+    pass(packer, part);
+    send(comm, r, packer.bytes());
+  }
+  return make_part(plan, local, 0);
+}
+
+}  // namespace
+
+Part distribute(MPI_Comm comm, const Model& model) {
+  ColumnGraph graph;
+  base::on_first_rank(comm, [&] { graph = column_graph(model); });
+  const std::vector<int> column_owner = partition(comm, graph);
+  Part part;
+  base::together(comm, [&] {
+    if (base::rank(comm) == 0) {
+      Plan plan{model, {}, {}, {}, {}, {}, {}, {}};
+      try {
+        part = share_out(comm, plan, graph, column_owner);
+      } catch (...) {
+        for (int r = 1; r < base::size(comm); ++r) send(comm, r, {});
+        throw;
+      }
+    } else {
+      const std::vector<char> bytes = receive(comm, 0);
+      if (bytes.empty()) return;
+      Unpacker unpacker(bytes);
+      pass(unpacker, part);
+    }
+  });
+  return part;
+}
+
+}  // namespace repose::solve

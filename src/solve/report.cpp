@@ -1,0 +1,69 @@
+#include "repose/solve/report.h"
+
+#include <fmt/format.h>
+
+namespace repose::solve {
+
+namespace {
+
+std::string row(const std::string& name, const std::string& value) {
+  return fmt::format("  {:<22} {}\n", name, value);
+}
+
+std::string work_rows(const Summary& s) {
+  return row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
+         row("iterations", fmt::format("{}", s.path.iterations)) +
+         row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
+                                        s.evaluations, s.assemblies));
+}
+
+std::string verdict(const Summary& s) {
+  if (s.path.complete()) return "";
+  return fmt::format(
+      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).\n",
+      s.path.load, s.last.displacement_error, s.last.reason);
+}
+
+}  // namespace
+
+std::string describe_model(const model::Model& model) {
+  const model::Counts c = model::count(model);
+  return row("points", fmt::format("{} ({} soft tissue, {} boundary, {} bone, {} held)", c.points,
+                                   c.soft, c.boundary, c.bone, c.held)) +
+         row("springs", fmt::format("{}", c.springs)) + row("prisms", fmt::format("{}", c.prisms));
+}
+
+std::string describe_build(const model::BuildReport& r) {
+  std::string text =
+      row("skin", fmt::format("{} vertices, {} edges, {} triangles", r.skin_vertices, r.skin_edges,
+                              r.skin_triangles)) +
+      row("columns", fmt::format("{} end in bone, {} end free ({} released), {} shortened",
+                                 r.attached, r.free_deep, r.released, r.shortened)) +
+      row("thickness", fmt::format("{:.3g} … {:.3g} mm, median {:.3g} mm", r.thickness_min,
+                                   r.thickness_max, r.thickness_median)) +
+      row("effective modulus", fmt::format("{:.4g} N/mm²", r.effective_modulus));
+  for (const std::string& remark : r.remarks) text += row("remark", remark);
+  return text;
+}
+
+std::string describe_run(const Summary& s, const Settings& settings, int ranks,
+                         const base::Stages& stages) {
+  std::string text = verdict(s);
+  text += row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
+  text += row("accuracy", fmt::format("{:.3g} mm reached, {:.3g} mm asked for",
+                                      s.last.displacement_error, settings.path.accuracy));
+  text += row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
+                                                  : "NOT A MINIMUM: negative curvature");
+  text += row("objective", fmt::format("{:.12g} N mm", s.last.objective));
+  text += row("inverted prisms", fmt::format("{}{}", s.last.inverted_prisms,
+                                             s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));
+  text += row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
+  text += row("unknowns", fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
+  text += work_rows(s);
+  for (const auto& stage : stages.list())
+    text += row("time, memory", fmt::format("{:<12} {:>9.3f} s {:>9.0f} MiB so far", stage.name,
+                                            stage.seconds, stage.mebibytes));
+  return text;
+}
+
+}  // namespace repose::solve

@@ -1,0 +1,185 @@
+#include "repose/solve/tangent.h"
+
+#include <algorithm>
+
+#include "repose/base/agreement.h"
+
+namespace repose::solve {
+
+using base::check;
+using mechanics::Curvature;
+
+Tangent::Tangent(Objective& objective)
+    : objective_(objective),
+      part_(objective.positions().part()),
+      diagonal_(objective.positions().make_vector()) {
+  make_pattern();
+  make_matrices();
+  find_slots();
+}
+
+bool Tangent::owns(int32_t point) const {
+  return part_.unknown[point] >= 0 && point < part_.owned_points;
+}
+
+void Tangent::make_pattern() {
+  std::vector<std::vector<int32_t>> neighbours(part_.owned_unknowns);
+  const auto link = [&](int32_t p, int32_t q) {
+    if (!owns(p) || part_.unknown[q] < 0) return;
+    neighbours[part_.unknown[p] - part_.first_unknown].push_back(
+        static_cast<int32_t>(part_.unknown[q]));
+  };
+  for (int64_t i = 0; i < part_.owned_points; ++i)
+    link(static_cast<int32_t>(i), static_cast<int32_t>(i));
+  for (const auto& loop : objective_.loops().springs)
+    for (const auto& [p, q] : loop.points) link(p, q), link(q, p);
+  if (objective_.weights().volume != mechanics::VolumeTerm::none)
+    for (const auto& corners : objective_.loops().prisms.points)
+      for (int32_t p : corners)
+        for (int32_t q : corners) link(p, q);
+  const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
+  for (BlockRows& rows : rows_) rows.begin.push_back(0);
+  for (auto& row : neighbours) {
+    std::sort(row.begin(), row.end());
+    row.erase(std::unique(row.begin(), row.end()), row.end());
+    for (int32_t column : row)
+      rows_[column >= first && column < last ? 0 : 1].column.push_back(column);
+    for (BlockRows& rows : rows_) rows.begin.push_back(static_cast<int32_t>(rows.column.size()));
+  }
+}
+
+void Tangent::make_matrices() {
+  const auto owned = static_cast<PetscInt>(part_.owned_unknowns);
+  std::vector<PetscInt> count[2];
+  for (int side = 0; side < 2; ++side)
+    for (PetscInt k = 0; k < owned; ++k)
+      count[side].push_back(rows_[side].begin[k + 1] - rows_[side].begin[k]);
+  const auto total = static_cast<PetscInt>(part_.total_unknowns);
+  check(MatCreate(objective_.positions().comm(), exact_.out()));
+  check(MatSetSizes(exact_, 3 * owned, 3 * owned, 3 * total, 3 * total));
+  check(MatSetBlockSize(exact_, 3));
+  check(MatSetType(exact_, MATAIJ));
+  check(MatXAIJSetPreallocation(exact_, 3, count[0].data(), count[1].data(), nullptr, nullptr));
+  check(MatSetOption(exact_, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  for (PetscInt k = 0; k < owned; ++k) {
+    const auto row = static_cast<PetscInt>(part_.first_unknown + k);
+    for (const BlockRows& rows : rows_) {
+      const PetscInt n = rows.begin[k + 1] - rows.begin[k];
+      const std::vector<PetscScalar> zeros(9 * n, 0.0);
+      const std::vector<PetscInt> columns(rows.column.begin() + rows.begin[k],
+                                          rows.column.begin() + rows.begin[k + 1]);
+      check(MatSetValuesBlocked(exact_, 1, &row, n, columns.data(), zeros.data(), INSERT_VALUES));
+    }
+  }
+  check(MatAssemblyBegin(exact_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(exact_, MAT_FINAL_ASSEMBLY));
+  check(MatDuplicate(exact_, MAT_SHARE_NONZERO_PATTERN, convex_.out()));
+  for (Mat matrix : {static_cast<Mat>(exact_), static_cast<Mat>(convex_)}) {
+    check(MatSetOption(matrix, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+    check(MatSetOption(matrix, MAT_SYMMETRIC, PETSC_TRUE));
+    check(MatSetOption(matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  }
+  check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
+}
+
+Tangent::Slot Tangent::find(int32_t row_point, int32_t column_point) const {
+  if (!owns(row_point) || part_.unknown[column_point] < 0) return -1;
+  const int64_t k = part_.unknown[row_point] - part_.first_unknown;
+  const auto column = static_cast<int32_t>(part_.unknown[column_point]);
+  const int64_t offset = column - part_.first_unknown;
+  const int side = offset >= 0 && offset < part_.owned_unknowns ? 0 : 1;
+  const BlockRows& rows = rows_[side];
+  const auto first = rows.column.begin() + rows.begin[k];
+  const auto place = std::lower_bound(first, rows.column.begin() + rows.begin[k + 1], column);
+  const int32_t before = side == 0 ? 0 : 9 * rows_[0].begin.back();
+  return before + 9 * rows.begin[k] + 3 * static_cast<int32_t>(place - first);
+}
+
+void Tangent::find_slots() {
+  for (const auto& loop : objective_.loops().springs) {
+    auto& slots = spring_slots_.emplace_back();
+    for (const auto& [p, q] : loop.points)
+      slots.push_back({find(p, p), find(p, q), find(q, p), find(q, q)});
+  }
+  if (objective_.weights().volume == mechanics::VolumeTerm::none) return;
+  for (const auto& corners : objective_.loops().prisms.points) {
+    auto& slots = prism_slots_.emplace_back();
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) slots[6 * i + j] = find(corners[i], corners[j]);
+  }
+}
+
+void Tangent::add(double* const values[2], Slot slot, int32_t row_point, const Mat3& block) const {
+  if (slot < 0) return;
+  const int32_t beyond = 9 * rows_[0].begin.back();
+  const int side = slot < beyond ? 0 : 1;
+  const int64_t k = part_.unknown[row_point] - part_.first_unknown;
+  const int32_t stride = 3 * (rows_[side].begin[k + 1] - rows_[side].begin[k]);
+  double* entry = values[side] + slot - (side == 0 ? 0 : beyond);
+  for (int r = 0; r < 3; ++r, entry += stride)
+    for (int c = 0; c < 3; ++c) entry[c] += block(r, c);
+}
+
+void Tangent::fill(Mat matrix, Curvature curvature) {
+  Mat sides[2] = {matrix, nullptr};
+  if (base::size(objective_.positions().comm()) > 1)
+    check(MatMPIAIJGetSeqAIJ(matrix, &sides[0], &sides[1], nullptr));
+  check(MatZeroEntries(matrix));
+  double* values[2] = {nullptr, nullptr};
+  for (int side = 0; side < 2; ++side)
+    if (sides[side]) check(MatSeqAIJGetArray(sides[side], &values[side]));
+  const auto position = objective_.positions().local();
+  const mechanics::Weights& weights = objective_.weights();
+  for (size_t l = 0; l < spring_slots_.size(); ++l) {
+    const mechanics::SpringLoop& loop = objective_.loops().springs[l];
+    mechanics::for_each_spring_block(loop, position, weights.elastic, curvature,
+                                     [&](int64_t e, const Mat3& block) {
+                                       const auto [p, q] = loop.points[e];
+                                       const auto& slots = spring_slots_[l][e];
+                                       add(values, slots[0], p, block);
+                                       add(values, slots[1], p, -block);
+                                       add(values, slots[2], q, -block);
+                                       add(values, slots[3], q, block);
+                                     });
+  }
+  const mechanics::PrismLoop& prisms = objective_.loops().prisms;
+  mechanics::for_each_prism_block(
+      prisms, position, weights, curvature, [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+        for (int i = 0; i < 6; ++i)
+          for (int j = 0; j < 6; ++j)
+            add(values, prism_slots_[e][6 * i + j], prisms.points[e][i], blocks[i][j]);
+      });
+  for (int side = 0; side < 2; ++side)
+    if (sides[side]) check(MatSeqAIJRestoreArray(sides[side], &values[side]));
+  check(MatAssemblyBegin(matrix, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(matrix, MAT_FINAL_ASSEMBLY));
+}
+
+void Tangent::lift_diagonal() {
+  constexpr double lift = 1e-9;  // keeps factors positive where the convex Hessian is singular
+  check(MatGetDiagonal(convex_, diagonal_));
+  PetscScalar* values = nullptr;
+  PetscInt size = 0;
+  check(VecGetLocalSize(diagonal_, &size));
+  check(VecGetArray(diagonal_, &values));
+  for (PetscInt i = 0; i < size; ++i) values[i] = values[i] > 0 ? values[i] * (1 + lift) : 1.0;
+  check(VecRestoreArray(diagonal_, &values));
+  check(MatDiagonalSet(convex_, diagonal_, INSERT_VALUES));
+}
+
+void Tangent::assemble(Vec displacement) {
+  Positions& positions = objective_.positions();
+  positions.update(displacement);
+  const auto now = positions.local();
+  int same = assembled_at_.size() == now.size() &&
+             std::equal(now.begin(), now.end(), assembled_at_.begin());
+  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
+  if (same) return;
+  fill(exact_, Curvature::exact);
+  fill(convex_, Curvature::convex);
+  lift_diagonal();
+  assembled_at_.assign(now.begin(), now.end());
+  ++assemblies_;
+}
+
+}  // namespace repose::solve

@@ -1,0 +1,22 @@
+#pragma once
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include "repose/surface/surface.h"
+
+/// What every CGAL-based file of this room shares. Predicates are exact, constructions rounded.
+namespace repose::surface {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point3 = Kernel::Point_3;
+using Triangle3 = Kernel::Triangle_3;
+using Segment3 = Kernel::Segment_3;
+
+inline Point3 to_cgal(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
+inline Vec3 from_cgal(const Point3& point) { return {point.x(), point.y(), point.z()}; }
+
+inline Triangle3 to_cgal(const Surface& surface, const Triangle& triangle) {
+  return {to_cgal(surface.points[triangle[0]]), to_cgal(surface.points[triangle[1]]),
+          to_cgal(surface.points[triangle[2]])};
+}
+
+}  // namespace repose::surface

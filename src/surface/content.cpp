@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "repose/base/error.h"
+#include "soup.h"
+#include "stl.h"
+
+namespace repose::surface {
+namespace {
+
+std::string first_word(const std::string& bytes) {
+  size_t position = 0;
+  while (position < bytes.size()) {
+    const auto found = words(next_line(bytes, position));
+    if (!found.empty() && found[0][0] != '#') return std::string(found[0]);
+  }
+  return {};
+}
+
+bool is_off_keyword(std::string word) {
+  for (const char* prefix : {"ST", "C", "N", "4", "n"})
+    if (word.starts_with(prefix)) word.erase(0, std::strlen(prefix));
+  return word == "OFF";
+}
+
+bool is_obj_keyword(const std::string& word) {
+  constexpr std::array known = {"v", "vn", "vt", "f", "o", "g", "s", "l", "mtllib", "usemtl"};
+  return std::find(known.begin(), known.end(), word) != known.end();
+}
+
+}  // namespace
+
+Content read_content(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status))
+    base::refuse("{}: no such file; check the path of this surface", file.string());
+  if (!std::filesystem::is_regular_file(status))
+    base::refuse("{}: not a file; name a PLY, STL, OBJ or OFF file", file.string());
+  std::ifstream in(file, std::ios::binary);
+  if (!in) base::refuse("{}: cannot be opened: {}", file.string(), std::strerror(errno));
+  Content content{file, {std::istreambuf_iterator<char>(in), {}}};
+  if (in.bad()) base::refuse("{}: cannot be read: {}", file.string(), std::strerror(errno));
+  if (content.bytes.starts_with("\xEF\xBB\xBF")) content.bytes.erase(0, 3);
+  if (content.bytes.empty()) base::refuse("{}: the file is empty; export it anew", file.string());
+  return content;
+}
+
+Format recognise(const Content& content) {
+  const std::string& bytes = content.bytes;
+  if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return Format::ply;
+  if (stl_size(bytes) == bytes.size()) return Format::stl_binary;
+  const std::string word = first_word(bytes);
+  if (is_off_keyword(word)) return Format::off;
+  const bool binary = bytes.find('\0') != std::string::npos;
+  if (lower(word) == "solid" && !binary) return Format::stl_text;
+  const std::string ending = lower(content.file.extension().string());
+  if (!binary && (ending == ".obj" || is_obj_keyword(word))) return Format::obj;
+  if (ending == ".stl") return Format::stl_binary;
+  base::refuse("{}: the content is none of PLY, STL, OBJ and OFF; convert the mesh to one of them",
+               content.file.string());
+}
+
+std::string lower(std::string_view text) {
+  std::string lowered(text);
+  for (char& c : lowered)
+    if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
+  return lowered;
+}
+
+void unify_newlines(std::string& text) {
+  size_t end = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '\r' && i + 1 < text.size() && text[i + 1] == '\n') continue;
+    text[end++] = text[i] == '\r' ? '\n' : text[i];
+  }
+  text.resize(end);
+}
+
+std::string_view next_line(std::string_view text, size_t& position) {
+  const size_t begin = position;
+  const size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
+  position = text.substr(end, 2) == "\r\n" ? end + 2 : std::min(end + 1, text.size());
+  return text.substr(begin, end - begin);
+}
+
+std::vector<std::string_view> words(std::string_view line) {
+  std::vector<std::string_view> found;
+  constexpr auto blanks = " \t\v\f";
+  for (size_t begin = line.find_first_not_of(blanks); begin != line.npos;) {
+    const size_t end = std::min(line.find_first_of(blanks, begin), line.size());
+    found.push_back(line.substr(begin, end - begin));
+    begin = line.find_first_not_of(blanks, end);
+  }
+  return found;
+}
+
+}  // namespace repose::surface

@@ -1,0 +1,179 @@
+#include "repose/surface/distance.h"
+
+#include <CGAL/AABB_tree.h>
+#include <CGAL/intersections.h>
+#include <CGAL/version.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "cgal.h"
+#include "edges.h"
+#include "repose/base/error.h"
+
+#if CGAL_VERSION_NR >= 1060000000
+#include <CGAL/AABB_traits_3.h>
+#else
+#include <CGAL/AABB_traits.h>
+
+#include <boost/variant/get.hpp>
+#endif
+
+namespace repose::surface {
+namespace {
+
+#if CGAL_VERSION_NR >= 1060000000
+template <class Primitive>
+using TreeTraits = CGAL::AABB_traits_3<Kernel, Primitive>;
+template <class Part, class Variant>
+const Part* part_of(const Variant& variant) {
+  return std::get_if<Part>(&variant);
+}
+#else
+template <class Primitive>
+using TreeTraits = CGAL::AABB_traits<Kernel, Primitive>;
+template <class Part, class Variant>
+const Part* part_of(const Variant& variant) {
+  return boost::get<Part>(&variant);
+}
+#endif
+
+/// A triangle of the tree, kept by address (CGAL's AABBPrimitive).
+class Leaf {
+ public:
+  using Id = const Triangle3*;
+  using Point = Point3;
+  using Datum = Triangle3;
+  using Datum_reference = const Triangle3&;
+
+  explicit Leaf(std::vector<Triangle3>::const_iterator triangle) : triangle_(&*triangle) {}
+  Id id() const { return triangle_; }
+  Datum_reference datum() const { return *triangle_; }
+  Point reference_point() const { return triangle_->vertex(0); }
+
+ private:
+  Id triangle_;
+};
+
+enum class Crossing { through, beside_edge, at_start };
+
+/// How the segment from `start` to `end` meets a triangle that it is known to intersect.
+Crossing crossing(const Triangle3& t, const Point3& start, const Point3& end) {
+  if (CGAL::orientation(t[0], t[1], t[2], start) == CGAL::COPLANAR)
+    return t.has_on(start) ? Crossing::at_start : Crossing::beside_edge;
+  for (int k = 0; k < 3; ++k)
+    if (CGAL::orientation(start, end, t[k], t[k + 1]) == CGAL::COPLANAR)
+      return Crossing::beside_edge;
+  return Crossing::through;
+}
+
+/// Directions spread over the sphere (a golden-angle spiral), none along an axis.
+Vec3 scattered_direction(int i) {
+  const double z = 2 * std::fmod(0.37 + i * (std::numbers::phi - 1), 1.0) - 1;
+  const double angle = 0.7 + i * 2.399963229728653, radius = std::sqrt(1 - z * z);
+  return {radius * std::cos(angle), radius * std::sin(angle), z};
+}
+
+void require_finite(const Vec3& query) {
+  if (!query.allFinite()) throw base::InternalError("distance asked of a point that is not finite");
+}
+
+}  // namespace
+
+struct DistanceTree::Tree {
+  using Aabb = CGAL::AABB_tree<TreeTraits<Leaf>>;
+
+  explicit Tree(const Surface& surface) {
+    require_sound(surface);
+    for (size_t t = 0; t < surface.triangles.size(); ++t) {
+      const Triangle3 triangle = to_cgal(surface, surface.triangles[t]);
+      if (triangle.is_degenerate()) continue;
+      triangles.push_back(triangle);
+      numbers.push_back(static_cast<int64_t>(t));
+    }
+    if (triangles.empty())
+      base::refuse("{}: no triangle with an area, so nothing to measure to; check the mesh",
+                   surface.name);
+    aabb.insert(triangles.cbegin(), triangles.cend());
+    aabb.build();
+    aabb.accelerate_distance_queries();
+    box = aabb.bbox();
+  }
+
+  int64_t number(Leaf::Id id) const { return numbers[id - triangles.data()]; }
+
+  /// From `point` in any direction, the whole surface lies nearer than this.
+  double reach(const Vec3& point) const {
+    const Vec3 low(box.xmin(), box.ymin(), box.zmin()), high(box.xmax(), box.ymax(), box.zmax());
+    return (point - low).cwiseAbs().cwiseMax((point - high).cwiseAbs()).norm();
+  }
+
+  std::vector<Leaf::Id> meeting(const Segment3& segment) const {
+    std::vector<Leaf::Id> ids;
+    aabb.all_intersected_primitives(segment, std::back_inserter(ids));
+    return ids;
+  }
+
+  std::vector<Triangle3> triangles;  ///< those with an area
+  std::vector<int64_t> numbers;      ///< of each in the surface
+  Aabb aabb;
+  CGAL::Bbox_3 box;
+};
+
+DistanceTree::DistanceTree(const Surface& surface) : tree_(std::make_unique<Tree>(surface)) {}
+DistanceTree::~DistanceTree() = default;
+DistanceTree::DistanceTree(DistanceTree&&) noexcept = default;
+DistanceTree& DistanceTree::operator=(DistanceTree&&) noexcept = default;
+
+DistanceTree::Nearest DistanceTree::nearest(const Vec3& query) const {
+  require_finite(query);
+  const auto [point, id] = tree_->aabb.closest_point_and_primitive(to_cgal(query));
+  return {from_cgal(point), tree_->number(id), (from_cgal(point) - query).norm()};
+}
+
+std::optional<DistanceTree::Hit> DistanceTree::first_hit(const Vec3& origin, const Vec3& direction,
+                                                         double reach) const {
+  require_finite(origin);
+  require_finite(direction);
+  const double end = std::min(reach, tree_->reach(origin)) * (1 + 1e-12);
+  const Segment3 segment(to_cgal(origin), to_cgal(origin + end * direction));
+  std::optional<Hit> first;
+  const auto offer = [&](const Point3& at, Leaf::Id id) {
+    const double distance = std::max(0.0, (from_cgal(at) - origin).dot(direction));
+    if (distance > reach || (first && distance >= first->distance)) return;
+    first = Hit{from_cgal(at), tree_->number(id), distance};
+  };
+  if (!(end > 0)) return first;
+  for (const auto id : tree_->meeting(segment)) {
+    const auto common = CGAL::intersection(segment, *id);
+    if (!common) continue;
+    if (const auto* point = part_of<Point3>(*common)) offer(*point, id);
+    if (const auto* along = part_of<Segment3>(*common)) {
+      offer(along->source(), id);
+      offer(along->target(), id);
+    }
+  }
+  return first;
+}
+
+bool DistanceTree::contains(const Vec3& query) const {
+  require_finite(query);
+  const Point3 start = to_cgal(query);
+  if (!CGAL::do_overlap(start.bbox(), tree_->box)) return false;
+  constexpr int most_directions = 64;
+  for (int i = 0; i < most_directions; ++i) {
+    const Point3 end = to_cgal(query + 2 * tree_->reach(query) * scattered_direction(i));
+    bool odd = false, sure = true;
+    for (const auto id : tree_->meeting(Segment3(start, end))) {
+      const Crossing how = crossing(*id, start, end);
+      if (how == Crossing::at_start) return true;
+      sure = sure && how == Crossing::through;
+      odd = !odd;
+    }
+    if (sure) return odd;
+  }
+  throw base::InternalError("every ray from a point runs along an edge of the surface");
+}
+
+}  // namespace repose::surface

@@ -1,0 +1,165 @@
+#include "edges.h"
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <tuple>
+#include <unordered_map>
+
+#include "repose/base/error.h"
+
+namespace repose::surface {
+namespace {
+
+struct Cell {
+  int64_t x, y, z;
+  bool operator==(const Cell&) const = default;
+};
+
+struct CellHash {
+  size_t operator()(const Cell& c) const {
+    const auto mix = [](uint64_t h, int64_t v) {
+      h = (h ^ static_cast<uint64_t>(v)) * 0x9E3779B97F4A7C15u;
+      return h ^ (h >> 29);
+    };
+    return mix(mix(mix(0, c.x), c.y), c.z);
+  }
+};
+
+/// Points put into cubes four tolerances wide, so that few neighbours need a look.
+class PointGrid {
+ public:
+  PointGrid(const std::vector<Vec3>& points, const Vec3& origin, double tolerance)
+      : points_(points), origin_(origin), tolerance_(tolerance), next_(points.size(), -1) {}
+
+  /// The earliest inserted point within the tolerance of `query`, −1 for none.
+  int64_t find(const Vec3& query) const {
+    const Vec3 reach = Vec3::Constant(tolerance_);
+    const Cell from = cell(query - reach), to = cell(query + reach);
+    int64_t found = -1;
+    for (int64_t x = from.x; x <= to.x; ++x)
+      for (int64_t y = from.y; y <= to.y; ++y)
+        for (int64_t z = from.z; z <= to.z; ++z) look_into({x, y, z}, query, found);
+    return found;
+  }
+
+  void insert(int64_t i) {
+    const auto [head, is_new] = heads_.try_emplace(cell(points_[i]), i);
+    if (is_new) return;
+    next_[i] = head->second;
+    head->second = i;
+  }
+
+ private:
+  Cell cell(const Vec3& point) const {
+    const Vec3 scaled = ((point - origin_) / (4 * tolerance_)).array().floor();
+    return {static_cast<int64_t>(scaled.x()), static_cast<int64_t>(scaled.y()),
+            static_cast<int64_t>(scaled.z())};
+  }
+
+  void look_into(const Cell& cell, const Vec3& query, int64_t& found) const {
+    const auto head = heads_.find(cell);
+    if (head == heads_.end()) return;
+    for (int64_t i = head->second; i >= 0; i = next_[i])
+      if ((points_[i] - query).norm() <= tolerance_ && (found < 0 || i < found)) found = i;
+  }
+
+  const std::vector<Vec3>& points_;
+  Vec3 origin_;
+  double tolerance_;
+  std::unordered_map<Cell, int64_t, CellHash> heads_;
+  std::vector<int64_t> next_;
+};
+
+}  // namespace
+
+EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
+  half_edges_.reserve(3 * triangles.size());
+  for (size_t t = 0; t < triangles.size(); ++t) {
+    if (repeats_vertex(triangles[t])) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int64_t a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+      half_edges_.push_back({std::min(a, b), std::max(a, b), static_cast<int64_t>(t), k, a < b});
+    }
+  }
+  std::sort(half_edges_.begin(), half_edges_.end(), [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  for (size_t i = 0; i < half_edges_.size(); ++i)
+    if (i == 0 || half_edges_[i].low != half_edges_[i - 1].low ||
+        half_edges_[i].high != half_edges_[i - 1].high)
+      begin_.push_back(i);
+  begin_.push_back(half_edges_.size());
+}
+
+bool EdgeTable::contains(int64_t a, int64_t b) const {
+  const std::pair wanted(std::min(a, b), std::max(a, b));
+  const auto found = std::lower_bound(
+      half_edges_.begin(), half_edges_.end(), wanted,
+      [](const HalfEdge& h, const auto& pair) { return std::pair(h.low, h.high) < pair; });
+  return found != half_edges_.end() && std::pair(found->low, found->high) == wanted;
+}
+
+std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
+                                     const EdgeTable& edges) {
+  const auto count = static_cast<int64_t>(triangles.size());
+  UnionFind sets(count);
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    for (const auto& half : edges[e]) sets.unite(edges[e].front().triangle, half.triangle);
+  std::vector<int64_t> members(triangles.size(), 0), sizes;
+  for (int64_t t = 0; t < count; ++t)
+    if (!repeats_vertex(triangles[t])) ++members[sets.find(t)];
+  std::copy_if(members.begin(), members.end(), std::back_inserter(sizes),
+               [](int64_t size) { return size > 0; });
+  std::sort(sizes.begin(), sizes.end(), std::greater<>());
+  return sizes;
+}
+
+std::vector<int64_t> coincident_points(const std::vector<Vec3>& points) {
+  std::vector<int64_t> first(points.size());
+  if (points.empty()) return first;
+  Vec3 least = points[0];
+  for (const auto& point : points) least = least.cwiseMin(point);
+  const double tolerance = std::max(1e-9 * bounding_diagonal(points), 1e-300);
+  PointGrid grid(points, least, tolerance);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const auto number = static_cast<int64_t>(i);
+    const int64_t found = grid.find(points[i]);
+    first[i] = found >= 0 ? found : number;
+    if (found < 0) grid.insert(number);
+  }
+  return first;
+}
+
+double bounding_diagonal(const std::vector<Vec3>& points) {
+  if (points.empty()) return 0;
+  Vec3 least = points[0], most = points[0];
+  for (const auto& point : points) {
+    least = least.cwiseMin(point);
+    most = most.cwiseMax(point);
+  }
+  return (most - least).norm();
+}
+
+double six_volumes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+  double sum = 0;
+  if (triangles.empty()) return sum;
+  const Vec3& origin = points[triangles[0][0]];
+  for (const auto& t : triangles)
+    sum += (points[t[0]] - origin).dot((points[t[1]] - origin).cross(points[t[2]] - origin));
+  return sum;
+}
+
+void require_sound(const Surface& surface) {
+  for (size_t i = 0; i < surface.points.size(); ++i)
+    if (!surface.points[i].allFinite())
+      base::refuse("{}: vertex {} has a coordinate that is not finite; repair or remove it",
+                   surface.name, i);
+  const auto count = static_cast<int64_t>(surface.points.size());
+  for (size_t t = 0; t < surface.triangles.size(); ++t)
+    for (const int64_t vertex : surface.triangles[t])
+      if (vertex < 0 || vertex >= count)
+        base::refuse("{}: triangle {} names vertex {}, but there are {} vertices (0 to {})",
+                     surface.name, t, vertex, count, count - 1);
+}
+
+}  // namespace repose::surface

@@ -1,0 +1,127 @@
+#include "orient.h"
+
+#include <Eigen/Geometry>
+#include <map>
+
+#include "edges.h"
+#include "repose/surface/distance.h"
+
+namespace repose::surface {
+namespace {
+
+struct Neighbour {
+  int64_t triangle;
+  bool agrees;  ///< with the orientation of this one
+};
+
+struct Part {
+  std::vector<int64_t> triangles;
+  bool closed = true;
+  Eigen::AlignedBox3d box;
+};
+
+class Orienter {
+ public:
+  explicit Orienter(Surface& surface)
+      : surface_(surface),
+        neighbours_(surface.triangles.size()),
+        closed_(surface.triangles.size(), true),
+        part_of_(surface.triangles.size(), -1) {
+    const EdgeTable edges(surface.triangles);
+    for (int64_t e = 0; e < edges.edges(); ++e) connect(edges[e]);
+  }
+
+  void run() {
+    for (size_t t = 0; t < surface_.triangles.size(); ++t)
+      if (part_of_[t] < 0) grow(static_cast<int64_t>(t));
+    for (size_t p = 0; p < parts_.size(); ++p)
+      if (parts_[p].closed && outward(parts_[p]) != (depth(p) % 2 == 0)) turn(parts_[p]);
+  }
+
+ private:
+  void connect(std::span<const HalfEdge> edge) {
+    if (edge.size() != 2) {
+      for (const auto& half : edge) closed_[half.triangle] = false;
+      return;
+    }
+    const bool agree = edge[0].rising != edge[1].rising;
+    neighbours_[edge[0].triangle].push_back({edge[1].triangle, agree});
+    neighbours_[edge[1].triangle].push_back({edge[0].triangle, agree});
+  }
+
+  void turn(int64_t triangle) {
+    std::swap(surface_.triangles[triangle][1], surface_.triangles[triangle][2]);
+  }
+
+  void turn(const Part& part) {
+    for (const int64_t t : part.triangles) turn(t);
+  }
+
+  /// Collects the part of `seed`, turning what disagrees with it; then with the majority.
+  void grow(int64_t seed) {
+    Part part;
+    std::vector<bool> turned;
+    const auto take = [&](int64_t triangle, bool turn_it) {
+      part_of_[triangle] = static_cast<int64_t>(parts_.size());
+      part.triangles.push_back(triangle);
+      turned.push_back(turn_it);
+    };
+    take(seed, false);
+    for (size_t i = 0; i < part.triangles.size(); ++i)
+      for (const auto& next : neighbours_[part.triangles[i]])
+        if (part_of_[next.triangle] < 0) take(next.triangle, turned[i] == next.agrees);
+    const auto count = std::count(turned.begin(), turned.end(), true);
+    const bool majority = 2 * count > static_cast<std::ptrdiff_t>(turned.size());
+    for (size_t i = 0; i < turned.size(); ++i) {
+      const int64_t t = part.triangles[i];
+      if (turned[i] != majority) turn(t);
+      part.closed = part.closed && closed_[t];
+      for (const int64_t vertex : surface_.triangles[t]) part.box.extend(surface_.points[vertex]);
+    }
+    parts_.push_back(std::move(part));
+  }
+
+  Surface of(const Part& part) const {
+    Surface surface{surface_.name, {}, {}};
+    for (const int64_t t : part.triangles) {
+      const auto first = static_cast<int64_t>(surface.points.size());
+      for (const int64_t vertex : surface_.triangles[t])
+        surface.points.push_back(surface_.points[vertex]);
+      surface.triangles.push_back({first, first + 1, first + 2});
+    }
+    return surface;
+  }
+
+  bool outward(const Part& part) const {
+    const Surface alone = of(part);
+    return six_volumes(alone.points, alone.triangles) > 0;
+  }
+
+  /// How many other closed parts part `p` lies in.
+  int64_t depth(size_t p) {
+    const auto& triangle = surface_.triangles[parts_[p].triangles.front()];
+    const Vec3 inside = (surface_.points[triangle[0]] + surface_.points[triangle[1]] +
+                         surface_.points[triangle[2]]) /
+                        3;
+    int64_t around = 0;
+    for (size_t q = 0; q < parts_.size(); ++q) {
+      if (q == p || !parts_[q].closed || !parts_[q].box.contains(parts_[p].box)) continue;
+      if (!trees_.contains(q)) trees_.emplace(q, DistanceTree(of(parts_[q])));
+      if (trees_.at(q).contains(inside)) ++around;
+    }
+    return around;
+  }
+
+  Surface& surface_;
+  std::vector<std::vector<Neighbour>> neighbours_;
+  std::vector<bool> closed_;
+  std::vector<int64_t> part_of_;
+  std::vector<Part> parts_;
+  std::map<size_t, DistanceTree> trees_;
+};
+
+}  // namespace
+
+void orient(Surface& surface) { Orienter(surface).run(); }
+
+}  // namespace repose::surface

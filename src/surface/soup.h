@@ -1,0 +1,53 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+
+/// What a mesh file holds, between its bytes and a Surface.
+namespace repose::surface {
+
+/// Points and polygons as a file stores them; nothing checked.
+struct Soup {
+  std::vector<Vec3> points;
+  std::vector<std::vector<int64_t>> polygons;  ///< 0-based rows of points
+};
+
+enum class Format { ply, stl_text, stl_binary, obj, off };
+
+/// The bytes of one file.
+struct Content {
+  std::filesystem::path file;  ///< for messages
+  std::string bytes;
+};
+
+/// Reads the whole of a regular file. Throws InputError when it is missing, unreadable or empty.
+Content read_content(const std::filesystem::path& file);
+
+/// The format by content; the ending decides only where the content does not. Throws InputError
+/// when it is none of the known ones.
+Format recognise(const Content& content);
+
+/// ASCII letters in lower case, whatever the locale.
+std::string lower(std::string_view text);
+
+/// CRLF and CR become LF.
+void unify_newlines(std::string& text);
+
+/// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
+std::string_view next_line(std::string_view text, size_t& position);
+
+/// The blank-separated words of a line.
+std::vector<std::string_view> words(std::string_view line);
+
+/// Readers of one format each; they refuse what is damaged, truncated or promises more than the
+/// file can hold, in one line. Indices and coordinates are left to read_surface.
+Soup parse_ply(Content content);
+Soup parse_stl_text(Content content);
+Soup parse_stl_binary(Content content);
+Soup parse_obj(Content content);
+Soup parse_off(Content content);
+
+}  // namespace repose::surface

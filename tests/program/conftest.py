@@ -1,0 +1,69 @@
+"""Fixtures of the end-to-end tests: programs run as a person runs them, and a hang is a failure."""
+
+import os
+import pathlib
+import signal
+import subprocess
+
+import pytest
+
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+TIME_LIMIT = 120  # seconds
+
+
+def mpi_environment():
+    """The environment that the scripts give mpirun, from the one place where it is written."""
+    command = ". drivers/setup.sh && mpi_environment && env -0"
+    text = subprocess.check_output(["bash", "-c", command], cwd=PROJECT).decode()
+    return dict(entry.split("=", 1) for entry in text.split("\0") if entry)
+
+
+def programs():
+    """The folder of the built programs (REPOSE_BIN, which ctest sets)."""
+    if "REPOSE_BIN" not in os.environ:
+        pytest.exit("REPOSE_BIN must name the folder of the built programs (build-ci/bin)", 1)
+    return pathlib.Path(os.environ["REPOSE_BIN"]).resolve()
+
+
+def finish(command, cwd, environment, time_limit):
+    """Runs a command to its end; past the time limit, stops all it started and fails the test."""
+    process = subprocess.Popen(
+        command, cwd=cwd, env=environment, text=True, errors="replace", start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        stdout, stderr = process.communicate(timeout=time_limit)
+    except subprocess.TimeoutExpired:
+        process.terminate()  # mpirun stops its ranks, which are not in its process group
+        try:
+            process.communicate(timeout=10)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+        pytest.fail(f"still running after {time_limit} s: {' '.join(map(str, command))}")
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+@pytest.fixture(scope="session")
+def environment():
+    return mpi_environment()
+
+
+@pytest.fixture
+def run(tmp_path, environment):
+    """run(program, *arguments, ranks=1, cwd=tmp_path) → CompletedProcess with text output.
+
+    On several ranks stderr is what the ranks wrote, without what mpirun adds when one fails.
+    """
+
+    def run_program(program, *arguments, ranks=1, cwd=tmp_path, time_limit=TIME_LIMIT):
+        command = [str(programs() / program), *map(str, arguments)]
+        if ranks == 1:
+            return finish(command, cwd, environment, time_limit)
+        errors = tmp_path / "stderr_of_the_ranks"
+        errors.write_text("")
+        wrapped = ["sh", "-c", f"exec \"$@\" 2>>'{errors}'", "sh", *command]
+        result = finish(["mpirun", "-n", str(ranks), *wrapped], cwd, environment, time_limit)
+        result.stderr = errors.read_text(errors="replace") or result.stderr
+        errors.unlink()
+        return result
+
+    return run_program

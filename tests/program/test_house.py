@@ -1,0 +1,164 @@
+"""What a machine can see of the house rules: rooms, sizes of functions, headers, words."""
+
+import ast
+import re
+
+import pytest
+
+from conftest import PROJECT
+
+ROOMS = {
+    "base": set(),
+    "scene": {"base"},
+    "surface": {"base"},
+    "model": {"base", "scene", "surface"},
+    "mechanics": {"base", "model"},
+    "solve": {"base", "model", "mechanics"},
+    "results": {"base", "model"},
+}
+PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
+               for top in ("src", "include/repose")]
+# Start of an included name → the folders that may include it.
+LIBRARIES = {
+    "CGAL/": ["src/surface"],
+    "vtk": ["src/surface"],
+    "yaml-cpp": ["src/scene"],
+    "petsctao": ["src/solve", "include/repose/solve"],
+    "hdf5": ["src/base", "src/results", "include/repose/base", "include/repose/results"],
+    "petsc": PETSC_ROOMS,
+    "repose/base/petsc": PETSC_ROOMS,
+}
+LONGEST, USUAL, USUAL_SHARE = 60, 35, 0.9
+WORDS = re.compile(r"\b(TO" r"DO|FIX" r"ME|XX" r"X|HA" r"CK)\b"
+                   r"|(?<![\w.$})~*-])/(work|home|root|tmp|mnt|Users)/")
+TEXT = {".cpp", ".h", ".py", ".sh", ".md", ".txt", ".yaml", ".json", ".cmake"}
+
+
+def files(*suffixes):
+    """The project's text files with one of the suffixes, build folders left out."""
+    for path in sorted(PROJECT.rglob("*")):
+        name = path.relative_to(PROJECT)
+        skip = any(part == ".git" or part.startswith("build") for part in name.parts[:-1])
+        if path.is_file() and path.suffix in suffixes and not skip:
+            yield name.as_posix(), path.read_text(encoding="utf-8")
+
+
+def sources():
+    """The sources of the rooms: what is declared in include/ and defined in src/."""
+    found = [(n, t) for n, t in files(".h", ".cpp") if n.startswith(("src/", "include/"))]
+    assert found
+    return found
+
+
+def crossings(name, text):
+    """Includes of a file of a room that cross the room's lines, one message each."""
+    folder = re.match(r"(?:src|include/repose)/(\w+)", name)
+    for line, text_line in enumerate(text.splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s*[<"]([^>"]+)', text_line)
+        if not match:
+            continue
+        included = match.group(1)
+        for start, homes in LIBRARIES.items():
+            if included.startswith(start) and folder.group(0) not in homes:
+                yield f"{name}:{line} includes {included}, which belongs in {', '.join(homes)}"
+        room = re.match(r"repose/(\w+)/", included)
+        if room and room.group(1) not in ROOMS[folder.group(1)] | {folder.group(1)}:
+            yield f"{name}:{line} includes {included}; {folder.group(1)} may not"
+
+
+def functions(text):
+    """(first line, number of lines) of each C++ function, laid out over lines by clang-format: its
+    last brace is as far in as the line that began it, and no line between is as far out."""
+    text = re.sub(r'R"(\w*)\(.*?\)\1"', lambda m: "\n".join('""' for _ in m[0].splitlines()), text,
+                  flags=re.S)
+    indents = [len(t) - len(t.lstrip()) for t in text.splitlines()]
+    lines = [t.strip() for t in text.splitlines()]
+    found = []
+    for end, line in enumerate(lines):
+        if not line.startswith("}") or line.startswith("} "):
+            continue
+        begin = end - 1
+        while begin >= 0 and (not lines[begin] or lines[begin][0] in '#"' or
+                              indents[begin] > indents[end]):
+            begin -= 1
+        head = " ".join(lines[max(begin, 0):end]).split("{")[0]
+        if "(" in head and not re.match(r"}|(if|for|while|switch|try|class|struct|enum)\b", head):
+            found = [(b, n) for b, n in found if b < begin] + [(begin, end - begin + 1)]
+    return [(begin + 1, length) for begin, length in found]
+
+
+def python_functions(text):
+    """(first line, number of lines) of each Python function."""
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, kinds)]
+    return [(node.lineno, node.end_lineno - node.lineno + 1) for node in nodes]
+
+
+def test_includes_stay_in_their_rooms():
+    faults = [fault for name, text in sources() for fault in crossings(name, text)]
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("name, include", [
+    ("src/base/a.cpp", '"repose/scene/scene.h"'),
+    ("include/repose/results/a.h", '"repose/mechanics/energy.h"'),
+    ("include/repose/surface/a.h", "<CGAL/Surface_mesh.h>"),
+    ("src/model/a.cpp", "<CGAL/Surface_mesh.h>"),
+    ("src/model/a.cpp", "<yaml-cpp/yaml.h>"),
+    ("src/mechanics/a.cpp", "<petscvec.h>"),
+    ("src/mechanics/a.cpp", '"repose/base/petsc.h"'),
+    ("src/base/a.cpp", "<petsctao.h>"),
+    ("src/solve/a.cpp", "<hdf5.h>"),
+])
+def test_a_crossing_is_seen(name, include):
+    assert list(crossings(name, f"#pragma once\n#include {include}\n"))
+
+
+def test_functions_fit_on_a_screen():
+    lengths = [(length, f"{name}:{line}") for name, text in files(".h", ".cpp")
+               for line, length in functions(text)]
+    lengths += [(length, f"{name}:{line}") for name, text in files(".py")
+                for line, length in python_functions(text)]
+    long_ones = sorted((entry for entry in lengths if entry[0] > USUAL), reverse=True)
+    assert not long_ones or long_ones[0][0] <= LONGEST, long_ones
+    assert len(long_ones) <= (1 - USUAL_SHARE) * len(lengths), long_ones
+
+
+def test_function_lengths_are_counted():
+    text = """namespace repose {
+struct Box {
+  int area() const {
+    return 1;
+  }
+};
+Box::Box(int a,
+         int b)
+    : a_(a) {
+  for (int i = 0; i < a; ++i) {
+
+    run([&] {
+      b();
+    });
+  }
+}
+
+}  // namespace repose
+"""
+    assert functions(text) == [(3, 3), (7, 10)]
+
+
+def test_headers_are_included_once():
+    headers = [(name, text) for name, text in files(".h")]
+    assert headers
+    assert [name for name, text in headers if not text.startswith("#pragma once\n")] == []
+
+
+def test_no_word_that_does_not_belong():
+    faults = [f"{name}:{line} {text_line.strip()[:80]}" for name, text in files(*TEXT)
+              for line, text_line in enumerate(text.splitlines(), 1) if WORDS.search(text_line)]
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("text", ["// TO" "DO later", "/ho" "me/me/head.ply", 'open("/tm' 'p/x")'])
+def test_a_word_is_seen(text):
+    assert WORDS.search(text)

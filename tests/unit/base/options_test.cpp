@@ -1,0 +1,205 @@
+#include "repose/base/options.h"
+
+#include <gtest/gtest.h>
+#include <petscsys.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "repose/base/error.h"
+#include "repose/base/petsc.h"
+
+namespace repose::base {
+namespace {
+
+std::vector<Option> table() {
+  return {
+      {"accuracy", OptionKind::number, "0.1", "Stop within this.", Range::above(0), "mm"},
+      {"level", OptionKind::number, "", "Isovalue.", {}, "HU"},
+      {"load_steps", OptionKind::integer, "auto", "Steps.", Range::between(1, 1000), "", {"auto"}},
+      {"functional",
+       OptionKind::choice,
+       "energy",
+       "What is minimised.",
+       {},
+       "",
+       {"energy", "force"}},
+      {"output", OptionKind::path, "", "Where to write."},
+      {"landmarks", OptionKind::path, "", "Two lists.", {}, "", {}, 2},
+      {"dry_run", OptionKind::flag, "", "Build only."}};
+}
+
+struct Line {
+  explicit Line(std::vector<std::string> typed,
+                std::vector<Argument> arguments = {{"INPUT", "A scene."}})
+      : tokens(std::move(typed)) {
+    tokens.insert(tokens.begin(), "/some/where/repose-try");
+    for (std::string& token : tokens) pointers.push_back(token.data());
+    options = std::make_unique<Options>(static_cast<int>(pointers.size()), pointers.data(),
+                                        "Tries options.", std::move(arguments), table());
+  }
+  Options* operator->() { return options.get(); }
+  std::string refusal() {
+    try {
+      options->check();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  std::vector<std::string> tokens;
+  std::vector<char*> pointers;
+  std::unique_ptr<Options> options;
+};
+
+TEST(Options, ReadsEveryKind) {
+  Line line({"-accuracy", "0.5", "head.yaml", "-level", "-300", "-load_steps", "8", "-functional",
+             "force", "-output", "out/head", "-landmarks", "a.json", "b.json", "-dry_run"});
+  line->check();
+  EXPECT_EQ(line->arguments(), std::vector<std::string>{"head.yaml"});
+  EXPECT_EQ(line->number("accuracy"), 0.5);
+  EXPECT_EQ(line->number("level"), -300);
+  EXPECT_EQ(line->integer("load_steps"), 8);
+  EXPECT_EQ(line->text("functional"), "force");
+  EXPECT_EQ(line->text("output"), "out/head");
+  EXPECT_EQ(line->texts("landmarks"), (std::vector<std::string>{"a.json", "b.json"}));
+  EXPECT_TRUE(line->flag("dry_run"));
+}
+
+TEST(Options, FallsBackToDefaults) {
+  Line line({"head.yaml"});
+  line->check();
+  EXPECT_FALSE(line->has("accuracy"));
+  EXPECT_EQ(line->number("accuracy"), 0.1);
+  EXPECT_EQ(line->text("load_steps"), "auto");
+  EXPECT_EQ(line->text("output"), "");
+  EXPECT_TRUE(line->texts("landmarks").empty());
+  EXPECT_FALSE(line->flag("dry_run"));
+  EXPECT_THROW(line->number("level"), InternalError);
+  EXPECT_THROW(line->integer("load_steps"), InternalError);
+  EXPECT_THROW(line->has("no_such"), InternalError);
+}
+
+TEST(Options, FlagTakesAWordOnlyIfItIsOne) {
+  Line line({"-dry_run", "head.yaml"});
+  line->check();
+  EXPECT_TRUE(line->flag("dry_run"));
+  Line off({"-dry_run", "false", "head.yaml"});
+  off->check();
+  EXPECT_TRUE(off->has("dry_run"));
+  EXPECT_FALSE(off->flag("dry_run"));
+}
+
+TEST(Options, LastOneWinsAndTwoDashesDo) {
+  Line line({"-accuracy", "1", "head.yaml", "--accuracy", "-.5", "-accuracy", "2"});
+  line->check();
+  EXPECT_EQ(line->number("accuracy"), 2);
+}
+
+TEST(Options, PassesPetscsOwnOn) {
+  Line line({"head.yaml", "-tao_type", "nls", "-accuracy", "1", "-ksp_shift", "-3", "-log_view",
+             "-mat_mumps_icntl_14", "40"});
+  line->check();
+  const std::vector<std::string> passed(line->petsc_argv() + 1,
+                                        line->petsc_argv() + line->petsc_argc());
+  EXPECT_EQ(passed, (std::vector<std::string>{"-tao_type", "nls", "-ksp_shift", "-3", "-log_view",
+                                              "-mat_mumps_icntl_14", "40"}));
+  EXPECT_EQ(line->petsc_argv()[line->petsc_argc()], nullptr);
+}
+
+TEST(Options, PathBehindAViewerOptionIsAnArgument) {
+  Line path({"-log_view", "head.yaml"});
+  path->check();
+  EXPECT_EQ(path->arguments(), std::vector<std::string>{"head.yaml"});
+  EXPECT_EQ(path->petsc_argc(), 2);
+  Line viewer({"-log_view", "ascii:log.txt", "head.yaml"});
+  viewer->check();
+  EXPECT_EQ(viewer->petsc_argc(), 3);
+}
+
+TEST(Options, HelpIsOursUnlessPetscsIsAskedFor) {
+  Line ours({"-help"});
+  EXPECT_TRUE(ours->help_wanted());
+  EXPECT_EQ(ours->petsc_argc(), 1);
+  Line petscs({"head.yaml", "-help", "petsc"});
+  EXPECT_FALSE(petscs->help_wanted());
+  EXPECT_STREQ(petscs->petsc_argv()[1], "-help");
+  EXPECT_EQ(petscs->petsc_argc(), 2);
+  Line intro({"-help", "intro"});
+  EXPECT_EQ(intro->petsc_argc(), 3);
+}
+
+TEST(Options, HelpShowsTheTable) {
+  Line line({"-help"});
+  const std::string help = line->help();
+  for (const char* part :
+       {"repose-try INPUT", "Tries options.", "-accuracy mm", "[> 0; default 0.1]", "-level HU",
+        "-load_steps N|auto", "[1 … 1000; default auto]", "-functional energy|force",
+        "-landmarks FILE FILE", "Build only.", "-help petsc"})
+    EXPECT_NE(help.find(part), std::string::npos) << part << "\n" << help;
+}
+
+struct Bad {
+  std::vector<std::string> typed;
+  std::string expected;
+};
+
+TEST(Options, RefusesInOneLine) {
+  const std::vector<Bad> cases{
+      {{"a", "-acuracy", "1"},
+       "repose-try: unknown option '-acuracy'; the nearest known one is -accuracy"},
+      {{"a", "-hlep"}, "nearest known one is -help"},
+      {{"a", "-accuracy"}, "-accuracy needs 1 value: a number of mm, > 0"},
+      {{"a", "-accuracy", "-output", "b"}, "-accuracy needs 1 value"},
+      {{"a", "-accuracy", "0"}, "-accuracy '0' must be a number of mm, > 0"},
+      {{"a", "-accuracy", "-2"}, "-accuracy '-2' must be"},
+      {{"a", "-accuracy", "nan"}, "-accuracy 'nan' must be"},
+      {{"a", "-accuracy", "-inf"}, "-accuracy '-inf' must be"},
+      {{"a", "-accuracy", "1mm"}, "-accuracy '1mm' must be"},
+      {{"a", "-load_steps", "0"}, "-load_steps '0' must be a whole number, 1 … 1000, or auto"},
+      {{"a", "-load_steps", "2.5"}, "-load_steps '2.5' must be"},
+      {{"a", "-functional", "enrgy"}, "must be one of energy, force; did you mean energy?"},
+      {{"a", "-output", ""}, "-output '' must be a path"},
+      {{"a", "-landmarks", "one.json"}, "-landmarks needs 2 values"},
+      {{}, "INPUT is missing: A scene."},
+      {{"-log_view", "a"}, "INPUT is missing: A scene.; 'a' was taken as the value of -log_view"},
+      {{"a", "b\nc"}, "unexpected argument 'b?c'; it takes 1"},
+  };
+  for (const Bad& bad : cases) {
+    const std::string message = Line(bad.typed).refusal();
+    EXPECT_NE(message.find(bad.expected), std::string::npos)
+        << message << "\nwanted " << bad.expected;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+}
+
+/// PETSc with a database as an -options_file would leave it; one life of PETSc for the whole test.
+TEST(Options, ReadsPetscsDatabase) {
+  const auto file =
+      std::filesystem::temp_directory_path() / fmt::format("options_{}.txt", getpid());
+  std::ofstream(file)
+      << "-accuracy 0.25\n-load_steps 7\n-dry_run\n-ksp_rtol 1e-3\n-functionl force\n";
+  Line line({"head.yaml", "-load_steps", "9", "-pc_typo", "x", "-options_file", file.string()});
+  const Session session(line->petsc_argc(), line->petsc_argv(), nullptr);
+  std::filesystem::remove(file);
+  EXPECT_NE(
+      line.refusal().find("unknown option '-functionl'; the nearest known one is -functional"),
+      std::string::npos)
+      << line.refusal();
+  ASSERT_EQ(PetscOptionsClearValue(nullptr, "-functionl"), 0);
+
+  Line again({"head.yaml", "-load_steps", "9", "-pc_typo", "x"});
+  again->check();
+  EXPECT_EQ(again->number("accuracy"), 0.25);
+  EXPECT_EQ(again->texts("load_steps"), std::vector<std::string>{"9"}) << "the command line wins";
+  EXPECT_TRUE(again->flag("dry_run"));
+  EXPECT_EQ(again->unused(), std::vector<std::string>{"-pc_typo"});
+  ASSERT_EQ(PetscOptionsSetValue(nullptr, "-accuracy", "-1"), 0);
+  EXPECT_NE(Line({"head.yaml"}).refusal().find("-accuracy '-1' must be"), std::string::npos);
+  ASSERT_EQ(PetscOptionsClear(nullptr), 0);
+}
+
+}  // namespace
+}  // namespace repose::base

@@ -1,0 +1,74 @@
+#pragma once
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "repose/mechanics/energy.h"
+#include "repose/mechanics/hessian.h"
+
+/// The kernels' results for a whole piece of tissue as one value, one vector and one matrix.
+namespace repose::test {
+
+inline std::vector<Vec3> moved(const std::vector<Vec3>& x, const std::vector<Vec3>& d, double h) {
+  std::vector<Vec3> y = x;
+  for (size_t i = 0; i < x.size(); ++i) y[i] += h * d[i];
+  return y;
+}
+
+inline Eigen::VectorXd flattened(const std::vector<Vec3>& x) {
+  return Eigen::Map<const Eigen::VectorXd>(x[0].data(), 3 * static_cast<int64_t>(x.size()));
+}
+
+struct ValueAndGradient {
+  double value = 0;
+  Eigen::VectorXd gradient;
+};
+
+inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics::Weights& weights,
+                                 const std::vector<Vec3>& x) {
+  ValueAndGradient result;
+  std::vector<Vec3> gradient(x.size(), Vec3::Zero());
+  for (const mechanics::SpringLoop& loop : loops.springs)
+    result.value +=
+        weights.elastic * mechanics::add_spring_gradient(loop, x, weights.elastic, gradient);
+  result.value += mechanics::add_prism_gradient(loops.prisms, x, weights, gradient);
+  result.gradient = flattened(gradient);
+  return result;
+}
+
+/// The dense Hessian from the 3×3 blocks.
+inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::Weights& weights,
+                                const std::vector<Vec3>& x, mechanics::Curvature curvature) {
+  const int64_t n = 3 * static_cast<int64_t>(x.size());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);
+  const auto add = [&](int32_t i, int32_t j, const Mat3& block) {
+    matrix.block<3, 3>(3 * i, 3 * j) += block;
+  };
+  for (const mechanics::SpringLoop& loop : loops.springs)
+    mechanics::for_each_spring_block(loop, x, weights.elastic, curvature,
+                                     [&](int64_t e, const Mat3& block) {
+                                       const auto [i, j] = loop.points[e];
+                                       add(i, i, block);
+                                       add(j, j, block);
+                                       add(i, j, -block);
+                                       add(j, i, -block);
+                                     });
+  mechanics::for_each_prism_block(loops.prisms, x, weights, curvature,
+                                  [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+                                    const auto& corner = loops.prisms.points[e];
+                                    for (int i = 0; i < 6; ++i)
+                                      for (int j = 0; j < 6; ++j)
+                                        add(corner[i], corner[j], blocks[i][j]);
+                                  });
+  return matrix;
+}
+
+inline Eigen::VectorXd hessian_action(const mechanics::Loops& loops,
+                                      const mechanics::Weights& weights, const std::vector<Vec3>& x,
+                                      const std::vector<Vec3>& d) {
+  std::vector<Vec3> product(x.size(), Vec3::Zero());
+  mechanics::add_hessian_action(loops, x, weights, d, product);
+  return flattened(product);
+}
+
+}  // namespace repose::test

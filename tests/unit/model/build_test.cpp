@@ -1,0 +1,310 @@
+#include "repose/model/build.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <set>
+
+#include "patches.h"
+#include "repose/base/error.h"
+
+namespace repose::model {
+namespace {
+
+using scene::RigidMotion;
+
+const surface::Surface kFlatBone = patches::box({-30, -30, -25}, {130, 130, -10});
+
+std::string refusal(const scene::Scene& scene, const surface::Surface& skin,
+                    const std::vector<surface::Surface>& bones) {
+  try {
+    build_model(scene, skin, bones);
+  } catch (const base::InputError& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.find('\n'), std::string::npos);
+    return text;
+  }
+  return "";
+}
+
+bool says(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+bool remarked(const BuildReport& report, const std::string& part) {
+  return std::any_of(report.remarks.begin(), report.remarks.end(),
+                     [&](const std::string& remark) { return says(remark, part); });
+}
+
+TEST(Build, every_point_is_in_the_set_it_belongs_to) {
+  scene::Scene scene = patches::scene_of(3, {"jaw"});
+  scene.moves[0] = RigidMotion::rotation({1, 0, 0}, {0, 10, -20}, 8);
+  const BuiltModel built = build_model(scene, patches::square(6, 60), {kFlatBone});
+  const Points& points = built.model.points;
+  EXPECT_NO_THROW(validate(built.model, "built"));
+  for (size_t i = 0; i < points.position.size(); ++i) {
+    const Vec3& top = points.position[i - i % 3];
+    const bool rim = top.x() < 1 || top.x() > 59 || top.y() < 1 || top.y() > 59;
+    const bool deepest = i % 3 == 2;
+    const PointSet expected = rim       ? PointSet::boundary
+                              : deepest ? PointSet::bone
+                                        : PointSet::soft_tissue;
+    EXPECT_EQ(points.set[i], expected);
+    EXPECT_EQ(points.bone[i], expected == PointSet::bone ? 0 : -1);
+    const Vec3 target =
+        expected == PointSet::bone ? scene.moves[0].apply(points.position[i]) : points.position[i];
+    EXPECT_EQ(points.target[i], target);
+  }
+  const Counts counts = count(built.model);
+  EXPECT_EQ(counts.boundary, 24 * 3);
+  EXPECT_EQ(counts.bone, 25);
+  EXPECT_EQ(counts.soft, 50);
+  EXPECT_EQ(built.report.attached, 25);
+  EXPECT_EQ(built.report.free_deep, 0);
+  EXPECT_NEAR(built.report.thickness_median, 10, 1e-9);
+  ASSERT_EQ(built.model.bone_transform.size(), 1u);
+  EXPECT_EQ(built.model.bone_transform[0], scene.moves[0].matrix());
+  EXPECT_EQ(built.model.bones, std::vector<std::string>{"jaw"});
+}
+
+TEST(Build, only_the_longest_border_is_the_rim) {
+  const surface::Surface skin = patches::paper_sized_annulus();
+  const surface::Surface bone = patches::box({-100, -100, -30}, {100, 100, -10});
+  scene::Scene scene = patches::scene_of(2, {"skull"});
+  EXPECT_EQ(count(build_model(scene, skin, {bone}).model).boundary, 60 * 2);
+  scene.rim_fixed = false;
+  const Counts free = count(build_model(scene, skin, {bone}).model);
+  EXPECT_EQ(free.boundary, 0);
+  EXPECT_EQ(free.bone, 477);
+}
+
+TEST(Build, columns_without_bone_beneath_end_free) {
+  const surface::Surface half = patches::box({-50, -50, -25}, {50, 150, -10});
+  const BuiltModel built =
+      build_model(patches::scene_of(4, {"skull"}), patches::square(20, 100), {half});
+  EXPECT_NO_THROW(validate(built.model, "built"));
+  EXPECT_GT(built.report.free_deep, 100);
+  EXPECT_GT(built.report.attached, 100);
+  for (size_t i = 3; i < built.model.points.position.size(); i += 4) {
+    if (built.model.points.position[i - 3].x() > 60) {
+      EXPECT_EQ(built.model.points.bone[i], -1);
+    }
+  }
+}
+
+TEST(Build, an_unattached_region_is_let_go_and_its_columns_stay_as_they_are) {
+  scene::Scene scene = patches::scene_of(3, {"skull"});
+  const surface::Surface skin = patches::square(20, 100);
+  const BuiltModel held = build_model(scene, skin, {kFlatBone});
+  scene.tissue.unattached.push_back({{50, 50, -10}, 20.1});
+  const BuiltModel built = build_model(scene, skin, {kFlatBone});
+  int64_t let_go = 0;
+  for (size_t i = 2; i < built.model.points.position.size(); i += 3) {
+    EXPECT_EQ(built.model.points.position[i], held.model.points.position[i]);
+    const bool inside = (built.model.points.position[i] - Vec3(50, 50, -10)).norm() <= 20.1;
+    let_go += inside;
+    if (inside) {
+      EXPECT_EQ(built.model.points.set[i], PointSet::soft_tissue);
+    }
+  }
+  EXPECT_EQ(held.report.attached - built.report.attached, let_go);
+  EXPECT_EQ(built.report.free_deep, let_go);
+  EXPECT_EQ(let_go, 49);  // grid points within 4.02 cells
+}
+
+struct TwoJaws {
+  surface::Surface skin = patches::square(40, 100);
+  std::vector<surface::Surface> bones = {patches::box({-20, -20, -25}, {51.2, 120, -10}),
+                                         patches::box({51.3, -20, -25}, {120, 120, -10})};
+  scene::Scene scene = patches::scene_of(2, {"upper", "lower"});
+};
+
+TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
+  TwoJaws jaws;
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  const BuiltModel built = build_model(jaws.scene, jaws.skin, jaws.bones);
+  int64_t released = 0;
+  for (size_t i = 1; i < built.model.points.position.size(); i += 2) {
+    if (built.model.points.set[i] == PointSet::boundary) continue;
+    const double x = built.model.points.position[i].x();
+    const bool near = x < 51.25 ? 51.3 - x <= 10 : x - 51.2 <= 10;
+    released += near;
+    const int32_t own = x < 51.25 ? 0 : 1;
+    EXPECT_EQ(built.model.points.bone[i], near ? -1 : own) << x;
+  }
+  EXPECT_GT(released, 0);
+  EXPECT_EQ(built.report.released, released);
+  EXPECT_EQ(built.report.free_deep, released);
+}
+
+TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {
+  TwoJaws jaws;
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  jaws.scene.tissue.release = 0;
+  EXPECT_EQ(build_model(jaws.scene, jaws.skin, jaws.bones).report.free_deep, 0);
+  jaws.scene.tissue.release = 10;
+  jaws.scene.moves[0] = jaws.scene.moves[1];
+  EXPECT_EQ(build_model(jaws.scene, jaws.skin, jaws.bones).report.free_deep, 0);
+  jaws.scene.moves[0] = RigidMotion::rotation({0, 0, 1}, {50, 50, 0}, 1);
+  EXPECT_GT(build_model(jaws.scene, jaws.skin, jaws.bones).report.released, 0);
+}
+
+TEST(Build, a_skin_inside_out_is_turned_round) {
+  surface::Surface skin = patches::square(6, 60);
+  const scene::Scene scene = patches::scene_of(2, {"skull"});
+  const BuiltModel straight = build_model(scene, skin, {kFlatBone});
+  EXPECT_FALSE(remarked(straight.report, "turned round"));
+  for (Triangle& t : skin.triangles) std::swap(t[1], t[2]);
+  const BuiltModel turned = build_model(scene, skin, {kFlatBone});
+  EXPECT_TRUE(remarked(turned.report, "turned round"));
+  EXPECT_EQ(turned.model.points.position, straight.model.points.position);
+  for (const double v : turned.model.prisms.rest_volume) EXPECT_GT(v, 0);
+  const Triangle& t = turned.model.skin.front();
+  const auto& x = turned.model.points.position;
+  EXPECT_GT((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).z(), 0);
+}
+
+TEST(Build, forces_sum_to_what_was_asked_and_reach_free_skin_points_only) {
+  scene::Scene scene = patches::scene_of(3, {"skull"});
+  scene.forces.push_back({{10, 30, 0}, 17, {0.3, -0.7, 2}});
+  scene.forces.push_back({{45, 45, 1}, 9, {0, 1, 0}});
+  const Model model = build_model(scene, patches::square(12, 60), {kFlatBone}).model;
+  Vec3 sum = Vec3::Zero();
+  for (size_t i = 0; i < model.points.position.size(); ++i) {
+    sum += model.points.external_force[i];
+    if (model.points.external_force[i].norm() == 0) continue;
+    EXPECT_EQ(model.points.layer[i], 0);
+    EXPECT_EQ(model.points.set[i], PointSet::soft_tissue);
+  }
+  EXPECT_LT((sum - Vec3(0.3, 0.3, 2)).norm(), 1e-14);
+}
+
+TEST(Build, masses_sum_to_the_layers_or_to_the_volume) {
+  scene::Scene scene = patches::scene_of(3, {"skull"});
+  scene.tissue.mass = {0.05, 0.1, 0.02};
+  const surface::Surface skin = patches::paper_sized_annulus();
+  const surface::Surface bone = patches::box({-100, -100, -30}, {100, 100, -10});
+  const Model model = build_model(scene, skin, {bone}).model;
+  double sums[3] = {0, 0, 0}, volume = 0;
+  for (size_t i = 0; i < model.points.mass.size(); ++i)
+    sums[model.points.layer[i]] += model.points.mass[i];
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(sums[a], scene.tissue.mass[a], 1e-15);
+
+  scene.tissue.mass.clear();
+  scene.tissue.density = 1e-6;
+  const Model dense = build_model(scene, skin, {bone}).model;
+  double mass = 0;
+  for (const double m : dense.points.mass) mass += m;
+  for (const double v : dense.prisms.rest_volume) volume += v;
+  EXPECT_NEAR(mass, 1e-6 * volume, 1e-12 * mass);
+}
+
+TEST(Build, masses_follow_the_area) {
+  scene::Scene scene = patches::scene_of(2, {"skull"});
+  scene.tissue.mass = {0.36, 0};
+  const Model model = build_model(scene, patches::square(6, 60), {kFlatBone}).model;
+  EXPECT_NEAR(model.points.mass[2 * 8], 0.36 / 36, 1e-15);  // an inner vertex has one cell's area
+  EXPECT_NEAR(model.points.mass[2 * 8 + 1], 0, 0);
+}
+
+TEST(Build, what_the_scene_does_not_mention_is_not_there) {
+  const Model model =
+      build_model(patches::scene_of(2, {"skull"}), patches::square(3, 60), {kFlatBone}).model;
+  EXPECT_EQ(model.gravity, Vec3(0, 0, 0));
+  for (const double m : model.points.mass) EXPECT_EQ(m, 0);
+  for (const Vec3& f : model.points.external_force) EXPECT_EQ(f, Vec3(0, 0, 0));
+}
+
+TEST(Build, twice_is_the_same_to_the_bit) {
+  TwoJaws jaws;
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  jaws.scene.tissue.springs["default"].modulus = 0.02;
+  const Model a = build_model(jaws.scene, jaws.skin, jaws.bones).model;
+  const Model b = build_model(jaws.scene, jaws.skin, jaws.bones).model;
+  EXPECT_EQ(a.points.position, b.points.position);
+  EXPECT_EQ(a.points.set, b.points.set);
+  EXPECT_EQ(a.springs.points, b.springs.points);
+  EXPECT_EQ(a.springs.stiffness, b.springs.stiffness);
+  EXPECT_EQ(a.prisms.rest_volume, b.prisms.rest_volume);
+}
+
+TEST(BuildRefuses, what_nothing_holds) {
+  scene::Scene scene = patches::scene_of(2, {});
+  scene.rim_fixed = false;
+  EXPECT_TRUE(says(refusal(scene, patches::square(6, 60), {}), "nothing holds"));
+}
+
+TEST(BuildRefuses, what_has_no_free_point) {
+  const scene::Scene scene = patches::scene_of(2, {"skull"});
+  EXPECT_TRUE(says(refusal(scene, patches::square(1, 60), {kFlatBone}), "free to move"));
+}
+
+TEST(BuildRefuses, a_bone_that_moves_without_tissue) {
+  scene::Scene scene = patches::scene_of(2, {"skull", "far"});
+  const surface::Surface far = patches::box({0, 0, -120}, {50, 50, -70});
+  const BuiltModel built = build_model(scene, patches::square(6, 60), {kFlatBone, far});
+  EXPECT_TRUE(remarked(built.report, "'far'"));
+  scene.moves[1] = RigidMotion::translation({1, 0, 0});
+  const std::string text = refusal(scene, patches::square(6, 60), {kFlatBone, far});
+  EXPECT_TRUE(says(text, "'far' moves")) << text;
+  EXPECT_TRUE(says(text, "70.0 mm")) << text;
+  EXPECT_TRUE(says(text, "attach_within is 30")) << text;
+}
+
+TEST(BuildRefuses, a_moving_bone_whose_tissue_is_all_released) {
+  TwoJaws jaws;
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  jaws.scene.tissue.release = 60;
+  EXPECT_TRUE(says(refusal(jaws.scene, jaws.skin, jaws.bones), "tissue.release smaller"));
+}
+
+TEST(BuildRefuses, surfaces_in_different_frames) {
+  surface::Surface bone = kFlatBone, skin = patches::square(6, 60);
+  for (Vec3& x : skin.points) x += Vec3(100, 200, 0);
+  for (Vec3& x : bone.points) {
+    x += Vec3(100, 200, 0);
+    x.head<2>() *= -1;
+  }
+  const scene::Scene scene = patches::scene_of(2, {"skull"});
+  EXPECT_TRUE(says(refusal(scene, skin, {bone}), "LPS"));
+  for (Vec3& x : bone.points) x += Vec3(0, 0, 1e6);
+  EXPECT_TRUE(says(refusal(scene, skin, {bone}), "one scan"));
+}
+
+TEST(BuildRefuses, skin_inside_bone) {
+  const surface::Surface bone = patches::box({-30, -30, -25}, {130, 20, 3});
+  const std::string text = refusal(patches::scene_of(2, {"skull"}), patches::square(6, 60), {bone});
+  EXPECT_TRUE(says(text, "inside")) << text;
+  EXPECT_TRUE(says(text, "vertex 0 ")) << text;
+}
+
+TEST(BuildRefuses, a_force_that_meets_no_free_skin) {
+  scene::Scene scene = patches::scene_of(2, {"skull"});
+  scene.forces.push_back({{30, 30, 50}, 5, {0, 0, -2}});
+  const std::string text = refusal(scene, patches::square(6, 60), {kFlatBone});
+  EXPECT_TRUE(says(text, "forces[0]")) << text;
+  EXPECT_TRUE(says(text, "50.00 mm")) << text;
+}
+
+TEST(BuildRefuses, a_skin_that_is_not_a_manifold) {
+  const scene::Scene scene = patches::scene_of(2, {"skull"});
+  surface::Surface skin = patches::square(3, 60);
+  skin.triangles.push_back({0, 1, 9});
+  EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "square.ply"));
+  skin = patches::square(3, 60);
+  std::swap(skin.triangles[4][0], skin.triangles[4][1]);
+  EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "opposite"));
+  skin = patches::square(3, 60);
+  skin.points.emplace_back(3, 3, 3);
+  EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "vertex 16"));
+  skin = patches::square(3, 60);
+  skin.points[5] = skin.points[6];
+  EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "no area"));
+  skin = patches::square(3, 60);
+  skin.triangles[2][1] = 99;
+  EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "vertex 99"));
+}
+
+}  // namespace
+}  // namespace repose::model

@@ -1,0 +1,121 @@
+#include <fstream>
+#include <sstream>
+
+#include "files.h"
+#include "repose/results/unfinished_file.h"
+
+namespace repose::results {
+namespace {
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+TEST(WholeOrAbsent, CommitLeavesTheResultAndItsDocuments) {
+  const Folder folder;
+  write_small_result(folder.path("a"), small_model());
+  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
+}
+
+TEST(WholeOrAbsent, NothingIsLeftWithoutCommit) {
+  const Folder folder;
+  const model::Model m = small_model();
+  {
+    ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+    file.append(small_numbers(0), small_rows(m, 0));
+    EXPECT_EQ(folder.content(), "a.h5.part");
+  }
+  EXPECT_EQ(folder.content(), "");
+}
+
+TEST(WholeOrAbsent, AnEarlierResultStaysUntilCommit) {
+  const Folder folder;
+  write_small_result(folder.path("a"), small_model());
+  const std::string before = text_of(folder.path("a.h5"));
+  { ResultFile file(MPI_COMM_SELF, folder.path("a"), small_model()); }
+  EXPECT_EQ(text_of(folder.path("a.h5")), before);
+}
+
+TEST(WholeOrAbsent, ADocumentOfAnEarlierRunThatDescribesNothingGoes) {
+  const Folder folder;
+  write_small_result(folder.path("a"), small_model());
+  model::Model m = small_model();
+  m.skin.clear();
+  write_small_result(folder.path("a"), m);
+  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_springs.xdmf a_tissue.xdmf");
+}
+
+TEST(WholeOrAbsent, BytesDoNotDependOnTheTime) {
+  const Folder folder;
+  write_small_result(folder.path("a"), small_model());
+  sleep(1);  // time stamps of HDF5 count seconds
+  write_small_result(folder.path("b"), small_model());
+  EXPECT_EQ(text_of(folder.path("a.h5")), text_of(folder.path("b.h5")));
+}
+
+TEST(WholeOrAbsent, DotsInTheNameAreKept) {
+  const Folder folder;
+  write_small_result(folder.path("a.v1.2"), small_model());
+  EXPECT_TRUE(std::filesystem::exists(folder.path("a.v1.2.h5")));
+  EXPECT_NE(text_of(folder.path("a.v1.2_skin.xdmf")).find(">a.v1.2.h5:/model/skin/points<"),
+            std::string::npos);
+}
+
+TEST(WholeOrAbsent, MarkupInTheNameIsEscaped) {
+  const Folder folder;
+  write_small_result(folder.path("a&b"), small_model());
+  EXPECT_NE(text_of(folder.path("a&b_skin.xdmf")).find(">a&amp;b.h5:/"), std::string::npos);
+}
+
+std::string refusal_to_write(const std::filesystem::path& name) {
+  return refusal([&] { ResultFile(MPI_COMM_SELF, name, small_model()).commit(); });
+}
+
+TEST(WholeOrAbsent, AMissingFolderIsRefused) {
+  const Folder folder;
+  const std::string text = refusal_to_write(folder.path("none/a"));
+  EXPECT_NE(text.find("none/a.h5: cannot be written: there is no folder"), std::string::npos)
+      << text;
+}
+
+TEST(WholeOrAbsent, AFolderInThePlaceOfTheFileIsRefused) {
+  const Folder folder;
+  for (const std::string place : {"a.h5", "b.h5.part"}) {
+    std::filesystem::create_directory(folder.path(place));
+    const std::string text = refusal_to_write(folder.path(place.substr(0, 1)));
+    EXPECT_NE(text.find(place + ": is a folder"), std::string::npos) << text;
+  }
+  EXPECT_EQ(folder.content(), "a.h5 b.h5.part");
+}
+
+TEST(WholeOrAbsent, ADocumentThatCannotBeReplacedLeavesNoResult) {
+  const Folder folder;
+  std::filesystem::create_directory(folder.path("a_skin.xdmf"));
+  const std::string text = refusal_to_write(folder.path("a"));
+  EXPECT_NE(text.find("a_skin.xdmf: is a folder"), std::string::npos) << text;
+  EXPECT_EQ(folder.content(), "a_skin.xdmf");
+}
+
+TEST(WholeOrAbsent, ADiskThatIsTooSmallIsRefusedBeforeWriting) {
+  const Folder folder;
+  const UnfinishedFile file(folder.path("a"));
+  file.write("content");
+  const auto left = std::filesystem::space(folder.path("")).available;
+  const std::string text = refusal([&] { file.reserve(static_cast<int64_t>(2 * left)); });
+  EXPECT_NE(text.find("free space or choose another -output"), std::string::npos) << text;
+  EXPECT_EQ(refusal([&] { file.reserve(1000); }), "accepted");
+}
+
+TEST(WholeOrAbsent, RowsThatAreNotTheSlabAreAnInternalError) {
+  const Folder folder;
+  const model::Model m = small_model();
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  StepRows rows = small_rows(m, 0);
+  rows.tension.pop_back();
+  EXPECT_THROW(file.append(small_numbers(0), rows), base::InternalError);
+}
+
+}  // namespace
+}  // namespace repose::results

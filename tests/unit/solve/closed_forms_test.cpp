@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include "models.h"
+#include "repose/base/agreement.h"
+#include "repose/mechanics/spring_law.h"
+#include "repose/scene/rigid_motion.h"
+#include "repose/solve/repose.h"
+
+namespace repose {
+namespace {
+
+using model::PointSet;
+
+constexpr double g = 9.80665;
+
+struct Rest {
+  std::vector<Vec3> position;  // all rows, on every rank
+  solve::Summary summary;
+};
+
+std::vector<Vec3> gather(const std::vector<Vec3>& slab) {
+  const int ranks = base::size(MPI_COMM_WORLD);
+  const int mine = static_cast<int>(3 * slab.size());
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, MPI_COMM_WORLD);
+  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<Vec3> all((starts.back() + counts.back()) / 3);
+  MPI_Allgatherv(slab.data(), mine, MPI_DOUBLE, all.data(), counts.data(), starts.data(),
+                 MPI_DOUBLE, MPI_COMM_WORLD);
+  return all;
+}
+
+Rest find_rest(const model::Model& m, double accuracy,
+               mechanics::Weights weights = {1, mechanics::VolumeTerm::none, 0}) {
+  solve::Settings settings;
+  settings.weights = weights;
+  settings.path.accuracy = accuracy;
+  base::Stages stages(MPI_COMM_WORLD);
+  Rest rest;
+  rest.summary =
+      solve::find_repose(MPI_COMM_WORLD, m, settings, {}, stages,
+                         [&](const results::StepNumbers&, const results::StepRows& rows) {
+                           rest.position = gather(rows.position);
+                         });
+  return rest;
+}
+
+/// The elongation at which a spring of exponent p carries `tension`, by bisection.
+double elongation(int p, double k0, double tension) {
+  double low = 0, high = 1e3;
+  for (int i = 0; i < 200; ++i) {
+    const double s = 0.5 * (low + high);
+    const double t = mechanics::with_exponent(
+        p, [&]<int q>() { return mechanics::spring_tension<q>(s, k0, 1.0); });
+    (t < tension ? low : high) = s;
+  }
+  return low;
+}
+
+class Laws : public ::testing::TestWithParam<int> {};
+
+TEST_P(Laws, HangingSpring) {
+  model::Model m;
+  m.bones = {"bone"};
+  m.gravity = {0, 0, -g};
+  const auto top = testing::add_point(m, {1, 2, 3}, PointSet::bone, 0);
+  const auto bob = testing::add_point(m, {1, 2, -7}, PointSet::soft_tissue, 0, 1);
+  testing::add_spring(m, top, bob, 0.7, GetParam());
+  m.points.mass[bob] = 0.25;
+  const Rest rest = find_rest(m, 1e-10);
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  const double s = elongation(GetParam(), 0.7, 0.25 * g);
+  EXPECT_NEAR(rest.position[bob].x(), 1, 1e-9);
+  EXPECT_NEAR(rest.position[bob].y(), 2, 1e-9);
+  EXPECT_NEAR(rest.position[bob].z(), -7 - s, 1e-9);
+}
+
+TEST_P(Laws, HangingChain) {
+  constexpr int links = 20;
+  model::Model m;
+  m.bones = {"bone"};
+  m.gravity = {0, 0, -g};
+  testing::add_point(m, Vec3::Zero(), PointSet::bone, 0);
+  for (int i = 1; i <= links; ++i) {
+    testing::add_point(m, {0, 0, -4.0 * i}, PointSet::soft_tissue, i);
+    testing::add_spring(m, i - 1, i, 1.5, GetParam());
+    m.points.mass[i] = 0.01 * i;
+  }
+  const Rest rest = find_rest(m, 1e-10);
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  double z = 0;
+  for (int i = 1; i <= links; ++i) {
+    double below = 0;
+    for (int j = i; j <= links; ++j) below += 0.01 * j * g;
+    z -= 4.0 + elongation(GetParam(), 1.5, below);
+    EXPECT_NEAR(rest.position[i].z(), z, 1e-9) << "point " << i;
+  }
+}
+
+/// A regular lattice whose border is pushed by an affine map follows it: every inner point is a
+/// centre of symmetry.
+TEST_P(Laws, PushedPatchIsAffine) {
+  model::Model m = testing::block(7, 6, 5, GetParam(), [](int i, int j, int a) {
+    const bool inner = i > 0 && i < 6 && j > 0 && j < 5 && a > 0 && a < 4;
+    return inner ? PointSet::soft_tissue : PointSet::held;
+  });
+  Mat3 map;
+  map << 1.05, 0.02, 0.0, -0.01, 1.03, 0.04, 0.03, 0.0, 0.97;
+  const auto push = [&](const Vec3& x) -> Vec3 { return map * x + Vec3(0.5, -0.25, 1.0); };
+  testing::aim(m, push);
+  const Rest rest = find_rest(m, 1e-10, {1, mechanics::VolumeTerm::penalty, 0.3});
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < rest.position.size(); ++i)
+    EXPECT_LT((rest.position[i] - push(m.points.position[i])).norm(), 1e-9) << "point " << i;
+}
+
+TEST_P(Laws, RigidMotionCarriesTissueRigidly) {
+  model::Model m = testing::block(6, 5, 4, GetParam(), [](int i, int j, int a) {
+    const bool rim = i == 0 || i == 5 || j == 0 || j == 4;
+    return rim || a == 3 ? PointSet::bone : PointSet::soft_tissue;
+  });
+  const auto motion = scene::RigidMotion::rotation({1, 2, 3}, {10, -20, 5}, 37);
+  const auto move = [&](const Vec3& x) -> Vec3 { return motion.apply(x) + Vec3(3, -4, 12); };
+  testing::aim(m, move);
+  const Rest rest = find_rest(m, 1e-10, {1, mechanics::VolumeTerm::penalty, 0.3});
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < rest.position.size(); ++i)
+    EXPECT_LT((rest.position[i] - move(m.points.position[i])).norm(), 1e-9) << "point " << i;
+  EXPECT_LT(rest.summary.last.objective, 1e-18);
+}
+
+INSTANTIATE_TEST_SUITE_P(Exponents, Laws, ::testing::Values(0, 1, 2));
+
+TEST(FindRepose, RefusesAModelWithNothingFree) {
+  const model::Model m = testing::block(2, 2, 2, 2, [](int, int, int) { return PointSet::bone; });
+  EXPECT_THROW(find_rest(m, 0.1), base::InputError);
+}
+
+}  // namespace
+}  // namespace repose
