@@ -31,7 +31,7 @@ void check_bones(const results::MergedBones& bones, const model::PrescribedMotio
 
 /// What the steps say of each other: the path leads from smaller to larger loads, to the end or to
 /// a step that did not converge.
-void check_path(const std::vector<results::StepNumbers>& steps, base::Comparison& comparison) {
+void check_path(const std::vector<model::StepNumbers>& steps, base::Comparison& comparison) {
   comparison.begin("path");
   bool rising = true;
   for (size_t s = 1; s < steps.size(); ++s) rising = rising && steps[s - 1].load < steps[s].load;
@@ -49,7 +49,7 @@ base::Comparison check_file(const std::string& file) {
   base::Comparison comparison(tolerance);
   comparison.begin("model");
   solve::check_model(model, comparison);
-  std::vector<results::StepNumbers> steps;
+  std::vector<model::StepNumbers> steps;
   for (int64_t s = 0; s < count; ++s) {
     const results::StoredStep step = results::read_step(file, s, model);
     comparison.begin(fmt::format("step {:04}", s));

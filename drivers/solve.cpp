@@ -149,7 +149,7 @@ class Writer {
   Writer(const std::filesystem::path& name, const model::Model& model, double interval)
       : name_(name), model_(model), file_(comm, name, model), interval_(interval) {}
 
-  void operator()(const results::StepNumbers& numbers, const results::StepRows& rows) {
+  void operator()(const model::StepNumbers& numbers, const model::StepRows& rows) {
     file_.append(numbers, rows);
     int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
     MPI_Bcast(&due, 1, MPI_INT, 0, comm);

@@ -36,7 +36,7 @@ void complete(const scene::Scene& scene, const SkinMesh& mesh,
               const std::vector<surface::Surface>& bones, Model& model) {
   set_stiffness(scene.tissue, mesh, model);
   set_masses(scene.tissue, mesh, model);
-  spread_forces(scene.forces, mesh, model);
+  spread_forces(scene, mesh, model);
   model.gravity = scene.gravity.value_or(Vec3::Zero());
   model.bone_surfaces = bones;
   for (size_t b = 0; b < bones.size(); ++b) {
@@ -97,6 +97,7 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   for (size_t c = 0; c < rim.size(); ++c)
     if (rim[c]) attachment.bone[c] = -1;
   release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
+  release_near_rim(columns.deep, rim, scene.moves, scene.tissue.release, attachment);
 
   built.model = make_layers(mesh, columns.deep, depths);
   set_points(rim, attachment, scene.moves, built.model);

@@ -42,10 +42,10 @@ void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model)
   set_layer_masses(tissue.mass, mesh, model);
 }
 
-void spread_forces(const std::vector<scene::Force>& forces, const SkinMesh& mesh, Model& model) {
+void spread_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
   const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
-  for (size_t k = 0; k < forces.size(); ++k) {
-    const scene::Force& force = forces[k];
+  for (size_t k = 0; k < scene.forces.size(); ++k) {
+    const scene::Force& force = scene.forces[k];
     std::vector<int64_t> within;
     double area = 0, nearest = std::numeric_limits<double>::infinity();
     for (size_t v = 0; v < mesh.points.size(); ++v) {
@@ -58,9 +58,9 @@ void spread_forces(const std::vector<scene::Force>& forces, const SkinMesh& mesh
     }
     if (within.empty())
       base::refuse(
-          "forces[{}]: no free skin point within {} mm of ({}, {}, {}), the nearest is {:.2f} mm "
-          "away; move `at` to the skin or make `radius` larger",
-          k, force.radius, force.at.x(), force.at.y(), force.at.z(), nearest);
+          "{}: forces[{}]: no free skin point within {} mm of ({}, {}, {}), the nearest is {:.2f} "
+          "mm away; move `at` to the skin or make `radius` larger",
+          scene.file.string(), k, force.radius, force.at.x(), force.at.y(), force.at.z(), nearest);
     for (const int64_t v : within)
       model.points.external_force[v * layers] += force.force * (mesh.vertex_area[v] / area);
   }

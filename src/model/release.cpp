@@ -37,4 +37,22 @@ void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& b
   }
 }
 
+void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
+                      const std::vector<scene::RigidMotion>& moves, double distance,
+                      Attachment& attachment) {
+  if (!(distance > 0)) return;
+  std::vector<Vec3> fixed;
+  for (size_t v = 0; v < deep.size(); ++v)
+    if (rim[v]) fixed.push_back(deep[v]);
+  const double reach = distance * distance;
+  for (size_t v = 0; v < deep.size(); ++v) {
+    if (attachment.bone[v] < 0 || moves[attachment.bone[v]].is_identity()) continue;
+    if (std::none_of(fixed.begin(), fixed.end(),
+                     [&](const Vec3& p) { return (p - deep[v]).squaredNorm() <= reach; }))
+      continue;
+    attachment.bone[v] = -1;
+    ++attachment.released;
+  }
+}
+
 }  // namespace repose::model

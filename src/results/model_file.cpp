@@ -141,7 +141,7 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   if (!in.has(group)) in.refuse(group, "is missing");
   const model::Counts counts = model::count(model);
   StoredStep stored;
-  for_each_number(stored.numbers, ReadAttribute{in, group});
+  model::for_each_number(stored.numbers, ReadAttribute{in, group});
   stored.rows.position = in.vectors(group + "/point/position", counts.points);
   stored.displacement = in.vectors(group + "/point/displacement", counts.points);
   stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);

@@ -53,16 +53,16 @@ struct UnpackNumbers {
 };
 
 /// Rank 0's numbers: attributes must be the same everywhere, and clocks are not.
-StepNumbers of_first_rank(MPI_Comm comm, const StepNumbers& mine) {
+model::StepNumbers of_first_rank(MPI_Comm comm, const model::StepNumbers& mine) {
   PackNumbers packed;
-  for_each_number(mine, packed);
+  model::for_each_number(mine, packed);
   int length = static_cast<int>(packed.text.size());
   MPI_Bcast(&length, 1, MPI_INT, 0, comm);
   packed.text.resize(length);
   MPI_Bcast(packed.text.data(), length, MPI_CHAR, 0, comm);
   MPI_Bcast(packed.values.data(), static_cast<int>(packed.values.size()), MPI_DOUBLE, 0, comm);
-  StepNumbers numbers;
-  for_each_number(numbers, UnpackNumbers{packed});
+  model::StepNumbers numbers;
+  model::for_each_number(numbers, UnpackNumbers{packed});
   return numbers;
 }
 
@@ -105,19 +105,19 @@ struct ResultFile::State {
            (int64_t{1} << 16);
   }
   void create(const model::Model& model);
-  void require_rows(const StepRows& rows) const;
+  void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
   void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
                      const base::Slab& mine, const double* values) const;
-  void write_points(hid_t step, const StepRows& rows) const;
-  void write_elements(hid_t step, const StepRows& rows) const;
+  void write_points(hid_t step, const model::StepRows& rows) const;
+  void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
   void publish();
 };
 
 void ResultFile::State::create(const model::Model& model) {
+  require_writable(with_ending(name, ".h5"));
   unfinished.emplace(with_ending(name, ".h5"));
-  require_writable(unfinished->file());
   bones = merge_bones(model.bone_surfaces);
   motion.emplace(model);
   say_where(part(), [&] {
@@ -136,7 +136,7 @@ void ResultFile::State::create(const model::Model& model) {
             static_cast<int64_t>(bones.triangles.size())};
 }
 
-void ResultFile::State::require_rows(const StepRows& rows) const {
+void ResultFile::State::require_rows(const model::StepRows& rows) const {
   const auto agrees = [this](size_t given, int64_t all) {
     return static_cast<int64_t>(given) == slab(all).rows();
   };
@@ -162,7 +162,7 @@ void ResultFile::State::write_dataset(hid_t group, const char* dataset, int64_t 
   on_disk([&] { write_rows(comm, created, mine, values); });
 }
 
-void ResultFile::State::write_points(hid_t step, const StepRows& rows) const {
+void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) const {
   const base::Hdf5Group group = create_group(step, "point");
   const base::Slab mine = slab(counts.points);
   std::vector<Vec3> displacement(rows.position.size());
@@ -172,7 +172,7 @@ void ResultFile::State::write_points(hid_t step, const StepRows& rows) const {
   write_dataset(group, "residual_force", counts.points, 3, mine, flat(rows.residual_force));
 }
 
-void ResultFile::State::write_elements(hid_t step, const StepRows& rows) const {
+void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) const {
   const base::Hdf5Group prism = create_group(step, "prism");
   const base::Hdf5Group spring = create_group(step, "spring");
   const base::Slab prisms = slab(counts.prisms), springs = slab(counts.springs);
@@ -225,13 +225,13 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
 
 ResultFile::~ResultFile() = default;
 
-void ResultFile::append(const StepNumbers& numbers, const StepRows& rows) {
+void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows& rows) {
   State& s = *state_;
   base::together(s.comm, [&] { s.require_rows(rows); });
   base::on_first_rank(s.comm, [&] { s.unfinished->reserve(s.step_bytes()); });
-  const StepNumbers same = of_first_rank(s.comm, numbers);
+  const model::StepNumbers same = of_first_rank(s.comm, numbers);
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
-  s.on_disk([&] { for_each_number(same, WriteAttribute{step}); });
+  s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

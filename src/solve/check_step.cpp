@@ -17,8 +17,7 @@ std::span<const double> flat(const std::vector<Vec3>& vectors) {
   return {vectors[0].data(), 3 * vectors.size()};
 }
 
-void check_ranges(const results::StepNumbers& n, bool gradient_known,
-                  base::Comparison& comparison) {
+void check_ranges(const model::StepNumbers& n, bool gradient_known, base::Comparison& comparison) {
   comparison.range("load", n.load, 0, 1);
   comparison.range("lambda", n.lambda, 0, 1);
   comparison.range("bulk_modulus", n.bulk_modulus, 0, unlimited);
@@ -36,7 +35,7 @@ void check_ranges(const results::StepNumbers& n, bool gradient_known,
                        one_of(n.volume, {"none", "paper", "penalty", "exact"}));
 }
 
-void check_numbers(const results::StepNumbers& stored, const RecomputedStep& again,
+void check_numbers(const model::StepNumbers& stored, const RecomputedStep& again,
                    base::Comparison& comparison) {
   const auto same = [&](const char* name, double value, const Recomputed& computed) {
     comparison.number(name, value, computed.value, computed.scale);
@@ -65,7 +64,7 @@ std::vector<Vec3> prescribed(const model::Model& model, const model::PrescribedM
 }  // namespace
 
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
-                const results::StepNumbers& numbers, const results::StepRows& rows,
+                const model::StepNumbers& numbers, const model::StepRows& rows,
                 const std::vector<Vec3>& displacement, base::Comparison& comparison) {
   const RecomputedStep again = recompute(model, numbers, rows.position);
   check_ranges(numbers, again.gradient_known, comparison);

@@ -10,7 +10,8 @@ using base::check;
 
 namespace {
 
-constexpr int most_halvings = 5;      // of one step
+constexpr int most_halvings = 5;  // of a step that fails or strays
+constexpr int fold_halvings = 1;  // of a step that folds tissue: a second fold is the path's own
 constexpr double trusted_miss = 0.5;  // of the predicted increment, beyond which a step is halved
 
 class Stopwatch {
@@ -43,23 +44,32 @@ int64_t LoadPath::inverted(Vec displacement) {
   return objective_.totals().inverted;
 }
 
-LoadPath::Attempt LoadPath::attempt(Vec displacement, double load, bool last_chance) {
+LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   Positions& positions = objective_.positions();
   const int64_t folded_before = inverted(displacement);
   const bool predicted = minimiser_.predict(displacement, load, increment_);
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
-  Attempt attempt{minimiser_.run(trial_, settings_.accuracy), false};
+  Attempt attempt;
+  attempt.outcome = minimiser_.run(trial_, settings_.accuracy);
   result_.iterations += attempt.outcome.iterations;
-  const bool folded = inverted(trial_) > folded_before;
-  const double expected = predicted ? largest_block(increment_) : 0;
+  attempt.folded = inverted(trial_) > folded_before;
+  if (!predicted) return attempt;
+  attempt.expected = largest_block(increment_);
   check(VecAXPY(increment_, 1.0, displacement));
   check(VecAXPY(increment_, -1.0, trial_));
-  const double miss = predicted ? largest_block(increment_) : 0;
-  const bool strayed = miss > trusted_miss * expected + settings_.accuracy;
-  attempt.accepted = attempt.outcome.converged && (last_chance || (!folded && !strayed));
+  attempt.miss = largest_block(increment_);
   return attempt;
+}
+
+bool LoadPath::follows(const Attempt& now, const Attempt* coarser) const {
+  if (!now.outcome.converged) return false;
+  // Halving shrinks what a smooth path misses by four. What it does not shrink, a jump of the rest
+  // position itself or a fold, is the path's own.
+  const bool smooth = now.miss <= trusted_miss * now.expected + settings_.accuracy && !now.folded;
+  return smooth || (coarser && coarser->outcome.converged && now.folded == coarser->folded &&
+                    now.miss > 0.5 * coarser->miss);
 }
 
 void LoadPath::settle(Vec displacement, const OnStep& on_step) {
@@ -79,23 +89,29 @@ PathOutcome LoadPath::run(Vec displacement, const OnStep& on_step) {
   settle(displacement, on_step);
   const double full_step = first_step();
   double step = full_step;
+  int halvings = 0;
+  std::optional<Attempt> coarser;
   while (result_.last.converged && result_.load < 1) {
     const Stopwatch watch;
     const double before = result_.load;
     double target = before + step;
     if (target > 1 - 1e-3 * full_step) target = 1;
-    const bool last_chance = step <= full_step * std::pow(0.5, most_halvings);
-    const Attempt tried = attempt(displacement, target, last_chance);
-    if (!tried.accepted && !last_chance) {
+    const Attempt tried = attempt(displacement, target);
+    const bool last_chance = halvings == most_halvings;
+    if (!last_chance && !follows(tried, coarser ? &*coarser : nullptr)) {
       positions.set_load(before);
       step /= 2;
+      ++halvings;
       ++result_.halvings;
+      coarser = tried;
       continue;
     }
     result_.last = tried.outcome;
     result_.load = target;
     ++result_.steps;
     step = std::min(full_step, 2 * step);
+    halvings = std::max(0, halvings - 1);
+    coarser.reset();
     check(VecCopy(trial_, displacement));
     positions.update(displacement);
     on_step(result_.last, result_.load, watch.seconds());

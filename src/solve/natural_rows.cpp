@@ -70,7 +70,7 @@ std::vector<double> NaturalRows::bring(const Route& route, const double* values)
   return natural;
 }
 
-results::StepRows NaturalRows::rows(Objective& objective) const {
+model::StepRows NaturalRows::rows(Objective& objective) const {
   const auto position = objective.positions().local();
   const model::Springs& springs = part_.model.springs;
   const model::Prisms& prisms = part_.model.prisms;
@@ -87,7 +87,7 @@ results::StepRows NaturalRows::rows(Objective& objective) const {
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
   const std::vector<Vec3> residual = objective.residual_force();
-  results::StepRows rows;
+  model::StepRows rows;
   rows.position = as_points(bring(points_, position.data()->data()));
   rows.residual_force = as_points(bring(points_, residual.data()->data()));
   rows.volume_ratio = bring(prisms_, ratio.data());

@@ -226,6 +226,7 @@ Part distribute(MPI_Comm comm, const Model& model) {
       if (bytes.empty()) return;
       Unpacker unpacker(bytes);
       pass(unpacker, part);
+      part.model.bones.resize(part.model.bone_transform.size());  // as many, without their names
     }
   });
   return part;

@@ -42,7 +42,7 @@ std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
 
 class Recomputation {
  public:
-  Recomputation(const model::Model& model, const results::StepNumbers& claimed,
+  Recomputation(const model::Model& model, const model::StepNumbers& claimed,
                 const std::vector<Vec3>& position)
       : model_(model), claimed_(claimed), x_(position) {}
 
@@ -76,7 +76,7 @@ class Recomputation {
   void force_functional_gradient();
 
   const model::Model& model_;
-  const results::StepNumbers& claimed_;
+  const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
   double elastic_ = 1;            // weight of f
   double smooth_force_ = 0;       // Σ (√(|F|² + ε²) − ε)
@@ -261,7 +261,7 @@ void Recomputation::gradient() {
 
 }  // namespace
 
-RecomputedStep recompute(const model::Model& model, const results::StepNumbers& claimed,
+RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
                          const std::vector<Vec3>& position) {
   RecomputedStep step = Recomputation(model, claimed, position).run();
   step.rows.position = position;

@@ -21,11 +21,11 @@ double force_sum(MPI_Comm comm, const std::vector<Vec3>& owned) {
   return sum;
 }
 
-results::StepNumbers numbers_of(Objective& objective, const Settings& settings,
-                                const Outcome& outcome, double load) {
+model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
+                              const Outcome& outcome, double load) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = settings.weights;
-  results::StepNumbers n;
+  model::StepNumbers n;
   n.load = load;
   n.volume = settings.volume;
   n.lambda = settings.lambda;

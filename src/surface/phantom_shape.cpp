@@ -108,9 +108,9 @@ std::vector<Part> skull_parts() {
 std::vector<Part> skin_parts() {
   std::vector<Part> parts{
       ellipsoid({0, 8, 60}, {78, 99, 74}, 0),
-      ellipsoid({0, -28, 6}, {74, 60, 56}, 10),                 // middle face
-      ellipsoid({0, -36, -14}, {60, 54, 60}, 12),               // lower face
-      ellipsoid({40, -58, 10}, {25, 26, 26}, 16),               // cheek
+      ellipsoid({0, -28, 8}, {74, 58, 54}, 10),                 // middle face
+      ellipsoid({0, -36, -14}, {59, 54, 57}, 12),               // lower face
+      ellipsoid({38, -55, 12}, {24, 25, 25}, 16),               // cheek
       chain({{{46, -17, -42}, 13}, {{20, -66, -52}, 14}}, 16),  // jaw line
       ellipsoid({0, -77, -60}, {20, 18, 15}, 14),               // chin
       chain({{{0, -80, 60}, 11}, {{30, -77, 63}, 11}}, 14),     // brow

@@ -24,7 +24,7 @@ using Edge = Mesh::Edge_index;
 
 const Vec3 center(0, 10, 34);  // the skin is a height over the directions from here
 const Vec3 mouth_middle(0, -94, -23.2);
-constexpr int sweeps = 20;  // of relaxation
+constexpr int sweeps = 10;  // of relaxation
 // Mirror images tie to rounding; coarser comparisons keep the outcome the same on every machine.
 constexpr double length_grain = 1e-6, cosine_grain = 1e-6;
 
@@ -92,7 +92,7 @@ Vec3 rim_curve(double t) {
   const bool forehead = t < 0.5;
   const double power = forehead ? 0.85 : 2.0 / 3.0;
   const double u = 1.36 * signed_power(std::cos(angle), power);
-  const double v = (forehead ? 0.8 : 1.1) * signed_power(std::sin(angle), power);
+  const double v = (forehead ? 0.8 : 1.04) * signed_power(std::sin(angle), power);
   const double r = std::hypot(u, v), tilt = 2 * std::asin(r / 2);
   const Vec3 normal(std::sin(tilt) * u / r, -std::cos(tilt), std::sin(tilt) * v / r);
   return Vec3(0, -10, 18) + normal.cwiseProduct(Vec3(75, 95, 100));

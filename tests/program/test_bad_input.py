@@ -170,7 +170,7 @@ CASES = {
     "axis of no length": (
         lambda i: i.scene("axis: [1,", "axis: [0,"), ["scene.yaml:9:", "axis"]),
     "force beside the skin": (
-        lambda i: i.scene("[0, -90, 0]", "[0, -9000, 0]"), ["scene.yaml:11:", "skin"]),
+        lambda i: i.scene("[0, -90, 0]", "[0, -9000, 0]"), ["scene.yaml", "forces[0]", "skin"]),
     "missing mesh": (
         lambda i: i.scene("paper_skin", "no_skin"), ["scene.yaml:1:", "no_skin.ply"]),
     "mesh of text": (
@@ -212,8 +212,8 @@ CASES = {
         lambda i: i.cut_model(), ["model.h5"]),
     "model of another version": (
         lambda i: i.model(version), ["model.h5", "version", "99"]),
-    "model without masses": (
-        lambda i: i.model(lambda f: f.__delitem__("model/point/mass")), ["point/mass"]),
+    "model without stiffness": (
+        lambda i: i.model(lambda f: f.__delitem__("model/spring/stiffness")), ["spring/stiffness"]),
     "model with floats for indices": (
         lambda i: i.model(put("spring/points", np.ones((15, 2)))), ["spring/points"]),
     "misshapen model": (

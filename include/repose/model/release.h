@@ -13,4 +13,11 @@ void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& b
                                const std::vector<scene::RigidMotion>& moves, double distance,
                                Attachment& attachment);
 
+/// Sets free the deepest points of bones that move within `distance` mm of the deepest point of a
+/// rim column (`rim` [V], 1 or 0): the rim stays where it is, so to bones that move it is another
+/// piece.
+void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
+                      const std::vector<scene::RigidMotion>& moves, double distance,
+                      Attachment& attachment);
+
 }  // namespace repose::model

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "repose/model/model.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 
 namespace repose::results {
 
@@ -20,8 +20,8 @@ bool is_hdf5(const std::filesystem::path& file);
 
 /// One whole step of a result file, serially.
 struct StoredStep {
-  StepNumbers numbers;
-  StepRows rows;                   ///< all rows
+  model::StepNumbers numbers;
+  model::StepRows rows;            ///< all rows
   std::vector<Vec3> displacement;  ///< [N] mm
   std::vector<Vec3> bone_points;   ///< mm, of all bone surfaces in turn; empty: none, or not moved
 };

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "repose/model/model.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 
 namespace repose::results {
 
@@ -26,7 +26,7 @@ class ResultFile {
   /// Appends one /step/NNNN and flushes it to the disk. Each rank gives its slabs; the numbers are
   /// rank 0's. Where bones have moved at this load their surfaces are stored where they are then
   /// (bone_surface/points f64 [P,3], all bones' in turn).
-  void append(const StepNumbers& numbers, const StepRows& rows);
+  void append(const model::StepNumbers& numbers, const model::StepRows& rows);
 
   /// Closes, fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
   /// NAME_skin.xdmf and NAME_bones.xdmf (each .part, then renamed) for what the model has; one of

@@ -3,7 +3,7 @@
 
 #include "repose/base/comparison.h"
 #include "repose/model/motion.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 
 namespace repose::solve {
 
@@ -12,7 +12,7 @@ namespace repose::solve {
 /// the run itself knows (iterations, evaluations, seconds, displacement_error, and gradient_max
 /// with volume "exact") is checked for its range.
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
-                const results::StepNumbers& numbers, const results::StepRows& rows,
+                const model::StepNumbers& numbers, const model::StepRows& rows,
                 const std::vector<Vec3>& displacement, base::Comparison& comparison);
 
 /// Compares the stored rest volumes with the prisms' volumes at the initial positions.

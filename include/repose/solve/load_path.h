@@ -2,7 +2,7 @@
 #include <functional>
 #include <optional>
 
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 #include "repose/solve/minimiser.h"
 
 namespace repose::solve {
@@ -43,11 +43,14 @@ class LoadPath {
  private:
   struct Attempt {
     Outcome outcome;
-    bool accepted;
+    bool folded = false;  // more inverted prisms than at the start of the step
+    double expected = 0;  // largest predicted displacement, mm
+    double miss = 0;      // largest distance of the end from the prediction, mm
   };
   double first_step() const;
   int64_t inverted(Vec displacement);
-  Attempt attempt(Vec displacement, double load, bool last_chance);
+  Attempt attempt(Vec displacement, double load);
+  bool follows(const Attempt& now, const Attempt* coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
 
   Objective& objective_;

@@ -1,6 +1,6 @@
 #pragma once
 #include "repose/base/petsc.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 #include "repose/solve/objective.h"
 
 namespace repose::solve {
@@ -12,7 +12,7 @@ class NaturalRows {
   NaturalRows(MPI_Comm comm, const Part& part);
 
   /// The arrays of a step at the objective's last update.
-  results::StepRows rows(Objective& objective) const;
+  model::StepRows rows(Objective& objective) const;
 
  private:
   struct Route {  // from owned rows to natural slabs, `block` numbers a row

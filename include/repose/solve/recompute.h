@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "repose/model/model.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 
 namespace repose::solve {
 
@@ -14,7 +14,7 @@ struct Recomputed {
 
 /// All of a step that follows from the model and the positions (MODEL.md, Eqs. 6 to 12).
 struct RecomputedStep {
-  results::StepRows rows;
+  model::StepRows rows;
   std::vector<Vec3> displacement;                                           ///< [N] mm
   double position_scale = 0, displacement_scale = 0, elongation_scale = 0;  ///< mm
   double tension_scale = 0, force_scale = 0;                                ///< N
@@ -27,7 +27,7 @@ struct RecomputedStep {
 /// Computes a step again by plain serial loops over the whole model, sharing with the solver only
 /// the formulas of spring_law.h and prism_geometry.h. Of `claimed` it takes what defines the
 /// objective: functional, volume, lambda, bulk_modulus, epsilon. `position` [N] mm.
-RecomputedStep recompute(const model::Model& model, const results::StepNumbers& claimed,
+RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
                          const std::vector<Vec3>& position);
 
 }  // namespace repose::solve

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "repose/base/stages.h"
-#include "repose/results/step.h"
+#include "repose/model/step.h"
 #include "repose/solve/load_path.h"
 
 namespace repose::solve {
@@ -17,12 +17,12 @@ struct Settings {
 };
 
 /// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
-using Receiver = std::function<void(const results::StepNumbers&, const results::StepRows&)>;
+using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
 
 /// What a run came to, for the closing table.
 struct Summary {
   PathOutcome path;
-  results::StepNumbers last;
+  model::StepNumbers last;
   int64_t unknowns = 0;     ///< scalar
   int64_t evaluations = 0;  ///< of objective and gradient
   int64_t assemblies = 0;   ///< of the Hessian

@@ -23,7 +23,8 @@ class Random {
   std::mt19937 engine_;
 };
 
-/// A patch whose springs differ in law, stiffness, rest length and reference length.
+/// A patch whose springs differ in law, stiffness, rest length and reference length. One prism is
+/// left out, so that their number, 23, is odd.
 inline model::Model uneven_patch() {
   model::Model model = layered_patch({});
   Random random(7);
@@ -33,6 +34,8 @@ inline model::Model uneven_patch() {
     model.springs.rest_length[e] *= 1.0 + 0.2 * random();
     if (e % 2 == 0) model.springs.reference[e] = 1.0;
   }
+  model.prisms.points.erase(model.prisms.points.begin());
+  model.prisms.rest_volume.erase(model.prisms.rest_volume.begin());
   for (double& volume : model.prisms.rest_volume) volume *= 1.0 + 0.2 * random();
   return model;
 }

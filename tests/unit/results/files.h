@@ -80,8 +80,8 @@ inline model::Model small_model() {
 }
 
 /// A step at `load` of one rank with numbers that can be told apart.
-inline StepRows small_rows(const model::Model& m, double load) {
-  StepRows rows;
+inline model::StepRows small_rows(const model::Model& m, double load) {
+  model::StepRows rows;
   for (size_t i = 0; i < m.points.position.size(); ++i) {
     rows.position.push_back(m.points.position[i] + load * Vec3(0.25, 0.5, 1));
     rows.residual_force.push_back(Vec3(1, 2, 3) * static_cast<double>(i));
@@ -95,8 +95,8 @@ inline StepRows small_rows(const model::Model& m, double load) {
   return rows;
 }
 
-inline StepNumbers small_numbers(double load) {
-  StepNumbers n;
+inline model::StepNumbers small_numbers(double load) {
+  model::StepNumbers n;
   n.load = load;
   n.functional = "energy";
   n.volume = "penalty";

@@ -53,7 +53,7 @@ TEST(RoundTrip, StepComesBackBitForBit) {
   write_small_result(folder.path("a"), m);
   ASSERT_EQ(step_count(folder.path("a.h5")), 2);
   const StoredStep step = read_step(folder.path("a.h5"), 1, m);
-  const StepRows rows = small_rows(m, 1);
+  const model::StepRows rows = small_rows(m, 1);
   EXPECT_EQ(step.rows.position, rows.position);
   EXPECT_EQ(step.rows.residual_force, rows.residual_force);
   EXPECT_EQ(step.rows.volume_ratio, rows.volume_ratio);
@@ -65,9 +65,9 @@ TEST(RoundTrip, StepComesBackBitForBit) {
   const auto print_to = [](std::ostringstream& out) {
     return [&out](const char* name, const auto& value) { out << name << '=' << value << '\n'; };
   };
-  for_each_number(step.numbers, print_to(stored));
-  const StepNumbers expected = small_numbers(1);
-  for_each_number(expected, print_to(given));
+  model::for_each_number(step.numbers, print_to(stored));
+  const model::StepNumbers expected = small_numbers(1);
+  model::for_each_number(expected, print_to(given));
   EXPECT_EQ(stored.str(), given.str());
 }
 

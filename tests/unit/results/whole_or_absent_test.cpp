@@ -112,7 +112,7 @@ TEST(WholeOrAbsent, RowsThatAreNotTheSlabAreAnInternalError) {
   const Folder folder;
   const model::Model m = small_model();
   ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
-  StepRows rows = small_rows(m, 0);
+  model::StepRows rows = small_rows(m, 0);
   rows.tension.pop_back();
   EXPECT_THROW(file.append(small_numbers(0), rows), base::InternalError);
 }

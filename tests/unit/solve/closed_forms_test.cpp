@@ -39,7 +39,7 @@ Rest find_rest(const model::Model& m, double accuracy,
   Rest rest;
   rest.summary =
       solve::find_repose(MPI_COMM_WORLD, m, settings, {}, stages,
-                         [&](const results::StepNumbers&, const results::StepRows& rows) {
+                         [&](const model::StepNumbers&, const model::StepRows& rows) {
                            rest.position = gather(rows.position);
                          });
   return rest;

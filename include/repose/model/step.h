@@ -5,7 +5,7 @@
 
 #include "repose/base/geometry.h"
 
-namespace repose::results {
+namespace repose::model {
 
 /// The numbers of one load step, one attribute each in the result file (names as there).
 struct StepNumbers {
@@ -61,4 +61,4 @@ struct StepRows {
   std::vector<double> tension;     ///< N
 };
 
-}  // namespace repose::results
+}  // namespace repose::model
