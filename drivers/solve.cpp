@@ -176,7 +176,10 @@ base::Exit run(const base::Options& options) {
   solve::Settings settings = settings_of(job.wanted);
   stages.end("build");
   if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));
-  if (options.flag("dry_run")) return base::Exit::done;
+  if (options.flag("dry_run")) {
+    say(solve::describe_stages(stages));
+    return base::Exit::done;
+  }
 
   results::Restart restart;
   if (options.has("restart")) {

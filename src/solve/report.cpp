@@ -46,6 +46,14 @@ std::string describe_build(const model::BuildReport& r) {
   return text;
 }
 
+std::string describe_stages(const base::Stages& stages) {
+  std::string text;
+  for (const auto& stage : stages.list())
+    text += row("time, memory", fmt::format("{:<12} {:>9.3f} s {:>9.0f} MiB so far", stage.name,
+                                            stage.seconds, stage.mebibytes));
+  return text;
+}
+
 std::string describe_run(const Summary& s, const Settings& settings, int ranks,
                          const base::Stages& stages) {
   std::string text = verdict(s);
@@ -60,10 +68,7 @@ std::string describe_run(const Summary& s, const Settings& settings, int ranks,
   text += row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
   text += row("unknowns", fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
   text += work_rows(s);
-  for (const auto& stage : stages.list())
-    text += row("time, memory", fmt::format("{:<12} {:>9.3f} s {:>9.0f} MiB so far", stage.name,
-                                            stage.seconds, stage.mebibytes));
-  return text;
+  return text + describe_stages(stages);
 }
 
 }  // namespace repose::solve

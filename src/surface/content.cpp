@@ -72,15 +72,6 @@ std::string lower(std::string_view text) {
   return lowered;
 }
 
-void unify_newlines(std::string& text) {
-  size_t end = 0;
-  for (size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '\r' && i + 1 < text.size() && text[i + 1] == '\n') continue;
-    text[end++] = text[i] == '\r' ? '\n' : text[i];
-  }
-  text.resize(end);
-}
-
 std::string_view next_line(std::string_view text, size_t& position) {
   const size_t begin = position;
   const size_t end = std::min(text.find_first_of("\r\n", begin), text.size());

@@ -119,14 +119,13 @@ Soup parse_ply(Content content) {
   check_ply(header, content);
   const std::string plain = plain_ply_header(header);
   const auto added = std::count(plain.begin(), plain.end(), '\n') - header.lines;
-  std::string body = content.bytes.substr(header.bytes);
   const bool text = header.format == "ascii";
-  if (text) unify_newlines(body);
   const Reader read = [](std::istream& in, Points& points, Polygons& polygons) {
     return CGAL::IO::read_PLY(in, points, polygons);
   };
   const std::string file = content.file.string();
-  return read_with(read, plain + body, text ? damaged_text(file, added) : damaged_binary(file));
+  return read_with(read, plain + content.bytes.substr(header.bytes),
+                   text ? damaged_text(file, added) : damaged_binary(file));
 }
 
 Soup parse_stl_text(Content content) {

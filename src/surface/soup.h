@@ -33,9 +33,6 @@ Format recognise(const Content& content);
 /// ASCII letters in lower case, whatever the locale.
 std::string lower(std::string_view text);
 
-/// CRLF and CR become LF.
-void unify_newlines(std::string& text);
-
 /// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
 std::string_view next_line(std::string_view text, size_t& position);
 

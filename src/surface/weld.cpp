@@ -38,7 +38,7 @@ int longest_side(const Surface& surface, const Triangle& t) {
 
 /// A triangle without area has a vertex on its longest side: merely dropped, it would leave a slit.
 /// Where one triangle lies beyond that side, the pair u v b, v u d becomes b u d, d v b. One pass,
-/// each triangle at most once; returns whether anything was flipped.
+/// each triangle at most once, orientation left to orient(); returns whether anything was flipped.
 bool flip_flat_triangles(Surface& surface) {
   const auto flat = without_area(surface);
   const EdgeTable edges(surface.triangles);
@@ -56,9 +56,8 @@ bool flip_flat_triangles(Surface& surface) {
     const int64_t b = thin[(side.corner + 2) % 3], d = wide[(beyond.corner + 2) % 3];
     if (b == d || edges.contains(b, d) || !made.insert(std::minmax(b, d)).second) continue;
     touched[side.triangle] = touched[beyond.triangle] = true;
-    const bool agree = side.rising != beyond.rising;
-    thin = agree ? Triangle{b, u, d} : Triangle{u, b, d};
-    wide = agree ? Triangle{d, v, b} : Triangle{v, d, b};
+    thin = {b, u, d};
+    wide = {d, v, b};
   }
   return !made.empty();
 }

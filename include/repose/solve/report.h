@@ -13,6 +13,9 @@ std::string describe_model(const model::Model& model);
 /// What the builder did: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
 
+/// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
+std::string describe_stages(const base::Stages& stages);
+
 /// How it ended: load, accuracy, reason, work, inverted prisms, and time and memory of each stage.
 /// An answer that is not converged, or folds tissue, says so first and loudly.
 std::string describe_run(const Summary& summary, const Settings& settings, int ranks,
