@@ -19,11 +19,12 @@ mpi_environment
 result=$build/demo/head_jaw_opening
 mkdir -p "$build/demo"
 mpirun -n 2 "$build/bin/repose-solve" meshes/head_jaw_opening.yaml -output "$result"
-"$build/bin/repose-check" "$result.h5"
+"$build/bin/repose-check" "$result.h5" | tee "${result}_check.txt" | tail -n 1
 
 cat <<TEXT
 
-The result is in $build/demo: every load step, displacement, force and volume ratio.
+The result is in $build/demo: every load step, displacement, force and volume ratio,
+and what the check recomputed (${result}_check.txt).
 Look at it in ParaView:   paraview ${result}_skin.xdmf ${result}_bones.xdmf
 A picture of it, before and after:   drivers/render.py $result
 TEXT

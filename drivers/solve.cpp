@@ -18,6 +18,7 @@
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
+#include "repose/solve/prestress.h"
 #include "repose/solve/report.h"
 
 namespace {
@@ -86,6 +87,8 @@ Job read_job(const std::filesystem::path& input) {
     model::BuiltModel built = model::build_model(scene);
     job.model = std::move(built.model);
     job.building = solve::describe_build(built.report);
+    if (scene.tissue.turgor > 0 || scene.gravity)
+      job.building += solve::describe_prestress(solve::prestress(job.model, scene.tissue.turgor));
     job.wanted = scene.solve;
   });
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)

@@ -15,15 +15,18 @@ double sum(MPI_Comm comm, double mine) {
   return all;
 }
 
-std::vector<Vec3> load_forces(const model::Model& model) {
+/// Weight and external force of each local point; empty if there is none on any rank.
+std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& loaded) {
   std::vector<Vec3> force(model.points.position.size(), Vec3::Zero());
-  bool any = false;
+  int any = 0;
   for (size_t i = 0; i < force.size(); ++i) {
     if (model.points.set[i] != model::PointSet::soft_tissue) continue;
     force[i] = model.points.mass[i] * model.gravity + model.points.external_force[i];
-    any = any || !force[i].isZero(0);
+    if (!force[i].isZero(0)) any = 1;
   }
+  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm);
   if (!any) force.clear();
+  loaded = any;
   return force;
 }
 
@@ -44,7 +47,7 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
       weights_(weights),
       loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
                                    positions.part().owned_prisms)),
-      load_force_(load_forces(positions.part().model)),
+      load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
       work_(positions.local().size()) {}
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
@@ -54,7 +57,7 @@ void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
 double Objective::potential() const {
   const Part& part = positions_.part();
   double w = 0;
-  if (!load_force_.empty())
+  if (loaded_)
     for (int64_t i = 0; i < part.owned_points; ++i)
       w -= load_force_[i].dot(positions_.local()[i] - part.model.points.position[i]);
   return sum(positions_.comm(), w);
@@ -71,7 +74,7 @@ double Objective::evaluate(Vec displacement, Vec gradient) {
   value += mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
-  if (!load_force_.empty()) value += weights_.elastic * potential();
+  if (loaded_) value += weights_.elastic * potential();
   if (!std::isfinite(value) || value > huge) {
     value = huge;
     make_finite(work_);

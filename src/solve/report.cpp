@@ -46,6 +46,12 @@ std::string describe_build(const model::BuildReport& r) {
   return text;
 }
 
+std::string describe_prestress(const Prestress& p) {
+  return row("initial equilibrium",
+             fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
+                         p.residual, p.largest_force, p.least_rest_ratio));
+}
+
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())

@@ -13,6 +13,7 @@
 #include "repose/base/error.h"
 #include "repose/surface/phantom.h"
 #include "repose/surface/phantom_shape.h"
+#include "repose/surface/read.h"
 
 namespace repose::surface {
 namespace {
@@ -61,7 +62,7 @@ Surface mesh_bone(double (*distance)(const Vec3&), double edge, const char* name
       domain, criteria, parameters::no_perturb(), parameters::no_exude(), parameters::manifold());
   Surface bone = to_surface(complex);
   bone.name = name;
-  return bone;
+  return weld_and_orient(bone);  // CGAL leaves open which side is out
 }
 
 }  // namespace

@@ -33,6 +33,7 @@ class Objective {
   Positions& positions_;
   mechanics::Weights weights_;
   mechanics::Loops loops_;
+  bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   std::vector<Vec3> work_;        // [local points]
   int64_t evaluations_ = 0;

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "repose/model/build.h"
+#include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 
 /// What a person reads when a run ends.
@@ -12,6 +13,9 @@ std::string describe_model(const model::Model& model);
 
 /// What the builder did: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
+
+/// The initial equilibrium in one row.
+std::string describe_prestress(const Prestress& prestress);
 
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);

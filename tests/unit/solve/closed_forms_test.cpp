@@ -37,11 +37,10 @@ Rest find_rest(const model::Model& m, double accuracy,
   settings.path.accuracy = accuracy;
   base::Stages stages(MPI_COMM_WORLD);
   Rest rest;
-  rest.summary =
-      solve::find_repose(MPI_COMM_WORLD, m, settings, {}, stages,
-                         [&](const model::StepNumbers&, const model::StepRows& rows) {
-                           rest.position = gather(rows.position);
-                         });
+  rest.summary = solve::find_repose(MPI_COMM_WORLD, m, settings, {}, stages,
+                                    [&](const model::StepNumbers&, const model::StepRows& rows) {
+                                      rest.position = gather(rows.position);
+                                    });
   return rest;
 }
 

@@ -188,7 +188,11 @@ TEST(Distance, contains_on_the_surface_and_in_line_with_its_features) {
   for (const Vec3& p : s.points) EXPECT_TRUE(tree.contains(p));
   EXPECT_TRUE(tree.contains({50, 0, 0}));
   EXPECT_TRUE(tree.contains({50, 50, 100}));
-  EXPECT_TRUE(tree.contains({50, 50, 50}));
+  for (const double x : {-30, 10, 50, 90, 130})
+    for (const double y : {-50, 0, 20, 50, 100, 150})
+      for (const double z : {0, 20, 50, 80, 100})
+        EXPECT_EQ(tree.contains({x, y, z}), x > 0 && x < 100 && y >= 0 && y <= 100)
+            << x << " " << y << " " << z;
   EXPECT_TRUE(tree.contains({1e-12, 1e-12, 1e-12}));
   EXPECT_FALSE(tree.contains({50, 50, -1e-12}));
   EXPECT_FALSE(tree.contains({150, 0, 0}));

@@ -84,15 +84,18 @@ TEST_F(Read, ply_with_comments_first_other_types_and_more_elements) {
 
 TEST_F(Read, polygons_become_triangles_of_the_same_area) {
   const std::string points = "v 0 0 0\nv 20 0 0\nv 20 20 0\nv 10 1 0\nv 0 20 0\n";
-  const Surface arrow = read_surface(write("arrow.obj", points + "f 5 1 2 3 4\n"));
-  ASSERT_EQ(arrow.triangles.size(), 3u);
-  double area = 0;
-  for (const auto& [a, b, c] : corners(arrow)) {
-    const double twice = (b - a).cross(c - a).z();
-    EXPECT_GT(twice, 0);
-    area += twice / 2;
+  for (const char* face :
+       {"f 1 2 3 4 5\n", "f 2 3 4 5 1\n", "f 3 4 5 1 2\n", "f 4 5 1 2 3\n", "f 5 1 2 3 4\n"}) {
+    const Surface arrow = read_surface(write("arrow.obj", points + face));
+    ASSERT_EQ(arrow.triangles.size(), 3u);
+    double area = 0;
+    for (const auto& [a, b, c] : corners(arrow)) {
+      const double twice = (b - a).cross(c - a).z();
+      EXPECT_GT(twice, 0) << face;
+      area += twice / 2;
+    }
+    EXPECT_NEAR(area, 400 - 0.5 * 20 * 19, 1e-12);
   }
-  EXPECT_NEAR(area, 400 - 0.5 * 20 * 19, 1e-12);
   EXPECT_EQ(
       read_surface(write("square.obj", points + "f -5\t-4 -3 -1 # all\nl 1 2\n")).triangles.size(),
       2u);
@@ -164,6 +167,8 @@ TEST_F(Read, headers_that_promise_more_than_the_file_holds) {
     EXPECT_NE(refused("long.off", with(off_text(cube()), "8 12 0", count + " 12 0")), "");
     EXPECT_NE(refused("long.off", with(off_text(cube()), "8 12 0", "8 " + count + "9 0")), "");
   }
+  const std::string rows = with(ply_text(cube()), "vertex 8", "vertex 4000000000");
+  EXPECT_NE(refused("long.ply", rows).find("promises 4000000000 rows"), std::string::npos);
   std::string list = with(ply_binary(tetrahedron(), false), "list uchar int", "list uint int");
   list.resize(list.size() - 4 * 13);
   const std::string huge = list + bytes_of(uint32_t{4000000000}) + std::string(48, '\0');

@@ -70,6 +70,13 @@ TEST_F(Weld, a_row_of_flat_triangles_is_flipped_away) {
   EXPECT_NEAR(volume(welded), 1e6, 1e-6);
 }
 
+TEST_F(Weld, no_flip_makes_a_non_manifold_edge) {
+  const Surface folded{"folded",
+                       {{0, 0, 0}, {100, 0, 0}, {50, 0, 0}, {50, 80, 0}},
+                       {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
+  EXPECT_EQ(inspect(weld_and_orient(folded)).non_manifold_edges, 0);
+}
+
 TEST_F(Weld, closed_surfaces_turn_outwards) {
   Surface s = together(cube(), cube(Vec3(300, 0, 0)));
   for (size_t t = 5; t < s.triangles.size(); t += 2) turn(s.triangles[t]);

@@ -1,0 +1,22 @@
+#pragma once
+#include "repose/model/model.h"
+
+namespace repose::solve {
+
+/// What the initial equilibrium came to.
+struct Prestress {
+  double residual = 0;          ///< largest |F_i| left on a soft-tissue point, N
+  double largest_force = 0;     ///< largest |F_i| before: skin tension and weight, N
+  double least_rest_ratio = 1;  ///< smallest rest length over initial length
+};
+
+/// The initial equilibrium (MODEL.md; the paper's sec. 3, Fig. 2): gives the skin springs (set
+/// "layer 0") the initial strain `turgor`, l = r_0/(1+τ), and all others with a soft-tissue point
+/// the rest lengths whose tensions, smallest in the energy norm, balance skin tension and weight at
+/// the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T = K Aᵀ μ, l_j = r_j −
+/// T⁻¹(T_j). External forces are not balanced: they act. Changes the rest lengths of `model`.
+/// Throws InputError naming the springs where a rest length would not be positive, or the point
+/// that no spring can hold. Serial.
+Prestress prestress(model::Model& model, double turgor);
+
+}  // namespace repose::solve
