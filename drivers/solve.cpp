@@ -171,6 +171,15 @@ class Writer {
   double interval_, last_ = MPI_Wtime();
 };
 
+/// Path of the result without ending; never that of the input.
+std::string result_name(const base::Options& options, const std::filesystem::path& input) {
+  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  std::error_code missing;
+  if (std::filesystem::equivalent(name + ".h5", input, missing) && !missing)
+    base::refuse("{}: the result would replace the input; give another -output", input.string());
+  return name;
+}
+
 base::Exit run(const base::Options& options) {
   base::Stages stages(comm);
   const std::filesystem::path input = options.arguments()[0];
@@ -189,7 +198,7 @@ base::Exit run(const base::Options& options) {
     restart = results::read_restart(comm, options.text("restart"), job.model);
     settings.path.start_load = restart.load;
   }
-  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  const std::string name = result_name(options, input);
   Writer writer(name, job.model,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary =

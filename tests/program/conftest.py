@@ -47,18 +47,17 @@ def environment():
     return mpi_environment()
 
 
-@pytest.fixture
-def run(tmp_path, environment):
-    """run(program, *arguments, ranks=1, cwd=tmp_path) → CompletedProcess with text output.
+def runner(folder, environment):
+    """run(program, *arguments, ranks=1, cwd=folder) → CompletedProcess with text output.
 
     On several ranks stderr is what the ranks wrote, without what mpirun adds when one fails.
     """
 
-    def run_program(program, *arguments, ranks=1, cwd=tmp_path, time_limit=TIME_LIMIT):
+    def run_program(program, *arguments, ranks=1, cwd=folder, time_limit=TIME_LIMIT):
         command = [str(programs() / program), *map(str, arguments)]
         if ranks == 1:
             return finish(command, cwd, environment, time_limit)
-        errors = tmp_path / "stderr_of_the_ranks"
+        errors = folder / "stderr_of_the_ranks"
         errors.write_text("")
         wrapped = ["sh", "-c", f"exec \"$@\" 2>>'{errors}'", "sh", *command]
         result = finish(["mpirun", "-n", str(ranks), *wrapped], cwd, environment, time_limit)
@@ -67,3 +66,29 @@ def run(tmp_path, environment):
         return result
 
     return run_program
+
+
+@pytest.fixture
+def run(tmp_path, environment):
+    """Runs a program in the test's own folder, see runner."""
+    return runner(tmp_path, environment)
+
+
+@pytest.fixture(scope="session")
+def solved(tmp_path_factory, environment):
+    """solved(scene, *options, ranks=1) → the result file of a shipped scene (or a path), which must
+    converge. The same is solved once only: tests change copies."""
+    folder = tmp_path_factory.mktemp("solved")
+    run_program, done = runner(folder, environment), {}
+
+    def solve(scene, *options, ranks=1):
+        key = (scene, *map(str, options), ranks)
+        if key not in done:
+            file = folder / f"{len(done)}.h5"
+            result = run_program("repose-solve", PROJECT / "meshes" / scene, *options,
+                                 "-output", file.with_suffix(""), ranks=ranks)
+            assert (result.returncode, result.stderr) == (0, ""), result
+            done[key] = file
+        return done[key]
+
+    return solve

@@ -6,9 +6,10 @@
 /// Fixed-size vectors that every room uses.
 namespace repose {
 
-using Vec3 = Eigen::Vector3d;             ///< a point (mm), a force (N) or a direction
-using Mat3 = Eigen::Matrix3d;             ///< a 3×3 block of a Hessian, or a rotation
-using Mat4 = Eigen::Matrix4d;             ///< a homogeneous transform, mm, acting on columns
-using Triangle = std::array<int64_t, 3>;  ///< three 0-based vertex numbers, counter-clockwise outside
+using Vec3 = Eigen::Vector3d;  ///< a point (mm), a force (N) or a direction
+using Mat3 = Eigen::Matrix3d;  ///< a 3×3 block of a Hessian, or a rotation
+using Mat4 = Eigen::Matrix4d;  ///< a homogeneous transform, mm, acting on columns
+using Triangle =
+    std::array<int64_t, 3>;  ///< three 0-based vertex numbers, counter-clockwise outside
 
 }  // namespace repose

@@ -14,7 +14,7 @@ class Stages {
 
   struct Stage {
     std::string name;
-    double seconds;   ///< largest over ranks
+    double seconds;    ///< largest over ranks
     double mebibytes;  ///< peak resident memory so far, summed over ranks
   };
 

@@ -11,12 +11,12 @@ namespace repose::model {
 /// What was done to make a valid model, for the closing table.
 struct BuildReport {
   int64_t skin_vertices = 0, skin_edges = 0, skin_triangles = 0;
-  int64_t attached = 0;          ///< columns that end in bone
-  int64_t free_deep = 0;         ///< columns that end free: no bone near, unattached, or released
-  int64_t released = 0;          ///< of those, let go near a piece that moves differently
-  int64_t shortened = 0;         ///< columns made shorter so that neighbours do not cross
+  int64_t attached = 0;   ///< columns that end in bone
+  int64_t free_deep = 0;  ///< columns that end free: no bone near, unattached, or released
+  int64_t released = 0;   ///< of those, let go near a piece that moves differently
+  int64_t shortened = 0;  ///< columns made shorter so that neighbours do not cross
   double thickness_min = 0, thickness_median = 0, thickness_max = 0;  ///< mm
-  double effective_modulus = 0;  ///< Σ k0 r_0² / Σ v_0 over springs and prisms, N/mm²
+  double effective_modulus = 0;      ///< Σ k0 r_0² / Σ v_0 over springs and prisms, N/mm²
   std::vector<std::string> remarks;  ///< lines for a person, each complete
 };
 

@@ -44,7 +44,7 @@ struct Model {
   Points points;
   Springs springs;
   Prisms prisms;
-  std::vector<Triangle> skin;                  ///< [K] for drawing, may be empty
+  std::vector<Triangle> skin;  ///< [K] for drawing, may be empty
   std::vector<std::string> spring_sets;
   std::vector<std::string> bones;
   std::vector<surface::Surface> bone_surfaces;  ///< [bones] or empty; at the initial position

@@ -9,8 +9,8 @@ namespace repose::surface {
 
 /// An indexed triangle surface. Points in mm; triangles counter-clockwise seen from outside.
 struct Surface {
-  std::string name;               ///< for messages: a file path or a bone's name
-  std::vector<Vec3> points;       ///< [P] mm
+  std::string name;                 ///< for messages: a file path or a bone's name
+  std::vector<Vec3> points;         ///< [P] mm
   std::vector<Triangle> triangles;  ///< [T] 0-based rows of points
 };
 
