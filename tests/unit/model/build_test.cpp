@@ -38,6 +38,7 @@ bool remarked(const BuildReport& report, const std::string& part) {
 
 TEST(Build, every_point_is_in_the_set_it_belongs_to) {
   scene::Scene scene = patches::scene_of(3, {"jaw"});
+  scene.tissue.release = 0;
   scene.moves[0] = RigidMotion::rotation({1, 0, 0}, {0, 10, -20}, 8);
   const BuiltModel built = build_model(scene, patches::square(6, 60), {kFlatBone});
   const Points& points = built.model.points;
@@ -136,6 +137,17 @@ TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
   EXPECT_GT(released, 0);
   EXPECT_EQ(built.report.released, released);
   EXPECT_EQ(built.report.free_deep, released);
+}
+
+TEST(Build, tissue_on_a_moving_bone_lets_go_near_the_fixed_rim) {
+  scene::Scene scene = patches::scene_of(3, {"jaw"});
+  const surface::Surface skin = patches::square(6, 60);
+  scene.tissue.release = 10.1;
+  EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
+  scene.moves[0] = RigidMotion::translation({0, -6, 0});
+  EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 16);  // the ring next to the rim
+  scene.rim_fixed = false;
+  EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
 }
 
 TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {
