@@ -61,7 +61,9 @@ def runner(folder, environment):
         errors.write_text("")
         wrapped = ["sh", "-c", f"exec \"$@\" 2>>'{errors}'", "sh", *command]
         result = finish(["mpirun", "-n", str(ranks), *wrapped], cwd, environment, time_limit)
-        result.stderr = errors.read_text(errors="replace") or result.stderr
+        own_status = range(4)  # beyond: mpirun itself failed, and what it says counts
+        if result.returncode in own_status:
+            result.stderr = errors.read_text(errors="replace")
         errors.unlink()
         return result
 

@@ -1,0 +1,56 @@
+"""The number of ranks changes neither the model nor the rest position."""
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import apart, last, model_of, steps
+
+LOADED = """
+gravity: [0, 0, -9.80665]
+forces:
+  - {at: [0, -90, 0], radius: 30, force: [0, 0, -0.5]}
+"""
+
+
+def check_same(one, many):
+    """Models equal in every byte, steps equal to rounding."""
+    model, other = model_of(one), model_of(many)
+    assert model.keys() == other.keys()
+    assert [name for name in model if model[name].tobytes() != other[name].tobytes()] == []
+    assert len(steps(one)) == len(steps(many))
+    rounding = 1e-12 * abs(last(one)["objective"])
+    for here, there in zip(steps(one), steps(many)):
+        assert apart(here, there) < 1e-6
+        for name in ("objective", "f_e", "f_v", "penalty", "potential"):
+            assert here[name] == pytest.approx(there[name], rel=1e-12, abs=rounding)
+        for name in ("load", "volume", "lambda", "bulk_modulus", "inverted_prisms", "converged"):
+            assert here[name] == there[name]
+        for name, scale in (("spring/tension", "spring/tension"), ("spring/elongation",) * 2,
+                            ("point/residual_force", "spring/tension"),
+                            ("prism/volume_ratio",) * 2, ("point/displacement",) * 2):
+            difference = np.abs(here[name] - there[name]).max()
+            assert difference <= 1e-6 * max(1, np.abs(here[scale]).max())
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5])
+def test_same_face_on_any_number_of_ranks(solved, ranks):
+    options = ["paper_jaw_advance.yaml", "-accuracy", "1e-6"]
+    check_same(solved(*options), solved(*options, ranks=ranks))
+
+
+def test_same_face_of_a_turned_jaw(solved):
+    options = ["paper_jaw_opening.yaml", "-accuracy", "1e-6"]
+    check_same(solved(*options), solved(*options, ranks=3))
+
+
+@pytest.mark.parametrize("volume", ["none", "paper"])
+def test_same_face_with_weight_turgor_and_forces(solved, tmp_path, volume):
+    text = (PROJECT / "meshes/paper_jaw_advance.yaml").read_text()
+    text = text.replace(": paper_", f": {PROJECT}/meshes/paper_").replace("-6, 0]", "-3, 0]")
+    text = text.replace("  layers: 4", "  layers: 4\n  turgor: 0.03\n  mass: [.1, .1, .1, .1]", 1)
+    scene = tmp_path / "loaded.yaml"
+    scene.write_text(text + LOADED)
+    options = [scene, "-accuracy", "1e-6", "-volume", volume, "-lambda", "0.9"]
+    check_same(solved(*options), solved(*options, ranks=3))
+    assert last(solved(*options))["potential"] != 0

@@ -1,0 +1,166 @@
+"""Which files a run of repose-solve writes, what is in them, and how a run is taken up again."""
+
+import shutil
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import apart, last, model_of, steps
+
+SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
+VIEWS = ["bones", "skin", "springs", "tissue"]
+ACCURACY = 1e-6
+
+
+@pytest.fixture
+def face(solved):
+    return solved(SCENE.name, "-accuracy", ACCURACY)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def files_of(name):
+    return sorted([f"{name}.h5"] + [f"{name}_{view}.xdmf" for view in VIEWS])
+
+
+def shortened(file, copy, keep):
+    """A copy of a result with the first `keep` of its steps."""
+    shutil.copy(file, copy)
+    with h5py.File(copy, "r+") as h5:
+        for name in sorted(h5["step"])[keep:]:
+            del h5["step"][name]
+    return copy
+
+
+def test_dry_run_writes_nothing(run, tmp_path):
+    result = run("repose-solve", SCENE, "-dry_run")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "1908" in result.stdout and "14941" in result.stdout and "2622" in result.stdout
+    assert names(tmp_path) == []
+
+
+def test_default_name_is_that_of_the_input_in_this_folder(run, tmp_path):
+    assert run("repose-solve", SCENE, "-accuracy", 1).returncode == 0
+    assert names(tmp_path) == files_of("paper_jaw_advance")
+
+
+def test_output_into_another_folder(run, tmp_path):
+    (tmp_path / "there").mkdir()
+    result = run("repose-solve", SCENE, "-accuracy", 1, "-output", "there/jaw.v2", ranks=2)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert names(tmp_path) == ["there"]
+    assert names(tmp_path / "there") == files_of("jaw.v2")
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "there/jaw.v2_skin.xdmf") as reader:
+        assert reader.num_steps == len(steps(tmp_path / "there/jaw.v2.h5"))
+
+
+def test_a_result_is_replaced_by_the_next(run, tmp_path):
+    assert run("repose-solve", SCENE, "-accuracy", 1, "-output", "jaw").returncode == 0
+    before = last(tmp_path / "jaw.h5")
+    assert run("repose-solve", SCENE, "-accuracy", 0.01, "-output", "jaw").returncode == 0
+    assert last(tmp_path / "jaw.h5")["displacement_error"] < before["displacement_error"]
+    assert names(tmp_path) == files_of("jaw")
+
+
+def test_a_result_may_be_its_own_input(run, tmp_path):
+    assert run("repose-solve", SCENE, "-accuracy", 1, "-output", "jaw").returncode == 0
+    model = model_of(tmp_path / "jaw.h5")
+    assert run("repose-solve", "jaw.h5", "-accuracy", 0.01).returncode == 0
+    assert last(tmp_path / "jaw.h5")["displacement_error"] <= 0.01
+    assert model.keys() == model_of(tmp_path / "jaw.h5").keys()
+
+
+@pytest.mark.parametrize("keep", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_restart_arrives_at_the_same_face(run, face, tmp_path, keep, ranks):
+    shortened(face, tmp_path / "part.h5", keep)
+    result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", "part.h5", "-output",
+                 "rest", ranks=ranks)
+    assert (result.returncode, result.stderr) == (0, "")
+    rest = steps(tmp_path / "rest.h5")
+    assert rest[0]["load"] == last(tmp_path / "part.h5")["load"]
+    assert apart(rest[0], last(tmp_path / "part.h5")) <= 2 * ACCURACY
+    assert rest[-1]["load"] == 1 and apart(rest[-1], last(face)) <= 2 * ACCURACY
+
+
+def test_restart_refines_an_end(run, face, tmp_path):
+    assert run("repose-solve", SCENE, "-accuracy", 1, "-output", "rough").returncode == 0
+    assert apart(last(tmp_path / "rough.h5"), last(face)) > 0.01
+    result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", "rough.h5", "-output",
+                 "fine")
+    assert result.returncode == 0
+    assert [step["load"] for step in steps(tmp_path / "fine.h5")] == [1]
+    assert apart(last(tmp_path / "fine.h5"), last(face)) <= 2 * ACCURACY
+
+
+def test_restart_from_another_model_is_refused(run, face, tmp_path):
+    result = run("repose-solve", PROJECT / "meshes/head_jaw_advance.yaml", "-restart", face)
+    assert result.returncode == 1
+    assert len(result.stderr.splitlines()) == 1 and str(face) in result.stderr
+    assert names(tmp_path) == []
+
+
+def test_checkpoints_are_results(run, face, tmp_path):
+    result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-checkpoint_interval", 1e-9,
+                 "-output", "jaw", ranks=2)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert set(files_of("jaw")) <= set(names(tmp_path))
+    checkpoint = tmp_path / "jaw_checkpoint.h5"
+    assert len(steps(checkpoint)) == 1
+    assert run("repose-check", checkpoint).returncode == 0
+    restarted = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", checkpoint, "-output",
+                    "rest")
+    assert restarted.returncode == 0
+    assert apart(last(tmp_path / "rest.h5"), last(face)) <= 2 * ACCURACY
+    assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.mark.parametrize("limit", [["-tao_max_it", 0], ["-tao_max_it", 3, "-tao_type", "cg"]],
+                         ids=["ntr", "cg"])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_what_is_not_converged_says_so(run, tmp_path, limit, ranks):
+    result = run("repose-solve", SCENE, "-accuracy", 1e-9, *limit, "-output", "jaw", ranks=ranks)
+    assert (result.returncode, result.stderr) == (2, "")
+    assert "NOT CONVERGED" in result.stdout and "iteration limit" in result.stdout
+    path = steps(tmp_path / "jaw.h5")
+    assert [step["converged"] for step in path] == [1] * (len(path) - 1) + [0]
+    assert b"iteration limit" in path[-1]["reason"]
+    assert path[-1]["load"] < 1 and path[-1]["displacement_error"] > 1e-9
+    assert names(tmp_path) == files_of("jaw")
+    assert run("repose-check", "jaw.h5").returncode == 0
+
+
+CELLS = {"tissue": ("wedge", 2622, 1908), "springs": ("line", 14941, 1908),
+         "skin": ("triangle", 874, 1908)}
+SHOWN = {"tissue": {"displacement": "point/displacement", "volume_ratio": "prism/volume_ratio",
+                    "residual_force": "point/residual_force"},
+         "springs": {"elongation": "spring/elongation", "tension": "spring/tension"},
+         "skin": {"displacement": "point/displacement"}}
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_views_open_as_time_series(face, view):
+    with meshio.xdmf.TimeSeriesReader(face.with_name(f"{face.stem}_{view}.xdmf")) as reader:
+        points, cells = reader.read_points_cells()
+        series = [reader.read_data(step) for step in range(reader.num_steps)]
+    path = steps(face)
+    assert [time for time, _, _ in series] == pytest.approx([step["load"] for step in path])
+    if view == "bones":
+        with h5py.File(face) as h5:
+            surfaces = list(h5["model/bone_surface"].values())
+            expected = (sum(len(s["triangles"]) for s in surfaces),
+                        sum(len(s["points"]) for s in surfaces))
+        assert (cells[0].type, len(cells[0].data), len(points)) == ("triangle", *expected)
+        return
+    kind, count, point_count = CELLS[view]
+    assert [(block.type, len(block.data)) for block in cells] == [(kind, count)]
+    assert len(points) == point_count
+    for (_, at_points, at_cells), step in zip(series, path):
+        for name, array in SHOWN[view].items():
+            shown = at_points[name] if name in at_points else at_cells[name][0]
+            assert np.array_equal(shown, step[array])
