@@ -13,7 +13,9 @@ using base::check;
 namespace {
 
 constexpr double safety = 1.5;  // the estimate is this many Newton steps long
-constexpr double infinity = std::numeric_limits<double>::infinity();
+// Newton's linear systems are solved to this much of their right-hand side: roughly far from the
+// rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
+constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
 
 bool uses_hessian(Tao tao) {
   PetscBool newton = PETSC_FALSE;
@@ -66,7 +68,10 @@ struct Minimiser::Callbacks {
   }
 
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
-    return guarded(me, [&](Minimiser& self) { self.solver_.tangent().assemble(x); });
+    return guarded(me, [&](Minimiser& self) {
+      self.solver_.tangent().assemble(x);
+      self.set_forcing();
+    });
   }
 
   static PetscErrorCode converged(Tao tao, void* me) {
@@ -78,6 +83,8 @@ struct Minimiser::Callbacks {
       check(TaoGetSolution(tao, &x));
       check(TaoGetGradient(tao, &g, nullptr, nullptr));
       const double force = largest_block(g);
+      self.force_ = force;
+      if (iteration == 0) self.first_force_ = force;
       const bool done = self.near_enough(x, g, force);
       if (self.watch_)
         self.watch_({iteration, self.objective_.positions().load(), value, force, self.error_});
@@ -113,8 +120,22 @@ void Minimiser::make_tao() {
   check(TaoGetKSP(tao_, &inner));
   check(KSPSetPC(inner, solver_.preconditioner()));
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
-  check(KSPSetTolerances(inner, 1e-2, 0.0, PETSC_DEFAULT, 200));
+  check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   check(KSPSetFromOptions(inner));
+  const char* prefix = nullptr;
+  check(KSPGetOptionsPrefix(inner, &prefix));
+  PetscBool given = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, prefix, "-ksp_rtol", &given));
+  automatic_forcing_ = !given;
+}
+
+void Minimiser::set_forcing() {
+  if (!newton_ || !automatic_forcing_ || first_force_ == 0) return;
+  KSP inner = nullptr;
+  check(TaoGetKSP(tao_, &inner));
+  const double forcing =
+      std::clamp(std::sqrt(force_ / first_force_), finest_forcing, coarsest_forcing);
+  check(KSPSetTolerances(inner, forcing, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
 double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
@@ -126,10 +147,10 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     error_ = 0;
     return true;
   }
-  // A Newton method needs this state's Hessian anyway; others look only when the force that went
-  // with a distance at the last look says it is worth it.
-  constexpr double hopeful = 2;
-  if (!newton_ && softest_ > 0 && largest_force > hopeful * softest_ * accuracy_) {
+  // A look costs the solution of a linear system, so it is taken only where the force that went
+  // with a distance at the last look says that it is worth it; a Newton method's steps go further.
+  const double hopeful = newton_ ? 20 : 2;
+  if (softest_ > 0 && largest_force > hopeful * softest_ * accuracy_) {
     error_ = largest_force / softest_;
     return false;
   }
@@ -188,7 +209,6 @@ Outcome Minimiser::summary(Vec displacement) {
 
 Outcome Minimiser::run(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
-  softest_ = 0;
   thrown_ = nullptr;
   check(TaoSetSolution(tao_, displacement));
   const PetscErrorCode code = TaoSolve(tao_);

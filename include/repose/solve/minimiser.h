@@ -52,6 +52,7 @@ class Minimiser {
  private:
   struct Callbacks;
   void make_tao();
+  void set_forcing();
   double strict_estimate(Vec displacement, Vec gradient);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   double measure(Vec displacement);
@@ -62,10 +63,12 @@ class Minimiser {
   TangentSolver solver_;
   std::function<void(const Iteration&)> watch_;
   TaoHandle tao_;
-  bool newton_ = true;   // the TAO method uses the Hessian
-  double accuracy_ = 0;  // mm, of the run under way
-  double error_ = 0;     // mm, latest strict estimate
-  double softest_ = 0;   // N/mm: force over distance at the last strict estimate
+  bool newton_ = true;  // the TAO method uses the Hessian
+  bool automatic_forcing_ = true;
+  double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate
+  double accuracy_ = 0;                 // mm, of the run under way
+  double error_ = 0;                    // mm, latest strict estimate
+  double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
   base::VecHandle gradient_, saved_;
   std::exception_ptr thrown_;
 };
