@@ -43,7 +43,13 @@ std::vector<base::Option> option_table() {
        {1e-12, 100},
        "mm"},
       {"functional", OptionKind::choice, "", "What is minimised.", {}, "", functional_words},
-      {"volume", OptionKind::choice, "", "Volume term.", {}, "", volume_words},
+      {"volume",
+       OptionKind::choice,
+       "",
+       "Volume term (force: none or paper).",
+       {},
+       "",
+       volume_words},
       {"lambda",
        OptionKind::number,
        "",
@@ -102,9 +108,9 @@ Job read_job(const std::filesystem::path& input) {
   return job;
 }
 
-template <class Choice>
+template <class Choice, class Target>
 void choose(const base::Options& options, const char* name, const std::vector<std::string>& words,
-            Choice& value) {
+            Target& value) {
   if (!options.has(name)) return;
   const auto place = std::find(words.begin(), words.end(), options.text(name));
   value = static_cast<Choice>(place - words.begin());
@@ -112,8 +118,8 @@ void choose(const base::Options& options, const char* name, const std::vector<st
 
 /// The command line beats the scene.
 void override_by(const base::Options& options, scene::Solve& wanted) {
-  choose(options, "functional", functional_words, wanted.functional);
-  choose(options, "volume", volume_words, wanted.volume);
+  choose<scene::Functional>(options, "functional", functional_words, wanted.functional);
+  choose<scene::VolumeForm>(options, "volume", volume_words, wanted.volume);
   if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
   if (options.has("lambda")) wanted.lambda = options.number("lambda");
   if (options.has("bulk_modulus")) wanted.bulk_modulus = options.number("bulk_modulus");
@@ -124,17 +130,22 @@ void override_by(const base::Options& options, scene::Solve& wanted) {
 
 solve::Settings settings_of(const scene::Solve& wanted) {
   using scene::VolumeForm;
-  if (wanted.functional == scene::Functional::force || wanted.volume == VolumeForm::exact)
-    base::refuse(
-        "this version minimises energy with volume term none, paper or penalty; "
-        "functional force and volume exact are not modelled");
   solve::Settings settings;
-  settings.volume = volume_words[static_cast<size_t>(wanted.volume)];
+  settings.force = wanted.functional == scene::Functional::force;
+  const VolumeForm form =
+      wanted.volume.value_or(settings.force ? VolumeForm::none : VolumeForm::penalty);
+  settings.volume = volume_words[static_cast<size_t>(form)];
+  if (settings.force && form != VolumeForm::none && form != VolumeForm::paper)
+    base::refuse(
+        "functional force takes volume none or paper, not {}: a penalty or a constraint belongs to "
+        "the energy; choose -functional energy or another -volume",
+        settings.volume);
   settings.path.accuracy = wanted.accuracy;
   settings.path.load_steps = wanted.load_steps;
-  if (wanted.volume == VolumeForm::penalty)
+  settings.exact_volume = form == VolumeForm::exact;
+  if (form == VolumeForm::penalty || form == VolumeForm::exact)
     settings.weights = {1, mechanics::VolumeTerm::penalty, *wanted.bulk_modulus};
-  if (wanted.volume == VolumeForm::paper) {
+  if (form == VolumeForm::paper) {
     settings.lambda = wanted.lambda;
     settings.weights = {wanted.lambda, mechanics::VolumeTerm::paper, 1 - wanted.lambda};
   }

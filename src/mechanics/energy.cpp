@@ -57,6 +57,7 @@ class TwoPrisms {
     const int64_t second = e + count_ - 1;
     corner_ = {&loop.points[e], &loop.points[second]};
     rest_volume = Pair{loop.rest_volume[e], loop.rest_volume[second]};
+    target_volume = Pair{loop.target_volume[e], loop.target_volume[second]};
   }
   PrismTriples<Pair> gather(std::span<const Vec3> values) const {
     PrismTriples<Pair> corners;
@@ -77,7 +78,7 @@ class TwoPrisms {
   }
   double sum(Pair values) const { return count_ == 2 ? values[0] + values[1] : values[0]; }
 
-  Pair rest_volume;
+  Pair rest_volume, target_volume;
 
  private:
   int count_;
@@ -99,7 +100,7 @@ double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
     const TwoPrisms prisms(loop, e, end);
     const PrismSlope<Pair> v(PrismEdges<Pair>(prisms.gather(position)));
     const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
-    const Pair change = v.volume - prisms.rest_volume, slope = stiffness * change;
+    const Pair change = v.volume - prisms.target_volume, slope = stiffness * change;
     PrismTriples<Pair> force;
     for (int c = 0; c < 6; ++c) force[c] = slope * v.gradient[c];
     prisms.scatter(force, gradient);
@@ -117,7 +118,7 @@ void prism_action(const PrismLoop& loop, std::span<const Vec3> position, const W
     const PrismSlope<Pair> v(edges);
     const PrismTriples<Pair> turned = prism_slope_change(edges, PrismEdges<Pair>(moves));
     const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
-    const Pair slope = stiffness * (v.volume - prisms.rest_volume);
+    const Pair slope = stiffness * (v.volume - prisms.target_volume);
     Pair change{};
     for (int c = 0; c < 6; ++c) change += v.gradient[c].dot(moves[c]);
     const Pair bend = stiffness * change;
@@ -147,8 +148,9 @@ double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> positio
   });
 }
 
-VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume) {
-  const double stiffness = volume_stiffness(weights, rest_volume), change = volume - rest_volume;
+VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume,
+                     double target_volume) {
+  const double stiffness = volume_stiffness(weights, rest_volume), change = volume - target_volume;
   return {0.5 * stiffness * change * change, stiffness * change, stiffness};
 }
 
@@ -171,12 +173,12 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
 }
 
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
-                         const Weights& weights, Curvature curvature) {
+                         double target_volume, const Weights& weights, Curvature curvature) {
   PrismTriples<double> x;
   for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
   const PrismEdges<double> edges(x);
   const PrismSlope<double> v(edges);
-  const VolumeLaw law = volume_law(weights, v.volume, rest_volume);
+  const VolumeLaw law = volume_law(weights, v.volume, rest_volume, target_volume);
   const double turning = curvature == Curvature::exact ? law.slope : 0.0;
   const auto skew = prism_volume_hessian(edges);
   PrismBlocks blocks;

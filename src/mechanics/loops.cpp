@@ -44,8 +44,10 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
     std::copy(prisms.points[e].begin(), prisms.points[e].end(), corners.begin());
     loops.prisms.points.push_back(corners);
     loops.prisms.rest_volume.push_back(prisms.rest_volume[e]);
+    loops.prisms.row.push_back(static_cast<int64_t>(e));
     if (static_cast<int64_t>(e) < owned_prisms) ++loops.prisms.counted;
   }
+  loops.prisms.target_volume = loops.prisms.rest_volume;
   return loops;
 }
 

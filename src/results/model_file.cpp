@@ -149,6 +149,8 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});
   if (in.has(group + "/prism/volume_ratio") || counts.prisms > 0)
     stored.rows.volume_ratio = in.numbers(group + "/prism/volume_ratio", {counts.prisms, {}});
+  if (in.has(group + "/prism/pressure"))
+    stored.rows.pressure = in.numbers(group + "/prism/pressure", {counts.prisms, {}});
   const std::string bones = group + "/bone_surface/points";
   if (in.has(bones)) stored.bone_points = in.vectors(bones, Shape::any);
   return stored;

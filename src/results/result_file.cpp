@@ -143,6 +143,7 @@ void ResultFile::State::require_rows(const model::StepRows& rows) const {
   if (!agrees(rows.position.size(), counts.points) ||
       !agrees(rows.residual_force.size(), counts.points) ||
       !agrees(rows.volume_ratio.size(), counts.prisms) ||
+      !(rows.pressure.empty() || agrees(rows.pressure.size(), counts.prisms)) ||
       !agrees(rows.elongation.size(), counts.springs) ||
       !agrees(rows.tension.size(), counts.springs))
     throw base::InternalError("a step's rows are not this rank's slab");
@@ -177,6 +178,8 @@ void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) 
   const base::Hdf5Group spring = create_group(step, "spring");
   const base::Slab prisms = slab(counts.prisms), springs = slab(counts.springs);
   write_dataset(prism, "volume_ratio", counts.prisms, 0, prisms, rows.volume_ratio.data());
+  if (counts.pressure)
+    write_dataset(prism, "pressure", counts.prisms, 0, prisms, rows.pressure.data());
   write_dataset(spring, "elongation", counts.springs, 0, springs, rows.elongation.data());
   write_dataset(spring, "tension", counts.springs, 0, springs, rows.tension.data());
 }
@@ -232,6 +235,7 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   const model::StepNumbers same = of_first_rank(s.comm, numbers);
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
   s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
+  s.counts.pressure = same.volume == "exact";
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

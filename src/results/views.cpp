@@ -17,18 +17,20 @@ std::vector<std::string> moving_points(size_t steps) {
 }
 
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
-  return {.name = "tissue",
-          .topology = "TopologyType=\"Wedge\"",
-          .corners = 6,
-          .connectivity = "/model/prism/points",
-          .points = counts.points,
-          .cells = counts.prisms,
-          .geometry = moving_points(steps),
-          .arrays = {{"displacement", "step/point/displacement", true, true},
-                     {"residual_force", "step/point/residual_force", true, true},
-                     {"set", "/model/point/set", true, false, small_integer},
-                     {"layer", "/model/point/layer", true, false, short_integer},
-                     {"volume_ratio", "step/prism/volume_ratio"}}};
+  XdmfBlock block{.name = "tissue",
+                  .topology = "TopologyType=\"Wedge\"",
+                  .corners = 6,
+                  .connectivity = "/model/prism/points",
+                  .points = counts.points,
+                  .cells = counts.prisms,
+                  .geometry = moving_points(steps),
+                  .arrays = {{"displacement", "step/point/displacement", true, true},
+                             {"residual_force", "step/point/residual_force", true, true},
+                             {"set", "/model/point/set", true, false, small_integer},
+                             {"layer", "/model/point/layer", true, false, short_integer},
+                             {"volume_ratio", "step/prism/volume_ratio"}}};
+  if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
+  return block;
 }
 
 XdmfBlock springs(const FileCounts& counts, size_t steps) {

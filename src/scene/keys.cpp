@@ -130,13 +130,15 @@ std::vector<Key> solve_keys() {
           {"solve.volume", map, "", "How the tissue keeps its volume."},
           {"solve.volume.form",
            choice,
-           "penalty",
-           "Form of the volume term.",
+           "",
+           "Form of the volume term; when not given penalty, and none with functional force, which "
+           "takes none or paper only.",
            "",
            {},
            {"none", "paper", "penalty", "exact"}},
           {"solve.volume.bulk_modulus", number, "",
-           "Bulk modulus κ of the penalty; 10 × the tissue's effective modulus when not given.",
+           "Bulk modulus κ of the penalty, and that exact starts with; 10 × the tissue's effective "
+           "modulus when not given.",
            "N/mm²", Range::above(0)},
           {"solve.lambda", number, "0.5",
            "Weight λ of the volume form paper; no other form uses it.", "", Range::between(0, 1)},

@@ -17,8 +17,8 @@ void set(Target& target, const Map& map, const char* name, Result (Value::*read)
 }
 
 /// The same for an enumeration whose values are numbered as the key's choices.
-template <class Enum>
-void set_choice(Enum& target, const Map& map, const char* name) {
+template <class Enum, class Target>
+void set_choice(Target& target, const Map& map, const char* name) {
   if (const auto value = map.find(name)) target = static_cast<Enum>(value->choice());
 }
 
@@ -153,10 +153,10 @@ std::vector<Force> read_forces(const Value& value) {
 Solve read_solve(const Value& value) {
   const Map map(value);
   Solve solve;
-  set_choice(solve.functional, map, "functional");
+  set_choice<Functional>(solve.functional, map, "functional");
   if (const auto volume = map.find("volume")) {
     const Map term(*volume);
-    set_choice(solve.volume, term, "form");
+    set_choice<VolumeForm>(solve.volume, term, "form");
     set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
   }
   set(solve.lambda, map, "lambda", &Value::number);

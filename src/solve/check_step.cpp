@@ -66,7 +66,7 @@ std::vector<Vec3> prescribed(const model::Model& model, const model::PrescribedM
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
                 const model::StepNumbers& numbers, const model::StepRows& rows,
                 const std::vector<Vec3>& displacement, base::Comparison& comparison) {
-  const RecomputedStep again = recompute(model, numbers, rows.position);
+  const RecomputedStep again = recompute(model, numbers, rows);
   check_ranges(numbers, again.gradient_known, comparison);
   check_numbers(numbers, again, comparison);
   const std::vector<Vec3> fixed = prescribed(model, motion, numbers.load, rows.position);

@@ -26,9 +26,11 @@ class Stopwatch {
 
 }  // namespace
 
-LoadPath::LoadPath(Objective& objective, Minimiser& minimiser, const PathSettings& settings)
+LoadPath::LoadPath(Objective& objective, Predictor& predictor, RestSearch& search,
+                   const PathSettings& settings)
     : objective_(objective),
-      minimiser_(minimiser),
+      predictor_(predictor),
+      search_(search),
       settings_(settings),
       trial_(objective.positions().make_vector()),
       increment_(objective.positions().make_vector()) {}
@@ -47,12 +49,12 @@ int64_t LoadPath::inverted(Vec displacement) {
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   Positions& positions = objective_.positions();
   const int64_t folded_before = inverted(displacement);
-  const bool predicted = minimiser_.predict(displacement, load, increment_);
+  const bool predicted = predictor_.predict(displacement, load, increment_);
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
   Attempt attempt;
-  attempt.outcome = minimiser_.run(trial_, settings_.accuracy);
+  attempt.outcome = search_.run(trial_, settings_.accuracy);
   result_.iterations += attempt.outcome.iterations;
   attempt.folded = inverted(trial_) > folded_before;
   if (!predicted) return attempt;
@@ -75,7 +77,7 @@ bool LoadPath::follows(const Attempt& now, const Attempt* coarser) const {
 void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   const Stopwatch watch;
   objective_.positions().set_load(result_.load);
-  result_.last = minimiser_.run(displacement, settings_.accuracy);
+  result_.last = search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   ++result_.steps;
   objective_.positions().update(displacement);

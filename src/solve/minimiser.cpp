@@ -64,12 +64,12 @@ struct Minimiser::Callbacks {
   }
 
   static PetscErrorCode value_and_gradient(Tao, Vec x, PetscReal* value, Vec gradient, void* me) {
-    return guarded(me, [&](Minimiser& self) { *value = self.objective_.evaluate(x, gradient); });
+    return guarded(me, [&](Minimiser& self) { *value = self.function_.evaluate(x, gradient); });
   }
 
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
     return guarded(me, [&](Minimiser& self) {
-      self.solver_.tangent().assemble(x);
+      self.solver_.hessian().assemble(x);
       self.set_forcing();
     });
   }
@@ -87,27 +87,33 @@ struct Minimiser::Callbacks {
       if (iteration == 0) self.first_force_ = force;
       const bool done = self.near_enough(x, g, force);
       if (self.watch_)
-        self.watch_({iteration, self.objective_.positions().load(), value, force, self.error_});
+        self.watch_({iteration, self.function_.positions().load(), value, force, self.error_});
       check(TaoDefaultConvergenceTest(tao, nullptr));
       if (done) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
   }
 };
 
-Minimiser::Minimiser(Objective& objective, std::function<void(const Iteration&)> watch)
-    : objective_(objective),
-      solver_(objective),
-      watch_(std::move(watch)),
-      gradient_(objective.positions().make_vector()),
-      saved_(objective.positions().make_vector()) {
+Minimiser::Minimiser(Function& function, TangentSolver& solver, const Watch& watch)
+    : Minimiser(function, solver, {function, solver}, watch) {}
+
+Minimiser::Minimiser(Function& function, TangentSolver& solver, const Certificate& certificate,
+                     const Watch& watch)
+    : function_(function),
+      solver_(solver),
+      certificate_(certificate),
+      watch_(watch),
+      gradient_(function.positions().make_vector()),
+      saved_(function.positions().make_vector()),
+      certified_gradient_(function.positions().make_vector()) {
   make_tao();
 }
 
 void Minimiser::make_tao() {
-  check(TaoCreate(objective_.positions().comm(), tao_.out()));
+  check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, TAONTR));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
-  check(TaoSetHessian(tao_, solver_.tangent().exact(), solver_.tangent().convex(),
+  check(TaoSetHessian(tao_, solver_.hessian().exact(), solver_.hessian().convex(),
                       Callbacks::hessian, this));
   check(TaoSetTolerances(tao_, 0, 0, 0));
   check(TaoSetMaximumIterations(tao_, 5000));
@@ -139,7 +145,11 @@ void Minimiser::set_forcing() {
 }
 
 double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
-  return safety * solver_.newton_distance(displacement, gradient);
+  if (&certificate_.function != &function_) {
+    certificate_.function.evaluate(displacement, certified_gradient_);
+    gradient = certified_gradient_;
+  }
+  return safety * certificate_.solver.newton_distance(displacement, gradient);
 }
 
 bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
@@ -168,7 +178,7 @@ int Minimiser::polish(Vec displacement) {
   while (corrections < most && error_ > accuracy_ && error_ <= std::max(1e-3, 10 * accuracy_)) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
-    check(VecAXPY(displacement, -1.0, solver_.latest()));
+    check(VecAXPY(displacement, -1.0, certificate_.solver.latest()));
     measure(displacement);
     if (error_ > 0.5 * before) {
       check(VecCopy(saved_, displacement));
@@ -181,7 +191,7 @@ int Minimiser::polish(Vec displacement) {
 }
 
 double Minimiser::measure(Vec displacement) {
-  const double objective = objective_.evaluate(displacement, gradient_);
+  const double objective = function_.evaluate(displacement, gradient_);
   error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_);
   return objective;
 }
@@ -190,7 +200,7 @@ Outcome Minimiser::summary(Vec displacement) {
   measure(displacement);
   const int corrections = polish(displacement);
   Outcome outcome;
-  outcome.objective = objective_.evaluate(displacement, gradient_);
+  outcome.objective = function_.evaluate(displacement, gradient_);
   outcome.gradient_max = largest_block(gradient_);
   outcome.displacement_error = error_;
   outcome.stable = std::isfinite(error_);
@@ -215,21 +225,6 @@ Outcome Minimiser::run(Vec displacement, double accuracy) {
   if (thrown_) std::rethrow_exception(thrown_);
   check(code);
   return summary(displacement);
-}
-
-bool Minimiser::predict(Vec displacement, double load, Vec increment) {
-  Positions& positions = objective_.positions();
-  positions.update(displacement);
-  const Part& part = positions.part();
-  std::vector<Vec3> direction(positions.local().size(), Vec3::Zero());
-  for (size_t i = 0; i < direction.size(); ++i)
-    if (part.unknown[i] < 0)
-      direction[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
-  base::VecHandle force = positions.make_vector();
-  objective_.hessian_action(direction, force);
-  check(VecScale(force, -1));
-  check(VecSet(increment, 0));
-  return solver_.solve(displacement, force, increment, 1e-2);
 }
 
 }  // namespace repose::solve

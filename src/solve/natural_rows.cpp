@@ -5,6 +5,7 @@
 #include "repose/base/agreement.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
+#include "repose/solve/exact_volume.h"
 
 namespace repose::solve {
 
@@ -17,6 +18,15 @@ double tension(const model::Springs& springs, int64_t e, double elongation) {
     return mechanics::spring_tension<p>(elongation, springs.stiffness[e],
                                         1.0 / springs.reference[e]);
   });
+}
+
+/// [owned prisms] N/mm²; none where nothing is free to move.
+std::vector<double> owned_pressures(Objective& objective) {
+  std::vector<double> owned(objective.positions().part().owned_prisms, 0.0);
+  const std::vector<double> pressure = pressures(objective);
+  for (int64_t e = 0; e < objective.prisms().counted; ++e)
+    owned[objective.prisms().row[e]] = pressure[e];
+  return owned;
 }
 
 std::vector<Vec3> as_points(const std::vector<double>& numbers) {
@@ -70,7 +80,7 @@ std::vector<double> NaturalRows::bring(const Route& route, const double* values)
   return natural;
 }
 
-model::StepRows NaturalRows::rows(Objective& objective) const {
+model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
   const auto position = objective.positions().local();
   const model::Springs& springs = part_.model.springs;
   const model::Prisms& prisms = part_.model.prisms;
@@ -91,6 +101,7 @@ model::StepRows NaturalRows::rows(Objective& objective) const {
   rows.position = as_points(bring(points_, position.data()->data()));
   rows.residual_force = as_points(bring(points_, residual.data()->data()));
   rows.volume_ratio = bring(prisms_, ratio.data());
+  if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective).data());
   rows.elongation = bring(springs_, elongation.data());
   rows.tension = bring(springs_, force.data());
   return rows;

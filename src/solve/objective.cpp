@@ -43,7 +43,7 @@ void make_finite(std::span<Vec3> gradient) {
 }  // namespace
 
 Objective::Objective(Positions& positions, const mechanics::Weights& weights)
-    : positions_(positions),
+    : Function(positions),
       weights_(weights),
       loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
                                    positions.part().owned_prisms)),
@@ -63,8 +63,7 @@ double Objective::potential() const {
   return sum(positions_.comm(), w);
 }
 
-double Objective::evaluate(Vec displacement, Vec gradient) {
-  ++evaluations_;
+double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   positions_.update(displacement);
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   double value = 0;

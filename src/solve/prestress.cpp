@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "repose/mechanics/spring_law.h"
+#include "repose/solve/tangent.h"
 #include "repose/solve/tangent_solver.h"
 
 namespace repose::solve {
@@ -152,7 +153,8 @@ Prestress prestress(Model& model, double turgor) {
 
   Prestress result;
   InitialForces system(stiffness_model(model, skin));
-  TangentSolver solver(system.objective());
+  Tangent tangent(system.objective());
+  TangentSolver solver(system.positions(), tangent);
   std::vector<double> tension(skin.size(), 0.0);
   constexpr int most_refinements = 6;
   for (int pass = 0; pass <= most_refinements; ++pass) {

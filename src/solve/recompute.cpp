@@ -43,8 +43,8 @@ std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
 class Recomputation {
  public:
   Recomputation(const model::Model& model, const model::StepNumbers& claimed,
-                const std::vector<Vec3>& position)
-      : model_(model), claimed_(claimed), x_(position) {}
+                const model::StepRows& rows)
+      : model_(model), claimed_(claimed), x_(rows.position), pressure_(rows.pressure) {}
 
   RecomputedStep run() {
     elastic_ = claimed_.volume == "paper" ? claimed_.lambda : 1.0;
@@ -78,11 +78,12 @@ class Recomputation {
   const model::Model& model_;
   const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
-  double elastic_ = 1;            // weight of f
-  double smooth_force_ = 0;       // Σ (√(|F|² + ε²) − ε)
-  std::vector<double> at_point_;  // [N] Σ noise of the forces there, N
-  std::vector<Vec3> gradient_;    // [N] of the objective
-  std::vector<double> noise_;     // [N] of the gradient
+  const std::vector<double>& pressure_;  // [M] or empty
+  double elastic_ = 1;                   // weight of f
+  double smooth_force_ = 0;              // Σ (√(|F|² + ε²) − ε)
+  std::vector<double> at_point_;         // [N] Σ noise of the forces there, N
+  std::vector<Vec3> gradient_;           // [N] of the objective
+  std::vector<double> noise_;            // [N] of the gradient
   RecomputedStep step_;
 };
 
@@ -188,6 +189,8 @@ void Recomputation::prism(int64_t j) {
   } else if (claimed_.volume == "penalty") {
     slope = kappa * change / v0;
     curvature = kappa / v0;
+  } else if (!pressure_.empty()) {
+    slope = -pressure_[j];
   }
   const std::array<Vec3, 6> toward = volume_gradient(corners, extent);
   for (int c = 0; c < 6; ++c) {
@@ -242,7 +245,7 @@ void Recomputation::force_functional_gradient() {
 }
 
 void Recomputation::gradient() {
-  step_.gradient_known = claimed_.volume != "exact";
+  step_.gradient_known = claimed_.volume != "exact" || !pressure_.empty();
   if (claimed_.functional == "energy")
     for (size_t i = 0; i < x_.size(); ++i) {
       gradient_[i] -= elastic_ * step_.rows.residual_force[i];
@@ -262,9 +265,9 @@ void Recomputation::gradient() {
 }  // namespace
 
 RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
-                         const std::vector<Vec3>& position) {
-  RecomputedStep step = Recomputation(model, claimed, position).run();
-  step.rows.position = position;
+                         const model::StepRows& rows) {
+  RecomputedStep step = Recomputation(model, claimed, rows).run();
+  step.rows.position = rows.position;
   return step;
 }
 

@@ -68,7 +68,8 @@ std::string describe_run(const Summary& s, const Settings& settings, int ranks,
                                       s.last.displacement_error, settings.path.accuracy));
   text += row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
                                                   : "NOT A MINIMUM: negative curvature");
-  text += row("objective", fmt::format("{:.12g} N mm", s.last.objective));
+  text +=
+      row("objective", fmt::format("{:.12g} {}", s.last.objective, settings.force ? "N" : "N mm"));
   text += row("inverted prisms", fmt::format("{}{}", s.last.inverted_prisms,
                                              s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));
   text += row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 
 #include "repose/base/agreement.h"
 #include "repose/base/progress.h"
+#include "repose/solve/exact_volume.h"
+#include "repose/solve/force_search.h"
 #include "repose/solve/natural_rows.h"
 
 namespace repose::solve {
@@ -24,9 +27,10 @@ double force_sum(MPI_Comm comm, const std::vector<Vec3>& owned) {
 model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
                               const Outcome& outcome, double load) {
   const mechanics::Totals totals = objective.totals();
-  const mechanics::Weights& weights = settings.weights;
+  const mechanics::Weights& weights = objective.weights();
   model::StepNumbers n;
   n.load = load;
+  n.functional = settings.force ? "force" : "energy";
   n.volume = settings.volume;
   n.lambda = settings.lambda;
   if (weights.volume == mechanics::VolumeTerm::penalty) n.bulk_modulus = weights.volume_weight;
@@ -35,7 +39,7 @@ model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
   n.f_f = force_sum(objective.positions().comm(), objective.residual_force());
   n.f_v = totals.volume_squares;
   n.penalty = n.bulk_modulus * totals.penalty_unit;
-  n.objective = outcome.objective;
+  n.objective = settings.exact_volume ? n.f_e + n.potential : outcome.objective;
   n.gradient_max = outcome.gradient_max;
   n.volume_error_max = totals.volume_error_max;
   n.inverted_prisms = totals.inverted;
@@ -62,6 +66,61 @@ class Watcher {
 
  private:
   base::Progress progress_;
+};
+
+/// What finds the rest position of a model under the settings: the function, its derivatives, the
+/// linear solver, the search. One object so that they live and end together.
+class Searcher {
+ public:
+  Searcher(Positions& positions, const Settings& settings)
+      : objective_(positions, settings.force ? mechanics::Weights{} : settings.weights),
+        tangent_(objective_),
+        solver_(positions, tangent_),
+        predictor_(objective_, solver_),
+        watcher_(positions.comm()) {
+    if (settings.force)
+      make_force_search(positions, settings);
+    else
+      minimiser_.emplace(objective_, solver_, std::ref(watcher_));
+    if (settings.exact_volume) exact_volume_.emplace(objective_, tangent_, *minimiser_);
+  }
+
+  RestSearch& search() {
+    if (force_search_) return *force_search_;
+    if (exact_volume_) return *exact_volume_;
+    return *minimiser_;
+  }
+  Objective& objective() { return objective_; }
+  Predictor& predictor() { return predictor_; }
+  double epsilon() const { return force_ ? force_->epsilon() : 0; }
+  int64_t evaluations() const { return force_ ? force_->evaluations() : objective_.evaluations(); }
+  int64_t assemblies() const {
+    return tangent_.assemblies() + (gauss_newton_ ? gauss_newton_->assemblies() : 0);
+  }
+
+ private:
+  void make_force_search(Positions& positions, const Settings& settings) {
+    force_.emplace(objective_, settings.weights);
+    gauss_newton_.emplace(*force_, tangent_);
+    force_solver_.emplace(positions, *gauss_newton_);
+    // Without volume term rest is F = 0, of which the energy's Newton step knows more.
+    const Certificate own{*force_, *force_solver_}, energy{objective_, solver_};
+    const bool balanced = settings.weights.volume == mechanics::VolumeTerm::none;
+    minimiser_.emplace(*force_, *force_solver_, balanced ? energy : own, std::ref(watcher_));
+    force_search_.emplace(*force_, *minimiser_);
+  }
+
+  Objective objective_;
+  Tangent tangent_;
+  TangentSolver solver_;
+  Predictor predictor_;
+  Watcher watcher_;
+  std::optional<ForceFunctional> force_;
+  std::optional<GaussNewton> gauss_newton_;
+  std::optional<TangentSolver> force_solver_;
+  std::optional<Minimiser> minimiser_;
+  std::optional<ForceSearch> force_search_;
+  std::optional<ExactVolume> exact_volume_;
 };
 
 /// Sets the unknowns to the displacements that take the initial positions to `start`.
@@ -101,26 +160,27 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   Positions positions(comm, part);
-  Objective objective(positions, settings.weights);
   const NaturalRows natural(comm, part);
   base::VecHandle displacement = positions.make_vector();
   if (settings.path.start_load > 0) restart_from(comm, part, start, displacement);
   stages.end("distribute");
 
-  Minimiser minimiser(objective, Watcher(comm));
-  LoadPath path(objective, minimiser, settings.path);
+  Searcher searcher(positions, settings);
+  Objective& objective = searcher.objective();
+  LoadPath path(objective, searcher.predictor(), searcher.search(), settings.path);
   Summary summary;
   int64_t evaluations_before = 0;
   summary.path = path.run(displacement, [&](const Outcome& outcome, double load, double seconds) {
     summary.last = numbers_of(objective, settings, outcome, load);
+    summary.last.epsilon = searcher.epsilon();
     summary.last.seconds = seconds;
-    summary.last.evaluations = objective.evaluations() - evaluations_before;
-    evaluations_before = objective.evaluations();
-    receive(summary.last, natural.rows(objective));
+    summary.last.evaluations = searcher.evaluations() - evaluations_before;
+    evaluations_before = searcher.evaluations();
+    receive(summary.last, natural.rows(objective, settings.exact_volume));
   });
   summary.unknowns = 3 * part.total_unknowns;
-  summary.evaluations = objective.evaluations();
-  summary.assemblies = minimiser.assemblies();
+  summary.evaluations = searcher.evaluations();
+  summary.assemblies = searcher.assemblies();
   stages.end("solve");
   return summary;
 }

@@ -129,10 +129,9 @@ void Tangent::fill(Mat matrix, Curvature curvature) {
   for (int side = 0; side < 2; ++side)
     if (sides[side]) check(MatSeqAIJGetArray(sides[side], &values[side]));
   const auto position = objective_.positions().local();
-  const mechanics::Weights& weights = objective_.weights();
   for (size_t l = 0; l < spring_slots_.size(); ++l) {
     const mechanics::SpringLoop& loop = objective_.loops().springs[l];
-    mechanics::for_each_spring_block(loop, position, weights.elastic, curvature,
+    mechanics::for_each_spring_block(loop, position, objective_.weights().elastic, curvature,
                                      [&](int64_t e, const Mat3& block) {
                                        const auto [p, q] = loop.points[e];
                                        const auto& slots = spring_slots_[l][e];
@@ -143,12 +142,13 @@ void Tangent::fill(Mat matrix, Curvature curvature) {
                                      });
   }
   const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-  mechanics::for_each_prism_block(
-      prisms, position, weights, curvature, [&](int64_t e, const mechanics::PrismBlocks& blocks) {
-        for (int i = 0; i < 6; ++i)
-          for (int j = 0; j < 6; ++j)
-            add(values, prism_slots_[e][6 * i + j], prisms.points[e][i], blocks[i][j]);
-      });
+  mechanics::for_each_prism_block(prisms, position, objective_.weights(), curvature,
+                                  [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+                                    for (int i = 0; i < 6; ++i)
+                                      for (int j = 0; j < 6; ++j)
+                                        add(values, prism_slots_[e][6 * i + j], prisms.points[e][i],
+                                            blocks[i][j]);
+                                  });
   for (int side = 0; side < 2; ++side)
     if (sides[side]) check(MatSeqAIJRestoreArray(sides[side], &values[side]));
   check(MatAssemblyBegin(matrix, MAT_FINAL_ASSEMBLY));

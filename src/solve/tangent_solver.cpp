@@ -27,14 +27,14 @@ void choose_preconditioner(PC pc, int64_t unknowns) {
 
 }  // namespace
 
-TangentSolver::TangentSolver(Objective& objective)
-    : tangent_(objective), work_(objective.positions().make_vector()) {
-  check(KSPCreate(objective.positions().comm(), krylov_.out()));
+TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
+    : hessian_(hessian), work_(positions.make_vector()) {
+  check(KSPCreate(positions.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
-  choose_preconditioner(preconditioner(), 3 * objective.positions().part().total_unknowns);
-  check(KSPSetOperators(krylov_, tangent_.exact(), tangent_.convex()));
+  choose_preconditioner(preconditioner(), 3 * positions.part().total_unknowns);
+  check(KSPSetOperators(krylov_, hessian_.exact(), hessian_.convex()));
   check(KSPSetFromOptions(krylov_));
 }
 
@@ -45,8 +45,8 @@ PC TangentSolver::preconditioner() {
 }
 
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
-  tangent_.assemble(displacement);
-  check(KSPSetOperators(krylov_, tangent_.exact(), tangent_.convex()));
+  hessian_.assemble(displacement);
+  check(KSPSetOperators(krylov_, hessian_.exact(), hessian_.convex()));
   check(KSPSetTolerances(krylov_, relative_tolerance, 0.0, PETSC_DEFAULT, PETSC_DEFAULT));
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;

@@ -21,7 +21,8 @@ double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
 struct VolumeLaw {
   double value, slope, curvature;
 };
-VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume);
+VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume,
+                     double target_volume);
 
 /// Σ scale · (∂²Φ/∂x²) d of all terms, added to `product`: the action of the exact Hessian.
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,

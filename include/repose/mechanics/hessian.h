@@ -62,7 +62,7 @@ void for_each_spring_block(const SpringLoop& loop, std::span<const Vec3> positio
 /// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
-                         const Weights& weights, Curvature curvature);
+                         double target_volume, const Weights& weights, Curvature curvature);
 
 /// Calls visit(prism number, blocks) for each prism of the loop.
 template <class Visit>
@@ -72,7 +72,7 @@ void for_each_prism_block(const PrismLoop& loop, std::span<const Vec3> position,
   for (int64_t e = 0; e < loop.size(); ++e) {
     std::array<Vec3, 6> corners;
     for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
-    visit(e, prism_blocks(corners, loop.rest_volume[e], weights, curvature));
+    visit(e, prism_blocks(corners, loop.rest_volume[e], loop.target_volume[e], weights, curvature));
   }
 }
 

@@ -24,7 +24,9 @@ struct SpringLoop {
 struct PrismLoop {
   std::vector<std::array<int32_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
   std::vector<double> rest_volume;             ///< [M] v_0, mm³
-  int64_t counted = 0;                         ///< as in SpringLoop
+  std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
+  std::vector<int64_t> row;           ///< [M] the prism's row in the part
+  int64_t counted = 0;                ///< as in SpringLoop
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
@@ -38,9 +40,10 @@ struct Loops {
 /// `owned_springs` and `owned_prisms` are counted here.
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms);
 
-/// The volume term of an objective, a quadratic of each prism's v − v_0:
-///     paper    weight (v_0 − v)²             (MODEL.md Eq. 10, weight = 1 − λ)
-///     penalty  weight ½ (v − v_0)² / v_0     (weight = κ)
+/// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:
+///     paper    weight (t − v)²             (MODEL.md Eq. 10, weight = 1 − λ)
+///     penalty  weight ½ (v − t)² / v_0     (weight = κ)
+/// t = v_0 but where multipliers move it (exact volume).
 enum class VolumeTerm { none, paper, penalty };
 
 /// Which parts of an objective are on: Φ = elastic (f_e + W) + volume term.

@@ -57,6 +57,7 @@ struct StepRows {
   std::vector<Vec3> position;        ///< mm
   std::vector<Vec3> residual_force;  ///< N
   std::vector<double> volume_ratio;
+  std::vector<double> pressure;    ///< N/mm², compression positive; empty but with volume "exact"
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
 };

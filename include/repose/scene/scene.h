@@ -57,7 +57,7 @@ struct Force {
 
 struct Solve {
   Functional functional = Functional::energy;
-  VolumeForm volume = VolumeForm::penalty;
+  std::optional<VolumeForm> volume;    ///< unset: penalty; with functional force none
   std::optional<double> bulk_modulus;  ///< N/mm²; unset: 10 × the tissue's effective modulus
   double lambda = 0.5;
   double accuracy = 0.1;  ///< mm

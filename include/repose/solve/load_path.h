@@ -3,7 +3,8 @@
 #include <optional>
 
 #include "repose/model/step.h"
-#include "repose/solve/minimiser.h"
+#include "repose/solve/predictor.h"
+#include "repose/solve/rest_search.h"
 
 namespace repose::solve {
 
@@ -31,7 +32,8 @@ class LoadPath {
  public:
   using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
 
-  LoadPath(Objective& objective, Minimiser& minimiser, const PathSettings& settings);
+  LoadPath(Objective& objective, Predictor& predictor, RestSearch& search,
+           const PathSettings& settings);
 
   /// From `displacement` (changed in place, the start of a restarted run) to load 1. `on_step` is
   /// called with the positions at each accepted step, and at the last one if it failed.
@@ -54,7 +56,8 @@ class LoadPath {
   void settle(Vec displacement, const OnStep& on_step);
 
   Objective& objective_;
-  Minimiser& minimiser_;
+  Predictor& predictor_;
+  RestSearch& search_;
   PathSettings settings_;
   base::VecHandle trial_, increment_;
   PathOutcome result_;

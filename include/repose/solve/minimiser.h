@@ -3,51 +3,34 @@
 
 #include <exception>
 #include <functional>
-#include <memory>
-#include <string>
 
+#include "repose/solve/rest_search.h"
 #include "repose/solve/tangent_solver.h"
 
 namespace repose::solve {
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
-/// What a person watching wants to know after each iteration.
-struct Iteration {
-  int64_t number = 0;
-  double load = 0;
-  double objective = 0;
-  double largest_force = 0;      ///< largest block of ∇Φ
-  double millimetres_to_go = 0;  ///< estimated distance to the rest position
+/// What tells how far a state is from rest: the Newton step of `function`, whose linear systems
+/// `solver` solves.
+struct Certificate {
+  Function& function;
+  TangentSolver& solver;
 };
 
-/// How a minimisation ended.
-struct Outcome {
-  bool converged = false;         ///< the estimated distance is below the accuracy asked for
-  bool stable = false;            ///< no negative curvature was met at the end
-  double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
-  double objective = 0;
-  double gradient_max = 0;  ///< N
-  int64_t iterations = 0;
-  std::string reason;
-};
-
-/// Minimises an objective with TAO until the rest position is near enough, in mm. Newton by
-/// default;
+/// Minimises a function with TAO until the rest position is near enough, in mm. Newton by default;
 /// `-tao_type` chooses any unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options
 /// apply. All members collective.
-class Minimiser {
+class Minimiser : public RestSearch {
  public:
-  Minimiser(Objective& objective, std::function<void(const Iteration&)> watch);
+  using Watch = std::function<void(const Iteration&)>;
+  /// `solver` is for Newton methods; the distance to the rest position is its Newton step too, or
+  /// that of another function with the same rest position.
+  Minimiser(Function& function, TangentSolver& solver, const Watch& watch);
+  Minimiser(Function& function, TangentSolver& solver, const Certificate& certificate,
+            const Watch& watch);
 
-  /// From `displacement` (changed in place) at the positions' load.
-  Outcome run(Vec displacement, double accuracy);
-
-  /// The linear prediction of how unknowns move when fixed points go from the positions' load to
-  /// `load`: −H⁻¹ H_sb Δx_b at `displacement`. Returns false where the Hessian is indefinite.
-  bool predict(Vec displacement, double load, Vec increment);
-
-  int64_t assemblies() { return solver_.tangent().assemblies(); }  ///< not collective
+  Outcome run(Vec displacement, double accuracy) override;
 
  private:
   struct Callbacks;
@@ -59,9 +42,10 @@ class Minimiser {
   int polish(Vec displacement);
   Outcome summary(Vec displacement);
 
-  Objective& objective_;
-  TangentSolver solver_;
-  std::function<void(const Iteration&)> watch_;
+  Function& function_;
+  TangentSolver& solver_;
+  Certificate certificate_;
+  Watch watch_;
   TaoHandle tao_;
   bool newton_ = true;  // the TAO method uses the Hessian
   bool automatic_forcing_ = true;
@@ -69,7 +53,7 @@ class Minimiser {
   double accuracy_ = 0;                 // mm, of the run under way
   double error_ = 0;                    // mm, latest strict estimate
   double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
-  base::VecHandle gradient_, saved_;
+  base::VecHandle gradient_, saved_, certified_gradient_;
   std::exception_ptr thrown_;
 };
 

@@ -12,7 +12,7 @@ class NaturalRows {
   NaturalRows(MPI_Comm comm, const Part& part);
 
   /// The arrays of a step at the objective's last update.
-  model::StepRows rows(Objective& objective) const;
+  model::StepRows rows(Objective& objective, bool with_pressure = false) const;
 
  private:
   struct Route {  // from owned rows to natural slabs, `block` numbers a row

@@ -1,19 +1,16 @@
 #pragma once
 #include "repose/mechanics/energy.h"
-#include "repose/solve/positions.h"
+#include "repose/solve/function.h"
 
 namespace repose::solve {
 
 /// The function that is minimised (MODEL.md Eqs. 11, 12) over the displacements of the unknowns:
 /// value, gradient and Hessian action, with gravity and external forces as a potential
 /// W = −Σ_{soft} (m g + f^ext) · (x − X). All members are collective unless said otherwise.
-class Objective {
+class Objective : public Function {
  public:
   Objective(Positions& positions, const mechanics::Weights& weights);
 
-  /// Φ at `displacement` and, if `gradient` is not null, ∇Φ. A value that overflows comes back as
-  /// a large finite number so that a line search can retreat from it.
-  double evaluate(Vec displacement, Vec gradient);
   /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
   void hessian_action(std::span<const Vec3> direction, Vec product);
 
@@ -22,21 +19,20 @@ class Objective {
   mechanics::Totals totals() const;  ///< summed over ranks, at the last update
   double potential() const;          ///< W, N·mm
 
-  int64_t evaluations() const { return evaluations_; }  ///< not collective
   const mechanics::Weights& weights() const { return weights_; }
+  void set_volume_weight(double weight) { weights_.volume_weight = weight; }
   const mechanics::Loops& loops() const { return loops_; }
-  Positions& positions() { return positions_; }
+  mechanics::PrismLoop& prisms() { return loops_.prisms; }
 
  private:
+  double value_and_gradient(Vec displacement, Vec gradient) override;
   void subtract_loads(double scale, std::span<Vec3> gradient) const;
 
-  Positions& positions_;
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   std::vector<Vec3> work_;        // [local points]
-  int64_t evaluations_ = 0;
 };
 
 }  // namespace repose::solve

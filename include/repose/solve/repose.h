@@ -10,7 +10,9 @@ namespace repose::solve {
 
 /// What is asked of a run.
 struct Settings {
-  mechanics::Weights weights;   ///< the objective
+  mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
+  bool force = false;           ///< minimises the force functional, not the energy
+  bool exact_volume = false;    ///< v = v_0, by multipliers
   std::string volume = "none";  ///< name of the volume term, for the result
   double lambda = 1;            ///< paper's weight, for the result
   PathSettings path;

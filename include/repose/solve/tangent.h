@@ -9,17 +9,17 @@ namespace repose::solve {
 /// The Hessian of an objective as assembled matrices of 3×3 blocks (MATAIJ, block size 3): the
 /// exact one, which acts, and the convex one, from which a positive definite preconditioner is
 /// made. Each rank assembles its own rows; nothing is added across ranks.
-class Tangent {
+class Tangent : public Hessian {
  public:
   explicit Tangent(Objective& objective);  ///< collective; O(elements) memory
 
-  /// Assembles both at `displacement`; nothing is done if that state is the one assembled last.
-  /// Collective.
-  void assemble(Vec displacement);
+  /// Nothing is done if `displacement` is the state assembled last, and nothing has changed since.
+  void assemble(Vec displacement) override;
+  /// The next assembly is done in any case: the elements have changed.
+  void forget() { assembled_at_.clear(); }
 
-  Mat exact() const { return exact_; }
-  Mat convex() const { return convex_; }
-  int64_t assemblies() const { return assemblies_; }
+  Mat exact() const override { return exact_; }
+  Mat convex() const override { return convex_; }
 
  private:
   /// The block columns of this rank's rows in one part of the matrix, in compressed rows.
@@ -48,7 +48,6 @@ class Tangent {
   std::vector<std::vector<std::array<Slot, 4>>> spring_slots_;  // [loop][spring] ii ij ji jj
   std::vector<std::array<Slot, 36>> prism_slots_;
   std::vector<Vec3> assembled_at_;  // [local points] of the last assembly
-  int64_t assemblies_ = 0;
 };
 
 }  // namespace repose::solve

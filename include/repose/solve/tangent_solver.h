@@ -3,13 +3,13 @@
 
 #include <limits>
 
-#include "repose/solve/tangent.h"
+#include "repose/solve/function.h"
 
 namespace repose::solve {
 
 using KspHandle = base::Handle<KSP, KSPDestroy>;
 
-/// Linear solves with the Hessian of an objective: conjugate gradients on the exact matrix,
+/// Linear solves with a Hessian: conjugate gradients on the exact matrix,
 /// preconditioned from the convex one, by default by MUMPS' Cholesky factors up to
 /// `direct_limit` unknowns and by smoothed-aggregation multigrid (GAMG) above. `-ksp_…` and
 /// `-pc_…` options apply. All members collective.
@@ -17,7 +17,7 @@ class TangentSolver {
  public:
   static constexpr int64_t direct_limit = 600000;  ///< scalar unknowns
 
-  explicit TangentSolver(Objective& objective);
+  TangentSolver(Positions& positions, Hessian& hessian);
 
   /// Solves H δ = rhs at `displacement` (assembled there, factors renewed if it moved), to a
   /// relative natural residual. Returns whether the Hessian showed no negative curvature on the
@@ -31,12 +31,12 @@ class TangentSolver {
   /// H⁻¹ ∇Φ of the last newton_distance.
   Vec latest() const { return work_; }
 
-  Tangent& tangent() { return tangent_; }
+  Hessian& hessian() { return hessian_; }
   PC preconditioner();
   KSP krylov() const { return krylov_; }
 
  private:
-  Tangent tangent_;
+  Hessian& hessian_;
   KspHandle krylov_;
   base::VecHandle work_;
 };

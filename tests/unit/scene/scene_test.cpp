@@ -50,7 +50,7 @@ TEST(Scene, MinimalHasTheDefaults) {
   ASSERT_EQ(scene.moves.size(), 2u);
   EXPECT_TRUE(scene.moves[0].is_identity());
   EXPECT_EQ(scene.solve.functional, Functional::energy);
-  EXPECT_EQ(scene.solve.volume, VolumeForm::penalty);
+  EXPECT_EQ(scene.solve.volume, std::nullopt);
   EXPECT_FALSE(scene.solve.bulk_modulus);
   EXPECT_EQ(scene.solve.accuracy, 0.1);
   EXPECT_EQ(scene.solve.load_steps, 0);
@@ -60,11 +60,10 @@ TEST(Scene, TableHasTheDefaultsOfTheCode) {
   const Scene plain = read(minimal);
   const auto standard = [](const char* path) { return find_key(path).standard; };
   const Scene spelt = read(fmt::format(
-      "{}boundary: {{rim: {}}}\nsolve: {{functional: {}, volume: {{form: {}}}, lambda: {}, "
+      "{}boundary: {{rim: {}}}\nsolve: {{functional: {}, lambda: {}, "
       "accuracy: {}, load_steps: {}}}\n",
-      minimal, standard("boundary.rim"), standard("solve.functional"),
-      standard("solve.volume.form"), standard("solve.lambda"), standard("solve.accuracy"),
-      standard("solve.load_steps")));
+      minimal, standard("boundary.rim"), standard("solve.functional"), standard("solve.lambda"),
+      standard("solve.accuracy"), standard("solve.load_steps")));
   EXPECT_EQ(plain.rim_fixed, spelt.rim_fixed);
   EXPECT_EQ(plain.solve.functional, spelt.solve.functional);
   EXPECT_EQ(plain.solve.volume, spelt.solve.volume);

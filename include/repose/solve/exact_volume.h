@@ -1,0 +1,33 @@
+#pragma once
+#include "repose/solve/minimiser.h"
+#include "repose/solve/tangent.h"
+
+namespace repose::solve {
+
+/// Finds the rest position under v = v_0 for every prism: an augmented Lagrangian (Hestenes 1969;
+/// Powell 1969), each minimisation with the penalty volume term, whose target volumes
+/// t = v_0 (1 + q/κ) carry the multipliers (pressures) q. κ grows where the error does not shrink.
+class ExactVolume : public RestSearch {
+ public:
+  static constexpr double tolerance = 1e-6;   ///< of |v/v_0 − 1|, every prism with a soft point
+  static constexpr double on_the_way = 1e-3;  ///< the same at loads below 1
+
+  /// `objective` has the penalty volume term, `tangent` is its Hessian, `minimiser` minimises it.
+  ExactVolume(Objective& objective, Tangent& tangent, Minimiser& minimiser);
+  Outcome run(Vec displacement, double accuracy) override;
+
+ private:
+  void update_multipliers(double weight);
+
+  Objective& objective_;
+  Tangent& tangent_;
+  Minimiser& minimiser_;
+  double first_weight_;  // κ at the start, N/mm²
+  base::VecHandle before_;
+};
+
+/// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
+/// at the last update. Not collective.
+std::vector<double> pressures(Objective& objective);
+
+}  // namespace repose::solve

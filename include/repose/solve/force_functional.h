@@ -1,0 +1,56 @@
+#pragma once
+#include <memory>
+
+#include "repose/solve/tangent.h"
+
+namespace repose::solve {
+
+/// The force functional (MODEL.md Eqs. 7, 11): Φ = λ Σ_{i ∈ P_s} (√(|F_i|² + ε²) − ε), with
+/// (1 − λ) f_v where the volume term is the paper's. All members collective unless said otherwise.
+class ForceFunctional : public Function {
+ public:
+  /// `elastic` is f_e + W alone; `weights` are λ and the volume term, none or paper.
+  ForceFunctional(Objective& elastic, const mechanics::Weights& weights);
+
+  void set_epsilon(double epsilon) { epsilon_ = epsilon; }  ///< N, > 0; not collective
+  double epsilon() const { return epsilon_; }
+  double largest_force(Vec displacement);  ///< N, max |F_i|
+
+  const mechanics::Weights& weights() const { return weights_; }
+  Objective& elastic() { return elastic_; }
+  Objective* volume() { return volume_.get(); }  ///< (1 − λ) f_v alone; null without volume term
+
+ private:
+  double value_and_gradient(Vec displacement, Vec gradient) override;
+
+  Objective& elastic_;
+  mechanics::Weights weights_;
+  std::unique_ptr<Objective> volume_;
+  double epsilon_ = 1;
+  base::VecHandle unit_, volume_gradient_;
+  std::vector<Vec3> direction_;  // [local points] F/√(|F|² + ε²) at soft tissue, else zero
+};
+
+/// The Gauss–Newton operator of the force functional, λ H D H + (1 − λ) ∇²f_v without the turning
+/// of its gradient: H the exact Hessian of f_e, D_i = (1 − F Fᵀ/ρ²)/ρ with ρ = √(|F|² + ε²). Never
+/// indefinite, so it is its own preconditioner.
+class GaussNewton : public Hessian {
+ public:
+  GaussNewton(ForceFunctional& functional, Tangent& elastic);  ///< assembled at no displacement
+
+  void assemble(Vec displacement) override;  ///< collective
+  Mat exact() const override { return product_; }
+  Mat convex() const override { return product_; }
+
+ private:
+  void make_metric();
+  void fill_metric();
+
+  ForceFunctional& functional_;
+  Tangent& elastic_;
+  std::unique_ptr<Tangent> volume_;
+  base::MatHandle metric_;  // λ D, block diagonal
+  base::MatHandle product_;
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,20 @@
+#pragma once
+#include "repose/solve/force_functional.h"
+#include "repose/solve/minimiser.h"
+
+namespace repose::solve {
+
+/// Finds the rest position as the minimum of the force functional, whose smoothing ε goes down
+/// towards zero. Without volume term every ε has the same minimum, F = 0.
+class ForceSearch : public RestSearch {
+ public:
+  ForceSearch(ForceFunctional& functional, Minimiser& minimiser);
+  Outcome run(Vec displacement, double accuracy) override;
+
+ private:
+  ForceFunctional& functional_;
+  Minimiser& minimiser_;
+  base::VecHandle before_;
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,22 @@
+#pragma once
+#include "repose/solve/objective.h"
+#include "repose/solve/tangent_solver.h"
+
+namespace repose::solve {
+
+/// How the unknowns move, to first order, when the fixed points go on: −H⁻¹ H_sb Δx_b.
+class Predictor {
+ public:
+  Predictor(Objective& objective, TangentSolver& solver);
+
+  /// The increment from `displacement` at the positions' load to `load`. Returns false where the
+  /// Hessian is indefinite. Collective.
+  bool predict(Vec displacement, double load, Vec increment);
+
+ private:
+  Objective& objective_;
+  TangentSolver& solver_;
+  base::VecHandle force_;
+};
+
+}  // namespace repose::solve

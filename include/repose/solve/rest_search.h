@@ -1,0 +1,37 @@
+#pragma once
+#include <petscvec.h>
+
+#include <cstdint>
+#include <string>
+
+namespace repose::solve {
+
+/// What a person watching wants to know after each iteration.
+struct Iteration {
+  int64_t number = 0;
+  double load = 0;
+  double objective = 0;
+  double largest_force = 0;      ///< largest block of ∇Φ
+  double millimetres_to_go = 0;  ///< estimated distance to the rest position
+};
+
+/// How a search for the rest position at one load ended.
+struct Outcome {
+  bool converged = false;         ///< the estimated distance is below the accuracy asked for
+  bool stable = false;            ///< no negative curvature was met at the end
+  double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
+  double objective = 0;
+  double gradient_max = 0;  ///< N
+  int64_t iterations = 0;
+  std::string reason;
+};
+
+/// Finds the rest position at a load.
+class RestSearch {
+ public:
+  virtual ~RestSearch() = default;
+  /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
+  virtual Outcome run(Vec displacement, double accuracy) = 0;
+};
+
+}  // namespace repose::solve

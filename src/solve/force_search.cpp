@@ -1,0 +1,37 @@
+#include "repose/solve/force_search.h"
+
+#include <algorithm>
+
+namespace repose::solve {
+
+using base::check;
+
+ForceSearch::ForceSearch(ForceFunctional& functional, Minimiser& minimiser)
+    : functional_(functional),
+      minimiser_(minimiser),
+      before_(functional.positions().make_vector()) {}
+
+Outcome ForceSearch::run(Vec displacement, double accuracy) {
+  constexpr int most_stages = 10;
+  constexpr double shrink = 0.1, least = 1e-6;  // of ε, at each stage and N at last
+  const bool same_minimum = functional_.weights().volume == mechanics::VolumeTerm::none;
+  double epsilon = std::max(functional_.largest_force(displacement), least);
+  Outcome outcome;
+  int64_t iterations = 0;
+  for (int stage = 0; stage < most_stages; ++stage, epsilon *= shrink) {
+    functional_.set_epsilon(epsilon);
+    check(VecCopy(displacement, before_));
+    outcome = minimiser_.run(displacement, accuracy);
+    iterations += outcome.iterations;
+    if (outcome.converged && same_minimum) break;
+    check(VecAXPY(before_, -1, displacement));
+    const double moved = largest_block(before_);
+    if (stage > 0) outcome.displacement_error += moved;
+    outcome.converged = stage > 0 && outcome.displacement_error <= accuracy;
+    if (outcome.converged) break;
+  }
+  outcome.iterations = iterations;
+  return outcome;
+}
+
+}  // namespace repose::solve

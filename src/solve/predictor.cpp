@@ -1,0 +1,24 @@
+#include "repose/solve/predictor.h"
+
+namespace repose::solve {
+
+using base::check;
+
+Predictor::Predictor(Objective& objective, TangentSolver& solver)
+    : objective_(objective), solver_(solver), force_(objective.positions().make_vector()) {}
+
+bool Predictor::predict(Vec displacement, double load, Vec increment) {
+  Positions& positions = objective_.positions();
+  positions.update(displacement);
+  const Part& part = positions.part();
+  std::vector<Vec3> direction(positions.local().size(), Vec3::Zero());
+  for (size_t i = 0; i < direction.size(); ++i)
+    if (part.unknown[i] < 0)
+      direction[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  objective_.hessian_action(direction, force_);
+  check(VecScale(force_, -1));
+  check(VecSet(increment, 0));
+  return solver_.solve(displacement, force_, increment, 1e-2);
+}
+
+}  // namespace repose::solve
