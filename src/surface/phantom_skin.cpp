@@ -27,6 +27,8 @@ const Vec3 mouth_middle(0, -94, -23.2);
 constexpr int sweeps = 10;  // of relaxation
 // Mirror images tie to rounding; coarser comparisons keep the outcome the same on every machine.
 constexpr double length_grain = 1e-6, cosine_grain = 1e-6;
+// Needles between a fine rim and far corners differ by less: relative to what is left to 1.
+constexpr double needle_grain = 0.1;
 
 /// The skin on the ray from the center through `guess`: bracketed by sphere tracing from there,
 /// then by regula falsi (Illinois).
@@ -37,10 +39,10 @@ Vec3 on_skin(const Vec3& guess) {
   while (da * db > 0) {
     a = b;
     da = db;
-    b -= db > 0 ? std::max(0.9 * db, 0.01) : std::min(0.9 * db, -0.01);
+    b -= std::abs(db) > 0.01 ? 0.9 * db : 2 * db + std::copysign(1e-9, db);
     db = height(b);
   }
-  while (db != 0 && std::abs(b - a) > 1e-10) {
+  while (std::abs(db) > 1e-11 && std::abs(b - a) > 1e-10) {
     const double c = b - db * (b - a) / (db - da), dc = height(c);
     if (dc * db < 0) {
       a = b;
@@ -133,7 +135,7 @@ std::vector<double> turns(const std::vector<Vec3>& points) {
 bool better_diagonal(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const double now = std::max(sharpness(a, b, c), sharpness(b, a, d));
   const double then = std::max(sharpness(c, d, b), sharpness(d, c, a));
-  return then < now - cosine_grain;
+  return then < now - std::min(cosine_grain, needle_grain * (1 - now));
 }
 
 /// The triangles between the two rings, each next one by the lesser turn.
@@ -249,12 +251,25 @@ class SkinMesher {
 
   bool better_flipped(Halfedge h) const {
     const Halfedge o = mesh_.opposite(h), left = mesh_.next(h), right = mesh_.next(o);
-    if (mesh_.halfedge(mesh_.target(left), mesh_.target(right)) != Mesh::null_halfedge())
-      return false;
     const Vec3 a = tip(o), b = tip(h), c = tip(left), d = tip(right);
     if (facing(c, d, b) <= 0 || facing(d, c, a) <= 0) return false;
-    return flat_ ? better_diagonal(flattened(a), flattened(b), flattened(c), flattened(d))
-                 : better_diagonal(a, b, c, d);
+    const bool better =
+        flat_ ? better_diagonal(flattened(a), flattened(b), flattened(c), flattened(d))
+              : better_diagonal(a, b, c, d);
+    return better && !joined(left, right);
+  }
+
+  /// Whether an edge joins the vertices two halfedges point to. Walks round both at once, so that a
+  /// vertex with an edge to half the rim costs no more than the other.
+  bool joined(Halfedge g, Halfedge h) const {
+    const Vertex u = mesh_.target(g), v = mesh_.target(h);
+    Halfedge at_u = g, at_v = h;
+    do {
+      if (mesh_.source(at_u) == v || mesh_.source(at_v) == u) return true;
+      at_u = mesh_.next_around_target(at_u);
+      at_v = mesh_.next_around_target(at_v);
+    } while (at_u != g && at_v != h);
+    return false;
   }
 
   /// Moves an inner vertex to the area-weighted mean of its triangles' centroids, on the skin, if

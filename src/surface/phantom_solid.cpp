@@ -52,6 +52,12 @@ double sheet_distance(const std::vector<Bead>& beads, const Vec3& point) {
   return nearest - beads[0].radius;
 }
 
+/// Whether the distance to a part is certainly more than `reach`.
+bool beyond(const Part& part, const Vec3& point, double reach) {
+  const double radius = part.extent + (reach > 0 ? part.stretch * reach : reach);
+  return radius < 0 || (point - part.middle).squaredNorm() > radius * radius;
+}
+
 double distance(const Part& part, const Vec3& point) {
   switch (part.kind) {
     case Part::Kind::ellipsoid:
@@ -70,14 +76,15 @@ Part beaded(Part::Kind kind, std::vector<Bead> beads, double blend) {
   for (const Bead& bead : beads)
     extent =
         std::max(extent, (bead.center - middle).norm() + std::max(bead.radius, beads[0].radius));
-  return {kind, std::move(beads), Vec3::Zero(), blend, middle, extent};
+  return {kind, std::move(beads), Vec3::Zero(), blend, middle, extent, 1};
 }
 
 }  // namespace
 
 Part ellipsoid(const Vec3& center, const Vec3& semi_axes, double blend) {
-  constexpr double everywhere = std::numeric_limits<double>::infinity();
-  return {Part::Kind::ellipsoid, {{center, 0}}, semi_axes, blend, center, everywhere};
+  const double longest = semi_axes.maxCoeff();
+  return {Part::Kind::ellipsoid,         {{center, 0}}, semi_axes, blend, center, longest,
+          longest / semi_axes.minCoeff()};
 }
 
 Part chain(std::vector<Bead> beads, double blend) {
@@ -106,7 +113,7 @@ double signed_distance(const std::vector<Part>& parts, const Vec3& point) {
   for (const Part& part : parts) {
     // Whatever is this far away or further changes nothing.
     const double reach = part.blend + (part.cut ? -result : result);
-    if ((mirrored - part.middle).norm() - part.extent > reach) continue;
+    if (beyond(part, mirrored, reach)) continue;
     const double d = distance(part, mirrored);
     result = part.cut ? soft_max(result, -d, part.blend) : soft_min(result, d, part.blend);
   }

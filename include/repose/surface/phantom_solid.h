@@ -21,7 +21,9 @@ struct Part {
   Vec3 semi_axes;           ///< mm, of an ellipsoid
   double blend;             ///< mm over which it flows into the parts before it
   Vec3 middle;              ///< mm, of a sphere around the part
-  double extent;     ///< mm, its radius; infinite for an ellipsoid, whose distance is not exact
+  double extent;            ///< mm, its radius
+  double stretch;    ///< how many times further off than its distance says a point may be; 1 for
+                     ///< all but an ellipsoid, whose distance is not exact
   bool cut = false;  ///< taken away instead of added
 };
 
