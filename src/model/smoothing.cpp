@@ -4,10 +4,12 @@
 #include <Eigen/SparseCore>
 #include <queue>
 
+#include "repose/model/multilevel.h"
+
 namespace repose::model {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+using Sparse = Multilevel::Sparse;
 
 /// diag(a w) + Σ_e c_e ℓ_e² (graph Laplacian of e).
 Sparse smoothing_matrix(const SkinMesh& mesh, const Eigen::VectorXd& data,
@@ -37,7 +39,7 @@ Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
   Eigen::VectorXd data(vertices);
   for (int64_t v = 0; v < vertices; ++v) data[v] = mesh.vertex_area[v] * weight[v];
   const Sparse matrix = smoothing_matrix(mesh, data, length);
-  Eigen::ConjugateGradient<Sparse, Eigen::Lower | Eigen::Upper> solver(matrix);
+  Eigen::ConjugateGradient<Sparse, Eigen::Lower | Eigen::Upper, Multilevel> solver(matrix);
   solver.setTolerance(1e-6);
   Eigen::MatrixXd field(given.rows(), given.cols());
   for (int64_t k = 0; k < given.cols(); ++k)

@@ -11,7 +11,8 @@ namespace repose::model {
 /// [V × k], `weight` w ≥ 0 [V] says how much each value is trusted, `length` ℓ (mm) [V] over what
 /// distance to smooth (averaged over an edge's ends), a_v is the vertex area and
 /// c_e = ⅔ edge_area / |e|² the positive form of the finite-element weights (equal to them on
-/// equilateral triangles), so that f never leaves the range of g. Conjugate gradients to 1e-6.
+/// equilateral triangles), so that f never leaves the range of g. Conjugate gradients to 1e-6,
+/// preconditioned over coarser and coarser graphs: O(V).
 Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
                              const std::vector<double>& weight, const std::vector<double>& length);
 
