@@ -22,6 +22,7 @@ struct Plan {
   const Model& model;
   std::vector<int> owner;              // [N] rank of each point
   std::vector<int64_t> order;          // [N] point rows, rank after rank, column after column
+  std::vector<int64_t> place;          // [N] where each point row is in `order`
   std::vector<int64_t> rank_begin;     // [ranks + 1] into order
   std::vector<int64_t> unknown;        // [N] block number or −1
   std::vector<int64_t> unknown_begin;  // [ranks + 1]
@@ -29,14 +30,24 @@ struct Plan {
   std::vector<Mat4> bone_transform;    // [bones]
 };
 
+template <class T>
+std::vector<T> pick(const std::vector<T>& values, const std::vector<int64_t>& rows) {
+  std::vector<T> picked;
+  picked.reserve(rows.size());
+  for (int64_t row : rows) picked.push_back(values[row]);
+  return picked;
+}
+
 void number_points(Plan& plan, const ColumnGraph& graph, int ranks) {
   const int64_t n = static_cast<int64_t>(plan.owner.size());
   plan.order.resize(n);
   for (int64_t i = 0; i < n; ++i) plan.order[i] = i;
+  const std::vector<int64_t> column = pick(memory_order(graph), graph.column_of_point);
   std::stable_sort(plan.order.begin(), plan.order.end(), [&](int64_t a, int64_t b) {
-    return std::pair(plan.owner[a], graph.column_of_point[a]) <
-           std::pair(plan.owner[b], graph.column_of_point[b]);
+    return std::pair(plan.owner[a], column[a]) < std::pair(plan.owner[b], column[b]);
   });
+  plan.place.resize(n);
+  for (int64_t k = 0; k < n; ++k) plan.place[plan.order[k]] = k;
   plan.rank_begin.assign(ranks + 1, n);
   plan.unknown_begin.assign(ranks + 1, 0);
   plan.unknown.assign(n, -1);
@@ -93,6 +104,22 @@ bool touches(const Plan& plan, const std::array<int64_t, n>& element, int rank) 
   });
 }
 
+/// Sorts rows of elements into blocks by where their first met point is, within a block as before:
+/// a loop then works on points that fit into the cache together.
+template <size_t n>
+void sort_into_blocks(const Plan& plan, const std::vector<std::array<int64_t, n>>& elements,
+                      std::vector<int64_t>& rows) {
+  constexpr int64_t points_in_block = 1024;
+  std::vector<std::vector<int64_t>> blocks(plan.place.size() / points_in_block + 1);
+  for (const int64_t row : rows) {
+    int64_t first = plan.place[elements[row][0]];
+    for (const int64_t point : elements[row]) first = std::min(first, plan.place[point]);
+    blocks[first / points_in_block].push_back(row);
+  }
+  rows.clear();
+  for (const auto& block : blocks) rows.insert(rows.end(), block.begin(), block.end());
+}
+
 /// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
 template <size_t n>
 std::vector<int64_t> element_rows(const Plan& plan,
@@ -105,17 +132,11 @@ std::vector<int64_t> element_rows(const Plan& plan,
     else if (touches(plan, elements[e], rank))
       others.push_back(static_cast<int64_t>(e));
   }
+  sort_into_blocks(plan, elements, rows);
+  sort_into_blocks(plan, elements, others);
   owned = static_cast<int64_t>(rows.size());
   rows.insert(rows.end(), others.begin(), others.end());
   return rows;
-}
-
-template <class T>
-std::vector<T> pick(const std::vector<T>& values, const std::vector<int64_t>& rows) {
-  std::vector<T> picked;
-  picked.reserve(rows.size());
-  for (int64_t row : rows) picked.push_back(values[row]);
-  return picked;
 }
 
 template <size_t n>
@@ -214,7 +235,7 @@ Part distribute(MPI_Comm comm, const Model& model) {
   Part part;
   base::together(comm, [&] {
     if (base::rank(comm) == 0) {
-      Plan plan{model, {}, {}, {}, {}, {}, {}, {}};
+      Plan plan{model, {}, {}, {}, {}, {}, {}, {}, {}};
       try {
         part = share_out(comm, plan, graph, column_owner);
       } catch (...) {

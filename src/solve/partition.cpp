@@ -109,7 +109,37 @@ std::vector<int> by_scotch(MPI_Comm comm, const ColumnGraph& graph, int64_t colu
   return {all.begin(), all.end()};
 }
 
+/// Adds the connected piece of `start`, breadth first, to `visited`; `round` marks what is met.
+void walk(const ColumnGraph& graph, int64_t start, int round, std::vector<int>& met,
+          std::vector<int64_t>& visited) {
+  size_t next = visited.size();
+  visited.push_back(start);
+  met[start] = round;
+  for (; next < visited.size(); ++next)
+    for (int64_t k = graph.row_begin[visited[next]]; k < graph.row_begin[visited[next] + 1]; ++k) {
+      const int64_t other = graph.neighbour[k];
+      if (met[other] == round) continue;
+      met[other] = round;
+      visited.push_back(other);
+    }
+}
+
 }  // namespace
+
+std::vector<int64_t> memory_order(const ColumnGraph& graph) {
+  std::vector<int> met(graph.columns(), 0);
+  std::vector<int64_t> visited, place(graph.columns());
+  for (int64_t c = 0; c < graph.columns(); ++c) {
+    if (met[c]) continue;
+    const size_t before = visited.size();
+    walk(graph, c, 1, met, visited);
+    const int64_t end = visited.back();
+    visited.resize(before);
+    walk(graph, end, 2, met, visited);
+  }
+  for (size_t k = 0; k < visited.size(); ++k) place[visited[k]] = static_cast<int64_t>(k);
+  return place;
+}
 
 ColumnGraph column_graph(const model::Model& model) {
   ColumnGraph graph;

@@ -18,6 +18,11 @@ struct ColumnGraph {
 };
 ColumnGraph column_graph(const model::Model& model);
 
+/// [columns] Place of each column in an order that keeps neighbours near one another in memory,
+/// whatever the skin's vertices are numbered like: breadth first from a column at the end of each
+/// connected piece (Cuthill & McKee 1969, without sorting by degree). Linear in the graph.
+std::vector<int64_t> memory_order(const ColumnGraph& graph);
+
 /// Owner rank of each column, on rank 0 (empty elsewhere). `graph` is looked at on rank 0 only.
 /// Few columns a rank (< 8) are dealt out in order instead of by PT-Scotch. Collective.
 std::vector<int> partition(MPI_Comm comm, const ColumnGraph& graph);
