@@ -1,0 +1,158 @@
+/// How the cost of a model grows with its points: builds synthetic heads in four layers from 2e3 to
+/// 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes; wants
+/// 6 GB of memory:
+///     benchmark_scaling docs/scaling.md
+#include <malloc.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <functional>
+#include <thread>
+
+#include "repose/base/petsc.h"
+#include "repose/base/whole_file.h"
+#include "repose/model/build.h"
+#include "repose/solve/tangent.h"
+#include "repose/surface/phantom.h"
+
+namespace {
+
+using namespace repose;
+
+constexpr int layers = 4;
+constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
+const std::vector<int64_t> skin_sizes = {477, 2500, 25000, 250000};
+
+/// What one head costs: CPU seconds on one core, bytes on the heap.
+struct Cost {
+  int64_t points, springs, prisms;
+  double build, evaluation, hessian;
+  double model_bytes, solver_bytes;
+};
+
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double heap_bytes() {
+  const auto use = mallinfo2();
+  return static_cast<double>(use.uordblks) + static_cast<double>(use.hblkhd);
+}
+
+/// Seconds of `work`, the least of several goes that together take about half a second.
+double seconds_of(const std::function<void()>& work) {
+  double least = 1e300, total = 0;
+  for (int go = 0; go < 3 || total < 0.5; ++go) {
+    const double begin = cpu_seconds();
+    work();
+    const double took = cpu_seconds() - begin;
+    least = std::min(least, took);
+    total += took;
+  }
+  return least;
+}
+
+/// The jaw opens by 8°, as in the shipped scenes.
+scene::Scene jaw_opening() {
+  scene::Scene scene;
+  scene.bones = {{"skull", {}}, {"mandible", {}}};
+  scene.tissue.layers = layers;
+  scene.moves = {scene::RigidMotion(),
+                 scene::RigidMotion::rotation(Vec3::UnitX(), Vec3::Zero(), 8)};
+  return scene;
+}
+
+/// Adds the costs of the objective and of its Hessian. The load changes between assemblies, because
+/// a state that was just assembled is not assembled again.
+void measure_solver(const model::Model& model, Cost& cost) {
+  const double before = heap_bytes();
+  const solve::Part part = solve::distribute(MPI_COMM_SELF, model);
+  solve::Positions positions(MPI_COMM_SELF, part);
+  const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty,
+                                   10 * model::effective_modulus(model)};
+  solve::Objective objective(positions, weights);
+  const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
+  positions.set_load(0.1);
+  cost.evaluation = seconds_of([&] { objective.evaluate(at, gradient); });
+  solve::Tangent tangent(objective);
+  double load = 0.1;
+  cost.hessian = seconds_of([&] {
+    positions.set_load(load += 1e-3);
+    tangent.assemble(at);
+  });
+  cost.solver_bytes = heap_bytes() - before;
+}
+
+Cost measure(int64_t skin_vertices, const std::vector<surface::Surface>& bones) {
+  const surface::Surface skin = surface::make_phantom_skin(skin_vertices);
+  const scene::Scene scene = jaw_opening();
+  const double before = heap_bytes(), begin = cpu_seconds();
+  const model::BuiltModel built = model::build_model(scene, skin, bones);
+  Cost cost{};
+  cost.build = cpu_seconds() - begin;
+  cost.model_bytes = heap_bytes() - before;
+  const model::Counts counts = model::count(built.model);
+  cost.points = counts.points;
+  cost.springs = counts.springs;
+  cost.prisms = counts.prisms;
+  measure_solver(built.model, cost);
+  return cost;
+}
+
+std::string row(const Cost& cost, const Cost& reference) {
+  const auto per_point = [](double value, const Cost& c) {
+    return value / static_cast<double>(c.points);
+  };
+  const auto cell = [&](double Cost::*what, double unit) {
+    const double here = per_point(cost.*what, cost), there = per_point(reference.*what, reference);
+    return fmt::format(" {:.3g} ({:.2f}) |", here / unit, here / there);
+  };
+  return fmt::format("| {} | {} | {} |", cost.points, cost.springs, cost.prisms) +
+         cell(&Cost::build, 1e-6) + cell(&Cost::evaluation, 1e-6) + cell(&Cost::hessian, 1e-6) +
+         cell(&Cost::model_bytes, 1) + cell(&Cost::solver_bytes, 1) + "\n";
+}
+
+std::string machine() {
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
+                        static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 30);
+  return fmt::format("{} cores, {:.0f} GiB of memory", std::thread::hardware_concurrency(), memory);
+}
+
+std::string page(const std::vector<Cost>& costs) {
+  std::string text = fmt::format(
+      "# Scaling: cost per point from 2e3 to 1e6 points\n\n"
+      "Made by `benchmark_scaling docs/scaling.md` (`cmake --preset release "
+      "-DREPOSE_BENCHMARKS=ON`)\n"
+      "in one run, on one core of a machine with {}.\n\n"
+      "Synthetic heads (`repose-phantom`), {} layers, quartic springs, penalty volume term; the\n"
+      "bones' edges are {} mm in all of them. Times are CPU time: of the whole model build from\n"
+      "surfaces in memory, of one evaluation of energy and gradient, and of one assembly of the\n"
+      "Hessian (exact and convex). Memory is what is held on the heap: by the model, and by the\n"
+      "distributed model, the objective and both matrices. In brackets: the ratio to the row of\n"
+      "about 1e5 points; 1 throughout would be exactly linear.\n\n"
+      "| points | springs | prisms | build, µs/point | evaluation, µs/point | Hessian, µs/point |"
+      " model, B/point | solver, B/point |\n|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+      machine(), layers, bone_edge);
+  for (const Cost& cost : costs) text += row(cost, costs[costs.size() - 2]);
+  return text;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: benchmark_scaling PAGE.md\n");
+    return 1;
+  }
+  const base::Session session(1, argv, nullptr);
+  const std::vector<surface::Surface> bones = {surface::make_phantom_skull(bone_edge),
+                                               surface::make_phantom_mandible(bone_edge)};
+  std::vector<Cost> costs;
+  for (const int64_t vertices : skin_sizes) {
+    costs.push_back(measure(vertices, bones));
+    std::fprintf(stderr, "%ld points: build %.2f s\n", static_cast<long>(costs.back().points),
+                 costs.back().build);
+  }
+  base::write_whole_file(argv[1], page(costs));
+  return 0;
+}
