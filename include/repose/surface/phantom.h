@@ -37,7 +37,7 @@ struct Phantom {
 /// The skin alone: exactly `vertices` points on the analytic surface, triangles close to
 /// equilateral, seen from outside counter-clockwise. Star-shaped as seen from inside the head, so
 /// it cannot intersect itself. The same on every machine up to rounding in libm.
-/// Time in proportion to the vertices: about 2 s for 20 000, 1.5 min for a million. Throws
+/// Time in proportion to the vertices: about 2 s for 20 000, below 2 min for a million. Throws
 /// InputError out of range.
 Surface make_phantom_skin(int64_t vertices);
 
