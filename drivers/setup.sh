@@ -59,8 +59,11 @@ mpi_environment() {
   export OMPI_MCA_mpi_yield_when_idle=1
   # Runs at the same time must not be pinned to the same cores.
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
-  # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd.
-  export OMPI_MCA_btl=^tcp
+  # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd, and
+  # whose libraries take most of a start, one second of it asleep at the end.
+  export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,ofi,openib
+  # A program started without mpirun needs no daemon beside it.
+  export OMPI_MCA_ess_singleton_isolated=1
   # A container's system-call filter forbids ranks to read each other's memory directly.
   if grep -q '^Seccomp:[[:space:]]*2' /proc/self/status 2>/dev/null; then
     export OMPI_MCA_btl_vader_single_copy_mechanism=none
