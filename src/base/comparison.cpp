@@ -61,7 +61,7 @@ void Comparison::range(const std::string& name, double stored, double least, dou
   row.name = name;
   row.stored = stored;
   row.kind = Row::range_only;
-  row.wrong = !(std::isfinite(stored) && stored >= least && stored <= most);
+  row.wrong = !(stored >= least && stored <= most);
   row.difference = row.wrong > 0 ? infinite : 0;
   add(row);
 }

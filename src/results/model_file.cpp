@@ -127,7 +127,10 @@ namespace {
 struct ReadAttribute {
   const Reader& in;
   const std::string& group;
-  void operator()(const char* name, double& value) const { value = in.number(group, name); }
+  void operator()(const char* name, double& value) const {
+    const bool maybe_infinite = std::string_view(name) == "displacement_error";  // at no minimum
+    value = maybe_infinite ? in.number_or_infinity(group, name) : in.number(group, name);
+  }
   void operator()(const char* name, int64_t& value) const { value = in.integer(group, name); }
   void operator()(const char* name, std::string& value) const { value = in.text(group, name); }
   void operator()(const char* name, bool& value) const { value = in.integer(group, name) != 0; }

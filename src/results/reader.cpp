@@ -106,6 +106,10 @@ void require_finite(const Reader& reader, const std::string& path, const Numbers
                                       static_cast<int64_t>(i) / per_row, values[i]));
 }
 
+std::string attribute_place(const std::string& object, const char* name) {
+  return fmt::format("{} attribute {}", object, name);
+}
+
 StoredArray open_attribute(hid_t file, const Reader& reader, const std::string& object,
                            const char* name, const std::string& place) {
   if (object != "/" && !reader.has(object)) reader.refuse(object, "is missing");
@@ -120,15 +124,12 @@ StoredArray open_attribute(hid_t file, const Reader& reader, const std::string& 
 template <class Read>
 auto attribute_values(hid_t file, const Reader& reader, const std::string& object, const char* name,
                       int64_t count, Read&& read) {
-  const std::string place = fmt::format("{} attribute {}", object, name);
+  const std::string place = attribute_place(object, name);
   return named(reader, place, [&] {
     const StoredArray array = open_attribute(file, reader, object, name, place);
     if (array.size() != count)
       reader.refuse(place, fmt::format("has {} values, expected {}", array.size(), count));
-    auto values = read(array);
-    if constexpr (std::is_same_v<decltype(values), std::vector<double>>)
-      require_finite(reader, place, values, count);
-    return values;
+    return read(array);
   });
 }
 
@@ -169,8 +170,17 @@ std::vector<std::string> Reader::names(const std::string& path) const {
 }
 
 double Reader::number(const std::string& object, const char* attribute) const {
-  return attribute_values(file_, *this, object, attribute, 1,
-                          [](const StoredArray& array) { return array.numbers(); })[0];
+  const double value = number_or_infinity(object, attribute);
+  require_finite(*this, attribute_place(object, attribute), std::array{value}, 1);
+  return value;
+}
+
+double Reader::number_or_infinity(const std::string& object, const char* attribute) const {
+  const double value =
+      attribute_values(file_, *this, object, attribute, 1,
+                       [](const StoredArray& array) { return array.numbers(); })[0];
+  if (std::isnan(value)) refuse(attribute_place(object, attribute), "is not a number");
+  return value;
 }
 
 int64_t Reader::integer(const std::string& object, const char* attribute) const {
@@ -184,10 +194,10 @@ std::string Reader::text(const std::string& object, const char* attribute) const
 }
 
 Vec3 Reader::vector(const std::string& object, const char* attribute) const {
-  return Vec3::Map(
-      attribute_values(file_, *this, object, attribute, 3, [](const StoredArray& array) {
-        return array.numbers();
-      }).data());
+  const std::vector<double> values = attribute_values(
+      file_, *this, object, attribute, 3, [](const StoredArray& array) { return array.numbers(); });
+  require_finite(*this, attribute_place(object, attribute), values, 3);
+  return Vec3::Map(values.data());
 }
 
 }  // namespace repose::results

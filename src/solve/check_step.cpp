@@ -11,6 +11,7 @@ namespace repose::solve {
 namespace {
 
 constexpr double unlimited = std::numeric_limits<double>::max();
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::span<const double> flat(const std::vector<Vec3>& vectors) {
   if (vectors.empty()) return {};
@@ -22,7 +23,7 @@ void check_ranges(const model::StepNumbers& n, bool gradient_known, base::Compar
   comparison.range("lambda", n.lambda, 0, 1);
   comparison.range("bulk_modulus", n.bulk_modulus, 0, unlimited);
   comparison.range("epsilon", n.epsilon, 0, unlimited);
-  comparison.range("displacement_error", n.displacement_error, 0, unlimited);
+  comparison.range("displacement_error", n.displacement_error, 0, infinity);
   comparison.range("iterations", static_cast<double>(n.iterations), 0, unlimited);
   comparison.range("evaluations", static_cast<double>(n.evaluations), 0, unlimited);
   comparison.range("seconds", n.seconds, 0, unlimited);

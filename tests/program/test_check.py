@@ -233,6 +233,14 @@ def test_finds_what_is_out_of_range(run, tmp_path, name, value):
                               if "OUT OF RANGE" in line)
 
 
+def test_a_distance_may_be_infinite_but_must_be_a_number(run, tmp_path):
+    file = write_result(tmp_path / "a.h5", "energy", "none")
+    for value, status in ((np.inf, 0), (np.nan, 1)):
+        with h5py.File(file, "r+") as h5:
+            h5["step/0000"].attrs["displacement_error"] = value
+        assert run("repose-check", file).returncode == status
+
+
 def test_finds_a_count_that_is_off_by_one_and_a_false_end(run, tmp_path):
     file = write_result(tmp_path / "a.h5", "energy", "none")
     with h5py.File(file, "r+") as h5:

@@ -20,7 +20,7 @@ class Comparison {
   /// The same for every entry; the table shows the worst. Arrays of different length disagree.
   void array(const std::string& name, std::span<const double> stored,
              std::span<const double> recomputed, double scale);
-  /// What cannot be recomputed: finite and within [least, most]. The table says "range only".
+  /// What cannot be recomputed: within [least, most], and not NaN. The table says "range only".
   void range(const std::string& name, double stored, double least, double most);
   /// A statement about the file that holds or does not.
   void statement(const std::string& text, bool holds);

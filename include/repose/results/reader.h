@@ -54,6 +54,8 @@ class Reader {
   }
 
   double number(const std::string& object, const char* attribute) const;
+  /// Anything but NaN.
+  double number_or_infinity(const std::string& object, const char* attribute) const;
   int64_t integer(const std::string& object, const char* attribute) const;
   std::string text(const std::string& object, const char* attribute) const;
   Vec3 vector(const std::string& object, const char* attribute) const;
