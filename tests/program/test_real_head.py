@@ -1,0 +1,84 @@
+"""A real head (CT, 4072 skin vertices) whose jaw opens by 8° and comes 6 mm forward. The data are not
+shipped: they lie beside the project, in ../shared/data/head."""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT, runner
+from tissue import last, model_of, prism_volumes, steps
+
+DATA = PROJECT.parent / "shared/data/head"
+CHIN = [3.3, -303.9, 343.2]  # its tip on the skin, mm
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The scene and the surfaces it names."""
+    top = tmp_path_factory.mktemp("real_head")
+    for name in ("face.ply", "skull.ply", "mandible.ply"):
+        (top / name).symlink_to(DATA / name)
+    (top / "scene.yaml").symlink_to(PROJECT / "meshes/real_head_jaw.yaml")
+    return top
+
+
+@pytest.fixture(scope="module")
+def face(folder, environment):
+    """The result on two ranks, which must converge."""
+    result = runner(folder, environment)("repose-solve", "scene.yaml", "-output", "face", ranks=2)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    return folder / "face.h5"
+
+
+def test_arrives_and_every_number_is_right(run, face):
+    step = last(face)
+    assert step["load"] == 1 and step["converged"] and step["displacement_error"] <= 0.1
+    assert run("repose-check", face).returncode == 0
+
+
+def test_tissue_is_never_inside_out(face):
+    model = model_of(face)
+    assert prism_volumes(model["point/position"], model["prism/points"])[0].min() > 0
+    for step in steps(face):
+        assert step["inverted_prisms"] == 0 and step["prism/volume_ratio"].min() > 0.5
+
+
+def test_the_chin_moves_most(face):
+    model, step = model_of(face), last(face)
+    moved = np.linalg.norm(step["point/displacement"], axis=1)
+    skin = np.unique(model["skin/points"])
+    most = skin[np.argmax(moved[skin])]
+    assert np.linalg.norm(model["point/position"][most] - CHIN) < 15
+    jaw = (model["point/set"] == 2) & (model["point/bone"] == list(model["bone"]).index(b"mandible"))
+    assert moved[most] == pytest.approx(moved[jaw].max(), rel=0.1)
+
+
+def displacement_gradients(points, displacement, triangles):
+    """The displacement's gradient in each triangle, [K, 3, 3], zero across it."""
+    p, u = points[triangles], displacement[triangles]
+    edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2)
+    changes = np.stack([u[:, 1] - u[:, 0], u[:, 2] - u[:, 0]], axis=2)
+    return changes @ np.linalg.pinv(edges)
+
+
+def neighbours(triangles):
+    """Pairs of triangles that share an edge."""
+    owners = defaultdict(list)
+    for row, (a, b, c) in enumerate(triangles):
+        for edge in ((a, b), (b, c), (c, a)):
+            owners[tuple(sorted(edge))].append(row)
+    return np.array([pair for pair in owners.values() if len(pair) == 2])
+
+
+def test_the_skin_is_smooth(face):
+    """Neighbouring triangles are strained and turned alike."""
+    model, step = model_of(face), last(face)
+    triangles = model["skin/points"]
+    gradient = displacement_gradients(model["point/position"], step["point/displacement"], triangles)
+    one, other = neighbours(triangles).T
+    jump = np.linalg.norm(gradient[one] - gradient[other], axis=(1, 2))
+    assert jump.max() < 0.6
+    assert np.quantile(jump, 0.99) < 0.25
