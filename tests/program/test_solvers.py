@@ -1,0 +1,64 @@
+"""Every solver, and every way to solve the linear systems, ends in the same rest position."""
+
+import pytest
+
+from tissue import apart, last, same_face
+
+ACCURACY = 1e-6  # mm; two answers this near to the truth are twice as far apart at most
+ADVANCE, OPENING = "paper_jaw_advance.yaml", "paper_jaw_opening.yaml"
+FINER = "head_jaw_advance.yaml"
+
+
+@pytest.fixture
+def check(solved):
+    def check_options(scene, *options, ranks=1):
+        other = solved(scene, "-accuracy", ACCURACY, *options, ranks=ranks)
+        same_face(solved(scene, "-accuracy", ACCURACY), other, 2 * ACCURACY)
+        assert last(other)["displacement_error"] <= ACCURACY
+
+    return check_options
+
+
+@pytest.mark.parametrize("tao", ["nls", "ntl", "bnls", "bntr", "bntl", "lmvm", "cg", "bncg"])
+def test_every_method_finds_the_same_face(check, tao):
+    check(ADVANCE, "-tao_type", tao)
+
+
+@pytest.mark.parametrize("tao", ["nls", "bntr", "cg"])
+def test_every_method_finds_the_same_face_of_a_turned_jaw(check, tao):
+    check(OPENING, "-tao_type", tao)
+
+
+@pytest.mark.parametrize("tao", ["nls", "cg"])
+def test_every_method_finds_the_same_face_on_ranks(check, tao):
+    check(ADVANCE, "-tao_type", tao, ranks=2)
+
+
+def test_trust_region_and_line_search_find_the_same_face_of_the_finer_head(solved):
+    trusting = solved(FINER, "-accuracy", ACCURACY, ranks=2)
+    searching = solved(FINER, "-accuracy", ACCURACY, "-tao_type", "nls", ranks=2)
+    same_face(trusting, searching, 2 * ACCURACY)
+
+
+@pytest.mark.parametrize("options", [
+    ["-pc_type", "pbjacobi"], ["-pc_type", "bjacobi"],
+    ["-pc_type", "cholesky", "-pc_factor_mat_solver_type", "mumps"], ["-pc_type", "lu"],
+    ["-ksp_type", "preonly"], ["-ksp_type", "minres", "-ksp_norm_type", "preconditioned"],
+    ["-tao_ntr_ksp_type", "nash"]],
+    ids=lambda options: " ".join(options[1::2]))
+def test_every_linear_solver_finds_the_same_face(check, options):
+    check(ADVANCE, *options)
+
+
+def test_multigrid_on_ranks(check):
+    check(ADVANCE, "-pc_type", "gamg", ranks=2)
+
+
+@pytest.mark.parametrize("options", [[], ["-tao_type", "cg"], ["-tao_type", "lmvm"],
+                                     ["-pc_type", "gamg"]], ids=lambda o: "".join(o[-1:]))
+@pytest.mark.parametrize("accuracy", [1, 0.1])
+def test_the_rest_position_is_as_near_as_estimated(solved, options, accuracy):
+    rest = last(solved(ADVANCE, "-accuracy", ACCURACY))
+    step = last(solved(ADVANCE, "-accuracy", accuracy, *options))
+    assert apart(step, rest) <= step["displacement_error"] + ACCURACY
+    assert step["displacement_error"] <= accuracy
