@@ -29,7 +29,7 @@ def test_every_method_finds_the_same_face_of_a_turned_jaw(check, tao):
     check(OPENING, "-tao_type", tao)
 
 
-@pytest.mark.parametrize("tao", ["nls", "cg"])
+@pytest.mark.parametrize("tao", ["nls", "bntr"])
 def test_every_method_finds_the_same_face_on_ranks(check, tao):
     check(ADVANCE, "-tao_type", tao, ranks=2)
 
