@@ -62,8 +62,6 @@ mpi_environment() {
   # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd, and
   # whose libraries take most of a start, one second of it asleep at the end.
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,ofi,openib
-  # A program started without mpirun needs no daemon beside it.
-  export OMPI_MCA_ess_singleton_isolated=1
   # A container's system-call filter forbids ranks to read each other's memory directly.
   if grep -q '^Seccomp:[[:space:]]*2' /proc/self/status 2>/dev/null; then
     export OMPI_MCA_btl_vader_single_copy_mechanism=none
