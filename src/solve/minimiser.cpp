@@ -89,7 +89,8 @@ struct Minimiser::Callbacks {
       if (self.watch_)
         self.watch_({iteration, self.function_.positions().load(), value, force, self.error_});
       check(TaoDefaultConvergenceTest(tao, nullptr));
-      if (done) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+      if (done || self.stalled(iteration, value))
+        check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
   }
 };
@@ -172,6 +173,17 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   return error_ <= accuracy_;
 }
 
+bool Minimiser::stalled(int64_t iteration, double value) {
+  constexpr int64_t patience = 20;
+  constexpr double rounding = 1e-14;  // of the value
+  if (iteration == 0 || value < lowest_ - rounding * std::abs(lowest_)) {
+    lowest_ = value;
+    lowered_at_ = iteration;
+  }
+  stalled_ = iteration - lowered_at_ >= patience;
+  return stalled_;
+}
+
 int Minimiser::polish(Vec displacement) {
   constexpr int most = 8;
   int corrections = 0;
@@ -210,7 +222,9 @@ Outcome Minimiser::summary(Vec displacement) {
   check(TaoGetConvergedReason(tao_, &reason));
   check(TaoGetIterationNumber(tao_, &iterations));
   outcome.iterations = iterations + corrections;
-  outcome.reason = outcome.converged ? reason_text(TAO_CONVERGED_USER) : reason_text(reason);
+  outcome.reason = outcome.converged ? reason_text(TAO_CONVERGED_USER)
+                   : stalled_        ? "the objective no longer decreases beyond rounding"
+                                     : reason_text(reason);
   if (corrections > 0)
     outcome.reason += fmt::format(", {} Newton corrections at the rounding level", corrections);
   if (!outcome.stable) outcome.reason += ", at a point that is not a minimum";

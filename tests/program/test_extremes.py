@@ -84,7 +84,7 @@ WILD = {
     "45°": (OPENING, [TWO, ("angle: 8", "angle: 45")], ["-accuracy", 1, "-load_steps", 1], [0, 2]),
     "45° with few iterations": (OPENING, [TWO, ("angle: 8", "angle: 45")],
                                 ["-accuracy", 1, "-tao_max_it", 5], [2]),
-    "6 m": (ADVANCE, [(JAW, "-6000, 0]")], ["-load_steps", 1, "-tao_max_it", 20], [2]),
+    "6 m": (ADVANCE, [(JAW, "-6000, 0]")], ["-load_steps", 1, "-tao_max_it", 20], [0, 2]),
     "stiffness 1e-6 … 1e6": (ADVANCE, [(SET, SET + '\n    "layer 0": {stiffness: 1.0e+6}'
                                         "\n    connecting: {stiffness: 1.0e-6}")],
                              ["-tao_max_it", 5, "-load_steps", 1], [2]),

@@ -38,6 +38,7 @@ class Minimiser : public RestSearch {
   void set_forcing();
   double strict_estimate(Vec displacement, Vec gradient);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
+  bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
   int polish(Vec displacement);
   Outcome summary(Vec displacement);
@@ -53,6 +54,9 @@ class Minimiser : public RestSearch {
   double accuracy_ = 0;                 // mm, of the run under way
   double error_ = 0;                    // mm, latest strict estimate
   double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
+  double lowest_ = 0;                   // value, of the run under way
+  int64_t lowered_at_ = 0;              // iteration at which it was found
+  bool stalled_ = false;                // the value has not fallen for long
   base::VecHandle gradient_, saved_, certified_gradient_;
   std::exception_ptr thrown_;
 };
