@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 
 #include "repose/base/agreement.h"
 
@@ -16,9 +18,20 @@ std::string duration(double seconds) {
   return fmt::format("{:.0f} min", seconds / 60);
 }
 
+/// Whether a person sees what is written to stderr: it is a terminal, or mpirun, which started this
+/// process with a pipe for stderr, passes it on to one.
+bool watched() {
+  if (isatty(STDERR_FILENO)) return true;
+  if (!std::getenv("OMPI_COMM_WORLD_SIZE")) return false;
+  std::error_code unknown;
+  const auto target = fmt::format("/proc/{}/fd/{}", getppid(), STDERR_FILENO);
+  const std::string path = std::filesystem::read_symlink(target, unknown).string();
+  return path.starts_with("/dev/pts/") || path.starts_with("/dev/tty");
+}
+
 }  // namespace
 
-Progress::Progress(MPI_Comm comm) : visible_(rank(comm) == 0 && isatty(STDERR_FILENO)) {}
+Progress::Progress(MPI_Comm comm) : visible_(rank(comm) == 0 && watched()) {}
 
 Progress::~Progress() { clear(); }
 

@@ -1,0 +1,46 @@
+"""Long work shows where it is on a terminal, under mpirun too, and nothing of that in a log."""
+
+import os
+import pty
+import subprocess
+
+import pytest
+
+from conftest import PROJECT, TIME_LIMIT, programs
+
+
+def seen(command, folder, environment):
+    """What a terminal shows that is the command's stderr."""
+    ours, its = pty.openpty()
+    process = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+                               stdout=subprocess.DEVNULL, stderr=its)
+    os.close(its)
+    text = b""
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not part:
+            break
+        text += part
+    os.close(ours)
+    assert process.wait(TIME_LIMIT) == 0
+    return text.decode(errors="replace")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ranks):
+    command = [programs() / "repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml"]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), *command]
+    text = seen(command, tmp_path, environment)
+    for word in ("load", "iteration", "largest force", "mm to go"):
+        assert word in text
+    assert text.endswith("\r\x1b[K"), "the line is cleared at the end"
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_log_stays_quiet(run, ranks):
+    result = run("repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml", ranks=ranks)
+    assert result.stderr == "" and "mm to go" not in result.stdout
