@@ -54,9 +54,8 @@ mpi_environment() {
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
     export PRTE_ALLOW_RUN_AS_ROOT=1 PRTE_ALLOW_RUN_AS_ROOT_CONFIRM=1
   fi
-  # More ranks than cores are allowed; a rank that waits gives way, else a busy machine crawls.
+  # More ranks than cores are allowed.
   export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
-  export OMPI_MCA_mpi_yield_when_idle=1
   # Runs at the same time must not be pinned to the same cores.
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
   # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd, and

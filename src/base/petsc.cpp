@@ -17,7 +17,6 @@ void check(PetscErrorCode code) {
 Session::Session(int argc, char** argv, const char* help) {
   setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0);
   setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
-  setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // a rank that waits gives way to those that work
   check(PetscInitialize(&argc, &argv, nullptr, help));
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
 }
