@@ -4,14 +4,26 @@
 
 namespace repose::base {
 
-void check(PetscErrorCode code) {
-  if (code == 0) return;
+namespace {
+
+/// PETSc's own words for an error, the general and the particular ones.
+std::string text_of(PetscErrorCode code) {
   const char* text = nullptr;
   char* specific = nullptr;
   PetscErrorMessage(code, &text, &specific);
-  throw InternalError(fmt::format("PETSc: {}{}{} (error {})", text ? text : "unknown error",
-                                  specific && *specific ? ": " : "", specific ? specific : "",
-                                  static_cast<int>(code)));
+  return fmt::format("{}{}{} (error {})", text ? text : "unknown error",
+                     specific && *specific ? ": " : "", specific ? specific : "",
+                     static_cast<int>(code));
+}
+
+}  // namespace
+
+void check(PetscErrorCode code) {
+  if (code != 0) throw InternalError("PETSc: " + text_of(code));
+}
+
+void check_options(PetscErrorCode code) {
+  if (code != 0) refuse("PETSc does not take an option's value: {}", text_of(code));
 }
 
 Session::Session(int argc, char** argv, const char* help) {

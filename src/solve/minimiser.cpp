@@ -120,7 +120,7 @@ void Minimiser::make_tao() {
   check(TaoSetMaximumIterations(tao_, 5000));
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
-  check(TaoSetFromOptions(tao_));
+  base::check_options(TaoSetFromOptions(tao_));
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
   KSP inner = nullptr;
@@ -128,7 +128,7 @@ void Minimiser::make_tao() {
   check(KSPSetPC(inner, solver_.preconditioner()));
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
-  check(KSPSetFromOptions(inner));
+  base::check_options(KSPSetFromOptions(inner));
   const char* prefix = nullptr;
   check(KSPGetOptionsPrefix(inner, &prefix));
   PetscBool given = PETSC_FALSE;

@@ -95,7 +95,7 @@ std::vector<int> by_scotch(MPI_Comm comm, const ColumnGraph& graph, int64_t colu
   check(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
   const std::vector<PetscInt> weights(graph.weight.begin(), graph.weight.end());
   check(MatPartitioningSetVertexWeights(partitioning, scatter_slab(comm, weights, rows)));
-  check(MatPartitioningSetFromOptions(partitioning));
+  base::check_options(MatPartitioningSetFromOptions(partitioning));
   base::IndexSetHandle assignment;
   check(MatPartitioningApply(partitioning, assignment.out()));
   const PetscInt* mine = nullptr;

@@ -35,7 +35,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
   choose_preconditioner(preconditioner(), 3 * positions.part().total_unknowns);
   check(KSPSetOperators(krylov_, hessian_.exact(), hessian_.convex()));
-  check(KSPSetFromOptions(krylov_));
+  base::check_options(KSPSetFromOptions(krylov_));
 }
 
 PC TangentSolver::preconditioner() {

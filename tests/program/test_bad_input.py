@@ -196,6 +196,12 @@ CASES = {
         lambda i: i.option("-accuracy", "fine"), ["-accuracy", "fine"]),
     "option of unknown choice": (
         lambda i: i.option("-volume", "penalti"), ["-volume", "penalti", "penalty"]),
+    "PETSc's option of unknown choice": (
+        lambda i: i.option("-tao_type", "fast"), ["option", "fast"]),
+    "PETSc's option not a number": (
+        lambda i: i.option("-tao_max_it", "many"), ["option", "many"]),
+    "force with a penalty": (
+        lambda i: i.option("-functional", "force", "-volume", "penalty"), ["force", "penalty"]),
     "two inputs": (
         lambda i: i.option("scene.yaml"), ["scene.yaml"]),
     "missing output folder": (
