@@ -7,8 +7,8 @@
 namespace repose::model {
 namespace {
 
-constexpr double kGap = 1.5;          // mm
-constexpr double kGapPerDepth = 0.5;  // of the column's thickness
+constexpr double gap = 1.5;            // mm
+constexpr double gap_per_depth = 0.5;  // of the column's thickness
 
 bool in_region(const scene::SphereRegion& region, const Vec3& point) {
   return (point - region.center).norm() <= region.radius;
@@ -37,7 +37,7 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     if (!columns.holds[v]) continue;
     const BoneField::Nearest nearest = bones.nearest(columns.deep[v]);
-    if (nearest.distance > std::max(kGap, kGapPerDepth * columns.thickness[v])) continue;
+    if (nearest.distance > std::max(gap, gap_per_depth * columns.thickness[v])) continue;
     attachment.bone[v] = nearest.bone;
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];

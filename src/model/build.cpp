@@ -16,7 +16,7 @@
 namespace repose::model {
 namespace {
 
-constexpr double kGapWorthSaying = 0.5;  // mm
+constexpr double gap_worth_saying = 0.5;  // mm
 
 std::vector<BoneField::Nearest> nearest_bone(const SkinMesh& mesh, const BoneField& bones) {
   std::vector<BoneField::Nearest> nearest;
@@ -58,7 +58,7 @@ void report_columns(const Columns& columns, const Attachment& attachment, BuildR
   if (columns.shortened > 0)
     report.remarks.push_back(fmt::format(
         "{} columns were shortened so that neighbours do not cross", columns.shortened));
-  if (attachment.largest_gap > kGapWorthSaying)
+  if (attachment.largest_gap > gap_worth_saying)
     report.remarks.push_back(
         fmt::format("deepest points attached to bone end up to {:.2f} mm short of it, where bone "
                     "falls away steeply or columns were shortened",

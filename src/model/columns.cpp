@@ -7,7 +7,7 @@
 namespace repose::model {
 namespace {
 
-constexpr double kSmoothingPerDepth = 0.5;
+constexpr double smoothing_per_depth = 0.5;
 
 /// Over what length (mm) to smooth the directions: in proportion to how deep the tissue is likely
 /// to be, because columns cross where their directions turn by much within their own length.
@@ -16,7 +16,7 @@ std::vector<double> smoothing_length(const std::vector<BoneField::Nearest>& near
   std::vector<double> length(nearest.size());
   for (size_t v = 0; v < length.size(); ++v) {
     const double bone = nearest[v].distance;
-    length[v] = kSmoothingPerDepth * (bone <= tissue.attach_within ? bone : tissue.free_thickness);
+    length[v] = smoothing_per_depth * (bone <= tissue.attach_within ? bone : tissue.free_thickness);
   }
   return length;
 }

@@ -9,9 +9,9 @@
 namespace repose::model {
 namespace {
 
-constexpr double kWantedCosine = 0.3;     // 72.5° to each triangle's normal
-constexpr double kSmallestCosine = 0.02;  // of the cone's axis: below it the skin is folded
-constexpr int kLocalRounds = 4;
+constexpr double wanted_cosine = 0.3;     // 72.5° to each triangle's normal
+constexpr double smallest_cosine = 0.02;  // of the cone's axis: below it the skin is folded
+constexpr int local_rounds = 4;
 
 /// The triangle around `v` whose inward normal is furthest from `u`: its unit normal and cosine.
 std::pair<Vec3, double> worst_normal(const SkinMesh& mesh, int64_t v, const Vec3& u) {
@@ -76,14 +76,14 @@ std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_nam
   std::vector<Cone> cones(mesh.points.size());
   for (size_t v = 0; v < cones.size(); ++v) {
     cones[v] = widest_cone(mesh, v);
-    if (!(cones[v].cosine >= kSmallestCosine)) {
+    if (!(cones[v].cosine >= smallest_cosine)) {
       const Vec3& at = mesh.points[v];
       base::refuse(
           "{}: the skin is folded at vertex {} ({:.2f}, {:.2f}, {:.2f}), no direction is inward of "
           "all its triangles; smooth or remesh the skin there",
           skin_name, v, at.x(), at.y(), at.z());
     }
-    cones[v].cosine = std::min(kWantedCosine, 0.7 * cones[v].cosine);
+    cones[v].cosine = std::min(wanted_cosine, 0.7 * cones[v].cosine);
   }
   return cones;
 }
@@ -105,7 +105,7 @@ std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone
   std::vector<Vec3> directions(vertices);
   for (int64_t v = 0; v < vertices; ++v)
     directions[v] = into_cone(mesh, v, cones[v], smoothed.row(v).transpose().normalized());
-  for (int round = 0; round < kLocalRounds; ++round) smooth_locally(mesh, cones, directions);
+  for (int round = 0; round < local_rounds; ++round) smooth_locally(mesh, cones, directions);
   return directions;
 }
 

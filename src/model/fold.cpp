@@ -9,10 +9,10 @@
 namespace repose::model {
 namespace {
 
-constexpr double kMargin = 0.05;
-constexpr double kShortening = 0.9;
-constexpr double kSteepest = 1.0;
-constexpr double kThinnest = 0.05;  // mm, and as a part of the first thickness
+constexpr double least_margin = 0.05;
+constexpr double shortening = 0.9;
+constexpr double steepest = 1.0;
+constexpr double thinnest = 0.05;  // mm, and as a part of the first thickness
 
 /// Least value of c[0] + c[1] s + c[2] s² for s in [0, 1].
 double least_on_unit_interval(const std::array<double, 3>& c) {
@@ -39,7 +39,7 @@ void refuse_thin(const SkinMesh& mesh, const std::string& skin_name, int64_t v, 
       "mm less than {:.2f} mm would be left before neighbouring columns cross; smooth or coarsen "
       "the "
       "skin mesh there, or set tissue.free_thickness or attach_within smaller",
-      skin_name, v, at.x(), at.y(), at.z(), from, std::max(kThinnest, kThinnest * from));
+      skin_name, v, at.x(), at.y(), at.z(), from, std::max(thinnest, thinnest * from));
 }
 
 std::vector<int64_t> corners(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
@@ -80,7 +80,7 @@ std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Ve
                                       const std::vector<double>& thickness) {
   std::vector<int64_t> folded;
   for (size_t f = 0; f < mesh.triangles.size(); ++f)
-    if (!(margin_of(mesh, static_cast<int64_t>(f), directions, thickness) >= kMargin))
+    if (!(margin_of(mesh, static_cast<int64_t>(f), directions, thickness) >= least_margin))
       folded.push_back(static_cast<int64_t>(f));
   return folded;
 }
@@ -92,15 +92,16 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
   while (!folded.empty()) {
     std::vector<int64_t> changed = corners(mesh, folded);
     for (const int64_t v : changed) {
-      thickness[v] *= kShortening;
-      if (!(thickness[v] > std::max(kThinnest, kThinnest * first[v])))
+      thickness[v] *= shortening;
+      if (!(thickness[v] > std::max(thinnest, thinnest * first[v])))
         refuse_thin(mesh, skin_name, v, first[v]);
     }
-    const std::vector<int64_t> drawn = limit_slope(mesh, kSteepest, changed, thickness);
+    const std::vector<int64_t> drawn = limit_slope(mesh, steepest, changed, thickness);
     changed.insert(changed.end(), drawn.begin(), drawn.end());
     folded = triangles_around(mesh, changed);
-    std::erase_if(folded,
-                  [&](int64_t f) { return margin_of(mesh, f, directions, thickness) >= kMargin; });
+    std::erase_if(folded, [&](int64_t f) {
+      return margin_of(mesh, f, directions, thickness) >= least_margin;
+    });
   }
 }
 

@@ -8,7 +8,7 @@
 namespace repose::model {
 namespace {
 
-constexpr int kFewest = 2, kMost = 64;
+constexpr int fewest = 2, most = 64;
 
 void add_points(const SkinMesh& mesh, const std::vector<Vec3>& deep,
                 const std::vector<double>& depths, Points& points) {
@@ -88,8 +88,8 @@ void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {
 
 std::vector<double> layer_depths(const scene::Tissue& tissue) {
   const int layers = tissue.layers;
-  if (layers < kFewest || layers > kMost)
-    base::refuse("tissue.layers is {}, allowed are {} to {}", layers, kFewest, kMost);
+  if (layers < fewest || layers > most)
+    base::refuse("tissue.layers is {}, allowed are {} to {}", layers, fewest, most);
   std::vector<double> depths = tissue.depths;
   if (depths.empty())
     for (int a = 0; a < layers; ++a) depths.push_back(static_cast<double>(a) / (layers - 1));

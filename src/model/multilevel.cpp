@@ -5,8 +5,8 @@ namespace {
 
 using Sparse = Multilevel::Sparse;
 
-constexpr int kSolvedDirectly = 500;  // rows
-constexpr double kCoarseStiffness = 0.5;
+constexpr int solved_directly = 500;  // rows
+constexpr double coarse_stiffness = 0.5;
 
 /// The aggregate of the neighbour a row is tied to most, −1 where none has one.
 int strongest(const Sparse& matrix, const std::vector<int>& aggregate, int row) {
@@ -42,14 +42,14 @@ int make_aggregates(const Sparse& matrix, std::vector<int>& aggregate) {
   return count;
 }
 
-/// Sums over aggregates, the entries between them times kCoarseStiffness; sums of rows are kept.
+/// Sums over aggregates, the entries between them times coarse_stiffness; sums of rows are kept.
 Sparse coarser(const Sparse& matrix, const std::vector<int>& aggregate, int count) {
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<double> diagonal(count, 0.0);
   for (int row = 0; row < matrix.rows(); ++row)
     for (Sparse::InnerIterator it(matrix, row); it; ++it) {
       const int a = aggregate[row], b = aggregate[it.col()];
-      const double between = a == b ? 0 : kCoarseStiffness * it.value();
+      const double between = a == b ? 0 : coarse_stiffness * it.value();
       diagonal[a] += it.value() - between;
       if (a != b) entries.emplace_back(a, b, between);
     }
@@ -75,7 +75,7 @@ void relax(const Sparse& matrix, const Eigen::VectorXd& right, int row, Eigen::V
 Multilevel& Multilevel::compute(const Sparse& matrix) {
   levels_.clear();
   Sparse current = matrix;
-  while (current.rows() > kSolvedDirectly) {
+  while (current.rows() > solved_directly) {
     Level level;
     level.aggregates = make_aggregates(current, level.aggregate);
     if (level.aggregates == current.rows()) break;

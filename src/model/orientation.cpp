@@ -7,7 +7,7 @@
 namespace repose::model {
 namespace {
 
-constexpr double kFarApart = 200, kNear = 50;  // mm
+constexpr double far_apart = 200, near = 50;  // mm
 
 using Box = Eigen::AlignedBox3d;
 
@@ -28,7 +28,7 @@ void refuse_far_apart(const surface::Surface& skin, const surface::Surface& bone
   Box turned;
   turned.extend(turn.cwiseProduct(bone_box.min()));
   turned.extend(turn.cwiseProduct(bone_box.max()));
-  const bool other_frame = skin_box.exteriorDistance(turned) <= kNear;
+  const bool other_frame = skin_box.exteriorDistance(turned) <= near;
   base::refuse("{} is at {}, but {} at {}: {:.0f} mm apart; {}", skin.name, corner_text(skin_box),
                bone.name, corner_text(bone_box), skin_box.exteriorDistance(bone_box),
                other_frame ? "one is in LPS and the other in RAS coordinates, export both in one"
@@ -41,7 +41,7 @@ void require_same_place(const surface::Surface& skin, const std::vector<surface:
                         const BoneField& field) {
   const Box skin_box = box_of(skin);
   for (const surface::Surface& bone : bones)
-    if (const Box box = box_of(bone); skin_box.exteriorDistance(box) > kFarApart)
+    if (const Box box = box_of(bone); skin_box.exteriorDistance(box) > far_apart)
       refuse_far_apart(skin, bone, skin_box, box);
   for (size_t v = 0; v < skin.points.size(); ++v)
     if (const int32_t bone = field.containing(skin.points[v]); bone >= 0) {

@@ -8,15 +8,15 @@
 namespace repose::model {
 namespace {
 
-constexpr double kStiffness = 1.0, kReference = 1.0;  // N/mm, mm
-constexpr int kSpringsOfPrism = 15;
+constexpr double default_stiffness = 1.0, default_reference = 1.0;  // N/mm, mm
+constexpr int springs_of_prism = 15;
 
 /// The rule that holds for a set once everything less specific is filled in.
 struct FullRule {
   std::optional<double> modulus;
-  double stiffness = kStiffness;
+  double stiffness = default_stiffness;
   scene::Law law = scene::Law::quartic;
-  double reference = kReference;
+  double reference = default_reference;
 
   void refine(const scene::SpringRule& rule) {
     if (rule.stiffness) {
@@ -63,7 +63,7 @@ std::vector<double> spring_volumes(const SkinMesh& mesh, const std::vector<doubl
   std::vector<double> volumes(diagonal + gaps * 2 * edges, 0);
   for (int64_t gap = 0; gap < gaps; ++gap)
     for (int64_t f = 0; f < triangles; ++f) {
-      const double share = prism_volumes[gap * triangles + f] / kSpringsOfPrism;
+      const double share = prism_volumes[gap * triangles + f] / springs_of_prism;
       for (const int64_t e : mesh.triangle_edges[f])
         for (const int64_t spring :
              {gap * edges + e, (gap + 1) * edges + e, diagonal + 2 * (gap * edges + e),

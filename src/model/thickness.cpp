@@ -9,11 +9,11 @@
 namespace repose::model {
 namespace {
 
-constexpr double kDeeperThanNearest = 1.6, kDeeperBy = 2.0;  // mm
-constexpr double kBoneRoom = 0.95, kSkinRoom = 0.45;
-constexpr double kSteepest = 1.0;
-constexpr double kHeldWeight = 100.0;
-constexpr double kSpikeWidth = 1.5, kSpikeHeight = 0.2;  // mm
+constexpr double deeper_than_nearest = 1.6, deeper_by = 2.0;  // mm
+constexpr double bone_room = 0.95, skin_room = 0.45;
+constexpr double steepest = 1.0;
+constexpr double held_weight = 100.0;
+constexpr double spike_width = 1.5, spike_height = 0.2;  // mm
 
 /// Distance along a column to where it would leave the skin again, infinite within `reach`.
 double to_other_side(const surface::DistanceTree& skin, const Vec3& from, const Vec3& direction,
@@ -25,18 +25,18 @@ double to_other_side(const surface::DistanceTree& skin, const Vec3& from, const 
 void flatten(const SkinMesh& mesh, std::vector<double>& thickness) {
   std::vector<int64_t> all(thickness.size());
   std::iota(all.begin(), all.end(), 0);
-  limit_slope(mesh, kSteepest, all, thickness);
+  limit_slope(mesh, steepest, all, thickness);
 }
 
-/// Cuts off what stands out by more than kSpikeHeight from the field smoothed over kSpikeWidth:
+/// Cuts off what stands out by more than spike_height from the field smoothed over spike_width:
 /// single columns that graze an edge of bone and meet it late.
 void cut_spikes(const SkinMesh& mesh, std::vector<double>& thickness) {
   const auto vertices = static_cast<int64_t>(thickness.size());
   const Eigen::MatrixXd given = Eigen::Map<const Eigen::VectorXd>(thickness.data(), vertices);
-  const std::vector<double> weight(vertices, 1.0), length(vertices, kSpikeWidth);
+  const std::vector<double> weight(vertices, 1.0), length(vertices, spike_width);
   const Eigen::MatrixXd smooth = smooth_field(mesh, given, weight, length);
   for (int64_t v = 0; v < vertices; ++v)
-    thickness[v] = std::min(thickness[v], smooth(v, 0) + kSpikeHeight);
+    thickness[v] = std::min(thickness[v], smooth(v, 0) + spike_height);
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
   const size_t vertices = mesh.points.size();
   const surface::DistanceTree skin({"skin", mesh.points, mesh.triangles});
   const double farthest =
-      std::max(tissue.attach_within, tissue.free_thickness / std::min(kBoneRoom, kSkinRoom));
+      std::max(tissue.attach_within, tissue.free_thickness / std::min(bone_room, skin_room));
   Reach reach{std::vector<double>(vertices), std::vector<double>(vertices),
               std::vector<char>(vertices)};
   for (size_t v = 0; v < vertices; ++v) {
@@ -57,9 +57,9 @@ Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
     const double skin_distance =
         to_other_side(skin, mesh.points[v], directions[v], start, farthest);
     const double deepest = std::min({tissue.attach_within, skin_distance,
-                                     kDeeperThanNearest * nearest[v].distance + kDeeperBy});
+                                     deeper_than_nearest * nearest[v].distance + deeper_by});
     reach.holds[v] = reach.to_bone[v] <= deepest;
-    reach.room[v] = std::min(kBoneRoom * reach.to_bone[v], kSkinRoom * skin_distance);
+    reach.room[v] = std::min(bone_room * reach.to_bone[v], skin_room * skin_distance);
   }
   return reach;
 }
@@ -71,7 +71,7 @@ std::vector<double> column_thickness(const SkinMesh& mesh, const Reach& reach,
   std::vector<double> weight(vertices);
   for (int64_t v = 0; v < vertices; ++v) {
     given(v, 0) = reach.holds[v] ? reach.to_bone[v] : std::min(free_thickness, reach.room[v]);
-    weight[v] = reach.holds[v] ? kHeldWeight : 1.0;
+    weight[v] = reach.holds[v] ? held_weight : 1.0;
   }
   const std::vector<double> length(vertices, free_thickness);
   const Eigen::MatrixXd blended = smooth_field(mesh, given, weight, length);
