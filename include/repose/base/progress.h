@@ -7,8 +7,8 @@
 namespace repose::base {
 
 /// One line on a terminal that is written over as work goes on, with the time it will still take;
-/// nothing at all where neither stderr nor that of mpirun is a terminal, and on ranks other than the
-/// first.
+/// nothing at all where neither stderr nor that of mpirun is a terminal, and on ranks other than
+/// the first.
 class Progress {
  public:
   explicit Progress(MPI_Comm comm);
