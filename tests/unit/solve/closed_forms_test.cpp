@@ -1,47 +1,24 @@
 #include <gtest/gtest.h>
 
 #include "models.h"
-#include "repose/base/agreement.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/scene/rigid_motion.h"
-#include "repose/solve/repose.h"
+#include "rest.h"
 
 namespace repose {
 namespace {
 
 using model::PointSet;
+using testing::Rest;
 
 constexpr double g = 9.80665;
-
-struct Rest {
-  std::vector<Vec3> position;  // all rows, on every rank
-  solve::Summary summary;
-};
-
-std::vector<Vec3> gather(const std::vector<Vec3>& slab) {
-  const int ranks = base::size(MPI_COMM_WORLD);
-  const int mine = static_cast<int>(3 * slab.size());
-  std::vector<int> counts(ranks), starts(ranks, 0);
-  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, MPI_COMM_WORLD);
-  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<Vec3> all((starts.back() + counts.back()) / 3);
-  MPI_Allgatherv(slab.data(), mine, MPI_DOUBLE, all.data(), counts.data(), starts.data(),
-                 MPI_DOUBLE, MPI_COMM_WORLD);
-  return all;
-}
 
 Rest find_rest(const model::Model& m, double accuracy,
                mechanics::Weights weights = {1, mechanics::VolumeTerm::none, 0}) {
   solve::Settings settings;
   settings.weights = weights;
   settings.path.accuracy = accuracy;
-  base::Stages stages(MPI_COMM_WORLD);
-  Rest rest;
-  rest.summary = solve::find_repose(MPI_COMM_WORLD, m, settings, {}, stages,
-                                    [&](const model::StepNumbers&, const model::StepRows& rows) {
-                                      rest.position = gather(rows.position);
-                                    });
-  return rest;
+  return testing::find_rest(m, settings);
 }
 
 /// The elongation at which a spring of exponent p carries `tension`, by bisection.
@@ -69,9 +46,9 @@ TEST_P(Laws, HangingSpring) {
   const Rest rest = find_rest(m, 1e-10);
   EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
   const double s = elongation(GetParam(), 0.7, 0.25 * g);
-  EXPECT_NEAR(rest.position[bob].x(), 1, 1e-9);
-  EXPECT_NEAR(rest.position[bob].y(), 2, 1e-9);
-  EXPECT_NEAR(rest.position[bob].z(), -7 - s, 1e-9);
+  EXPECT_NEAR(rest.rows.position[bob].x(), 1, 1e-9);
+  EXPECT_NEAR(rest.rows.position[bob].y(), 2, 1e-9);
+  EXPECT_NEAR(rest.rows.position[bob].z(), -7 - s, 1e-9);
 }
 
 TEST_P(Laws, HangingChain) {
@@ -92,7 +69,7 @@ TEST_P(Laws, HangingChain) {
     double below = 0;
     for (int j = i; j <= links; ++j) below += 0.01 * j * g;
     z -= 4.0 + elongation(GetParam(), 1.5, below);
-    EXPECT_NEAR(rest.position[i].z(), z, 1e-9) << "point " << i;
+    EXPECT_NEAR(rest.rows.position[i].z(), z, 1e-9) << "point " << i;
   }
 }
 
@@ -109,8 +86,8 @@ TEST_P(Laws, PushedPatchIsAffine) {
   testing::aim(m, push);
   const Rest rest = find_rest(m, 1e-10, {1, mechanics::VolumeTerm::penalty, 0.3});
   EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
-  for (size_t i = 0; i < rest.position.size(); ++i)
-    EXPECT_LT((rest.position[i] - push(m.points.position[i])).norm(), 1e-9) << "point " << i;
+  for (size_t i = 0; i < rest.rows.position.size(); ++i)
+    EXPECT_LT((rest.rows.position[i] - push(m.points.position[i])).norm(), 1e-9) << "point " << i;
 }
 
 TEST_P(Laws, RigidMotionCarriesTissueRigidly) {
@@ -123,8 +100,8 @@ TEST_P(Laws, RigidMotionCarriesTissueRigidly) {
   testing::aim(m, move);
   const Rest rest = find_rest(m, 1e-10, {1, mechanics::VolumeTerm::penalty, 0.3});
   EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
-  for (size_t i = 0; i < rest.position.size(); ++i)
-    EXPECT_LT((rest.position[i] - move(m.points.position[i])).norm(), 1e-9) << "point " << i;
+  for (size_t i = 0; i < rest.rows.position.size(); ++i)
+    EXPECT_LT((rest.rows.position[i] - move(m.points.position[i])).norm(), 1e-9) << "point " << i;
   EXPECT_LT(rest.summary.last.objective, 1e-18);
 }
 

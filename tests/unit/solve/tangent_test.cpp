@@ -2,39 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
-#include "models.h"
+#include "moved_block.h"
 #include "repose/base/agreement.h"
 
 namespace repose {
 namespace {
 
 using base::check;
-using model::PointSet;
 
-/// A block on any number of ranks, its unknowns moved from the initial position at random but the
-/// same for every distribution: each displacement depends on the row of the point in the model.
-struct Moved {
-  model::Model whole = testing::block(9, 8, 4, 2, [](int i, int j, int a) {
-    return i == 0 || j == 7 || a == 3 ? PointSet::bone : PointSet::soft_tissue;
-  });
-  solve::Part part = solve::distribute(MPI_COMM_WORLD, whole);
-  solve::Positions positions{MPI_COMM_WORLD, part};
+struct Moved : testing::MovedBlock {
   solve::Objective objective;
-
   explicit Moved(mechanics::VolumeTerm term) : objective(positions, {0.7, term, 0.4}) {}
-
-  base::VecHandle vector(unsigned seed, double size) {
-    base::VecHandle v = positions.make_vector();
-    std::vector<Vec3> values(part.point_row.size());
-    for (size_t i = 0; i < values.size(); ++i) {
-      std::mt19937 random(seed + 1000003u * static_cast<unsigned>(part.point_row[i]));
-      for (double& x : values[i]) x = size * (random() / 2147483648.0 - 1.0);
-    }
-    positions.keep_owned(values, v);
-    return v;
-  }
 };
 
 class Terms : public ::testing::TestWithParam<mechanics::VolumeTerm> {};
@@ -82,13 +60,8 @@ TEST_P(Terms, ValueAndGradientDoNotDependOnTheRanks) {
   if (base::rank(MPI_COMM_WORLD) == 0) {
     solve::Positions positions(MPI_COMM_SELF, serial_part);
     solve::Objective objective(positions, m.objective.weights());
-    std::vector<Vec3> values(serial_part.point_row.size());
-    for (size_t i = 0; i < values.size(); ++i) {
-      std::mt19937 random(1 + 1000003u * static_cast<unsigned>(serial_part.point_row[i]));
-      for (double& x : values[i]) x = 0.4 * (random() / 2147483648.0 - 1.0);
-    }
-    base::VecHandle same = positions.make_vector(), slope = positions.make_vector();
-    positions.keep_owned(values, same);
+    base::VecHandle same = testing::random_vector(positions, 1, 0.4);
+    base::VecHandle slope = positions.make_vector();
     expected[0] = objective.evaluate(same, slope);
     check(VecNorm(slope, NORM_2, &expected[1]));
   }
