@@ -21,15 +21,20 @@ std::vector<double> pressures(Objective& objective) {
   return pressure;
 }
 
-ExactVolume::ExactVolume(Objective& objective, Tangent& tangent, Minimiser& minimiser)
+ExactVolume::ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& solver,
+                         Minimiser& minimiser)
     : objective_(objective),
       tangent_(tangent),
+      solver_(solver),
       minimiser_(minimiser),
       first_weight_(objective.weights().volume_weight),
-      before_(objective.positions().make_vector()) {}
+      settled_weight_(first_weight_),
+      settled_target_(objective.prisms().target_volume),
+      before_(objective.positions().make_vector()),
+      gradient_(objective.positions().make_vector()),
+      correction_(objective.positions().make_vector()) {}
 
-void ExactVolume::update_multipliers(double weight) {
-  const std::vector<double> pressure = pressures(objective_);
+void ExactVolume::set_multipliers(const std::vector<double>& pressure, double weight) {
   mechanics::PrismLoop& prisms = objective_.prisms();
   for (int64_t e = 0; e < prisms.size(); ++e)
     prisms.target_volume[e] = prisms.rest_volume[e] * (1 + pressure[e] / weight);
@@ -37,17 +42,40 @@ void ExactVolume::update_multipliers(double weight) {
   tangent_.forget();
 }
 
-Outcome ExactVolume::run(Vec displacement, double accuracy) {
+/// Newton's method at fixed multipliers, as far as it lessens the largest force.
+void ExactVolume::balance(Vec displacement, Outcome& outcome) {
+  constexpr int most = 5;
+  constexpr double close = 1e-10;  // of the right-hand side, for the linear systems
+  outcome.objective = objective_.evaluate(displacement, gradient_);
+  outcome.gradient_max = largest_block(gradient_);
+  for (int i = 0; i < most && outcome.gradient_max > 0; ++i) {
+    check(VecCopy(displacement, before_));
+    if (!solver_.solve(displacement, gradient_, correction_, close)) break;
+    check(VecAXPY(displacement, -1, correction_));
+    const double objective = objective_.evaluate(displacement, gradient_);
+    const double largest = largest_block(gradient_);
+    if (largest > 0.5 * outcome.gradient_max) {
+      check(VecCopy(before_, displacement));
+      objective_.positions().update(displacement);
+      break;
+    }
+    ++outcome.iterations;
+    outcome.objective = objective;
+    outcome.gradient_max = largest;
+  }
+}
+
+Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
   constexpr int most_rounds = 40;
   constexpr double slow = 0.2, growth = 10, stiffest = 1e6;  // of the error, of κ, of the first κ
-  constexpr double finest = 1e-9;                            // mm
-  const double allowed = objective_.positions().load() < 1 ? on_the_way : tolerance;
+  // mm, of each minimisation: a state out of balance makes multipliers that are no pressures.
+  constexpr double coarsest = 1e-4, finest = 1e-9;
   double error = 0, before = std::numeric_limits<double>::infinity();
   Outcome outcome;
   int64_t iterations = 0;
   for (int round = 0; round < most_rounds; ++round) {
     check(VecCopy(displacement, before_));
-    const double wanted = round == 0 ? accuracy : std::max(finest, 0.01 * std::min(error, 1.0));
+    const double wanted = round == 0 ? coarsest : std::clamp(0.01 * error, finest, coarsest);
     outcome = minimiser_.run(displacement, std::min(accuracy, wanted));
     iterations += outcome.iterations;
     objective_.positions().update(displacement);
@@ -63,10 +91,24 @@ Outcome ExactVolume::run(Vec displacement, double accuracy) {
         "the volume cannot be kept where the bones have moved: a prism's error stays at {:.3g}",
         error);
     if (weight > stiffest * first_weight_) break;
-    update_multipliers(weight);
+    set_multipliers(pressures(objective_), weight);
     before = error;
   }
   outcome.iterations = iterations;
+  return outcome;
+}
+
+Outcome ExactVolume::run(Vec displacement, double accuracy) {
+  // What a search that failed made of the multipliers is no start for the next one.
+  objective_.prisms().target_volume = settled_target_;
+  objective_.set_volume_weight(settled_weight_);
+  tangent_.forget();
+  const double allowed = objective_.positions().load() < 1 ? on_the_way : tolerance;
+  Outcome outcome = search(displacement, accuracy, allowed);
+  if (!outcome.converged) return outcome;
+  balance(displacement, outcome);
+  settled_target_ = objective_.prisms().target_volume;
+  settled_weight_ = objective_.weights().volume_weight;
   return outcome;
 }
 

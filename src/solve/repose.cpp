@@ -82,7 +82,7 @@ class Searcher {
       make_force_search(positions, settings);
     else
       minimiser_.emplace(objective_, solver_, std::ref(watcher_));
-    if (settings.exact_volume) exact_volume_.emplace(objective_, tangent_, *minimiser_);
+    if (settings.exact_volume) exact_volume_.emplace(objective_, tangent_, solver_, *minimiser_);
   }
 
   RestSearch& search() {

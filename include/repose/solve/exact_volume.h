@@ -7,23 +7,31 @@ namespace repose::solve {
 /// Finds the rest position under v = v_0 for every prism: an augmented Lagrangian (Hestenes 1969;
 /// Powell 1969), each minimisation with the penalty volume term, whose target volumes
 /// t = v_0 (1 + q/κ) carry the multipliers (pressures) q. κ grows where the error does not shrink.
+/// A large κ makes pressures of the least displacement, so that Newton's method ends the search by
+/// balance: what is near enough in mm need not be so in N/mm².
 class ExactVolume : public RestSearch {
  public:
   static constexpr double tolerance = 1e-6;   ///< of |v/v_0 − 1|, every prism with a soft point
   static constexpr double on_the_way = 1e-3;  ///< the same at loads below 1
 
-  /// `objective` has the penalty volume term, `tangent` is its Hessian, `minimiser` minimises it.
-  ExactVolume(Objective& objective, Tangent& tangent, Minimiser& minimiser);
+  /// `objective` has the penalty volume term, `tangent` is its Hessian, of which `solver` solves
+  /// linear systems, `minimiser` minimises it.
+  ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& solver, Minimiser& minimiser);
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
-  void update_multipliers(double weight);
+  Outcome search(Vec displacement, double accuracy, double allowed);
+  void set_multipliers(const std::vector<double>& pressure, double weight);
+  void balance(Vec displacement, Outcome& outcome);
 
   Objective& objective_;
   Tangent& tangent_;
+  TangentSolver& solver_;
   Minimiser& minimiser_;
-  double first_weight_;  // κ at the start, N/mm²
-  base::VecHandle before_;
+  double first_weight_;                 // κ at the start, N/mm²
+  double settled_weight_;               // κ of the last search that succeeded
+  std::vector<double> settled_target_;  // its t, [prisms of the loop] mm³
+  base::VecHandle before_, gradient_, correction_;
 };
 
 /// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
