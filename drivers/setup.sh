@@ -2,7 +2,7 @@
 
 build_packages=(
   g++ cmake ninja-build ccache pkg-config
-  openmpi-bin libopenmpi-dev libpetsc-real-dev libhdf5-openmpi-dev
+  openmpi-bin libopenmpi-dev libpetsc-real-dev libslepc-real-dev libhdf5-openmpi-dev
   libopenblas0-serial # a fast BLAS, serial because MPI ranks already use the cores
   libeigen3-dev libcgal-dev libyaml-cpp-dev libfmt-dev
 )

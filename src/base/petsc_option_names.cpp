@@ -7,10 +7,12 @@ namespace repose::base {
 
 namespace {
 
-// First words of the options in libpetsc 3.18 and 3.22, and the prefixes of nested solvers.
+// First words of the options in libpetsc 3.18 and 3.22, and the prefixes of nested solvers;
+// SLEPc's too.
 constexpr std::array prefixes{"adaptor_",
                               "ao_",
                               "blas_",
+                              "bv_",
                               "coarse_",
                               "convest_",
                               "da_",
@@ -25,6 +27,8 @@ constexpr std::array prefixes{"adaptor_",
                               "dmts_",
                               "draw_",
                               "drawaxis_",
+                              "ds_",
+                              "eps_",
                               "error_output_",
                               "esteig_",
                               "fas_",
@@ -67,9 +71,11 @@ constexpr std::array prefixes{"adaptor_",
                               "redundant_",
                               "saws_",
                               "sf_",
+                              "slepc_",
                               "snes_",
                               "splitreduction_",
                               "ssls_",
+                              "st_",
                               "sub_",
                               "tao_",
                               "telescope_",

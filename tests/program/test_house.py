@@ -23,6 +23,7 @@ LIBRARIES = {
     "CGAL/": ["src/surface"],
     "vtk": ["src/surface"],
     "yaml-cpp": ["src/scene"],
+    "slepc": ["src/solve"],
     "petsctao": ["src/solve", "include/repose/solve"],
     "hdf5": ["src/base", "src/results", "include/repose/base", "include/repose/results"],
     "petsc": PETSC_ROOMS,

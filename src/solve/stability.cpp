@@ -1,0 +1,130 @@
+#include "repose/solve/stability.h"
+
+#include <slepceps.h>
+
+#include <cmath>
+
+#include "repose/base/error.h"
+
+namespace repose::solve {
+
+using base::check;
+
+namespace {
+
+using EpsHandle = base::Handle<EPS, EPSDestroy>;
+
+/// SLEPc, started at first use and ended with PETSc.
+void start_slepc() {
+  PetscBool started = PETSC_FALSE;
+  check(SlepcInitialized(&started));
+  if (started) return;
+  check(SlepcInitializeNoArguments());
+  check(PetscRegisterFinalize(SlepcFinalize));
+}
+
+double largest_diagonal(Mat matrix) {
+  base::VecHandle diagonal;
+  check(MatCreateVecs(matrix, diagonal.out(), nullptr));
+  check(MatGetDiagonal(matrix, diagonal));
+  PetscReal largest = 0;
+  check(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return largest;
+}
+
+void choose_factors(KSP krylov) {
+  PC pc = nullptr;
+  check(KSPSetType(krylov, KSPPREONLY));
+  check(KSPGetPC(krylov, &pc));
+  check(PCSetType(pc, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+/// How many eigenvalues are below `shift`: as many as the pivots of H − shift that are negative.
+PetscInt eigenvalues_below(Mat matrix, double shift) {
+  constexpr int parallel_root = 13;  // ICNTL: without ScaLAPACK, which does not know the inertia
+  base::MatHandle shifted;
+  check(MatDuplicate(matrix, MAT_COPY_VALUES, shifted.out()));
+  check(MatShift(shifted, -shift));
+  KspHandle krylov;
+  check(KSPCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), krylov.out()));
+  check(KSPSetOperators(krylov, shifted, shifted));
+  choose_factors(krylov);
+  PC pc = nullptr;
+  Mat factors = nullptr;
+  check(KSPGetPC(krylov, &pc));
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factors));
+  check(MatMumpsSetIcntl(factors, parallel_root, 1));
+  check(KSPSetUp(krylov));
+  PetscInt below = 0;
+  check(MatGetInertia(factors, &below, nullptr, nullptr));
+  return below;
+}
+
+/// A shift below every eigenvalue, near the smallest one.
+double shift_below_all(Mat matrix) {
+  constexpr double first = 1e-6, last = 1e3, growth = 10;  // of the largest diagonal entry
+  const double stiffest = largest_diagonal(matrix);
+  double part = first;
+  while (part < last && eigenvalues_below(matrix, -part * stiffest) > 0) part *= growth;
+  return -part * stiffest;
+}
+
+/// Makes the eigenvalue nearest to the target the smallest one.
+void choose_shift_and_invert(EPS eps, Mat matrix) {
+  ST st = nullptr;
+  KSP krylov = nullptr;
+  check(EPSSetType(eps, EPSKRYLOVSCHUR));
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  check(EPSSetTarget(eps, shift_below_all(matrix)));
+  check(EPSGetST(eps, &st));
+  check(STSetType(st, STSINVERT));
+  check(STGetKSP(st, &krylov));
+  choose_factors(krylov);
+  check(EPSSetFromOptions(eps));
+}
+
+void choose_preconditioned(EPS eps, TangentSolver& solver) {
+  ST st = nullptr;
+  KSP krylov = nullptr;
+  check(EPSSetType(eps, EPSLOBPCG));
+  check(EPSSetWhichEigenpairs(eps, EPS_SMALLEST_REAL));
+  check(EPSGetST(eps, &st));
+  check(STSetType(st, STPRECOND));
+  check(STSetPreconditionerMat(st, solver.hessian().convex()));
+  check(STGetKSP(st, &krylov));
+  check(KSPSetType(krylov, KSPPREONLY));
+  check(KSPSetPC(krylov, solver.preconditioner()));
+  check(EPSSetFromOptions(eps));
+}
+
+}  // namespace
+
+double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t direct_limit) {
+  constexpr double tolerance = 1e-8;  // of the eigenvalue
+  constexpr int most = 2000;          // iterations
+  start_slepc();
+  solver.hessian().assemble(displacement);
+  const Mat exact = solver.hessian().exact();
+  PetscInt unknowns = 0;
+  check(MatGetSize(exact, &unknowns, nullptr));
+  EpsHandle eps;
+  check(EPSCreate(PetscObjectComm(reinterpret_cast<PetscObject>(exact)), eps.out()));
+  check(EPSSetOperators(eps, exact, nullptr));
+  check(EPSSetProblemType(eps, EPS_HEP));
+  check(EPSSetTolerances(eps, tolerance, most));
+  if (unknowns <= direct_limit)
+    choose_shift_and_invert(eps, exact);
+  else
+    choose_preconditioned(eps, solver);
+  check(EPSSolve(eps));
+  PetscInt converged = 0;
+  check(EPSGetConverged(eps, &converged));
+  if (converged == 0) return std::nan("");
+  PetscScalar value = 0;
+  check(EPSGetEigenvalue(eps, 0, &value, nullptr));
+  return value;
+}
+
+}  // namespace repose::solve

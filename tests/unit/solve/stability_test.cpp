@@ -1,0 +1,122 @@
+#include "repose/solve/stability.h"
+
+#include <gtest/gtest.h>
+
+#include "moved_block.h"
+#include "repose/base/agreement.h"
+#include "repose/solve/tangent.h"
+
+namespace repose {
+namespace {
+
+using base::check;
+using model::PointSet;
+
+constexpr int64_t always_direct = 1000000, never_direct = 0;
+
+/// The Hessian of a model's energy on the ranks of `comm`.
+struct Energy {
+  solve::Part part;
+  solve::Positions positions;
+  solve::Objective objective;
+  solve::Tangent tangent;
+  solve::TangentSolver solver;
+
+  Energy(MPI_Comm comm, const model::Model& model, const mechanics::Weights& weights = {})
+      : part(solve::distribute(comm, model)),
+        positions(comm, part),
+        objective(positions, weights),
+        tangent(objective),
+        solver(positions, tangent) {}
+
+  double smallest(Vec displacement, int64_t direct_limit) {
+    return solve::smallest_eigenvalue(solver, displacement, direct_limit);
+  }
+  double smallest_at_start(int64_t direct_limit) {
+    const base::VecHandle start = positions.make_vector();
+    return smallest(start, direct_limit);
+  }
+};
+
+class Solver : public ::testing::TestWithParam<int64_t> {};
+
+/// A chain of equal springs between two bones, stretched to the tension T: the Hessian is k along
+/// it and T/r across it times the second difference, whose eigenvalues are 2 − 2 cos(j π / (n+1)).
+model::Model chain(int links, double length, double stretch, double k) {
+  model::Model m;
+  m.bones = {"bone"};
+  for (int i = 0; i <= links; ++i) {
+    const bool end = i == 0 || i == links;
+    testing::add_point(m, {0, 0, -length * i}, end ? PointSet::bone : PointSet::soft_tissue, i);
+    if (i > 0) testing::add_spring(m, i - 1, i, k, 0);
+  }
+  for (double& rest : m.springs.rest_length) rest = length - stretch;
+  return m;
+}
+
+TEST_P(Solver, StretchedChainHasTheEigenvaluesOfAString) {
+  constexpr int links = 24;
+  constexpr double length = 4, stretch = 0.5, k = 1.5;
+  Energy energy(MPI_COMM_WORLD, chain(links, length, stretch, k));
+  const double across = k * stretch / length;
+  const double expected = across * (2 - 2 * std::cos(M_PI / links));
+  EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * expected);
+}
+
+TEST_P(Solver, CompressedChainBucklesByItsStiffestWave) {
+  constexpr int links = 24;
+  constexpr double length = 4, stretch = -0.5, k = 1.5;
+  Energy energy(MPI_COMM_WORLD, chain(links, length, stretch, k));
+  const double across = k * stretch / length;
+  const double expected = across * (2 + 2 * std::cos(M_PI / links));
+  EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * std::abs(expected));
+}
+
+/// A weight on a spring, at rest below its support or on top of it: m g / r across, of either sign.
+class Pendulum : public ::testing::TestWithParam<std::tuple<bool, int64_t>> {};
+
+TEST_P(Pendulum, StandsOnlyWhereItHangs) {
+  const auto [hangs, direct_limit] = GetParam();
+  constexpr double k = 0.7, mass = 0.02, g = 9.80665, length = 10;
+  model::Model m;
+  m.bones = {"bone"};
+  m.gravity = {0, 0, -g};
+  const auto support = testing::add_point(m, {1, 2, 3}, PointSet::bone, 0);
+  const double z = hangs ? 3 - length : 3 + length;
+  const auto bob = testing::add_point(m, {1, 2, z}, PointSet::soft_tissue, 0, 1);
+  testing::add_spring(m, support, bob, k, 0);
+  m.points.mass[bob] = mass;
+  m.springs.rest_length[0] = hangs ? length - mass * g / k : length + mass * g / k;
+  Energy energy(MPI_COMM_WORLD, m);
+  const double expected = (hangs ? 1 : -1) * mass * g / length;
+  EXPECT_NEAR(energy.smallest_at_start(direct_limit), expected, 1e-7 * std::abs(expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(HangsAndStands, Pendulum,
+                         ::testing::Combine(::testing::Bool(), ::testing::Values(always_direct)));
+
+/// A block out of equilibrium, where the Hessian is indefinite, has the same on any ranks.
+TEST_P(Solver, DoesNotDependOnTheRanks) {
+  const model::Model block = testing::held_block();
+  const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty, 0.4};
+  for (const double size : {0.05, 0.8}) {
+    Energy energy(MPI_COMM_WORLD, block, weights);
+    const base::VecHandle moved = testing::random_vector(energy.positions, 1, size);
+    const double value = energy.smallest(moved, GetParam());
+    double expected = 0;
+    if (base::rank(MPI_COMM_WORLD) == 0) {
+      Energy serial(MPI_COMM_SELF, block, weights);
+      const base::VecHandle same = testing::random_vector(serial.positions, 1, size);
+      expected = serial.smallest(same, always_direct);
+    }
+    MPI_Bcast(&expected, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    EXPECT_EQ(expected<0, size> 0.5) << expected;
+    EXPECT_NEAR(value, expected, 1e-6 * std::abs(expected));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(DirectAndPreconditioned, Solver,
+                         ::testing::Values(always_direct, never_direct));
+
+}  // namespace
+}  // namespace repose
