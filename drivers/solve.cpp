@@ -63,6 +63,8 @@ std::vector<base::Option> option_table() {
        {1, 100000},
        "",
        {"auto"}},
+      {"stability", OptionKind::flag, "",
+       "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
       {"dry_run", OptionKind::flag, "", "Build and report the model only."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
@@ -78,8 +80,9 @@ std::vector<base::Option> option_table() {
 /// The model on rank 0, with what the scene asks of the solver.
 struct Job {
   model::Model model;
-  scene::Solve wanted;   // on all ranks
-  std::string building;  // what the builder has to say, on rank 0
+  scene::Solve wanted;               // on all ranks
+  bool initial_equilibrium = false;  // on all ranks
+  std::string building;              // what the builder has to say, on rank 0
 };
 
 Job read_job(const std::filesystem::path& input) {
@@ -95,11 +98,13 @@ Job read_job(const std::filesystem::path& input) {
     job.building = solve::describe_build(built.report);
     if (scene.tissue.turgor > 0 || scene.gravity)
       job.building += solve::describe_prestress(solve::prestress(job.model, scene.tissue.turgor));
+    job.initial_equilibrium = scene.tissue.turgor > 0 || scene.gravity.has_value();
     job.wanted = scene.solve;
   });
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
     job.wanted.bulk_modulus = 10 * model::effective_modulus(job.model);
   double bulk_modulus = job.wanted.bulk_modulus.value_or(0);
+  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&bulk_modulus, 1, MPI_DOUBLE, 0, comm);
   job.wanted.bulk_modulus.reset();
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
@@ -197,6 +202,8 @@ base::Exit run(const base::Options& options) {
   Job job = read_job(input);
   override_by(options, job.wanted);
   solve::Settings settings = settings_of(job.wanted);
+  settings.stability = options.flag("stability");
+  settings.initial_equilibrium = job.initial_equilibrium;
   stages.end("build");
   if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));
   if (options.flag("dry_run")) {

@@ -128,6 +128,7 @@ struct ReadAttribute {
   const Reader& in;
   const std::string& group;
   void operator()(const char* name, double& value) const {
+    if (model::is_optional(name) && !in.has_attribute(group, name)) return;
     const bool maybe_infinite = std::string_view(name) == "displacement_error";  // at no minimum
     value = maybe_infinite ? in.number_or_infinity(group, name) : in.number(group, name);
   }

@@ -1,5 +1,6 @@
 #include "repose/results/result_file.h"
 
+#include <cmath>
 #include <optional>
 
 #include "repose/base/agreement.h"
@@ -70,6 +71,9 @@ struct WriteAttribute {
   hid_t group;
   void operator()(const char* name, bool value) const {
     write_attribute(group, name, static_cast<int64_t>(value));
+  }
+  void operator()(const char* name, double value) const {
+    if (!std::isnan(value) || !model::is_optional(name)) write_attribute(group, name, value);
   }
   template <class Value>
   void operator()(const char* name, const Value& value) const {

@@ -191,6 +191,7 @@ void Recomputation::prism(int64_t j) {
     curvature = kappa / v0;
   } else if (!pressure_.empty()) {
     slope = -pressure_[j];
+    curvature = kappa / v0;  // the pressure itself is κ (t − v)/v_0
   }
   const std::array<Vec3, 6> toward = volume_gradient(corners, extent);
   for (int c = 0; c < 6; ++c) {

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace repose::solve {
 
 namespace {
@@ -15,6 +17,12 @@ std::string work_rows(const Summary& s) {
          row("iterations", fmt::format("{}", s.path.iterations)) +
          row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
                                         s.evaluations, s.assemblies));
+}
+
+std::string stability(double eigenvalue) {
+  if (std::isnan(eigenvalue)) return "stability not known: the eigenvalue solver did not converge";
+  return fmt::format("{}: smallest eigenvalue {:.4g} N/mm",
+                     eigenvalue > 0 ? "stable" : "NOT STABLE", eigenvalue);
 }
 
 std::string verdict(const Summary& s) {
@@ -68,6 +76,8 @@ std::string describe_run(const Summary& s, const Settings& settings, int ranks,
                                       s.last.displacement_error, settings.path.accuracy));
   text += row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
                                                   : "NOT A MINIMUM: negative curvature");
+  if (s.initial_eigenvalue) text += row("at the start", stability(*s.initial_eigenvalue));
+  if (s.final_eigenvalue) text += row("where it ended", stability(*s.final_eigenvalue));
   text +=
       row("objective", fmt::format("{:.12g} {}", s.last.objective, settings.force ? "N" : "N mm"));
   text += row("inverted prisms", fmt::format("{}{}", s.last.inverted_prisms,

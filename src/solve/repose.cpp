@@ -10,6 +10,7 @@
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/natural_rows.h"
+#include "repose/solve/stability.h"
 
 namespace repose::solve {
 
@@ -91,6 +92,7 @@ class Searcher {
     return *minimiser_;
   }
   Objective& objective() { return objective_; }
+  TangentSolver& solver() { return solver_; }
   Predictor& predictor() { return predictor_; }
   double epsilon() const { return force_ ? force_->epsilon() : 0; }
   int64_t evaluations() const { return force_ ? force_->evaluations() : objective_.evaluations(); }
@@ -173,6 +175,15 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   summary.path = path.run(displacement, [&](const Outcome& outcome, double load, double seconds) {
     summary.last = numbers_of(objective, settings, outcome, load);
     summary.last.epsilon = searcher.epsilon();
+    summary.last.smallest_eigenvalue = std::nan("");
+    const bool start = load == 0 && settings.initial_equilibrium;
+    const bool end = load == 1 || !outcome.converged;
+    if (settings.stability && (start || end)) {
+      const double value = smallest_eigenvalue(searcher.solver(), displacement);
+      if (start) summary.initial_eigenvalue = value;
+      if (end) summary.final_eigenvalue = value;
+      summary.last.smallest_eigenvalue = value;
+    }
     summary.last.seconds = seconds;
     summary.last.evaluations = searcher.evaluations() - evaluations_before;
     evaluations_before = searcher.evaluations();

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "repose/base/geometry.h"
@@ -24,7 +26,12 @@ struct StepNumbers {
   double seconds = 0;
   std::string reason;
   bool converged = false;
+  /// Of the exact Hessian over the unknowns, N/mm; NaN, and no attribute, where not asked for.
+  double smallest_eigenvalue = std::numeric_limits<double>::quiet_NaN();
 };
+
+/// The number of a step that a file may do without; it is NaN then.
+inline bool is_optional(std::string_view name) { return name == "smallest_eigenvalue"; }
 
 /// Calls visit(name, member) for every number of a step, in the order of the file.
 template <class Numbers, class Visit>
@@ -50,6 +57,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("seconds", numbers.seconds);
   visit("reason", numbers.reason);
   visit("converged", numbers.converged);
+  visit("smallest_eigenvalue", numbers.smallest_eigenvalue);
 }
 
 /// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.

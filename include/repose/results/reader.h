@@ -53,6 +53,7 @@ class Reader {
     return result;
   }
 
+  bool has_attribute(const std::string& object, const char* attribute) const;
   double number(const std::string& object, const char* attribute) const;
   /// Anything but NaN.
   double number_or_infinity(const std::string& object, const char* attribute) const;

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "repose/base/stages.h"
@@ -10,11 +11,13 @@ namespace repose::solve {
 
 /// What is asked of a run.
 struct Settings {
-  mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
-  bool force = false;           ///< minimises the force functional, not the energy
-  bool exact_volume = false;    ///< v = v_0, by multipliers
-  std::string volume = "none";  ///< name of the volume term, for the result
-  double lambda = 1;            ///< paper's weight, for the result
+  mechanics::Weights weights;        ///< the objective; for exact volume the penalty it starts with
+  bool force = false;                ///< minimises the force functional, not the energy
+  bool exact_volume = false;         ///< v = v_0, by multipliers
+  std::string volume = "none";       ///< name of the volume term, for the result
+  double lambda = 1;                 ///< paper's weight, for the result
+  bool stability = false;            ///< the smallest eigenvalue where the run ends, …
+  bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
   PathSettings path;
 };
 
@@ -25,9 +28,11 @@ using Receiver = std::function<void(const model::StepNumbers&, const model::Step
 struct Summary {
   PathOutcome path;
   model::StepNumbers last;
-  int64_t unknowns = 0;     ///< scalar
-  int64_t evaluations = 0;  ///< of objective and gradient
-  int64_t assemblies = 0;   ///< of the Hessian
+  int64_t unknowns = 0;                      ///< scalar
+  int64_t evaluations = 0;                   ///< of objective and gradient
+  int64_t assemblies = 0;                    ///< of the Hessian
+  std::optional<double> initial_eigenvalue;  ///< N/mm, at the start, where asked for
+  std::optional<double> final_eigenvalue;    ///< N/mm, where the run ended; NaN: not found
 };
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
