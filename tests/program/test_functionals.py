@@ -206,5 +206,5 @@ def smallest_eigenvalue(tissue, step):
         return ((there - back) / (2 * h))[soft].ravel()
 
     size = 3 * soft.sum()
-    return eigsh(LinearOperator((size, size), product), k=1, which="SA", tol=1e-7,
+    return eigsh(LinearOperator((size, size), product, dtype=float), k=1, which="SA", tol=1e-7,
                  return_eigenvectors=False)[0]
