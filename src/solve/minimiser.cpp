@@ -158,6 +158,7 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     error_ = 0;
     return true;
   }
+  if (accuracy_ == 0) return false;
   // A look costs the solution of a linear system, so it is taken only where the force that went
   // with a distance at the last look says that it is worth it; a Newton method's steps go further.
   const double hopeful = newton_ ? 20 : 2;

@@ -10,7 +10,7 @@
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/natural_rows.h"
-#include "repose/solve/stability.h"
+#include "repose/solve/problem.h"
 
 namespace repose::solve {
 
@@ -69,58 +69,39 @@ class Watcher {
   base::Progress progress_;
 };
 
-/// What finds the rest position of a model under the settings: the function, its derivatives, the
-/// linear solver, the search. One object so that they live and end together.
+/// What finds the rest position of a model under the settings. One object so that its parts live
+/// and end together.
 class Searcher {
  public:
   Searcher(Positions& positions, const Settings& settings)
-      : objective_(positions, settings.force ? mechanics::Weights{} : settings.weights),
-        tangent_(objective_),
-        solver_(positions, tangent_),
-        predictor_(objective_, solver_),
-        watcher_(positions.comm()) {
-    if (settings.force)
-      make_force_search(positions, settings);
-    else
-      minimiser_.emplace(objective_, solver_, std::ref(watcher_));
-    if (settings.exact_volume) exact_volume_.emplace(objective_, tangent_, solver_, *minimiser_);
+      : problem_(positions, settings.weights, settings.force),
+        predictor_(problem_.objective(), problem_.elastic_solver()),
+        watcher_(positions.comm()),
+        minimiser_(problem_.function(), problem_.solver(), problem_.certificate(),
+                   std::ref(watcher_)) {
+    if (settings.force) force_search_.emplace(*problem_.force(), minimiser_);
+    if (settings.exact_volume)
+      exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
+                            minimiser_);
   }
 
   RestSearch& search() {
     if (force_search_) return *force_search_;
     if (exact_volume_) return *exact_volume_;
-    return *minimiser_;
+    return minimiser_;
   }
-  Objective& objective() { return objective_; }
-  TangentSolver& solver() { return solver_; }
+  Objective& objective() { return problem_.objective(); }
+  TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
   Predictor& predictor() { return predictor_; }
-  double epsilon() const { return force_ ? force_->epsilon() : 0; }
-  int64_t evaluations() const { return force_ ? force_->evaluations() : objective_.evaluations(); }
-  int64_t assemblies() const {
-    return tangent_.assemblies() + (gauss_newton_ ? gauss_newton_->assemblies() : 0);
-  }
+  double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
+  int64_t evaluations() { return problem_.function().evaluations(); }
+  int64_t assemblies() const { return problem_.assemblies(); }
 
  private:
-  void make_force_search(Positions& positions, const Settings& settings) {
-    force_.emplace(objective_, settings.weights);
-    gauss_newton_.emplace(*force_, tangent_);
-    force_solver_.emplace(positions, *gauss_newton_);
-    // Without volume term rest is F = 0, of which the energy's Newton step knows more.
-    const Certificate own{*force_, *force_solver_}, energy{objective_, solver_};
-    const bool balanced = settings.weights.volume == mechanics::VolumeTerm::none;
-    minimiser_.emplace(*force_, *force_solver_, balanced ? energy : own, std::ref(watcher_));
-    force_search_.emplace(*force_, *minimiser_);
-  }
-
-  Objective objective_;
-  Tangent tangent_;
-  TangentSolver solver_;
+  Problem problem_;
   Predictor predictor_;
   Watcher watcher_;
-  std::optional<ForceFunctional> force_;
-  std::optional<GaussNewton> gauss_newton_;
-  std::optional<TangentSolver> force_solver_;
-  std::optional<Minimiser> minimiser_;
+  Minimiser minimiser_;
   std::optional<ForceSearch> force_search_;
   std::optional<ExactVolume> exact_volume_;
 };
@@ -179,7 +160,7 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
     const bool start = load == 0 && settings.initial_equilibrium;
     const bool end = load == 1 || !outcome.converged;
     if (settings.stability && (start || end)) {
-      const double value = smallest_eigenvalue(searcher.solver(), displacement);
+      const double value = smallest_eigenvalue(searcher.elastic_solver(), displacement);
       if (start) summary.initial_eigenvalue = value;
       if (end) summary.final_eigenvalue = value;
       summary.last.smallest_eigenvalue = value;

@@ -2,16 +2,15 @@
 /// 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes; wants
 /// 6 GB of memory:
 ///     benchmark_scaling docs/scaling.md
-#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <functional>
 #include <thread>
 
 #include "repose/base/petsc.h"
+#include "repose/base/usage.h"
 #include "repose/base/whole_file.h"
 #include "repose/model/build.h"
 #include "repose/solve/tangent.h"
@@ -20,6 +19,7 @@
 namespace {
 
 using namespace repose;
+using base::cpu_seconds, base::heap_bytes;
 
 constexpr int layers = 4;
 constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
@@ -31,13 +31,6 @@ struct Cost {
   double build, evaluation, hessian;
   double model_bytes, solver_bytes;
 };
-
-double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-double heap_bytes() {
-  const auto use = mallinfo2();
-  return static_cast<double>(use.uordblks) + static_cast<double>(use.hblkhd);
-}
 
 /// Seconds of `work`, the least of several goes that together take about half a second.
 double seconds_of(const std::function<void()>& work) {

@@ -30,6 +30,7 @@ class Minimiser : public RestSearch {
   Minimiser(Function& function, TangentSolver& solver, const Certificate& certificate,
             const Watch& watch);
 
+  /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
   Outcome run(Vec displacement, double accuracy) override;
 
  private:

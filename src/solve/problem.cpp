@@ -1,0 +1,32 @@
+#include "repose/solve/problem.h"
+
+namespace repose::solve {
+
+Problem::Problem(Positions& positions, const mechanics::Weights& weights, bool force)
+    : objective_(positions, force ? mechanics::Weights{} : weights),
+      tangent_(objective_),
+      elastic_solver_(positions, tangent_) {
+  if (!force) return;
+  force_.emplace(objective_, weights);
+  gauss_newton_.emplace(*force_, tangent_);
+  force_solver_.emplace(positions, *gauss_newton_);
+}
+
+Function& Problem::function() {
+  if (force_) return *force_;
+  return objective_;
+}
+
+TangentSolver& Problem::solver() { return force_solver_ ? *force_solver_ : elastic_solver_; }
+
+Certificate Problem::certificate() {
+  // Without volume term rest is F = 0, of which the energy's Newton step knows more.
+  if (force_ && !force_->volume()) return {objective_, elastic_solver_};
+  return {function(), solver()};
+}
+
+int64_t Problem::assemblies() const {
+  return tangent_.assemblies() + (gauss_newton_ ? gauss_newton_->assemblies() : 0);
+}
+
+}  // namespace repose::solve
