@@ -15,6 +15,7 @@ ROOMS = {
     "mechanics": {"base", "model"},
     "solve": {"base", "model", "mechanics"},
     "results": {"base", "model"},
+    "paper": {"base", "scene", "surface", "model", "mechanics", "solve", "results"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

@@ -1,0 +1,201 @@
+#include "repose/paper/contest.h"
+
+#include <optional>
+
+#include "repose/solve/force_search.h"
+#include "repose/solve/load_path.h"
+#include "repose/solve/polak_ribiere.h"
+
+namespace repose::paper {
+
+using base::check;
+
+namespace {
+
+const MPI_Comm comm = PETSC_COMM_SELF;
+
+/// Sets a PETSc option for its life, where the person has not given it.
+class ScopedOption {
+ public:
+  ScopedOption(const char* name, const std::string& value) : name_(name) {
+    char text[128] = "";
+    PetscBool given = PETSC_FALSE;
+    check(PetscOptionsGetString(nullptr, nullptr, name, text, sizeof text, &given));
+    if (given) before_ = text;
+    check(PetscOptionsSetValue(nullptr, name, value.c_str()));
+  }
+  ~ScopedOption() {
+    if (before_.empty())
+      PetscOptionsClearValue(nullptr, name_);
+    else
+      PetscOptionsSetValue(nullptr, name_, before_.c_str());
+  }
+  ScopedOption(const ScopedOption&) = delete;
+  ScopedOption& operator=(const ScopedOption&) = delete;
+
+ private:
+  const char* name_;
+  std::string before_;
+};
+
+double dot(Vec x, Vec y) {
+  PetscScalar product = 0;
+  check(VecDot(x, y, &product));
+  return product;
+}
+
+/// Finds the rest position of a problem by a function that watches it.
+class WatchedSearch {
+ public:
+  WatchedSearch(solve::Problem& problem, solve::Function& watched)
+      : minimiser_(watched, problem.solver(), certificate(problem, watched), nullptr) {
+    if (problem.force()) force_search_.emplace(*problem.force(), minimiser_);
+  }
+  solve::RestSearch& search() {
+    if (force_search_) return *force_search_;
+    return minimiser_;
+  }
+
+ private:
+  static solve::Certificate certificate(solve::Problem& problem, solve::Function& watched) {
+    const solve::Certificate own = problem.certificate();
+    if (&own.function != &problem.function()) return own;
+    return {watched, own.solver};
+  }
+
+  solve::Minimiser minimiser_;
+  std::optional<solve::ForceSearch> force_search_;
+};
+
+}  // namespace
+
+Contest::Contest(const model::Model& model, const Functional& functional, const Rules& rules)
+    : part_(solve::distribute(comm, model)),
+      positions_(comm, part_),
+      problem_(positions_, settings_of(functional, rules.accuracy).weights, functional.force),
+      reference_(positions_.make_vector()),
+      rules_(rules) {}
+
+base::VecHandle Contest::copy_of_reference() const {
+  base::VecHandle copy = positions_.make_vector();
+  check(VecCopy(reference_, copy));
+  return copy;
+}
+
+double Contest::distance(Vec displacement) const {
+  const base::VecHandle difference = positions_.make_vector();
+  check(VecWAXPY(difference, -1, reference_, displacement));
+  return solve::largest_block(difference);
+}
+
+Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
+  Referee referee(problem_.function(), goal, rules);
+  Entry entry;
+  try {
+    search(referee, displacement);
+    entry.end = Entry::End::elsewhere;
+  } catch (const RaceOver& over) {
+    entry.end = over.reached ? Entry::End::reached : Entry::End::limit;
+  }
+  entry.seconds = referee.seconds();
+  entry.evaluations = referee.evaluations();
+  entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : referee.closest();
+  return entry;
+}
+
+Entry Contest::follow_path() {
+  positions_.set_load(0);
+  solve::Predictor predictor(problem_.objective(), problem_.elastic_solver());
+  bool complete = false;
+  const Search follow = [&](solve::Function& watched, Vec displacement) {
+    WatchedSearch search(problem_, watched);
+    solve::LoadPath path(problem_.objective(), predictor, search.search(),
+                         {.accuracy = rules_.accuracy});
+    complete = path.run(displacement, [](const solve::Outcome&, double, double) {}).complete();
+  };
+  Entry entry =
+      race_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.path_seconds}, follow, reference_);
+  entry.method = "default";
+  if (complete) entry.end = Entry::End::reached;
+  positions_.set_load(1);
+  return entry;
+}
+
+bool Contest::refine(double accuracy, Vec start) {
+  positions_.set_load(1);
+  if (start) check(VecCopy(start, reference_));
+  bool known = false;
+  const Search settle = [&](solve::Function& watched, Vec displacement) {
+    WatchedSearch search(problem_, watched);
+    known = search.search().run(displacement, accuracy).converged;
+  };
+  race_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.seconds}, settle, reference_);
+  if (problem_.force()) problem_.force()->set_epsilon(epsilon);
+  return known;
+}
+
+bool Contest::find_own_minimum(Vec displacement) {
+  constexpr double nearby = 1, far = 100;  // mm; beyond, a search has diverged
+  if (problem_.force() || !(distance(displacement) < far)) return false;
+  const base::VecHandle moved = positions_.make_vector();
+  check(VecCopy(displacement, moved));
+  const ScopedOption few("-tao_max_it", "50");
+  solve::Minimiser newton(problem_.function(), problem_.solver(), nullptr);
+  const solve::Outcome outcome = newton.run(displacement, 0.01 * rules_.accuracy);
+  check(VecAXPY(moved, -1, displacement));
+  return outcome.converged && solve::largest_block(moved) < nearby;
+}
+
+Entry Contest::race(const std::string& method, const Search& search) {
+  const base::VecHandle end = positions_.make_vector(), again = positions_.make_vector();
+  Entry entry = race_to(reference_, rules_, search, end);
+  entry.method = method;
+  if (entry.end == Entry::End::reached || !find_own_minimum(end)) return entry;
+  Entry own = race_to(end, rules_, search, again);
+  if (own.end != Entry::End::reached) return entry;
+  own.method = method;
+  own.end = Entry::End::own_minimum;
+  own.distance = distance(end);
+  const double rest = problem_.function().evaluate(reference_, nullptr);
+  own.excess = problem_.function().evaluate(end, nullptr) / rest - 1;
+  return own;
+}
+
+Entry Contest::race_polak_ribiere() {
+  return race("Polak–Ribière, Brent", [](solve::Function& function, Vec displacement) {
+    solve::polak_ribiere(function, displacement);
+  });
+}
+
+Entry Contest::race_tao(const std::string& type) {
+  const ScopedOption chosen("-tao_type", type);
+  return race("TAO " + type, [&](solve::Function& function, Vec displacement) {
+    solve::Minimiser minimiser(function, problem_.solver(), nullptr);
+    minimiser.run(displacement, 0);
+  });
+}
+
+Contest::Curvature Contest::curvature() {
+  constexpr int inverse_steps = 10, steps = 60;
+  const base::VecHandle v = positions_.make_vector(), w = positions_.make_vector();
+  solve::TangentSolver& solver = problem_.solver();
+  solver.hessian().assemble(reference_);
+  Curvature found{};
+  check(VecSet(v, 1));
+  for (int k = 0; k < inverse_steps; ++k) {
+    check(VecNormalize(v, nullptr));
+    check(VecSet(w, 0));
+    solver.solve(reference_, v, w, 1e-3);
+    found.least = 1 / dot(v, w);
+    check(VecCopy(w, v));
+  }
+  for (int k = 0; k < steps; ++k) {
+    check(VecNormalize(v, nullptr));
+    check(MatMult(solver.hessian().exact(), v, w));
+    found.largest = dot(v, w);
+    check(VecCopy(w, v));
+  }
+  return found;
+}
+
+}  // namespace repose::paper
