@@ -67,6 +67,14 @@ void write_results(const std::filesystem::path& meshes, const scene::Scene& adva
   solved(turned, "turned");
 }
 
+/// What a person types for this page, the output's folder left out.
+std::string command_of(const base::Options& options) {
+  std::string command = "repose-paper";
+  for (const char* name : {"layers", "accuracy", "limit", "seconds", "path_seconds", "images"})
+    if (options.has(name)) command += fmt::format(" -{} {}", name, options.text(name));
+  return command;
+}
+
 base::Exit run(const base::Options& options) {
   if (base::size(MPI_COMM_WORLD) > 1) base::refuse("repose-paper is serial: run it without mpirun");
   const std::filesystem::path folder = options.text("output"), meshes = options.text("meshes");
@@ -84,7 +92,7 @@ base::Exit run(const base::Options& options) {
     std::fflush(stdout);
   });
   base::write_whole_file(folder / "paper.md",
-                         paper::page(findings, "repose-paper", options.text("images")));
+                         paper::page(findings, command_of(options), options.text("images")));
   paper::write_laws(folder / "laws.csv");
   paper::write_equilibrium(plan.scene, folder / "equilibrium.csv");
   write_results(meshes, plan.scene, folder);

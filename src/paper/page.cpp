@@ -104,7 +104,8 @@ brackets its true distance. Forces are smoothed by ε = {2} N (our default lower
 - `other minimum (d, p)`: it came to another minimum, d away, whose Φ is higher by p; evaluations
   and time are to {5} mm of that one.
 - `–`: there is no rest position to measure from.
-- `*`: the minimum is not known to that accuracy; distances are from the lowest state found.
+- `*`: the minimum is not known to that accuracy; distances are from the state to which refining
+  the energy's rest position came.
 
 )",
       rules.accuracy, 0.1 * rules.accuracy, Contest::epsilon, rules.seconds, rules.path_seconds,
@@ -160,9 +161,8 @@ std::string page(const Findings& findings, const std::string& command, const std
              "Teschner, Girod and Girod, \"Direct Computation of Nonlinear Soft-Tissue "
              "Deformation\", VMV 2000,\non the shipped head of the paper's size (`{}`: quartic "
              "springs of 1 N/mm,\ns_ref = 1 mm, the lower jaw 6 mm forward).\n\n"
-             "Made by `{}` in one run, on one core of a machine\nwith {}. Times vary by machine "
-             "and by run; evaluations and distances do not vary by more\nthan rounding makes "
-             "them.\n\n",
+             "Made by `{}` in one run, on one core of a machine with {};\n"
+             "pictures by `drivers/plot_paper.py`. Times vary by machine and by run.\n\n",
              findings.plan.scene.file.filename().string(), command, machine()) +
          size_table(findings) + race_tables(findings) + motion_table(findings) + claims(findings) +
          figures(images);

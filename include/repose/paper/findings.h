@@ -12,7 +12,7 @@ struct Race {
   int layers = 0;
   Functional functional;
   Entry own;                     ///< as repose-solve does it
-  bool reference_known = false;  ///< else it is only the lowest state found
+  bool reference_known = false;  ///< else it is only where the search for it came to
   bool from_energy = false;      ///< the reference was sought from the energy's rest position
   std::vector<Entry> entries;    ///< Polak–Ribière, then TAO's
 };
