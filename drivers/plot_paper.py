@@ -124,8 +124,8 @@ def draw_states(panels, target):
     for row, view in zip(axes, VIEWS):
         for place, (title, result, state, coloured) in zip(row, panels):
             draw_face(place, result, state, view, largest if coloured else None)
-            if row is axes[0]:
-                place.set_title(title, fontsize=10)
+            if view == next(iter(VIEWS)):
+                place.set_title(title, fontsize=9)
     scale = plt.cm.ScalarMappable(plt.Normalize(0, largest / 0.9), plt.cm.magma_r)
     figure.colorbar(scale, ax=axes, shrink=0.5, label="displacement, mm")
     save(figure, target)
@@ -144,7 +144,7 @@ def main():
                  ("displacement", opening, "after", True)], path("paper_opening.png"))
     draw_states([("6 mm forward", forward, "after", False),
                  ("displacement", forward, "after", True),
-                 ("6 mm forward, turned by 4°", turned, "after", False),
+                 ("forward and turned by 4°", turned, "after", False),
                  ("displacement", turned, "after", True)], path("paper_options.png"))
 
 
