@@ -11,6 +11,7 @@
 #include "repose/solve/force_search.h"
 #include "repose/solve/natural_rows.h"
 #include "repose/solve/problem.h"
+#include "repose/solve/stability.h"
 
 namespace repose::solve {
 
