@@ -1,11 +1,11 @@
 #include "repose/base/progress.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 
 #include "repose/base/agreement.h"
 
@@ -23,10 +23,12 @@ std::string duration(double seconds) {
 bool watched() {
   if (isatty(STDERR_FILENO)) return true;
   if (!std::getenv("OMPI_COMM_WORLD_SIZE")) return false;
-  std::error_code unknown;
-  const auto target = fmt::format("/proc/{}/fd/{}", getppid(), STDERR_FILENO);
-  const std::string path = std::filesystem::read_symlink(target, unknown).string();
-  return path.starts_with("/dev/pts/") || path.starts_with("/dev/tty");
+  const std::string shown = fmt::format("/proc/{}/fd/{}", getppid(), STDERR_FILENO);
+  const int file = open(shown.c_str(), O_WRONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool terminal = isatty(file);
+  close(file);
+  return terminal;
 }
 
 }  // namespace

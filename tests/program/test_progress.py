@@ -36,6 +36,9 @@ def seen(command, folder, environment):
 def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ranks):
     command = [programs() / "repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml"]
     if ranks > 1:
+        version = subprocess.run(["mpirun", "--version"], env=environment, capture_output=True, text=True)
+        if "Open MPI) 4" not in version.stdout:
+            pytest.skip("seen under mpirun with Open MPI 4 only")
         command = ["mpirun", "-n", str(ranks), *command]
     text = seen(command, tmp_path, environment)
     for word in ("load", "iteration", "largest force", "mm to go"):
