@@ -29,6 +29,7 @@ Outcome ForceSearch::run(Vec displacement, double accuracy) {
     if (stage > 0) outcome.displacement_error += moved;
     outcome.converged = stage > 0 && outcome.displacement_error <= accuracy;
     if (outcome.converged) break;
+    outcome.reason = "the minimum still moves as the smoothing of the forces goes down";
   }
   outcome.iterations = iterations;
   return outcome;
