@@ -85,26 +85,35 @@ struct Job {
   std::string building;              // what the builder has to say, on rank 0
 };
 
+/// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
+/// any.
+void bring_into_equilibrium(const scene::Scene& scene, Job& job) {
+  job.initial_equilibrium = scene.tissue.turgor > 0 || scene.gravity.has_value();
+  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
+  if (!job.initial_equilibrium) return;
+  const solve::Recording recording{
+      scene.tissue.turgor, scene.scan_gravity.value_or(scene.gravity.value_or(Vec3::Zero()))};
+  job.building += solve::describe_prestress(solve::prestress(comm, job.model, recording));
+}
+
 Job read_job(const std::filesystem::path& input) {
   Job job;
+  scene::Scene scene;
   base::on_first_rank(comm, [&] {
     if (results::is_hdf5(input)) {
       job.model = results::read_model(input);
       return;
     }
-    const scene::Scene scene = scene::read_scene(input);
+    scene = scene::read_scene(input);
     model::BuiltModel built = model::build_model(scene);
     job.model = std::move(built.model);
     job.building = solve::describe_build(built.report);
-    if (scene.tissue.turgor > 0 || scene.gravity)
-      job.building += solve::describe_prestress(solve::prestress(job.model, scene.tissue.turgor));
-    job.initial_equilibrium = scene.tissue.turgor > 0 || scene.gravity.has_value();
     job.wanted = scene.solve;
   });
+  bring_into_equilibrium(scene, job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
     job.wanted.bulk_modulus = 10 * model::effective_modulus(job.model);
   double bulk_modulus = job.wanted.bulk_modulus.value_or(0);
-  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&bulk_modulus, 1, MPI_DOUBLE, 0, comm);
   job.wanted.bulk_modulus.reset();
   static_assert(std::is_trivially_copyable_v<scene::Solve>);

@@ -53,7 +53,7 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
   model::Model model = model::build_model(scene).model;
   model::Model strained = model;
   strain_skin(strained, turgor);
-  solve::prestress(model, turgor);
+  solve::prestress(comm, model, {turgor, model.gravity});
   const solve::Part part = solve::distribute(comm, model);
   const std::vector<Vec3> before = initial_forces(solve::distribute(comm, strained));
   const std::vector<Vec3> after = initial_forces(part);

@@ -81,6 +81,9 @@ std::vector<Key> spring_keys() {
 
 std::vector<Key> load_keys() {
   return {{"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
+          {"scan_gravity", vector, "",
+           "Gravity field when the surfaces were recorded, lying in a CT say; default: gravity.",
+           "N/kg"},
           {"boundary", map, "", "What holds the skin where it ends."},
           {"boundary.rim",
            choice,

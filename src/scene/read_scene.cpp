@@ -172,6 +172,10 @@ void read_surroundings(Scene& scene, const Map& map) {
     if (scene.tissue.mass.empty() && !scene.tissue.density)
       gravity->refuse("needs a mass to pull; give tissue.mass or tissue.density, or remove it");
   }
+  if (const auto before = map.find("scan_gravity")) {
+    scene.scan_gravity = before->vector();
+    if (!scene.gravity) before->refuse("needs gravity, the field of now ([0, 0, 0] for none)");
+  }
   if (const auto boundary = map.find("boundary"))
     if (const auto rim = Map(*boundary).find("rim")) scene.rim_fixed = rim->choice() == 0;
   if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);

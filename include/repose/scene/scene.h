@@ -69,9 +69,10 @@ struct Scene {
   std::filesystem::path skin;  ///< absolute
   std::vector<BoneEntry> bones;
   Tissue tissue;
-  std::optional<Vec3> gravity;     ///< N/kg
-  bool rim_fixed = true;           ///< the outermost border loop of an open skin
-  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
+  std::optional<Vec3> gravity;       ///< N/kg
+  std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
+  bool rim_fixed = true;             ///< the outermost border loop of an open skin
+  std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
   std::vector<Force> forces;
   Solve solve;
 };

@@ -21,8 +21,9 @@ class Packer {
 
  private:
   void append(const void* data, size_t size) {
-    const auto* first = static_cast<const char*>(data);
-    bytes_.insert(bytes_.end(), first, first + size);
+    const size_t before = bytes_.size();
+    bytes_.resize(before + size);
+    if (size > 0) std::memcpy(bytes_.data() + before, data, size);
   }
   template <class T>
   void pack(const T& value) {

@@ -1,4 +1,6 @@
 #pragma once
+#include <mpi.h>
+
 #include "repose/model/model.h"
 
 namespace repose::solve {
@@ -10,13 +12,19 @@ struct Prestress {
   double least_rest_ratio = 1;  ///< smallest rest length over initial length
 };
 
+/// How the tissue was when its surfaces were recorded.
+struct Recording {
+  double turgor = 0;            ///< initial strain of the skin springs
+  Vec3 gravity = Vec3::Zero();  ///< N/kg
+};
+
 /// The initial equilibrium (MODEL.md; the paper's sec. 3, Fig. 2): gives the skin springs (set
-/// "layer 0") the initial strain `turgor`, l = r_0/(1+τ), and all others with a soft-tissue point
+/// "layer 0") the initial strain τ, l = r_0/(1+τ), and all others with a soft-tissue point
 /// the rest lengths whose tensions, smallest in the energy norm, balance skin tension and weight at
 /// the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T = K Aᵀ μ, l_j = r_j −
 /// T⁻¹(T_j). External forces are not balanced: they act. Changes the rest lengths of `model`.
-/// Throws InputError naming the springs where a rest length would not be positive, or the point
-/// that no spring can hold. Serial.
-Prestress prestress(model::Model& model, double turgor);
+/// Model and recording are looked at on rank 0 only. Throws InputError naming the springs where a
+/// rest length would not be positive, or the point that no spring can hold. Collective.
+Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
 
 }  // namespace repose::solve

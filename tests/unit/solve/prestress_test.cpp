@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "models.h"
+#include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/mechanics/spring_law.h"
 
@@ -47,7 +48,8 @@ class PrestressOf : public ::testing::TestWithParam<int> {};
 
 TEST_P(PrestressOf, BalancesEveryFreePointAndEndsOnTheBone) {
   model::Model m = weighty_block(GetParam());
-  const solve::Prestress result = solve::prestress(m, 0.1);
+  const solve::Prestress result = solve::prestress(MPI_COMM_WORLD, m, {0.1, m.gravity});
+  if (base::rank(MPI_COMM_WORLD) != 0) return;
   const std::vector<Vec3> force = initial_forces(m);
   Vec3 all = Vec3::Zero(), weight = Vec3::Zero();
   double residual = 0;
@@ -67,11 +69,31 @@ TEST_P(PrestressOf, BalancesEveryFreePointAndEndsOnTheBone) {
 TEST_P(PrestressOf, GivesTheSkinItsTurgor) {
   model::Model m = weighty_block(GetParam());
   const std::vector<double> initial = m.springs.rest_length;
-  solve::prestress(m, 0.1);
+  solve::prestress(MPI_COMM_WORLD, m, {0.1, m.gravity});
+  if (base::rank(MPI_COMM_WORLD) != 0) return;
   for (size_t e = 0; e < initial.size(); ++e) {
     if (m.springs.set[e] != 1) continue;
     EXPECT_DOUBLE_EQ(m.springs.rest_length[e], initial[e] / 1.1);
   }
+}
+
+TEST_P(PrestressOf, TakesTheGravityOfTheRecording) {
+  model::Model lying = weighty_block(GetParam()), upright = lying;
+  lying.gravity = {0, 9.80665, 0};
+  solve::prestress(MPI_COMM_WORLD, lying, {0.1, lying.gravity});
+  solve::prestress(MPI_COMM_WORLD, upright, {0.1, lying.gravity});
+  for (size_t e = 0; e < lying.springs.points.size(); ++e)
+    EXPECT_NEAR(lying.springs.rest_length[e], upright.springs.rest_length[e], 1e-11);
+  EXPECT_NE(lying.gravity, upright.gravity);
+}
+
+TEST_P(PrestressOf, DoesNotDependOnTheRanks) {
+  model::Model alone = weighty_block(GetParam()), together = alone;
+  solve::prestress(MPI_COMM_SELF, alone, {0.1, alone.gravity});
+  solve::prestress(MPI_COMM_WORLD, together, {0.1, together.gravity});
+  if (base::rank(MPI_COMM_WORLD) != 0) return;
+  for (size_t e = 0; e < alone.springs.points.size(); ++e)
+    EXPECT_NEAR(together.springs.rest_length[e], alone.springs.rest_length[e], 1e-11);
 }
 
 INSTANTIATE_TEST_SUITE_P(Exponents, PrestressOf, ::testing::Values(0, 1, 2));
@@ -80,7 +102,7 @@ TEST(Prestress, LeavesAModelWithoutTurgorAndWeightAlone) {
   model::Model m = weighty_block(2);
   m.gravity.setZero();
   const std::vector<double> initial = m.springs.rest_length;
-  solve::prestress(m, 0);
+  solve::prestress(MPI_COMM_WORLD, m, {0, m.gravity});
   for (size_t e = 0; e < initial.size(); ++e)
     EXPECT_DOUBLE_EQ(m.springs.rest_length[e], initial[e]);
 }
@@ -89,7 +111,7 @@ TEST(Prestress, RefusesRestLengthsBelowZeroAndNamesTheSpring) {
   model::Model m = weighty_block(0);
   std::fill(m.points.mass.begin(), m.points.mass.end(), 10.0);
   try {
-    solve::prestress(m, 0);
+    solve::prestress(MPI_COMM_WORLD, m, {0, m.gravity});
     FAIL() << "not refused";
   } catch (const base::InputError& e) {
     EXPECT_NE(std::string(e.what()).find("is spring "), std::string::npos) << e.what();
@@ -106,7 +128,7 @@ TEST(Prestress, RefusesAPointThatNothingHolds) {
   testing::add_spring(m, top, side, 1, 0);
   m.points.mass[side] = 0.1;
   try {
-    solve::prestress(m, 0);
+    solve::prestress(MPI_COMM_WORLD, m, {0, m.gravity});
     FAIL() << "not refused";
   } catch (const base::InputError& e) {
     EXPECT_NE(std::string(e.what()).find("point 1 "), std::string::npos) << e.what();
