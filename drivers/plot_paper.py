@@ -25,6 +25,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
 
+from plot_equilibrium import draw_forces, save
+
 # Where the camera stands as seen from the head: +x patient left, +y posterior, +z up.
 VIEWS = {"front": (0, -1, 0), "side": (1, 0, 0)}
 LIGHT = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
@@ -35,13 +37,6 @@ COLUMN = 3.2  # inches
 def columns_of(file):
     """The columns of a CSV file by their names."""
     return np.genfromtxt(file, delimiter=",", names=True)
-
-
-def save(figure, file):
-    figure.savefig(file + ".part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(file + ".part", file)
-    plt.close(figure)
-    print(file)
 
 
 def draw_laws(source, target):
@@ -61,17 +56,9 @@ def draw_equilibrium(source, target):
     """Fig. 2: the forces on the points of the skin seen from the side, before and after."""
     rows = columns_of(source)
     rows = rows[rows["layer"] == 0]
-    figure, panels = plt.subplots(1, 2, figsize=(2 * COLUMN, 1.1 * COLUMN), sharey=True)
-    for axes, state in zip(panels, ("before", "after")):
-        force = np.stack([rows[f"{state}_{k}"] for k in "xyz"], axis=1)
-        axes.plot(rows["y"], rows["z"], ".", color="0.75", ms=2)
-        axes.quiver(rows["y"], rows["z"], force[:, 1], force[:, 2], color="#b02020", angles="xy",
-                    scale_units="xy", scale=0.6, width=0.004)
-        largest = np.linalg.norm(force, axis=1).max()
-        axes.set_title(f"{state}: {largest:.2g} N at most", fontsize=10)
-        axes.set_aspect("equal")
-        axes.set_axis_off()
-    save(figure, target)
+    stack = lambda *names: np.stack([rows[name] for name in names], axis=1)
+    draw_forces(stack("x", "y", "z"), *(stack(*(f"{state}_{k}" for k in "xyz"))
+                                        for state in ("before", "after")), target)
 
 
 def read(file):

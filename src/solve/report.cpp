@@ -19,10 +19,13 @@ std::string work_rows(const Summary& s) {
                                         s.evaluations, s.assemblies));
 }
 
-std::string stability(double eigenvalue) {
-  if (std::isnan(eigenvalue)) return "stability not known: the eigenvalue solver did not converge";
-  return fmt::format("{}: smallest eigenvalue {:.4g} N/mm",
-                     eigenvalue > 0 ? "stable" : "NOT STABLE", eigenvalue);
+std::string stability(const Spectrum& s) {
+  if (std::isnan(s.smallest)) return "stability not known: the eigenvalue solver did not converge";
+  std::string text = fmt::format("{}: smallest eigenvalue {:.4g} N/mm",
+                                 s.smallest > 0 ? "stable" : "NOT STABLE", s.smallest);
+  if (s.smallest > 0 && s.largest > 0)
+    text += fmt::format(", condition number {:.2g}", s.largest / s.smallest);
+  return text;
 }
 
 std::string verdict(const Summary& s) {
@@ -76,8 +79,8 @@ std::string describe_run(const Summary& s, const Settings& settings, int ranks,
                                       s.last.displacement_error, settings.path.accuracy));
   text += row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
                                                   : "NOT A MINIMUM: negative curvature");
-  if (s.initial_eigenvalue) text += row("at the start", stability(*s.initial_eigenvalue));
-  if (s.final_eigenvalue) text += row("where it ended", stability(*s.final_eigenvalue));
+  if (s.initial_spectrum) text += row("at the start", stability(*s.initial_spectrum));
+  if (s.final_spectrum) text += row("where it ended", stability(*s.final_spectrum));
   text +=
       row("objective", fmt::format("{:.12g} {}", s.last.objective, settings.force ? "N" : "N mm"));
   text += row("inverted prisms", fmt::format("{}{}", s.last.inverted_prisms,

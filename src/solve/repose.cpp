@@ -157,14 +157,17 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   summary.path = path.run(displacement, [&](const Outcome& outcome, double load, double seconds) {
     summary.last = numbers_of(objective, settings, outcome, load);
     summary.last.epsilon = searcher.epsilon();
-    summary.last.smallest_eigenvalue = std::nan("");
     const bool start = load == 0 && settings.initial_equilibrium;
     const bool end = load == 1 || !outcome.converged;
     if (settings.stability && (start || end)) {
-      const double value = smallest_eigenvalue(searcher.elastic_solver(), displacement);
-      if (start) summary.initial_eigenvalue = value;
-      if (end) summary.final_eigenvalue = value;
-      summary.last.smallest_eigenvalue = value;
+      TangentSolver& solver = searcher.elastic_solver();
+      Spectrum spectrum;
+      spectrum.smallest = smallest_eigenvalue(solver, displacement);
+      spectrum.largest = largest_eigenvalue(solver.hessian().exact());
+      if (start) summary.initial_spectrum = spectrum;
+      if (end) summary.final_spectrum = spectrum;
+      summary.last.smallest_eigenvalue = spectrum.smallest;
+      summary.last.largest_eigenvalue = spectrum.largest;
     }
     summary.last.seconds = seconds;
     summary.last.evaluations = searcher.evaluations() - evaluations_before;

@@ -99,25 +99,17 @@ void choose_preconditioned(EPS eps, TangentSolver& solver) {
   check(EPSSetFromOptions(eps));
 }
 
-}  // namespace
-
-double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t direct_limit) {
-  constexpr double tolerance = 1e-8;  // of the eigenvalue
-  constexpr int most = 2000;          // iterations
+EpsHandle symmetric_problem(Mat matrix, double tolerance, int most) {
   start_slepc();
-  solver.hessian().assemble(displacement);
-  const Mat exact = solver.hessian().exact();
-  PetscInt unknowns = 0;
-  check(MatGetSize(exact, &unknowns, nullptr));
   EpsHandle eps;
-  check(EPSCreate(PetscObjectComm(reinterpret_cast<PetscObject>(exact)), eps.out()));
-  check(EPSSetOperators(eps, exact, nullptr));
+  check(EPSCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), eps.out()));
+  check(EPSSetOperators(eps, matrix, nullptr));
   check(EPSSetProblemType(eps, EPS_HEP));
   check(EPSSetTolerances(eps, tolerance, most));
-  if (unknowns <= direct_limit)
-    choose_shift_and_invert(eps, exact);
-  else
-    choose_preconditioned(eps, solver);
+  return eps;
+}
+
+double first_eigenvalue(EPS eps) {
   check(EPSSolve(eps));
   PetscInt converged = 0;
   check(EPSGetConverged(eps, &converged));
@@ -125,6 +117,29 @@ double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t dire
   PetscScalar value = 0;
   check(EPSGetEigenvalue(eps, 0, &value, nullptr));
   return value;
+}
+
+}  // namespace
+
+double largest_eigenvalue(Mat hessian) {
+  const EpsHandle eps = symmetric_problem(hessian, 1e-2, 1000);
+  check(EPSSetWhichEigenpairs(eps, EPS_LARGEST_REAL));
+  return first_eigenvalue(eps);
+}
+
+double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t direct_limit) {
+  constexpr double tolerance = 1e-8;  // of the eigenvalue
+  constexpr int most = 2000;          // iterations
+  solver.hessian().assemble(displacement);
+  const Mat exact = solver.hessian().exact();
+  PetscInt unknowns = 0;
+  check(MatGetSize(exact, &unknowns, nullptr));
+  const EpsHandle eps = symmetric_problem(exact, tolerance, most);
+  if (unknowns <= direct_limit)
+    choose_shift_and_invert(eps, exact);
+  else
+    choose_preconditioned(eps, solver);
+  return first_eigenvalue(eps);
 }
 
 }  // namespace repose::solve

@@ -185,17 +185,19 @@ def test_stability_is_reported_when_asked_for(run, small, tmp_path):
     assert result.returncode == 0 and result.stderr == ""
     first, final = steps(tmp_path / "steady.h5")[::len(steps(tmp_path / "steady.h5")) - 1]
     for row, step in (("at the start", first), ("where it ended", final)):
-        assert f"{row:<22} stable: smallest eigenvalue {step['smallest_eigenvalue']:.4g} N/mm" \
-            in result.stdout
-    expected = smallest_eigenvalue(Tissue(model_of(tmp_path / "steady.h5"), "none", 0), final)
-    assert final["smallest_eigenvalue"] == pytest.approx(expected, rel=1e-5)
+        condition = step["largest_eigenvalue"] / step["smallest_eigenvalue"]
+        assert f"{row:<22} stable: smallest eigenvalue {step['smallest_eigenvalue']:.4g} N/mm, " \
+            f"condition number {condition:.2g}" in result.stdout
+    tissue = Tissue(model_of(tmp_path / "steady.h5"), "none", 0)
+    assert final["smallest_eigenvalue"] == pytest.approx(eigenvalue(tissue, final, "SA"), rel=1e-5)
+    assert final["largest_eigenvalue"] == pytest.approx(eigenvalue(tissue, final, "LA"), rel=0.01)
     assert run("repose-check", "steady.h5").returncode == 0
     run("repose-solve", scene, *options)
     assert all("smallest_eigenvalue" not in step for step in steps(tmp_path / "steady.h5"))
 
 
-def smallest_eigenvalue(tissue, step):
-    """By scipy, from difference quotients of numpy's gradient."""
+def eigenvalue(tissue, step, which):
+    """The smallest or largest by scipy, from difference quotients of numpy's gradient."""
     soft, x = tissue.soft, step["point/position"]
 
     def product(way):
@@ -206,5 +208,5 @@ def smallest_eigenvalue(tissue, step):
         return ((there - back) / (2 * h))[soft].ravel()
 
     size = 3 * soft.sum()
-    return eigsh(LinearOperator((size, size), product, dtype=float), k=1, which="SA", tol=1e-7,
+    return eigsh(LinearOperator((size, size), product, dtype=float), k=1, which=which, tol=1e-7,
                  return_eigenvectors=False)[0]

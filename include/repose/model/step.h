@@ -28,10 +28,11 @@ struct StepNumbers {
   bool converged = false;
   /// Of the exact Hessian over the unknowns, N/mm; NaN, and no attribute, where not asked for.
   double smallest_eigenvalue = std::numeric_limits<double>::quiet_NaN();
+  double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
 };
 
-/// The number of a step that a file may do without; it is NaN then.
-inline bool is_optional(std::string_view name) { return name == "smallest_eigenvalue"; }
+/// A number of a step that a file may do without; it is NaN then.
+inline bool is_optional(std::string_view name) { return name.ends_with("_eigenvalue"); }
 
 /// Calls visit(name, member) for every number of a step, in the order of the file.
 template <class Numbers, class Visit>
@@ -58,6 +59,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("reason", numbers.reason);
   visit("converged", numbers.converged);
   visit("smallest_eigenvalue", numbers.smallest_eigenvalue);
+  visit("largest_eigenvalue", numbers.largest_eigenvalue);
 }
 
 /// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.

@@ -6,6 +6,7 @@
 #include "repose/base/stages.h"
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
+#include "repose/solve/stability.h"
 
 namespace repose::solve {
 
@@ -31,8 +32,8 @@ struct Summary {
   int64_t unknowns = 0;                      ///< scalar
   int64_t evaluations = 0;                   ///< of objective and gradient
   int64_t assemblies = 0;                    ///< of the Hessian
-  std::optional<double> initial_eigenvalue;  ///< N/mm, at the start, where asked for
-  std::optional<double> final_eigenvalue;    ///< N/mm, where the run ended; NaN: not found
+  std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
+  std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
 };
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest

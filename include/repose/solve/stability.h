@@ -1,7 +1,19 @@
 #pragma once
+#include <limits>
+
 #include "repose/solve/tangent_solver.h"
 
 namespace repose::solve {
+
+/// The ends of the spectrum of a Hessian, N/mm; not a number where not found or not asked for.
+struct Spectrum {
+  double smallest = std::numeric_limits<double>::quiet_NaN();  ///< positive at a strict minimum
+  double largest = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// The largest eigenvalue of the exact Hessian as it is assembled, by Krylov–Schur, to 1 %.
+/// Collective.
+double largest_eigenvalue(Mat hessian);
 
 /// The smallest eigenvalue of the exact Hessian over the unknowns at `displacement` and the
 /// positions' load, N/mm: positive at a strict minimum, negative where the tissue buckles. Not a

@@ -103,7 +103,7 @@ inline model::StepNumbers small_numbers(double load) {
   n.lambda = 0.5;
   n.bulk_modulus = 0.25;
   n.epsilon = 1e-6;
-  if (load > 0) n.smallest_eigenvalue = 0.125;
+  if (load > 0) n.smallest_eigenvalue = 0.125, n.largest_eigenvalue = 3;
   n.f_e = 3;
   n.potential = -4;
   n.f_f = 5;

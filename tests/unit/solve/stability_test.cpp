@@ -36,6 +36,10 @@ struct Energy {
     const base::VecHandle start = positions.make_vector();
     return smallest(start, direct_limit);
   }
+  double largest_at_start() {
+    tangent.assemble(positions.make_vector());
+    return solve::largest_eigenvalue(tangent.exact());
+  }
 };
 
 class Solver : public ::testing::TestWithParam<int64_t> {};
@@ -61,6 +65,8 @@ TEST_P(Solver, StretchedChainHasTheEigenvaluesOfAString) {
   const double across = k * stretch / length;
   const double expected = across * (2 - 2 * std::cos(M_PI / links));
   EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * expected);
+  const double along = k * (2 + 2 * std::cos(M_PI / links));
+  EXPECT_NEAR(energy.largest_at_start(), along, 0.01 * along);
 }
 
 TEST_P(Solver, CompressedChainBucklesByItsStiffestWave) {

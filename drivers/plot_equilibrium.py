@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Fig. 2 of the paper for any result: the forces on the skin's free points at the initial position,
+by skin tension and weight alone (before) and with the tensions that balance them (after).
+
+    drivers/plot_equilibrium.py NAME.h5 PICTURE.png [GX GY GZ]
+
+Forces are recomputed from /model. GX GY GZ is the gravity field of the recording (the scene's
+scan_gravity), N/kg; when not given, that of /model.
+Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
+"""
+
+import os
+import sys
+
+try:
+    import h5py
+    import matplotlib
+    import numpy as np
+except ImportError as missing:
+    print(f"plot_equilibrium.py: {missing.name} is missing: "
+          "apt-get install --no-install-recommends python3-matplotlib python3-h5py",
+          file=sys.stderr)
+    sys.exit(1)
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+LONGEST = 12  # mm of an arrow that few exceed
+MOST = 1500  # arrows
+
+
+def spring_forces(model, which):
+    """The forces of the springs `which` on all points at the initial position, [N, 3] N."""
+    points = model["spring/points"][()][which]
+    position = model["point/position"][()]
+    edge = position[points[:, 1]] - position[points[:, 0]]
+    length = np.linalg.norm(edge, axis=1)
+    elongation = length - model["spring/rest_length"][()][which]
+    ratio = elongation / model["spring/reference"][()][which]
+    tension = (model["spring/stiffness"][()][which] * elongation
+               * (1 + ratio**2) ** model["spring/exponent"][()][which].astype(float))
+    pull = edge * np.divide(tension, length, out=np.zeros_like(length), where=length > 0)[:, None]
+    force = np.zeros_like(position)
+    np.add.at(force, points[:, 0], pull)
+    np.add.at(force, points[:, 1], -pull)
+    return force
+
+
+def initial_forces(file, gravity=None):
+    """Free skin points, and the forces on them before and after the equilibrium, [K, 3] each."""
+    with h5py.File(file) as h5:
+        model = h5["model"]
+        field = np.array(gravity if gravity else model.attrs["gravity"], float)
+        skin = list(model["spring_set"][()]).index(b"layer 0")
+        weight = model["point/mass"][()][:, None] * field if "point/mass" in model else 0
+        of_skin = model["spring/set"][()] == skin
+        free = (model["point/set"][()] == 0) & (model["point/layer"][()] == 0)
+        before = weight + spring_forces(model, of_skin)
+        after = before + spring_forces(model, ~of_skin)
+        return model["point/position"][()][free], before[free], after[free]
+
+
+def draw_forces(points, before, after, target):
+    """Two panels of arrows seen from the side (+x), to one scale."""
+    extent = np.ptp(points[:, 1:], axis=0)
+    width = 3.4 * max(extent[0] / extent[1], 0.5)
+    figure, panels = plt.subplots(1, 2, figsize=(2 * width, 3.8), sharey=True)
+    scale = np.percentile(np.linalg.norm(before[:, 1:], axis=1), 98) / LONGEST
+    shown = slice(None, None, 1 + len(points) // MOST)
+    for axes, state, force in zip(panels, ("before", "after"), (before, after)):
+        axes.plot(points[:, 1], points[:, 2], ".", color="0.75", ms=1.5)
+        axes.quiver(points[shown, 1], points[shown, 2], force[shown, 1], force[shown, 2],
+                    color="#b02020", angles="xy", scale_units="xy", scale=scale, width=0.004)
+        largest = np.linalg.norm(force, axis=1).max()
+        axes.set_title(f"{state}: {largest:.2g} N at most", fontsize=10)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+    save(figure, target)
+
+
+def save(figure, file):
+    """Writes a picture whole or not at all."""
+    figure.savefig(file + ".part", format="png", dpi=110, bbox_inches="tight")
+    os.replace(file + ".part", file)
+    plt.close(figure)
+    print(file)
+
+
+def main():
+    if len(sys.argv) not in (3, 6):
+        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
+        sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
+    draw_forces(*initial_forces(sys.argv[1], [float(g) for g in sys.argv[3:]]), sys.argv[2])
+
+
+if __name__ == "__main__":
+    main()
