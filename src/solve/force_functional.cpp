@@ -40,23 +40,29 @@ double ForceFunctional::largest_force(Vec displacement) {
   return largest;
 }
 
+std::span<const Vec3> ForceFunctional::directions() {
+  PetscScalar* unit = nullptr;
+  check(VecGetArray(unit_, &unit));
+  for_each_force(elastic_, [&](int64_t row, const Vec3& force) {
+    Eigen::Map<Vec3>(unit + 3 * row) = force / std::hypot(force.norm(), epsilon_);
+  });
+  check(VecRestoreArray(unit_, &unit));
+  positions_.spread(unit_, direction_);
+  return direction_;
+}
+
 double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
   constexpr double huge = 1e100;  // stands for a value that overflows
   positions_.update(displacement);
   double value = 0;
-  PetscScalar* unit = nullptr;
-  check(VecGetArray(unit_, &unit));
-  for_each_force(elastic_, [&](int64_t row, const Vec3& force) {
+  for_each_force(elastic_, [&](int64_t, const Vec3& force) {
     const double length = std::hypot(force.norm(), epsilon_);
     value += force.squaredNorm() / (length + epsilon_);  // √(|F|² + ε²) − ε without cancelling
-    Eigen::Map<Vec3>(unit + 3 * row) = force / length;
   });
-  check(VecRestoreArray(unit_, &unit));
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, positions_.comm());
   value *= weights_.elastic;
   if (gradient) {
-    positions_.spread(unit_, direction_);
-    elastic_.hessian_action(direction_, gradient);
+    elastic_.hessian_action(directions(), gradient);
     check(VecScale(gradient, -weights_.elastic));
   }
   if (volume_) {
@@ -69,15 +75,15 @@ double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
   return huge;
 }
 
-GaussNewton::GaussNewton(ForceFunctional& functional, Tangent& elastic)
-    : functional_(functional), elastic_(elastic) {
+ForceHessian::ForceHessian(ForceFunctional& functional, Tangent& elastic)
+    : functional_(functional), elastic_(elastic), third_(elastic.make_third()) {
   if (functional.volume()) volume_ = std::make_unique<Tangent>(*functional.volume());
   make_metric();
   const base::VecHandle at_start = functional.positions().make_vector();
   assemble(at_start);
 }
 
-void GaussNewton::make_metric() {
+void ForceHessian::make_metric() {
   const Part& part = functional_.positions().part();
   const auto owned = static_cast<PetscInt>(3 * part.owned_unknowns);
   const auto total = static_cast<PetscInt>(3 * part.total_unknowns);
@@ -89,7 +95,7 @@ void GaussNewton::make_metric() {
   check(MatMPIAIJSetPreallocation(metric_, 3, nullptr, 0, nullptr));
 }
 
-void GaussNewton::fill_metric() {
+void ForceHessian::fill_metric() {
   const PetscInt first = static_cast<PetscInt>(functional_.positions().part().first_unknown);
   for_each_force(functional_.elastic(), [&](int64_t row, const Vec3& force) {
     const double length = std::hypot(force.norm(), functional_.epsilon());
@@ -103,25 +109,37 @@ void GaussNewton::fill_metric() {
   check(MatAssemblyEnd(metric_, MAT_FINAL_ASSEMBLY));
 }
 
-void GaussNewton::assemble(Vec displacement) {
-  constexpr double lift = 1e-12;  // of the largest diagonal, so that factors stay positive
-  elastic_.assemble(displacement);
-  functional_.positions().update(displacement);
-  fill_metric();
-  if (product_)
-    check(MatPtAP(metric_, elastic_.exact(), MAT_REUSE_MATRIX, PETSC_DEFAULT, product_.out()));
-  else
-    check(MatPtAP(metric_, elastic_.exact(), MAT_INITIAL_MATRIX, 2, product_.out()));
-  if (volume_) {
-    volume_->assemble(displacement);
-    check(MatAXPY(product_, 1, volume_->convex(), SUBSET_NONZERO_PATTERN));
-  }
+void ForceHessian::lift_diagonal() {
+  constexpr double lift = 1e-12;  // of the largest diagonal entry, so that factors stay positive
   base::VecHandle diagonal = functional_.positions().make_vector();
-  check(MatGetDiagonal(product_, diagonal));
+  check(MatGetDiagonal(convex_, diagonal));
   PetscReal largest = 0;
   check(VecNorm(diagonal, NORM_INFINITY, &largest));
-  check(MatShift(product_, lift * largest));
-  check(MatSetOption(product_, MAT_SPD, PETSC_TRUE));
+  check(MatShift(convex_, lift * largest));
+  check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
+}
+
+void ForceHessian::assemble(Vec displacement) {
+  elastic_.assemble(displacement);
+  if (elastic_.assemblies() == elastic_assemblies_ && functional_.epsilon() == epsilon_) return;
+  elastic_assemblies_ = elastic_.assemblies();
+  epsilon_ = functional_.epsilon();
+  functional_.positions().update(displacement);
+  fill_metric();
+  if (convex_)
+    check(MatPtAP(metric_, elastic_.exact(), MAT_REUSE_MATRIX, PETSC_DEFAULT, convex_.out()));
+  else
+    check(MatPtAP(metric_, elastic_.exact(), MAT_INITIAL_MATRIX, 2, convex_.out()));
+  if (!exact_) check(MatDuplicate(convex_, MAT_DO_NOT_COPY_VALUES, exact_.out()));
+  check(MatCopy(convex_, exact_, SAME_NONZERO_PATTERN));
+  elastic_.third(functional_.directions(), third_);
+  check(MatAXPY(exact_, -functional_.weights().elastic, third_, SUBSET_NONZERO_PATTERN));
+  if (volume_) {
+    volume_->assemble(displacement);
+    check(MatAXPY(exact_, 1, volume_->exact(), SUBSET_NONZERO_PATTERN));
+    check(MatAXPY(convex_, 1, volume_->convex(), SUBSET_NONZERO_PATTERN));
+  }
+  lift_diagonal();
   ++assemblies_;
 }
 

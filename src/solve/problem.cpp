@@ -8,8 +8,8 @@ Problem::Problem(Positions& positions, const mechanics::Weights& weights, bool f
       elastic_solver_(positions, tangent_) {
   if (!force) return;
   force_.emplace(objective_, weights);
-  gauss_newton_.emplace(*force_, tangent_);
-  force_solver_.emplace(positions, *gauss_newton_);
+  force_hessian_.emplace(*force_, tangent_);
+  force_solver_.emplace(positions, *force_hessian_);
 }
 
 Function& Problem::function() {
@@ -26,7 +26,7 @@ Certificate Problem::certificate() {
 }
 
 int64_t Problem::assemblies() const {
-  return tangent_.assemblies() + (gauss_newton_ ? gauss_newton_->assemblies() : 0);
+  return tangent_.assemblies() + (force_hessian_ ? force_hessian_->assemblies() : 0);
 }
 
 }  // namespace repose::solve

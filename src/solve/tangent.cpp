@@ -120,7 +120,18 @@ void Tangent::add(double* const values[2], Slot slot, int32_t row_point, const M
     for (int c = 0; c < 3; ++c) entry[c] += block(r, c);
 }
 
-void Tangent::fill(Mat matrix, Curvature curvature) {
+void Tangent::add_spring(double* const values[2], size_t loop, int64_t spring,
+                         const Mat3& block) const {
+  const auto [p, q] = objective_.loops().springs[loop].points[spring];
+  const auto& slots = spring_slots_[loop][spring];
+  add(values, slots[0], p, block);
+  add(values, slots[1], p, -block);
+  add(values, slots[2], q, -block);
+  add(values, slots[3], q, block);
+}
+
+template <class Work>
+void Tangent::refill(Mat matrix, Work&& add_blocks) {
   Mat sides[2] = {matrix, nullptr};
   if (base::size(objective_.positions().comm()) > 1)
     check(MatMPIAIJGetSeqAIJ(matrix, &sides[0], &sides[1], nullptr));
@@ -128,31 +139,46 @@ void Tangent::fill(Mat matrix, Curvature curvature) {
   double* values[2] = {nullptr, nullptr};
   for (int side = 0; side < 2; ++side)
     if (sides[side]) check(MatSeqAIJGetArray(sides[side], &values[side]));
-  const auto position = objective_.positions().local();
-  for (size_t l = 0; l < spring_slots_.size(); ++l) {
-    const mechanics::SpringLoop& loop = objective_.loops().springs[l];
-    mechanics::for_each_spring_block(loop, position, objective_.weights().elastic, curvature,
-                                     [&](int64_t e, const Mat3& block) {
-                                       const auto [p, q] = loop.points[e];
-                                       const auto& slots = spring_slots_[l][e];
-                                       add(values, slots[0], p, block);
-                                       add(values, slots[1], p, -block);
-                                       add(values, slots[2], q, -block);
-                                       add(values, slots[3], q, block);
-                                     });
-  }
-  const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-  mechanics::for_each_prism_block(prisms, position, objective_.weights(), curvature,
-                                  [&](int64_t e, const mechanics::PrismBlocks& blocks) {
-                                    for (int i = 0; i < 6; ++i)
-                                      for (int j = 0; j < 6; ++j)
-                                        add(values, prism_slots_[e][6 * i + j], prisms.points[e][i],
-                                            blocks[i][j]);
-                                  });
+  add_blocks(values);
   for (int side = 0; side < 2; ++side)
     if (sides[side]) check(MatSeqAIJRestoreArray(sides[side], &values[side]));
   check(MatAssemblyBegin(matrix, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(matrix, MAT_FINAL_ASSEMBLY));
+}
+
+void Tangent::fill(Mat matrix, Curvature curvature) {
+  refill(matrix, [&](double* const values[2]) {
+    const auto position = objective_.positions().local();
+    for (size_t l = 0; l < spring_slots_.size(); ++l)
+      mechanics::for_each_spring_block(
+          objective_.loops().springs[l], position, objective_.weights().elastic, curvature,
+          [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
+    const mechanics::PrismLoop& prisms = objective_.loops().prisms;
+    mechanics::for_each_prism_block(prisms, position, objective_.weights(), curvature,
+                                    [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+                                      for (int i = 0; i < 6; ++i)
+                                        for (int j = 0; j < 6; ++j)
+                                          add(values, prism_slots_[e][6 * i + j],
+                                              prisms.points[e][i], blocks[i][j]);
+                                    });
+  });
+}
+
+base::MatHandle Tangent::make_third() const {
+  base::MatHandle matrix;
+  check(MatDuplicate(exact_, MAT_DO_NOT_COPY_VALUES, matrix.out()));
+  check(MatSetOption(matrix, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  return matrix;
+}
+
+void Tangent::third(std::span<const Vec3> direction, Mat matrix) {
+  refill(matrix, [&](double* const values[2]) {
+    const auto position = objective_.positions().local();
+    for (size_t l = 0; l < spring_slots_.size(); ++l)
+      mechanics::for_each_spring_third(
+          objective_.loops().springs[l], position, objective_.weights().elastic, direction,
+          [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
+  });
 }
 
 void Tangent::lift_diagonal() {

@@ -48,6 +48,20 @@ def test_force_and_energy_meet(solved, small, scene, weight):
     assert np.linalg.norm(last(force)["point/displacement"], axis=1).max() > 0.9
 
 
+def test_force_and_energy_meet_after_the_whole_move_of_the_finer_head(solved, tmp_path):
+    """With weight and without volume term; the opening has many minima there, the advance one."""
+    text = (PROJECT / "meshes/head_jaw_advance.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    text = text.replace("  layers: 4 ", "  density: 1.0e-6\n  layers: 4 ")
+    scene = tmp_path / "advance.yaml"
+    scene.write_text(text + "gravity: [0, 0, -9.80665]\n")
+    accuracy = 1e-4
+    energy, force = (solved(scene, "-volume", "none", "-accuracy", accuracy, "-functional", which)
+                     for which in ("energy", "force"))
+    assert apart(last(energy), last(force)) <= 2 * accuracy
+    assert np.linalg.norm(last(force)["point/displacement"], axis=1).max() > 5.9
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_check_agrees_with_the_force_functional(run, solved, small, ranks):
     file = solved(small(ADVANCE, True), "-volume", "none", "-functional", "force", ranks=ranks)

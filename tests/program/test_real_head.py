@@ -85,3 +85,17 @@ def test_the_skin_is_smooth(face):
     jump = np.linalg.norm(gradient[one] - gradient[other], axis=(1, 2))
     assert jump.max() < 0.6
     assert np.quantile(jump, 0.99) < 0.25
+
+
+def test_a_face_scanned_lying_is_in_equilibrium_and_hangs_upright(folder, run, tmp_path):
+    (folder / "posture.yaml").symlink_to(PROJECT / "meshes/real_head_posture.yaml")
+    result = run("repose-solve", folder / "posture.yaml", "-stability", ranks=2)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    row = next(line for line in result.stdout.splitlines() if "initial equilibrium" in line)
+    left, before = float(row.split()[2]), float(row.split("left of")[1].split()[0])
+    assert left <= 1e-12 * before
+    file = tmp_path / "posture.h5"
+    step = last(file)
+    assert step["converged"] and step["smallest_eigenvalue"] > 0 and step["inverted_prisms"] == 0
+    sag = step["point/displacement"][model_of(file)["point/layer"] == 0][:, 2]
+    assert -4 < sag.min() < -2 and sag.max() < 0.5

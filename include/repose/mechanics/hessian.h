@@ -59,6 +59,38 @@ void for_each_spring_block(const SpringLoop& loop, std::span<const Vec3> positio
   });
 }
 
+/// ∂(K w)/∂d, N/mm²: how the stiffness of a spring turns what acts on a fixed vector w, the third
+/// derivative of E: a ((u·w) 1 + u wᵀ + w uᵀ) + (T″ − 3 a) (u·w) u uᵀ with a = (T′ − T/r)/r.
+/// Nothing where r = 0.
+template <int p>
+Mat3 spring_third(const Vec3& d, const Vec3& w, double k0, double rest_length,
+                  double inverse_reference) {
+  const double r = d.norm(), s = r - rest_length;
+  if (r == 0) return Mat3::Zero();
+  const Vec3 u = d / r;
+  const double slope = spring_tangent_slope<p>(s, k0, inverse_reference), along = u.dot(w);
+  const double a = (spring_tangent<p>(s, k0, inverse_reference) -
+                    spring_tension<p>(s, k0, inverse_reference) / r) /
+                   r;
+  const Mat3 mixed = u * w.transpose();
+  return a * (along * Mat3::Identity() + mixed + mixed.transpose()) +
+         (slope - 3 * a) * along * u * u.transpose();
+}
+
+/// Calls visit(spring number, scale · ∂(K w)/∂d), w the difference of `direction` along the spring.
+template <class Visit>
+void for_each_spring_third(const SpringLoop& loop, std::span<const Vec3> position, double scale,
+                           std::span<const Vec3> direction, Visit&& visit) {
+  with_exponent(loop.exponent, [&]<int p>() {
+    for (int64_t e = 0; e < loop.size(); ++e) {
+      const auto [i, j] = loop.points[e];
+      visit(e, spring_third<p>(position[j] - position[i], direction[j] - direction[i],
+                               scale * loop.stiffness[e], loop.rest_length[e],
+                               loop.inverse_reference[e]));
+    }
+  });
+}
+
 /// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,

@@ -32,6 +32,18 @@ Scalar spring_tangent(Scalar s, double k0, double inverse_reference) {
   if constexpr (p == 2) return k0 * (1.0 + q) * (1.0 + 5.0 * q);
 }
 
+/// d²T/ds² in N/mm².
+template <int p, class Scalar>
+Scalar spring_tangent_slope(Scalar s, double k0, double inverse_reference) {
+  const Scalar once = k0 * s * inverse_reference * inverse_reference;
+  if constexpr (p == 0) return Scalar(0.0);
+  if constexpr (p == 1) return 6.0 * once;
+  if constexpr (p == 2) {
+    const Scalar q = (s * inverse_reference) * (s * inverse_reference);
+    return 4.0 * once * (3.0 + 5.0 * q);
+  }
+}
+
 /// Calls `visit` with the exponent as a compile-time constant: one branch a loop, none a spring.
 template <class Visit>
 decltype(auto) with_exponent(int p, Visit&& visit) {

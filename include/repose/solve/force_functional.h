@@ -19,6 +19,8 @@ class ForceFunctional : public Function {
   const mechanics::Weights& weights() const { return weights_; }
   Objective& elastic() { return elastic_; }
   Objective* volume() { return volume_.get(); }  ///< (1 − λ) f_v alone; null without volume term
+  /// [local points] F/√(|F|² + ε²) at soft tissue, as of the positions' last update. Collective.
+  std::span<const Vec3> directions();
 
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;
@@ -31,26 +33,32 @@ class ForceFunctional : public Function {
   std::vector<Vec3> direction_;  // [local points] F/√(|F|² + ε²) at soft tissue, else zero
 };
 
-/// The Gauss–Newton operator of the force functional, λ H D H + (1 − λ) ∇²f_v without the turning
-/// of its gradient: H the exact Hessian of f_e, D_i = (1 − F Fᵀ/ρ²)/ρ with ρ = √(|F|² + ε²). Never
-/// indefinite, so it is its own preconditioner.
-class GaussNewton : public Hessian {
+/// The force functional's second derivatives, with H the exact Hessian of f_e, w_i = F_i/ρ_i,
+/// ρ_i = √(|F_i|² + ε²) and D_i = (1 − w wᵀ)/ρ:
+///     exact    λ (H D H − ∂(H w)/∂x at fixed w) + (1 − λ) ∇²f_v
+///     convex   λ H D H + 2 (1 − λ) Σ ∇v ∇vᵀ, the Gauss–Newton operator, never indefinite
+class ForceHessian : public Hessian {
  public:
-  GaussNewton(ForceFunctional& functional, Tangent& elastic);  ///< assembled at no displacement
+  ForceHessian(ForceFunctional& functional, Tangent& elastic);  ///< assembled at no displacement
 
   void assemble(Vec displacement) override;  ///< collective
-  Mat exact() const override { return product_; }
-  Mat convex() const override { return product_; }
+  Mat exact() const override { return exact_; }
+  Mat convex() const override { return convex_; }
+  Mat model() const override { return convex_; }
 
  private:
   void make_metric();
   void fill_metric();
+  void lift_diagonal();
 
   ForceFunctional& functional_;
   Tangent& elastic_;
   std::unique_ptr<Tangent> volume_;
   base::MatHandle metric_;  // λ D, block diagonal
-  base::MatHandle product_;
+  base::MatHandle third_;
+  base::MatHandle convex_, exact_;
+  int64_t elastic_assemblies_ = -1;  // of H and …
+  double epsilon_ = 0;               // … ε, at the last assembly
 };
 
 }  // namespace repose::solve

@@ -42,6 +42,8 @@ class Hessian {
   virtual void assemble(Vec displacement) = 0;
   virtual Mat exact() const = 0;
   virtual Mat convex() const = 0;
+  /// The one whose quadratic model a Newton method steps by.
+  virtual Mat model() const { return exact(); }
   int64_t assemblies() const { return assemblies_; }
 
  protected:

@@ -23,8 +23,9 @@ struct Recording {
 /// the rest lengths whose tensions, smallest in the energy norm, balance skin tension and weight at
 /// the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T = K Aᵀ μ, l_j = r_j −
 /// T⁻¹(T_j). External forces are not balanced: they act. Changes the rest lengths of `model`.
-/// Model and recording are looked at on rank 0 only. Throws InputError naming the springs where a
-/// rest length would not be positive, or the point that no spring can hold. Collective.
+/// F is 1e-12 of the largest force before, or what the rounding of lengths leaves where that is
+/// more. Model and recording are looked at on rank 0 only. Throws InputError naming the springs
+/// where a rest length would not be positive, or the point that no spring can hold. Collective.
 Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
 
 }  // namespace repose::solve

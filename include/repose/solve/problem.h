@@ -28,7 +28,7 @@ class Problem {
   Tangent tangent_;
   TangentSolver elastic_solver_;
   std::optional<ForceFunctional> force_;
-  std::optional<GaussNewton> gauss_newton_;
+  std::optional<ForceHessian> force_hessian_;
   std::optional<TangentSolver> force_solver_;
 };
 

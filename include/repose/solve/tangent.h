@@ -18,6 +18,11 @@ class Tangent : public Hessian {
   /// The next assembly is done in any case: the elements have changed.
   void forget() { assembled_at_.clear(); }
 
+  base::MatHandle make_third() const;  ///< a matrix for third(); collective
+  /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
+  /// update, into `matrix` of make_third(). Collective.
+  void third(std::span<const Vec3> direction, Mat matrix);
+
   Mat exact() const override { return exact_; }
   Mat convex() const override { return convex_; }
 
@@ -37,6 +42,9 @@ class Tangent : public Hessian {
   bool owns(int32_t point) const;
   Slot find(int32_t row_point, int32_t column_point) const;
   void add(double* const values[2], Slot slot, int32_t row_point, const Mat3& block) const;
+  void add_spring(double* const values[2], size_t loop, int64_t spring, const Mat3& block) const;
+  template <class Work>
+  void refill(Mat matrix, Work&& add_blocks);
   void fill(Mat matrix, mechanics::Curvature curvature);
   void lift_diagonal();
 

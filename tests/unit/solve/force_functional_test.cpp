@@ -137,15 +137,44 @@ class Reference {
   Forces& f_;
 };
 
+/// |∇Φ(x + h d) − ∇Φ(x − h d) − 2 h H d| falls as h³.
+TEST_P(ForceTerms, HessianPassesTheTaylorTest) {
+  Forces f(std::get<0>(GetParam()));
+  f.functional.set_epsilon(epsilon());
+  solve::ForceHessian hessian(f.functional, f.tangent);
+  for (unsigned seed : {1u, 11u, 21u}) {
+    const base::VecHandle direction = f.vector(seed + 1, 1.0);
+    const base::VecHandle at = f.vector(seed, 0.4), product = f.positions.make_vector();
+    hessian.assemble(at);
+    check(MatMult(hessian.exact(), direction, product));
+    double h = 1.0 / 1024, before = 0;
+    for (int halving = 0; halving < 3; ++halving, h /= 2) {
+      const base::VecHandle there = f.vector(seed, 0.4), back = f.vector(seed, 0.4);
+      const base::VecHandle ahead = f.positions.make_vector(), behind = f.positions.make_vector();
+      check(VecAXPY(there, h, direction));
+      check(VecAXPY(back, -h, direction));
+      f.functional.evaluate(there, ahead);
+      f.functional.evaluate(back, behind);
+      check(VecAXPY(ahead, -1, behind));
+      check(VecAXPY(ahead, -2 * h, product));
+      const double rest = solve::largest_block(ahead);
+      if (halving > 0) {
+        EXPECT_NEAR(std::log2(before / rest), 3, 0.2) << "h " << h;
+      }
+      before = rest;
+    }
+  }
+}
+
 TEST_P(ForceTerms, GaussNewtonIsTheForcesPart) {
   Forces f(std::get<0>(GetParam()));
   f.functional.set_epsilon(epsilon());
-  solve::GaussNewton operator_of(f.functional, f.tangent);
+  solve::ForceHessian operator_of(f.functional, f.tangent);
   for (unsigned seed : {1u, 11u}) {
     base::VecHandle at = f.vector(seed, 0.4), direction = f.vector(seed + 1, 1.0);
     operator_of.assemble(at);
     base::VecHandle product = f.positions.make_vector();
-    check(MatMult(operator_of.exact(), direction, product));
+    check(MatMult(operator_of.convex(), direction, product));
     base::VecHandle expected = Reference(f).product(at, direction);
     const double size = solve::largest_block(expected);
     check(VecAXPY(expected, -1, product));
@@ -156,14 +185,14 @@ TEST_P(ForceTerms, GaussNewtonIsTheForcesPart) {
 TEST_P(ForceTerms, GaussNewtonIsSymmetricAndPositive) {
   Forces f(std::get<0>(GetParam()));
   f.functional.set_epsilon(epsilon());
-  solve::GaussNewton operator_of(f.functional, f.tangent);
+  solve::ForceHessian operator_of(f.functional, f.tangent);
   base::VecHandle at = f.vector(1, 0.4);
   operator_of.assemble(at);
   base::VecHandle from_a = f.positions.make_vector(), from_b = f.positions.make_vector();
   for (unsigned seed = 2; seed < 8; ++seed) {
     base::VecHandle a = f.vector(seed, 1.0), b = f.vector(seed + 10, 1.0);
-    check(MatMult(operator_of.exact(), a, from_a));
-    check(MatMult(operator_of.exact(), b, from_b));
+    check(MatMult(operator_of.convex(), a, from_a));
+    check(MatMult(operator_of.convex(), b, from_b));
     EXPECT_GT(dot(a, from_a), 0);
     EXPECT_NEAR(dot(a, from_b), dot(b, from_a), 1e-12 * dot(a, from_a));
   }

@@ -107,6 +107,13 @@ TEST(Prestress, LeavesAModelWithoutTurgorAndWeightAlone) {
     EXPECT_DOUBLE_EQ(m.springs.rest_length[e], initial[e]);
 }
 
+TEST(Prestress, BalancesToTheRoundingOfLengthsWhereTheWeightIsNextToNothing) {
+  model::Model m = weighty_block(2);
+  std::fill(m.points.mass.begin(), m.points.mass.end(), 1e-9);
+  const solve::Prestress result = solve::prestress(MPI_COMM_WORLD, m, {0, m.gravity});
+  EXPECT_LT(result.residual, 1e-12);  // N; some springs of 1 N/mm and 10 mm meet in a point
+}
+
 TEST(Prestress, RefusesRestLengthsBelowZeroAndNamesTheSpring) {
   model::Model m = weighty_block(0);
   std::fill(m.points.mass.begin(), m.points.mass.end(), 10.0);
