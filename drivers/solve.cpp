@@ -65,6 +65,14 @@ std::vector<base::Option> option_table() {
        {"auto"}},
       {"stability", OptionKind::flag, "",
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
+      {"monitor_mm", OptionKind::flag, "",
+       "Print time, evaluations and the estimated distance to go after each iteration."},
+      {"time_limit",
+       OptionKind::number,
+       "",
+       "End the search after this, keep the state it has and say how far it is.",
+       {0, 1e9},
+       "s"},
       {"dry_run", OptionKind::flag, "", "Build and report the model only."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
@@ -212,6 +220,8 @@ base::Exit run(const base::Options& options) {
   override_by(options, job.wanted);
   solve::Settings settings = settings_of(job.wanted);
   settings.stability = options.flag("stability");
+  settings.monitor = options.flag("monitor_mm");
+  if (options.has("time_limit")) settings.time_limit = options.number("time_limit");
   settings.initial_equilibrium = job.initial_equilibrium;
   stages.end("build");
   if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));

@@ -82,6 +82,7 @@ Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
     error = objective_.totals().volume_error_max;
     check(VecAXPY(before_, -1, displacement));
     if (round > 0) outcome.displacement_error += largest_block(before_);
+    if (outcome.stopped) outcome.converged = false;
     const bool at_rest = outcome.converged && outcome.displacement_error <= accuracy;
     if (!outcome.converged || (at_rest && error <= allowed)) break;
     double weight = objective_.weights().volume_weight;

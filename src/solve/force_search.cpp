@@ -23,7 +23,8 @@ Outcome ForceSearch::run(Vec displacement, double accuracy) {
     check(VecCopy(displacement, before_));
     outcome = minimiser_.run(displacement, accuracy);
     iterations += outcome.iterations;
-    if (outcome.converged && same_minimum) break;
+    if (outcome.stopped) outcome.converged = outcome.converged && same_minimum;
+    if (outcome.stopped || (outcome.converged && same_minimum)) break;
     check(VecAXPY(before_, -1, displacement));
     const double moved = largest_block(before_);
     if (stage > 0) outcome.displacement_error += moved;

@@ -93,14 +93,14 @@ PathOutcome LoadPath::run(Vec displacement, const OnStep& on_step) {
   double step = full_step;
   int halvings = 0;
   std::optional<Attempt> coarser;
-  while (result_.last.converged && result_.load < 1) {
+  while (result_.last.converged && !result_.last.stopped && result_.load < 1) {
     const Stopwatch watch;
     const double before = result_.load;
     double target = before + step;
     if (target > 1 - 1e-3 * full_step) target = 1;
     const Attempt tried = attempt(displacement, target);
     const bool last_chance = halvings == most_halvings;
-    if (!last_chance && !follows(tried, coarser ? &*coarser : nullptr)) {
+    if (!tried.outcome.stopped && !last_chance && !follows(tried, coarser ? &*coarser : nullptr)) {
       positions.set_load(before);
       step /= 2;
       ++halvings;

@@ -86,10 +86,11 @@ struct Minimiser::Callbacks {
       self.force_ = force;
       if (iteration == 0) self.first_force_ = force;
       const bool done = self.near_enough(x, g, force);
-      if (self.watch_)
-        self.watch_({iteration, self.function_.positions().load(), value, force, self.error_});
+      if (self.watch_ && !done)
+        self.stopped_ = !self.watch_({iteration, self.function_.positions().load(), value, force,
+                                      self.error_, self.function_.evaluations()});
       check(TaoDefaultConvergenceTest(tao, nullptr));
-      if (done || self.stalled(iteration, value))
+      if (done || self.stopped_ || self.stalled(iteration, value))
         check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
   }
@@ -209,6 +210,13 @@ double Minimiser::measure(Vec displacement) {
   return objective;
 }
 
+std::string Minimiser::reason_of(const Outcome& outcome, TaoConvergedReason reason) const {
+  if (stopped_ && (!outcome.converged || function_.positions().load() < 1))
+    return "stopped before it was done, by a signal or the time limit";
+  if (outcome.converged) return reason_text(TAO_CONVERGED_USER);
+  return stalled_ ? "the objective no longer decreases beyond rounding" : reason_text(reason);
+}
+
 Outcome Minimiser::summary(Vec displacement) {
   measure(displacement);
   const int corrections = polish(displacement);
@@ -223,9 +231,8 @@ Outcome Minimiser::summary(Vec displacement) {
   check(TaoGetConvergedReason(tao_, &reason));
   check(TaoGetIterationNumber(tao_, &iterations));
   outcome.iterations = iterations + corrections;
-  outcome.reason = outcome.converged ? reason_text(TAO_CONVERGED_USER)
-                   : stalled_        ? "the objective no longer decreases beyond rounding"
-                                     : reason_text(reason);
+  outcome.stopped = stopped_;
+  outcome.reason = reason_of(outcome, reason);
   if (corrections > 0)
     outcome.reason += fmt::format(", {} Newton corrections at the rounding level", corrections);
   if (!outcome.stable) outcome.reason += ", at a point that is not a minimum";
@@ -235,6 +242,7 @@ Outcome Minimiser::summary(Vec displacement) {
 Outcome Minimiser::run(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
+  stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
   const PetscErrorCode code = TaoSolve(tao_);
   if (thrown_) std::rethrow_exception(thrown_);

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "repose/base/agreement.h"
+#include "repose/base/interrupt.h"
 #include "repose/base/progress.h"
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
@@ -48,26 +51,44 @@ model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
   n.displacement_error = outcome.displacement_error;
   n.iterations = outcome.iterations;
   n.reason = outcome.reason;
-  n.converged = outcome.converged;
+  n.converged = outcome.converged && !(outcome.stopped && load < 1);
   return n;
 }
 
-/// Shows each iteration on a terminal.
+/// Shows each iteration on a terminal, prints it where that is asked for, and ends the search where
+/// a signal or the time limit wants it.
 class Watcher {
  public:
-  explicit Watcher(MPI_Comm comm) : progress_(comm) {}
-  void operator()(const Iteration& i) {
+  Watcher(MPI_Comm comm, const Settings& settings)
+      : progress_(comm),
+        interrupt_(comm, settings.time_limit),
+        prints_(settings.monitor && base::rank(comm) == 0) {}
+  bool operator()(const Iteration& i) {
     const std::string to_go = std::isfinite(i.millimetres_to_go) && i.millimetres_to_go > 0
                                   ? fmt::format("{:.3g} mm to go", i.millimetres_to_go)
                                   : std::string("far from rest");
+    if (prints_) print(i, to_go);
     progress_.show(fmt::format("load {:.3f}  iteration {}  objective {:.6g} N mm  largest force "
                                "{:.3g} N  {}",
                                i.load, i.number, i.objective, i.largest_force, to_go),
                    i.load);
+    return !interrupt_.wanted();
   }
 
  private:
+  void print(const Iteration& i, const std::string& to_go) {
+    progress_.clear();
+    const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+    fmt::print("  {:8.2f} s  load {:.4f}  iteration {:4d}  {:6d} evaluations  {}\n", elapsed,
+               i.load, i.number, i.evaluations, to_go);
+    std::fflush(stdout);
+  }
+
+  using Clock = std::chrono::steady_clock;
   base::Progress progress_;
+  base::Interrupt interrupt_;
+  bool prints_;
+  Clock::time_point begin_ = Clock::now();
 };
 
 /// What finds the rest position of a model under the settings. One object so that its parts live
@@ -77,7 +98,7 @@ class Searcher {
   Searcher(Positions& positions, const Settings& settings)
       : problem_(positions, settings.weights, settings.force),
         predictor_(problem_.objective(), problem_.elastic_solver()),
-        watcher_(positions.comm()),
+        watcher_(positions.comm(), settings),
         minimiser_(problem_.function(), problem_.solver(), problem_.certificate(),
                    std::ref(watcher_)) {
     if (settings.force) force_search_.emplace(*problem_.force(), minimiser_);

@@ -23,7 +23,8 @@ struct Certificate {
 /// apply. All members collective.
 class Minimiser : public RestSearch {
  public:
-  using Watch = std::function<void(const Iteration&)>;
+  /// Sees each iteration; returns whether to go on, the same on all ranks.
+  using Watch = std::function<bool(const Iteration&)>;
   /// `solver` is for Newton methods; the distance to the rest position is its Newton step too, or
   /// that of another function with the same rest position.
   Minimiser(Function& function, TangentSolver& solver, const Watch& watch);
@@ -42,6 +43,7 @@ class Minimiser : public RestSearch {
   bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
   int polish(Vec displacement);
+  std::string reason_of(const Outcome& outcome, TaoConvergedReason reason) const;
   Outcome summary(Vec displacement);
 
   Function& function_;
@@ -58,6 +60,7 @@ class Minimiser : public RestSearch {
   double lowest_ = 0;                   // value, of the run under way
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long
+  bool stopped_ = false;                // the watcher did not want to go on
   base::VecHandle gradient_, saved_, certified_gradient_;
   std::exception_ptr thrown_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -12,11 +13,13 @@ namespace repose::solve {
 
 /// What is asked of a run.
 struct Settings {
-  mechanics::Weights weights;        ///< the objective; for exact volume the penalty it starts with
-  bool force = false;                ///< minimises the force functional, not the energy
-  bool exact_volume = false;         ///< v = v_0, by multipliers
-  std::string volume = "none";       ///< name of the volume term, for the result
-  double lambda = 1;                 ///< paper's weight, for the result
+  mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
+  bool force = false;           ///< minimises the force functional, not the energy
+  bool exact_volume = false;    ///< v = v_0, by multipliers
+  std::string volume = "none";  ///< name of the volume term, for the result
+  double lambda = 1;            ///< paper's weight, for the result
+  double time_limit = std::numeric_limits<double>::infinity();  ///< s, of the search
+  bool monitor = false;              ///< print a line for every iteration
   bool stability = false;            ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
   PathSettings path;

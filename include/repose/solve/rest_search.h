@@ -13,11 +13,13 @@ struct Iteration {
   double objective = 0;
   double largest_force = 0;      ///< largest block of ∇Φ
   double millimetres_to_go = 0;  ///< estimated distance to the rest position
+  int64_t evaluations = 0;       ///< of value and gradient so far
 };
 
 /// How a search for the rest position at one load ended.
 struct Outcome {
   bool converged = false;         ///< the estimated distance is below the accuracy asked for
+  bool stopped = false;           ///< it was asked to end early
   bool stable = false;            ///< no negative curvature was met at the end
   double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
   double objective = 0;

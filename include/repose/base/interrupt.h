@@ -1,0 +1,30 @@
+#pragma once
+#include <mpi.h>
+
+#include <chrono>
+#include <limits>
+
+namespace repose::base {
+
+/// A person's wish that work should end and keep what it has: SIGINT, SIGTERM or SIGUSR1 to any
+/// rank (mpirun and batch systems pass the last one on to all), or a time limit. A second SIGINT or
+/// SIGTERM ends the program as usual.
+class Interrupt {
+ public:
+  /// `limit` in s of wall-clock time from now.
+  explicit Interrupt(MPI_Comm comm, double limit = std::numeric_limits<double>::infinity());
+  ~Interrupt();  ///< signals do again what they did before
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  bool wanted();  ///< the same on all ranks; stays true. Collective.
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  MPI_Comm comm_;
+  double limit_;
+  Clock::time_point begin_ = Clock::now();
+  bool wanted_ = false;
+};
+
+}  // namespace repose::base
