@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "repose/base/scoped_option.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/load_path.h"
 #include "repose/solve/polak_ribiere.h"
@@ -13,30 +14,6 @@ using base::check;
 namespace {
 
 const MPI_Comm comm = PETSC_COMM_SELF;
-
-/// Sets a PETSc option for its life, where the person has not given it.
-class ScopedOption {
- public:
-  ScopedOption(const char* name, const std::string& value) : name_(name) {
-    char text[128] = "";
-    PetscBool given = PETSC_FALSE;
-    check(PetscOptionsGetString(nullptr, nullptr, name, text, sizeof text, &given));
-    if (given) before_ = text;
-    check(PetscOptionsSetValue(nullptr, name, value.c_str()));
-  }
-  ~ScopedOption() {
-    if (before_.empty())
-      PetscOptionsClearValue(nullptr, name_);
-    else
-      PetscOptionsSetValue(nullptr, name_, before_.c_str());
-  }
-  ScopedOption(const ScopedOption&) = delete;
-  ScopedOption& operator=(const ScopedOption&) = delete;
-
- private:
-  const char* name_;
-  std::string before_;
-};
 
 double dot(Vec x, Vec y) {
   PetscScalar product = 0;
@@ -139,7 +116,7 @@ bool Contest::find_own_minimum(Vec displacement) {
   if (problem_.force() || !(distance(displacement) < far)) return false;
   const base::VecHandle moved = positions_.make_vector();
   check(VecCopy(displacement, moved));
-  const ScopedOption few("-tao_max_it", "50");
+  const base::ScopedOption few("-tao_max_it", "50");
   solve::Minimiser newton(problem_.function(), problem_.solver(), nullptr);
   const solve::Outcome outcome = newton.run(displacement, 0.01 * rules_.accuracy);
   check(VecAXPY(moved, -1, displacement));
@@ -168,7 +145,7 @@ Entry Contest::race_polak_ribiere() {
 }
 
 Entry Contest::race_tao(const std::string& type) {
-  const ScopedOption chosen("-tao_type", type);
+  const base::ScopedOption chosen("-tao_type", type);
   return race("TAO " + type, [&](solve::Function& function, Vec displacement) {
     solve::Minimiser minimiser(function, problem_.solver(), nullptr);
     minimiser.run(displacement, 0);

@@ -43,8 +43,7 @@ Size measure_size(const scene::Scene& scene) {
 
 scene::Scene with_layers(scene::Scene scene, int layers) {
   scene.tissue.layers = layers;
-  scene.tissue.depths.resize(layers);
-  for (int a = 0; a < layers; ++a) scene.tissue.depths[a] = static_cast<double>(a) / (layers - 1);
+  scene.tissue.depths.clear();
   return scene;
 }
 

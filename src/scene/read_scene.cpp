@@ -44,12 +44,6 @@ std::vector<BoneEntry> read_bones(const Value& value) {
   return bones;
 }
 
-std::vector<double> even_depths(int layers) {
-  std::vector<double> depths(layers);
-  for (int a = 0; a < layers; ++a) depths[a] = static_cast<double>(a) / (layers - 1);
-  return depths;
-}
-
 std::vector<double> read_one_a_layer(const Value& value, int layers) {
   const std::vector<double> numbers = value.numbers();
   if (numbers.size() != static_cast<std::size_t>(layers))
@@ -128,8 +122,8 @@ Tissue read_tissue(const Value& value) {
   const Map map(value);
   Tissue tissue;
   tissue.layers = map.at("layers").integer();
-  const auto depths = map.find("depths");
-  tissue.depths = depths ? read_depths(*depths, tissue.layers) : even_depths(tissue.layers);
+  if (const auto depths = map.find("depths"))
+    tissue.depths = read_depths(*depths, tissue.layers);
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);

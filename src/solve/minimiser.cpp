@@ -163,10 +163,14 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   // A look costs the solution of a linear system, so it is taken only where the force that went
   // with a distance at the last look says that it is worth it; a Newton method's steps go further.
   const double hopeful = newton_ ? 20 : 2;
-  if (softest_ > 0 && largest_force > hopeful * softest_ * accuracy_) {
+  constexpr int64_t seldom = 20;  // evaluations: a look costs other methods as much as many of them
+  const bool far = largest_force > hopeful * softest_ * accuracy_;
+  const bool soon = !newton_ && function_.evaluations() - looked_at_ < seldom;
+  if (softest_ > 0 && (far || soon)) {
     error_ = largest_force / softest_;
     return false;
   }
+  looked_at_ = function_.evaluations();
   error_ = strict_estimate(displacement, gradient);
   if (std::isfinite(error_))
     softest_ = largest_force / error_;

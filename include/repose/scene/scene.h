@@ -35,7 +35,7 @@ struct SphereRegion {
 
 struct Tissue {
   int layers = 4;              ///< 2 … 64
-  std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; even when not given
+  std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
   double attach_within = 30;   ///< mm
   double free_thickness = 12;  ///< mm
   double release = 10;         ///< mm

@@ -57,6 +57,7 @@ class Minimiser : public RestSearch {
   double accuracy_ = 0;                 // mm, of the run under way
   double error_ = 0;                    // mm, latest strict estimate
   double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
+  int64_t looked_at_ = 0;               // evaluations at that estimate
   double lowest_ = 0;                   // value, of the run under way
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long

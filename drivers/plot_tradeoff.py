@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""The pictures of repose-tradeoff, drawn without a screen from the tables it wrote.
+
+    drivers/plot_tradeoff.py NAME [NAME …]
+
+For each NAME reads NAME.csv, NAME_map.csv and NAME_triangles.csv and writes NAME.png (error against
+evaluations and time, what layers, volume term and load steps change; the cheapest ways are named)
+and NAME_map.png (where on the face). Then prints how the program's own estimates compare with the
+true errors of all the tables together.
+Needs: apt-get install --no-install-recommends python3-matplotlib
+"""
+
+import csv
+import os
+import sys
+
+try:
+    import matplotlib
+    import numpy as np
+except ImportError as missing:
+    print(f"plot_tradeoff.py: {missing.name} is missing: "
+          "apt-get install --no-install-recommends python3-matplotlib", file=sys.stderr)
+    sys.exit(1)
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.collections import PolyCollection
+
+MARKS = {"ntr": "o", "nls": "s", "lmvm": "^", "cg": "v", "bnls": "D", "bntr": "P"}
+INK, ACCENT = "#303030", "#b02020"
+NUMBERS = ("accuracy_mm", "cpu_s", "evaluations", "estimate_mm", "error_mm", "skin_rms_mm",
+           "skin_95_mm", "skin_max_mm")
+
+
+def read(name):
+    """The rows of NAME.csv, numbers as numbers."""
+    with open(name + ".csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        row.update({key: float(row[key]) for key in NUMBERS})
+    return rows
+
+
+def save(figure, file):
+    figure.savefig(file + ".part", format="png", dpi=110, bbox_inches="tight")
+    os.replace(file + ".part", file)
+    plt.close(figure)
+    print(file)
+
+
+def front(rows, cost, error):
+    """The rows that no other beats in both, cheapest first."""
+    best, kept = np.inf, []
+    for row in sorted(rows, key=lambda row: (row[cost], row[error])):
+        if row[error] < best:
+            best = row[error]
+            kept.append(row)
+    return kept
+
+
+def draw_methods(axes, rows, cost, label):
+    """True error over cost, a line a method; the front is marked and named."""
+    rows = [row for row in rows if row["study"] == "solver" and row["error_mm"] > 0]
+    unit = min(row["cpu_s"] for row in rows) if cost == "cpu_s" else 1
+    for method in dict.fromkeys(row["method"] for row in rows):
+        own = sorted((row for row in rows if row["method"] == method),
+                     key=lambda row: -row["accuracy_mm"])
+        axes.loglog([row[cost] / unit for row in own], [row["error_mm"] for row in own],
+                    MARKS.get(method, "x") + "-", ms=4, lw=0.8, label=method)
+    kept = front(rows, cost, "error_mm")
+    axes.loglog([row[cost] / unit for row in kept], [row["error_mm"] for row in kept], "o", ms=9,
+                mfc="none", mec=ACCENT, label="cheapest")
+    axes.set_xlabel(label)
+    axes.set_ylabel("true error, mm")
+    axes.legend(fontsize=7)
+
+
+def draw_choices(axes, rows):
+    """How far the skin is from the reference for each layer count, volume term and load step."""
+    rows = [row for row in rows if row["study"] not in ("solver",)]
+    rows = [row for row in rows if row["skin_95_mm"] == row["skin_95_mm"]]
+    key = {"layers": "layers", "volume": "volume", "load steps": "load_steps", "mesh": "resolution_mm"}
+    names = [f"{row[key[row['study']]]} {row['study']}" for row in rows]
+    place = np.arange(len(rows))
+    axes.barh(place, [max(row["skin_max_mm"], 1e-6) for row in rows], color="0.85", label="largest")
+    axes.barh(place, [max(row["skin_95_mm"], 1e-6) for row in rows], color="0.6", height=0.5,
+              label="95 %")
+    unit = min(row["cpu_s"] for row in rows)
+    for k, row in enumerate(rows):
+        axes.text(0.98, k, f"{row['cpu_s'] / unit:.2g}×", fontsize=6.5, ha="right", va="center",
+                  transform=axes.get_yaxis_transform())
+    axes.set_yticks(place, names, fontsize=6.5)
+    axes.set_xlabel("skin from the reference, mm (right: time)")
+    axes.legend(fontsize=7, loc="lower right", bbox_to_anchor=(0.92, 0))
+    axes.invert_yaxis()
+
+
+def draw_study(name, rows):
+    figure, panels = plt.subplots(1, 3, figsize=(12, 3.6))
+    draw_methods(panels[0], rows, "evaluations", "evaluations of value and gradient")
+    draw_methods(panels[1], rows, "cpu_s", "time, relative to the fastest")
+    draw_choices(panels[2], rows)
+    figure.tight_layout()
+    save(figure, name + ".png")
+
+
+def draw_map(name):
+    """The reference's face from the side and the front, coloured by each way's error."""
+    with open(name + "_map.csv", newline="") as file:
+        titles = next(csv.reader(file))[3:]
+    values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))
+    triangles = np.genfromtxt(name + "_triangles.csv", delimiter=",", skip_header=1, dtype=int)
+    shown = [k for k, title in enumerate(titles) if title.startswith(("layers", "volume", "mesh"))]
+    points, error = values[:, :3], values[:, 3:]
+    largest = np.percentile(error[:, shown].max(axis=1), 99)
+    figure, panels = plt.subplots(1, len(shown), figsize=(1.7 * len(shown), 2.6), squeeze=False)
+    order = np.argsort(-points[triangles][:, :, 1].mean(axis=1))
+    for axes, k in zip(panels[0], shown):
+        faces = PolyCollection(points[triangles][order][:, :, [0, 2]], cmap="magma_r", lw=0)
+        faces.set_array(error[:, k][triangles].mean(axis=1)[order])
+        faces.set_clim(0, largest)
+        axes.add_collection(faces)
+        axes.autoscale()
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        axes.set_title(titles[k], fontsize=7)
+    bar = figure.colorbar(faces, ax=panels[0], shrink=0.8)
+    bar.set_label("mm from the reference", fontsize=7)
+    bar.ax.tick_params(labelsize=6)
+    save(figure, name + "_map.png")
+
+
+def judge_estimates(rows):
+    """Markdown rows: how the estimate of each run compares with its true error, by method."""
+    print("\n| method | runs | estimate below the error | more than 10 times above | ratio, median "
+          "(5 … 95 %) |\n|---|--:|--:|--:|--:|")
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    for method in [*methods, "all"]:
+        own = [row for row in rows if method in ("all", row["method"])
+               and row["error_mm"] > 1e-7 and row["converged"] == "1"]
+        ratio = np.array([row["estimate_mm"] / row["error_mm"] for row in own])
+        low, middle, high = np.percentile(ratio, [5, 50, 95])
+        print(f"| {method} | {len(own)} | {np.mean(ratio < 1):.1%} | {np.mean(ratio > 10):.1%} | "
+              f"{middle:.2f} ({low:.2f} … {high:.2f}) |")
+
+
+def main():
+    if not sys.argv[1:] or sys.argv[1] == "-help":
+        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] else sys.stderr)
+        sys.exit(0 if sys.argv[1:] else 1)
+    every = []
+    for name in sys.argv[1:]:
+        rows = read(name)
+        draw_study(name, rows)
+        if os.path.getsize(name + "_map.csv") > 10:
+            draw_map(name)
+        every += rows
+    judge_estimates(every)
+
+
+main()

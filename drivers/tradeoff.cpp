@@ -1,0 +1,130 @@
+/// repose-tradeoff SCENE: what accuracy costs on a scene, and whether the program knows it.
+///
+///     repose-tradeoff meshes/paper_jaw_advance.yaml
+///     mpirun -n 2 repose-tradeoff my_head.yaml -methods ntr,lmvm -accuracies 1,0.1,0.01 -layers
+///     2,4,6 drivers/plot_tradeoff.py paper_jaw_advance_tradeoff
+///
+/// Solves the scene with methods × accuracies, and varies load steps, volume term and layers one at
+/// a time; each is compared with a reference of its own. Writes NAME.csv, NAME_map.csv and
+/// NAME_triangles.csv. Exit status: 0 done, 1 bad input, 3 internal error.
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/base/progress.h"
+#include "repose/base/text.h"
+#include "repose/base/whole_file.h"
+#include "repose/tradeoff/study.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+
+std::vector<base::Option> option_table() {
+  return {{"output", OptionKind::path, "", "Path of the tables without ending (SCENE_tradeoff)."},
+          {"methods", OptionKind::text, "ntr,nls,lmvm,cg", "TAO's methods, the usual one first."},
+          {"accuracies", OptionKind::text, "1,0.3,0.1,0.03,0.01,0.001", "mm."},
+          {"load_steps", OptionKind::text, "1,2,4,8,16", "Numbers of equal steps; may be empty."},
+          {"volumes", OptionKind::text, "none,paper,penalty", "Volume terms; may be empty."},
+          {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; may be empty."},
+          {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.", {1e-12, 1}, "mm"},
+          {"time_limit", OptionKind::number, "60", "Of one run.", {1e-3, 1e6}, "s"}};
+}
+
+std::vector<std::string> words_of(const base::Options& options, const char* name) {
+  std::vector<std::string> words;
+  std::istringstream list(options.text(name));
+  for (std::string word; std::getline(list, word, ',');) words.push_back(word);
+  return words;
+}
+
+std::vector<double> numbers_of(const base::Options& options, const char* name,
+                               const base::Range& range) {
+  std::vector<double> numbers;
+  for (const std::string& word : words_of(options, name)) {
+    const auto number = base::parse_number(word);
+    if (!number || !range.contains(*number))
+      base::refuse("-{} {}: {} is not a number, {}", name, options.text(name), base::shown(word),
+                   range.text());
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+std::vector<int> integers_of(const base::Options& options, const char* name,
+                             const base::Range& range) {
+  std::vector<int> integers;
+  for (const double number : numbers_of(options, name, range)) {
+    if (number != std::floor(number))
+      base::refuse("-{} {}: {:g} is not a whole number", name, options.text(name), number);
+    integers.push_back(static_cast<int>(number));
+  }
+  return integers;
+}
+
+std::vector<std::string> choices_of(const base::Options& options, const char* name,
+                                    const std::vector<std::string>& allowed) {
+  const std::vector<std::string> chosen = words_of(options, name);
+  for (const std::string& word : chosen)
+    if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
+      base::refuse("-{} {}: {} is not one of {}", name, options.text(name), base::shown(word),
+                   fmt::format("{}", fmt::join(allowed, ", ")));
+  return chosen;
+}
+
+tradeoff::Plan read_plan(const base::Options& options) {
+  using base::Range;
+  tradeoff::Plan plan;
+  plan.methods = choices_of(options, "methods", {"ntr", "nls", "lmvm", "cg", "bnls", "bntr"});
+  plan.accuracies = numbers_of(options, "accuracies", Range::between(1e-12, 100));
+  plan.volumes = choices_of(options, "volumes", {"none", "paper", "penalty"});
+  plan.load_steps = integers_of(options, "load_steps", Range::between(1, 100000));
+  plan.layers = integers_of(options, "layers", Range::between(2, 64));
+  plan.reference_accuracy = options.number("reference");
+  plan.seconds = options.number("time_limit");
+  if (plan.methods.empty()) base::refuse("-methods: give one or more");
+  return plan;
+}
+
+std::string triangle_table(const std::vector<Triangle>& triangles) {
+  std::string text = "a,b,c\n";
+  for (const auto& [a, b, c] : triangles) text += fmt::format("{},{},{}\n", a, b, c);
+  return text;
+}
+
+base::Exit run(const base::Options& options) {
+  const std::filesystem::path input = options.arguments()[0];
+  tradeoff::Plan plan = read_plan(options);
+  base::together(comm, [&] { plan.scene = scene::read_scene(input); });
+  const std::string name =
+      options.has("output") ? options.text("output") : input.stem().string() + "_tradeoff";
+  const tradeoff::Findings found = tradeoff::measure(plan, [](const std::string& line, double) {
+    if (base::rank(comm) == 0) std::printf("  %s\n", line.c_str());
+    std::fflush(stdout);
+  });
+  base::on_first_rank(comm, [&] {
+    base::write_whole_file(name + ".csv", tradeoff::table(found.measurements));
+    base::write_whole_file(name + "_map.csv", tradeoff::map_table(found.map));
+    base::write_whole_file(name + "_triangles.csv", triangle_table(found.map.triangles));
+    std::printf("%s.csv, %s_map.csv, %s_triangles.csv: drivers/plot_tradeoff.py %s draws them\n",
+                name.c_str(), name.c_str(), name.c_str(), name.c_str());
+  });
+  return base::Exit::done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv, "Measures what accuracy costs on a scene.",
+                        {{"SCENE", "scene (.yaml)"}}, option_table());
+  return base::run_program(options, [&] { return run(options); });
+}

@@ -1,0 +1,76 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "repose/scene/scene.h"
+#include "repose/surface/surface.h"
+
+/// What accuracy costs: one scene solved in many ways, each against one reference.
+namespace repose::tradeoff {
+
+/// One way to solve the scene.
+struct Way {
+  std::string study;      ///< what is varied: solver, load steps, volume, layers, mesh
+  std::string method;     ///< -tao_type
+  double accuracy;        ///< mm asked for
+  std::string volume;     ///< none, paper, penalty
+  int load_steps = 0;     ///< 0: automatic
+  int layers = 0;         ///< point layers
+  double resolution = 0;  ///< mm by which the skin was decimated; 0: as it is
+};
+
+/// What it cost and how far it came. Errors are largest distances to the reference, mm; NaN where
+/// there is nothing to compare.
+struct Measurement {
+  Way way;
+  int64_t points = 0, unknowns = 0;
+  bool converged = false;
+  std::string reason;
+  double seconds = 0;  ///< CPU, of the rank that took longest, distribution included
+  int64_t evaluations = 0, assemblies = 0, iterations = 0;
+  double estimate = 0;  ///< mm, the program's own displacement_error
+  double error = 0;     ///< mm, over all points, against the same model converged to rounding
+  double skin_rms = 0;  ///< mm, over the vertices of the scene's skin, against the reference
+  double skin_95 = 0;   ///< likewise, 95 %
+  double skin_max = 0;  ///< likewise
+};
+
+/// What is to be varied, one thing at a time but for methods × accuracies.
+struct Plan {
+  scene::Scene scene;
+  std::vector<std::string> methods;
+  std::vector<double> accuracies;  ///< mm
+  std::vector<std::string> volumes;
+  std::vector<int> load_steps, layers;
+  std::vector<double> resolutions;   ///< mm
+  double reference_accuracy = 1e-8;  ///< mm
+  double seconds = 60;               ///< time limit of one run
+};
+
+/// The face on which errors are mapped: the scene's skin at rest in the reference, and how far from
+/// it each way, but those that differ in method or accuracy alone, leaves it.
+struct Map {
+  std::vector<Vec3> rest;           ///< [V] mm
+  std::vector<Triangle> triangles;  ///< of the skin
+  std::vector<Way> ways;
+  std::vector<std::vector<double>> error;  ///< [ways][V] mm
+};
+
+struct Findings {
+  std::vector<Measurement> measurements;
+  Map map;  ///< of the ways that differ in layers, mesh or volume term
+};
+
+/// Runs the study; `tell` is given a line before each run, with how much is done. The plan is the
+/// same on all ranks; findings are complete on rank 0.
+/// The reference has the most layers and the skin as it is. Throws InputError as the solver does.
+/// Collective.
+Findings measure(const Plan& plan, const std::function<void(const std::string&, double)>& tell);
+
+/// CSV: a line of names, then one row a measurement.
+std::string table(const std::vector<Measurement>& measurements);
+/// CSV: one row a skin vertex, its position and the error of each way.
+std::string map_table(const Map& map);
+
+}  // namespace repose::tradeoff

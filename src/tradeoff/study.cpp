@@ -1,0 +1,197 @@
+#include "repose/tradeoff/study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "label.h"
+#include "repose/base/agreement.h"
+#include "repose/base/scoped_option.h"
+#include "repose/base/usage.h"
+#include "repose/model/build.h"
+#include "repose/solve/prestress.h"
+#include "repose/solve/repose.h"
+#include "skin.h"
+#include "ways.h"
+
+namespace repose::tradeoff {
+
+namespace {
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+const double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// All rows of slabs of points, on rank 0.
+std::vector<Vec3> gather(const std::vector<Vec3>& slab) {
+  const int mine = static_cast<int>(3 * slab.size()), ranks = base::size(comm);
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
+  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<Vec3> all(base::rank(comm) == 0 ? (starts.back() + counts.back()) / 3 : 0);
+  MPI_Gatherv(slab.empty() ? nullptr : slab.data()->data(), mine, MPI_DOUBLE,
+              all.empty() ? nullptr : all.data()->data(), counts.data(), starts.data(), MPI_DOUBLE,
+              0, comm);
+  return all;
+}
+
+/// What a run left behind, the positions on rank 0.
+struct Run {
+  Measurement measurement;
+  std::vector<Vec3> position;
+};
+
+/// A model of the scene, and its own rest position found to the reference's accuracy.
+struct Discretisation {
+  model::Model model;  // on rank 0
+  double bulk_modulus = 0;
+  std::vector<Vec3> rest;  // on rank 0
+};
+
+class Study {
+ public:
+  Study(const Plan& plan, const std::function<void(const std::string&, double)>& tell)
+      : plan_(plan), tell_(tell) {}
+
+  Findings run() {
+    const std::vector<Way> ways = ways_of(plan_);
+    prepare(ways);
+    for (size_t k = 0; k < ways.size(); ++k) {
+      tell_(fmt::format("{}: {}", ways[k].study, label(ways[k])),
+            static_cast<double>(k) / static_cast<double>(ways.size()));
+      add(ways[k]);
+    }
+    return std::move(findings_);
+  }
+
+ private:
+  using Key = std::tuple<int, double, std::string>;  // layers, resolution, volume term
+  static Key key_of(const Way& way) { return {way.layers, way.resolution, way.volume}; }
+
+  /// The reference: the most layers, the skin as it is, the scene's volume term.
+  void prepare(const std::vector<Way>& ways) {
+    Way finest = usual_way(plan_);
+    for (const Way& way : ways) finest.layers = std::max(finest.layers, way.layers);
+    tell_("the reference", 0);
+    const Discretisation& reference = discretisation(finest);
+    base::on_first_rank(comm, [&] {
+      skin_.emplace(reference.model, reference.rest);
+      findings_.map.rest = skin_->rest();
+      findings_.map.triangles = skin_->triangles();
+    });
+  }
+
+  const Discretisation& discretisation(const Way& way) {
+    const auto known = known_.find(key_of(way));
+    if (known != known_.end()) return known->second;
+    Discretisation& made = known_[key_of(way)];
+    base::on_first_rank(comm, [&] {
+      made.model = build(plan_.scene, way);
+      made.bulk_modulus =
+          plan_.scene.solve.bulk_modulus.value_or(10 * model::effective_modulus(made.model));
+    });
+    MPI_Bcast(&made.bulk_modulus, 1, MPI_DOUBLE, 0, comm);
+    bring_into_equilibrium(made.model);
+    Way closely = usual_way(plan_);
+    closely.volume = way.volume;
+    closely.accuracy = plan_.reference_accuracy;
+    made.rest = solve_as(closely, made).position;
+    return made;
+  }
+
+  void bring_into_equilibrium(model::Model& model) const {
+    const scene::Scene& scene = plan_.scene;
+    int wanted = scene.tissue.turgor > 0 || scene.gravity;
+    MPI_Bcast(&wanted, 1, MPI_INT, 0, comm);
+    if (!wanted) return;
+    const Vec3 field = scene.scan_gravity.value_or(scene.gravity.value_or(Vec3::Zero()));
+    solve::prestress(comm, model, {scene.tissue.turgor, field});
+  }
+
+  solve::Settings settings_of(const Way& way, double bulk_modulus) const {
+    solve::Settings settings;
+    settings.path = {.accuracy = way.accuracy, .load_steps = way.load_steps};
+    settings.volume = way.volume;
+    settings.time_limit = plan_.seconds;
+    if (way.volume == "penalty")
+      settings.weights = {1, mechanics::VolumeTerm::penalty, bulk_modulus};
+    if (way.volume == "paper") {
+      settings.lambda = plan_.scene.solve.lambda;
+      settings.weights = {settings.lambda, mechanics::VolumeTerm::paper, 1 - settings.lambda};
+    }
+    return settings;
+  }
+
+  Run solve_as(const Way& way, const Discretisation& made) const {
+    const base::ScopedOption method("-tao_type", way.method);
+    Run run;
+    run.measurement.way = way;
+    base::Stages stages(comm);
+    const double begin = base::cpu_seconds();
+    const solve::Summary summary =
+        solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus), {}, stages,
+                           [&](const model::StepNumbers&, const model::StepRows& rows) {
+                             run.position = gather(rows.position);
+                           });
+    Measurement& m = run.measurement;
+    m.seconds = base::cpu_seconds() - begin;
+    MPI_Allreduce(MPI_IN_PLACE, &m.seconds, 1, MPI_DOUBLE, MPI_MAX, comm);
+    m.points = static_cast<int64_t>(made.model.points.position.size());
+    m.unknowns = summary.unknowns;
+    m.converged = summary.path.complete();
+    m.reason = summary.last.reason;
+    m.evaluations = summary.evaluations;
+    m.assemblies = summary.assemblies;
+    m.iterations = summary.path.iterations;
+    m.estimate = summary.last.displacement_error;
+    if (summary.path.load < 1) run.position.clear();
+    return run;
+  }
+
+  void add(const Way& way) {
+    const Discretisation& made = discretisation(way);
+    Run run = solve_as(way, made);
+    base::on_first_rank(comm, [&] {
+      Measurement& m = run.measurement;
+      m.error = m.skin_rms = m.skin_95 = m.skin_max = unknown;
+      if (!run.position.empty()) compare(run, made);
+      findings_.measurements.push_back(m);
+    });
+  }
+
+  void compare(Run& run, const Discretisation& made) {
+    Measurement& m = run.measurement;
+    if (made.rest.size() == run.position.size()) {
+      m.error = 0;
+      for (size_t i = 0; i < made.rest.size(); ++i)
+        m.error = std::max(m.error, (made.rest[i] - run.position[i]).norm());
+    }
+    std::vector<double> off = skin_->distances(made.model, run.position);
+    if (m.way.study != "solver") {
+      findings_.map.ways.push_back(m.way);
+      findings_.map.error.push_back(off);
+    }
+    std::sort(off.begin(), off.end());
+    double squares = 0;
+    for (const double d : off) squares += d * d;
+    m.skin_rms = std::sqrt(squares / static_cast<double>(off.size()));
+    m.skin_95 = off[(off.size() - 1) * 95 / 100];
+    m.skin_max = off.back();
+  }
+
+  const Plan& plan_;
+  const std::function<void(const std::string&, double)>& tell_;
+  std::map<Key, Discretisation> known_;
+  std::optional<Skin> skin_;  // on rank 0
+  Findings findings_;
+};
+
+}  // namespace
+
+Findings measure(const Plan& plan, const std::function<void(const std::string&, double)>& tell) {
+  return Study(plan, tell).run();
+}
+
+}  // namespace repose::tradeoff

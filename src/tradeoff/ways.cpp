@@ -1,0 +1,50 @@
+#include "ways.h"
+
+#include <algorithm>
+
+namespace repose::tradeoff {
+
+std::string volume_word(const scene::Solve& solve) {
+  switch (solve.volume.value_or(scene::VolumeForm::penalty)) {
+    case scene::VolumeForm::none:
+      return "none";
+    case scene::VolumeForm::paper:
+      return "paper";
+    default:
+      return "penalty";
+  }
+}
+
+Way usual_way(const Plan& plan) {
+  return {.study = "solver",
+          .method = plan.methods.front(),
+          .accuracy = plan.scene.solve.accuracy,
+          .volume = volume_word(plan.scene.solve),
+          .load_steps = plan.scene.solve.load_steps,
+          .layers = plan.scene.tissue.layers};
+}
+
+std::vector<Way> ways_of(const Plan& plan) {
+  const Way usual = usual_way(plan);
+  std::vector<Way> ways;
+  const auto vary = [&](const std::string& study, const auto& values, auto&& change) {
+    for (const auto& value : values) {
+      Way way = usual;
+      way.study = study;
+      change(way, value);
+      ways.push_back(way);
+    }
+  };
+  for (const std::string& method : plan.methods)
+    vary("solver", plan.accuracies, [&](Way& way, double accuracy) {
+      way.method = method;
+      way.accuracy = accuracy;
+    });
+  vary("load steps", plan.load_steps, [](Way& way, int steps) { way.load_steps = steps; });
+  vary("volume", plan.volumes, [](Way& way, const std::string& form) { way.volume = form; });
+  vary("layers", plan.layers, [](Way& way, int layers) { way.layers = layers; });
+  vary("mesh", plan.resolutions, [](Way& way, double mm) { way.resolution = mm; });
+  return ways;
+}
+
+}  // namespace repose::tradeoff

@@ -1,0 +1,13 @@
+#pragma once
+#include "repose/tradeoff/study.h"
+
+namespace repose::tradeoff {
+
+/// The scene as it stands, by the first method and the second of the accuracies.
+Way usual_way(const Plan& plan);
+/// All ways of a plan, those of one model one after another.
+std::vector<Way> ways_of(const Plan& plan);
+/// The word of a volume term.
+std::string volume_word(const scene::Solve& solve);
+
+}  // namespace repose::tradeoff
