@@ -1,0 +1,149 @@
+/// repose-isosurface VOLUME: triangle meshes from a CT or a label map, by marching cubes.
+///
+///     repose-isosurface ct.nii.gz -level -300 -largest -output skin.ply
+///     repose-isosurface dicom_folder -level 300 -components_above 1000 -smooth 10 -output bone.stl
+///     repose-isosurface labels.nii.gz -labels -largest -output bones.ply
+///
+/// Writes the mesh, with -labels one a label (bones_1.ply, bones_2.ply, …), in LPS and mm, and says
+/// what it did to the data. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
+#include <cstdio>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/base/progress.h"
+#include "repose/surface/component.h"
+#include "repose/surface/defects.h"
+#include "repose/surface/extract.h"
+#include "repose/surface/volume_filter.h"
+#include "repose/surface/write.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+constexpr double largest_length = 1000;  // mm
+
+std::vector<base::Option> option_table() {
+  const base::Range length{0, largest_length};
+  return {
+      {"level", OptionKind::number, "", "Surface where values cross this one.", {}, "HU"},
+      {"otsu", OptionKind::flag, "", "The level by Otsu's method, from the values."},
+      {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 1e6}},
+      {"labels", OptionKind::flag, "", "One mesh for every label: NAME_LABEL.ply."},
+      {"box",
+       OptionKind::number,
+       "",
+       "Lowest x y z and highest: only these voxels.",
+       {},
+       "MM",
+       {},
+       6},
+      {"voxel", OptionKind::number, "0", "Average to voxels this large first; 0: none.", length,
+       "MM"},
+      {"close_holes", OptionKind::number, "0", "Close gaps up to twice as wide.", length, "MM"},
+      {"border",
+       OptionKind::choice,
+       "closed",
+       "Where the volume ends: capped or cut off.",
+       {},
+       "",
+       {"closed", "open"}},
+      {"largest", OptionKind::flag, "", "Keep the largest component only."},
+      {"components_above", OptionKind::number, "0", "Keep components this large.",
+       base::Range::at_least(0), "MM3"},
+      {"smooth", OptionKind::integer, "0", "Rounds of smoothing that does not shrink.", {0, 1000}},
+      {"output", OptionKind::path, "mesh.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
+}
+
+surface::Extraction wanted_of(const base::Options& options) {
+  surface::Extraction wanted;
+  if (options.has("level")) wanted.level = options.number("level");
+  wanted.otsu = options.flag("otsu");
+  if (options.has("label")) wanted.label = options.integer("label");
+  if (options.has("box")) {
+    std::array<Vec3, 2> box;
+    const auto numbers = options.texts("box");
+    for (int i = 0; i < 6; ++i) box[i / 3][i % 3] = base::parse_number(numbers[i]).value();
+    if (!(box[0].array() < box[1].array()).all())
+      base::refuse("-box: {} must be the lowest x, y, z and then the highest",
+                   fmt::join(numbers, " "));
+    wanted.box = box;
+  }
+  wanted.voxel = options.number("voxel");
+  wanted.close_holes = options.number("close_holes");
+  if (options.text("border") == "open") wanted.border = surface::VolumeBorder::open;
+  wanted.largest = options.flag("largest");
+  wanted.components_above = options.number("components_above");
+  wanted.smooth = options.integer("smooth");
+  return wanted;
+}
+
+void print_volume(const surface::Volume& volume) {
+  const auto range = surface::value_range(volume);
+  std::printf("%s: %lld × %lld × %lld voxels of %.4g × %.4g × %.4g mm, values %g … %g\n",
+              volume.name.c_str(), static_cast<long long>(volume.size[0]),
+              static_cast<long long>(volume.size[1]), static_cast<long long>(volume.size[2]),
+              volume.spacing(0), volume.spacing(1), volume.spacing(2), range[0], range[1]);
+}
+
+void print_surface(const std::string& file, const surface::Surface& mesh) {
+  const surface::Defects defects = surface::inspect(mesh, false);
+  const bool manifold = defects.non_manifold_edges + defects.non_manifold_vertices == 0;
+  std::printf("%s: %zu vertices, %zu triangles, area %.6g mm²", file.c_str(), mesh.points.size(),
+              mesh.triangles.size(), surface::area_of(mesh));
+  if (defects.border_edges == 0) std::printf(", volume %.6g mm³", surface::volume_of(mesh));
+  std::printf("\n  %s; %s\n", manifold ? "manifold" : "not manifold",
+              surface::describe(defects).c_str());
+}
+
+/// mesh.ply → mesh_2.ply
+std::string numbered(const std::filesystem::path& file, int64_t label) {
+  const std::string name = file.stem().string() + "_" + std::to_string(label);
+  return (file.parent_path() / name).string() + file.extension().string();
+}
+
+void write_one(const surface::Volume& volume, const surface::Extraction& wanted,
+               const std::string& file) {
+  base::Progress progress(MPI_COMM_WORLD);
+  const auto result = surface::extract(
+      volume, wanted, [&](const std::string& step, double done) { progress.show(step, done); });
+  progress.clear();
+  for (const std::string& remark : result.remarks) std::printf("  %s\n", remark.c_str());
+  if (wanted.otsu) std::printf("  level by Otsu's method: %.6g\n", result.level);
+  surface::write_surface(file, result.surface);
+  print_surface(file, result.surface);
+}
+
+void run(const base::Options& options) {
+  const std::string output = options.text("output");
+  surface::check_surface_ending(output);
+  surface::Extraction wanted = wanted_of(options);
+  const bool all = options.flag("labels");
+  if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
+    base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
+  base::Progress progress(MPI_COMM_WORLD);
+  const surface::Volume volume = surface::read_volume(
+      options.arguments()[0], [&](double done) { progress.show("reading slices", done); });
+  progress.clear();
+  print_volume(volume);
+  if (!all) return write_one(volume, wanted, output);
+  const auto labels = surface::labels_of(volume);
+  if (labels.empty()) base::refuse("{}: holds no label, only 0", volume.name);
+  for (const int64_t label : labels) {
+    wanted.label = label;
+    write_one(volume, wanted, numbered(output, label));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(
+      argc, argv, "Triangle meshes from a CT or a label map, by marching cubes.",
+      {{"VOLUME", "a folder of DICOM slices, .nii, .nii.gz, .nrrd, .mha or .mhd"}}, option_table());
+  return base::run_program(options, [&] {
+    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    return base::Exit::done;
+  });
+}

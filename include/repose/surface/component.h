@@ -1,0 +1,25 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "repose/surface/surface.h"
+
+/// Whole surfaces and their connected parts: measures and choice.
+namespace repose::surface {
+
+double area_of(const Surface& surface);  ///< mm²
+/// mm³, signed: positive where the surface is closed and faces outward, negative for the wall of a
+/// cavity. For an open surface that of the cone over its rim from the first point.
+double volume_of(const Surface& surface);
+
+/// The parts connected by edges, the one of the largest |volume| first (of open ones the largest
+/// area). Points are renumbered, their order kept.
+std::vector<Surface> components(const Surface& surface);
+
+/// The first of components().
+Surface largest_component(const Surface& surface);
+
+/// Those parts whose |volume| is at least `volume` mm³. Throws InputError where none is.
+Surface components_above(const Surface& surface, double volume);
+
+}  // namespace repose::surface

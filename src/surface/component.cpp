@@ -1,0 +1,106 @@
+#include "repose/surface/component.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "edges.h"
+#include "repose/base/error.h"
+
+namespace repose::surface {
+namespace {
+
+bool is_open(const Surface& surface) {
+  const EdgeTable edges(surface.triangles);
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    if (edges[e].size() == 1) return true;
+  return false;
+}
+
+/// Which part each triangle belongs to, numbered in the order of their first triangle.
+std::vector<int64_t> parts_of(const Surface& surface, int64_t& count) {
+  const EdgeTable edges(surface.triangles);
+  UnionFind sets(static_cast<int64_t>(surface.triangles.size()));
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    for (const HalfEdge& half : edges[e]) sets.unite(edges[e].front().triangle, half.triangle);
+  std::vector<int64_t> part(surface.triangles.size());
+  count = 0;
+  for (int64_t t = 0; t < static_cast<int64_t>(part.size()); ++t)
+    part[t] = sets.find(t) == t ? count++ : part[sets.find(t)];
+  return part;
+}
+
+/// Every part with its own points.
+std::vector<Surface> split(const Surface& surface) {
+  int64_t count = 0;
+  const auto part = parts_of(surface, count);
+  std::vector<Surface> parts(count);
+  std::vector<int64_t> row(surface.points.size(), -1), owner(surface.points.size(), -1);
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    Surface& target = parts[part[t]];
+    Triangle triangle = surface.triangles[t];
+    for (int64_t& vertex : triangle) {
+      const int64_t old = vertex;
+      if (owner[old] != part[t]) {
+        owner[old] = part[t];
+        row[old] = static_cast<int64_t>(target.points.size());
+        target.points.push_back(surface.points[old]);
+      }
+      vertex = row[old];
+    }
+    target.triangles.push_back(triangle);
+  }
+  for (Surface& each : parts) each.name = surface.name;
+  return parts;
+}
+
+}  // namespace
+
+double area_of(const Surface& surface) {
+  double twice = 0;
+  for (const auto& [a, b, c] : surface.triangles)
+    twice +=
+        (surface.points[b] - surface.points[a]).cross(surface.points[c] - surface.points[a]).norm();
+  return twice / 2;
+}
+
+double volume_of(const Surface& surface) {
+  return surface.points.empty() ? 0 : six_volumes(surface.points, surface.triangles) / 6;
+}
+
+std::vector<Surface> components(const Surface& surface) {
+  std::vector<Surface> parts = split(surface);
+  const bool by_area = is_open(surface);
+  std::vector<std::pair<double, size_t>> order;
+  for (size_t p = 0; p < parts.size(); ++p)
+    order.emplace_back(by_area ? -area_of(parts[p]) : -std::abs(volume_of(parts[p])), p);
+  std::sort(order.begin(), order.end());
+  std::vector<Surface> sorted;
+  for (const auto& [size, p] : order) sorted.push_back(std::move(parts[p]));
+  return sorted;
+}
+
+Surface largest_component(const Surface& surface) {
+  auto parts = components(surface);
+  if (parts.empty()) base::refuse("{}: holds no triangle", surface.name);
+  return std::move(parts.front());
+}
+
+Surface components_above(const Surface& surface, double volume) {
+  Surface kept{surface.name, {}, {}};
+  double largest = 0;
+  for (const Surface& part : components(surface)) {
+    largest = std::max(largest, std::abs(volume_of(part)));
+    if (std::abs(volume_of(part)) < volume) continue;
+    const auto shift = static_cast<int64_t>(kept.points.size());
+    kept.points.insert(kept.points.end(), part.points.begin(), part.points.end());
+    for (const auto& [a, b, c] : part.triangles)
+      kept.triangles.push_back({a + shift, b + shift, c + shift});
+  }
+  if (kept.triangles.empty())
+    base::refuse("{}: no component of {:g} mm³ or more; the largest has {:.4g} mm³", surface.name,
+                 volume, largest);
+  return kept;
+}
+
+}  // namespace repose::surface
