@@ -87,6 +87,8 @@ Mat3 axes_of(const Image& image, const std::string& name) {
 
 Vec3 origin_of(const Image& image) { return {image.origin[0], image.origin[1], image.origin[2]}; }
 
+Mat3 inverse_axes(const Volume& volume) { return volume.axes.inverse(); }
+
 Volume read_volume(const std::filesystem::path& path, const Watch& watch) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))

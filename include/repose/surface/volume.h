@@ -29,6 +29,9 @@ struct Volume {
   double spacing(int axis) const { return axes.col(axis).norm(); }  ///< mm
 };
 
+/// The matrix from mm beside the origin to voxels.
+Mat3 inverse_axes(const Volume& volume);
+
 /// Reads a folder of DICOM slices, NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr) or MetaImage (.mha,
 /// .mhd). Positions come in LPS: NIfTI, which is RAS, and NRRD of another space are converted;
 /// DICOM's rescale slope is applied; oblique axes and tilted gantries are kept as they are. Numbers

@@ -1,0 +1,110 @@
+/// repose-scan RANGE.ply: a laser scanner's range grid (Cyberware / Stanford PLY) as a triangle
+/// mesh.
+///
+///     repose-scan bun000.ply -output face.ply
+///     repose-scan head.ply -cylinder -max_edge 4 -output head.vtp
+///
+/// Cuts steps in depth, keeps colours, says how many holes are left. The mesh is in mm; a scan less
+/// than 5 units across is taken to be in metres. Exit status: 0 done, 1 bad input (nothing
+/// written), 3 internal error.
+#include <algorithm>
+#include <cstdio>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/surface/component.h"
+#include "repose/surface/defects.h"
+#include "repose/surface/range_scan.h"
+#include "repose/surface/write.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+constexpr double smallest_in_mm = 5;  // a scan less than this across is in metres
+
+std::vector<base::Option> option_table() {
+  return {{"unit",
+           OptionKind::choice,
+           "auto",
+           "Unit of the file; auto: by its size.",
+           {},
+           "",
+           {"auto", "mm", "m"}},
+          {"max_edge",
+           OptionKind::number,
+           "auto",
+           "Longest edge; longer ones cross a step. auto: 4 × the grid's median step.",
+           {1e-3, 1000},
+           "MM",
+           {"auto"}},
+          {"max_angle",
+           OptionKind::number,
+           "80",
+           "Steepest triangle against the scanner's view.",
+           {1, 90},
+           "DEGREES"},
+          {"cylinder", OptionKind::flag, "", "The scanner went round the y axis (head scanners)."},
+          {"output", OptionKind::path, "scan.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
+}
+
+/// mm per unit of the file.
+double scale_of(const base::Options& options, const surface::RangeGrid& grid) {
+  const std::string unit = options.text("unit");
+  if (unit != "auto") return unit == "m" ? 1000 : 1;
+  Vec3 low = Vec3::Constant(1e300), high = -low;
+  for (const Vec3& point : grid.points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  const double size = (high - low).norm();
+  if (size >= smallest_in_mm) return 1;
+  std::printf("  %.3g units across: taken as metres (-unit mm says otherwise)\n", size);
+  return 1000;
+}
+
+void print_mesh(const std::string& file, const surface::ScanMesh& mesh) {
+  const auto count = [](size_t number) { return static_cast<long long>(number); };
+  std::printf("  steps cut: %lld triangles with an edge > %.3g mm, %lld more too steep\n",
+              static_cast<long long>(mesh.cut_long), mesh.longest_edge,
+              static_cast<long long>(mesh.cut_steep));
+  std::printf("  points: %lld in no triangle left out, %lld doubled where sheets met in a point\n",
+              static_cast<long long>(mesh.unused), static_cast<long long>(mesh.split));
+  const auto holes = surface::hole_lengths(mesh.surface);
+  std::printf("  holes: %lld", count(holes.size()));
+  if (!holes.empty()) std::printf(", the longest %.3g mm around", holes.front());
+  std::printf("\n%s: %lld vertices, %lld triangles, area %.6g mm²%s\n", file.c_str(),
+              count(mesh.surface.points.size()), count(mesh.surface.triangles.size()),
+              surface::area_of(mesh.surface), mesh.data.colours.empty() ? "" : ", with colours");
+  std::printf("  %s\n", surface::describe(surface::inspect(mesh.surface, false)).c_str());
+}
+
+void run(const base::Options& options) {
+  const std::string output = options.text("output");
+  surface::check_surface_ending(output);
+  const surface::RangeGrid grid = surface::read_range_grid(options.arguments()[0]);
+  const auto filled =
+      grid.cell.size() - static_cast<size_t>(std::count(grid.cell.begin(), grid.cell.end(), -1));
+  std::printf("%s: %lld × %lld cells, %zu of them with a point\n", grid.name.c_str(),
+              static_cast<long long>(grid.columns), static_cast<long long>(grid.rows), filled);
+  surface::ScanOptions wanted;
+  wanted.scale = scale_of(options, grid);
+  if (options.text("max_edge") != "auto") wanted.longest_edge = options.number("max_edge");
+  wanted.steepest = options.number("max_angle");
+  wanted.cylinder = options.flag("cylinder");
+  const surface::ScanMesh mesh = surface::mesh_of(grid, wanted);
+  surface::write_surface(output, mesh.surface, mesh.data);
+  print_mesh(output, mesh);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv, "A laser scanner's range grid as a triangle mesh.",
+                        {{"RANGE.ply", "a Cyberware or Stanford range-grid PLY"}}, option_table());
+  return base::run_program(options, [&] {
+    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    return base::Exit::done;
+  });
+}
