@@ -29,7 +29,7 @@ std::vector<base::Option> option_table() {
   return {
       {"level", OptionKind::number, "", "Surface where values cross this one.", {}, "HU"},
       {"otsu", OptionKind::flag, "", "The level by Otsu's method, from the values."},
-      {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 1e6}},
+      {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 100000}},
       {"labels", OptionKind::flag, "", "One mesh for every label: NAME_LABEL.ply."},
       {"box",
        OptionKind::number,

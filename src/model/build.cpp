@@ -6,12 +6,12 @@
 #include "repose/model/attachment.h"
 #include "repose/model/columns.h"
 #include "repose/model/layers.h"
+#include "repose/model/load_entry.h"
 #include "repose/model/loads.h"
 #include "repose/model/orientation.h"
 #include "repose/model/point_sets.h"
 #include "repose/model/release.h"
 #include "repose/model/stiffness.h"
-#include "repose/surface/read.h"
 
 namespace repose::model {
 namespace {
@@ -109,10 +109,10 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 }
 
 BuiltModel build_model(const scene::Scene& scene) {
-  const surface::Surface skin = surface::load_surface(scene.skin, surface::Role::skin);
+  const surface::Surface skin = load_entry(scene.skin, surface::Role::skin);
   std::vector<surface::Surface> bones;
   for (const scene::BoneEntry& bone : scene.bones)
-    bones.push_back(surface::load_surface(bone.file, surface::Role::bone));
+    bones.push_back(load_entry(bone.surface, surface::Role::bone));
   return build_model(scene, skin, bones);
 }
 

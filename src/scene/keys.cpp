@@ -11,15 +11,51 @@ namespace {
 using base::Range;
 using enum KeyKind;
 
+/// The keys of a surface taken from a volume, below `above`.
+std::vector<Key> volume_keys(const std::string& above) {
+  return {{above + ".volume", volume, "",
+           "CT or label map to take the surface from: its largest component."},
+          {above + ".level",
+           number,
+           "",
+           "Level of the surface; otsu finds it from the values. Excludes label.",
+           "HU",
+           {},
+           {"otsu"}},
+          {above + ".label", integer, "", "Label whose surface it is. Excludes level.", "",
+           Range::between(1, 100000)},
+          {above + ".box", numbers, "",
+           "Lowest x, y, z and highest: the rest of the volume is left out.", "mm"},
+          {above + ".border",
+           choice,
+           "closed",
+           "What becomes of the surface where the volume or the box ends: capped, or cut off.",
+           "",
+           {},
+           {"closed", "open"}},
+          {above + ".voxel", number, "",
+           "Average the volume to voxels this large first, for fewer triangles.", "mm",
+           Range::above(0)},
+          {above + ".close_holes", number, "0", "Close gaps and holes up to twice this wide.", "mm",
+           Range::between(0, 1000)},
+          {above + ".smooth", integer, "10", "Rounds of smoothing that does not shrink.", "",
+           Range::between(0, 1000)}};
+}
+
 std::vector<Key> surface_keys() {
-  return {{"skin", file, "required", "Triangle mesh of the skin, open or closed."},
-          {"skin.volume", not_modelled, "", "give a triangle mesh of the skin"},
-          {"bones", list, "required", "The bones, each a triangle mesh; the list may be empty."},
-          {"bones[].name", text, "required",
-           "The bone's name: printable ASCII, 64 characters at most."},
-          {"bones[].file", file, "required", "Triangle mesh of the bone."},
-          {"bones[].volume", not_modelled, "", "give a triangle mesh of the bone"},
-          {"bones[].file.volume", not_modelled, "", "give a triangle mesh of the bone"}};
+  std::vector<Key> rows{{"skin", mesh, "required",
+                         "Triangle mesh of the skin, open or closed, or what volume to take it "
+                         "from."}};
+  const std::vector<Key> of_skin = volume_keys("skin"), of_bone = volume_keys("bones[]");
+  rows.insert(rows.end(), of_skin.begin(), of_skin.end());
+  rows.push_back(
+      {"bones", list, "required",
+       "The bones, each a triangle mesh or taken from a volume; the list may be empty."});
+  rows.push_back({"bones[].name", text, "required",
+                  "The bone's name: printable ASCII, 64 characters at most."});
+  rows.push_back({"bones[].file", file, "", "Triangle mesh of the bone; or give volume."});
+  rows.insert(rows.end(), of_bone.begin(), of_bone.end());
+  return rows;
 }
 
 std::vector<Key> tissue_keys() {
@@ -224,6 +260,10 @@ std::string wanted(const Key& key) {
       return "a text";
     case file:
       return "a file, relative to the scene's folder";
+    case mesh:
+      return "a file, relative to the scene's folder, or a map";
+    case volume:
+      return "a file or a folder of DICOM slices, relative to the scene's folder";
     case transform:
       return "a file, a 4×4 matrix, or a list";
     case not_modelled:

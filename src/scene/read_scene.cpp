@@ -30,12 +30,57 @@ std::string read_name(const Value& value) {
   return name;
 }
 
+std::array<Vec3, 2> read_box(const Value& value) {
+  const std::vector<double> n = value.numbers();
+  if (n.size() != 6) value.refuse("must have 6 numbers (x y z twice), it has {}", n.size());
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(n[axis] < n[axis + 3]))
+      value.refuse("must name the lowest x, y, z and then the highest: {:g} is not below {:g}",
+                   n[axis], n[axis + 3]);
+  return {Vec3(n[0], n[1], n[2]), Vec3(n[3], n[4], n[5])};
+}
+
+/// A surface from a volume; `map` has the key volume.
+SurfaceEntry read_volume_entry(const Map& map) {
+  const auto path = map.find("volume")->file_or_folder();
+  VolumeEntry entry;
+  const auto level = map.find("level"), label = map.find("label");
+  if (level.has_value() == label.has_value())
+    map.itself().refuse("needs either level (HU, or otsu) or label beside volume");
+  if (level && !level->is_word("otsu")) entry.level = level->number();
+  if (label) entry.label = label->integer();
+  if (const auto box = map.find("box")) entry.box = read_box(*box);
+  if (const auto border = map.find("border")) entry.open = border->choice() == 1;
+  set(entry.voxel, map, "voxel", &Value::number);
+  set(entry.close_holes, map, "close_holes", &Value::number);
+  set(entry.smooth, map, "smooth", &Value::integer);
+  return {path, entry};
+}
+
+SurfaceEntry read_skin(const Value& value) {
+  if (!value.is_map()) return {value.file(), std::nullopt};
+  const Map map(value);
+  if (!map.find("volume")) value.refuse("lacks the key 'volume'; or give a triangle mesh");
+  return read_volume_entry(map);
+}
+
+SurfaceEntry read_bone_surface(const Map& map) {
+  const auto file = map.find("file"), volume = map.find("volume");
+  if (file.has_value() == volume.has_value())
+    map.itself().refuse("needs either file (a triangle mesh) or volume");
+  if (volume) return read_volume_entry(map);
+  for (const char* key : {"level", "label", "box", "border", "voxel", "close_holes", "smooth"})
+    if (const auto value = map.find(key))
+      value->refuse("belongs to a volume, and this bone is a mesh; remove it");
+  return {file->file(), std::nullopt};
+}
+
 std::vector<BoneEntry> read_bones(const Value& value) {
   std::vector<BoneEntry> bones;
   for (const Value& item : value.items()) {
     const Map map(item);
     const Value name = map.at("name");
-    const BoneEntry bone{read_name(name), map.at("file").file()};
+    const BoneEntry bone{read_name(name), read_bone_surface(map)};
     for (const BoneEntry& other : bones)
       if (other.name == bone.name)
         name.refuse("{} is the name of two bones; rename one", base::shown(bone.name));
@@ -181,7 +226,7 @@ Scene read_scene(const std::filesystem::path& file) {
   const Map map(Value(file, read_yaml(file)));
   Scene scene;
   scene.file = file;
-  scene.skin = map.at("skin").file();
+  scene.skin = read_skin(map.at("skin"));
   scene.bones = read_bones(map.at("bones"));
   scene.tissue = read_tissue(map.at("tissue"));
   read_surroundings(scene, map);

@@ -86,18 +86,27 @@ std::vector<double> Value::numbers() const {
   return result;
 }
 
+std::filesystem::path Value::absolute_path() const {
+  return std::filesystem::absolute(std::filesystem::absolute(*file_).parent_path() / text())
+      .lexically_normal();
+}
+
 std::filesystem::path Value::file() const {
-  if (is_map() && !keys_below(path_).empty()) Map{*this};
-  const std::filesystem::path name = text();
-  const auto path =
-      std::filesystem::absolute(std::filesystem::absolute(*file_).parent_path() / name)
-          .lexically_normal();
+  const auto path = absolute_path();
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
-    refuse("names the folder {}; a file is needed", base::shown(name.string()));
+    refuse("names the folder {}; a file is needed", shown());
   if (!std::filesystem::is_regular_file(path, error))
-    refuse("names {}, which is no file (paths are relative to the scene's folder)",
-           base::shown(name.string()));
+    refuse("names {}, which is no file (paths are relative to the scene's folder)", shown());
+  return path;
+}
+
+std::filesystem::path Value::file_or_folder() const {
+  const auto path = absolute_path();
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
+    refuse("names {}, which is no file or folder (paths are relative to the scene's folder)",
+           shown());
   return path;
 }
 

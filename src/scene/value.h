@@ -40,6 +40,8 @@ class Value {
   std::vector<double> numbers() const;
   /// Absolute path of a file that exists.
   std::filesystem::path file() const;
+  /// Absolute path of a file or folder that exists.
+  std::filesystem::path file_or_folder() const;
 
   /// The items of a list of maps, each under the key "path[]".
   std::vector<Value> items() const;
@@ -66,6 +68,7 @@ class Value {
   void add_entry(Entry entry, std::vector<Entry>& found) const;
   [[noreturn]] void refuse_at(const YAML::Mark& mark, const std::string& text) const;
   [[noreturn]] void refuse_kind() const;
+  std::filesystem::path absolute_path() const;
   std::string shown() const;
   double number_as(const std::string& wanted) const;
 

@@ -69,7 +69,10 @@ void check_closed(const Surface& surface, const Defects& d) {
 }  // namespace
 
 Surface load_surface(const std::filesystem::path& file, Role role) {
-  const Surface raw = read_surface(file);
+  return accept_surface(read_surface(file), role);
+}
+
+Surface accept_surface(const Surface& raw, Role role) {
   check_size(raw);
   Surface surface = weld_and_orient(raw);
   if (surface.triangles.empty())

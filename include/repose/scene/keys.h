@@ -18,6 +18,8 @@ enum class KeyKind {
   choice,
   text,
   file,
+  mesh,         ///< a file, or a map that names a volume
+  volume,       ///< a file, or a folder of DICOM slices
   transform,    ///< a file, a 4×4 matrix, or a list of forms
   not_modelled  ///< known, and refused: this version does not model it
 };

@@ -13,9 +13,26 @@
 /// file (mm, N, kg, degrees already turned into RigidMotion).
 namespace repose::scene {
 
+/// A surface to be taken from a volume: the largest component at a level or of a label.
+struct VolumeEntry {
+  std::optional<double> level;  ///< unset without a label: by Otsu's method
+  std::optional<int> label;
+  std::optional<std::array<Vec3, 2>> box;  ///< mm, lowest and highest corner
+  bool open = false;                       ///< cut off, not capped, where the volume ends
+  double voxel = 0;                        ///< mm; 0: as it is
+  double close_holes = 0;                  ///< mm
+  int smooth = 10;                         ///< rounds
+};
+
+/// Where a surface comes from.
+struct SurfaceEntry {
+  std::filesystem::path file;         ///< absolute: a mesh, or the volume
+  std::optional<VolumeEntry> volume;  ///< unset: file is a mesh
+};
+
 struct BoneEntry {
   std::string name;
-  std::filesystem::path file;  ///< absolute, resolved against the scene's folder
+  SurfaceEntry surface;
 };
 
 enum class Law { linear = 0, quadratic = 1, quartic = 2 };  ///< value = exponent p of the law
@@ -66,7 +83,7 @@ struct Solve {
 
 struct Scene {
   std::filesystem::path file;
-  std::filesystem::path skin;  ///< absolute
+  SurfaceEntry skin;
   std::vector<BoneEntry> bones;
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg

@@ -33,4 +33,7 @@ void write_ply(const std::filesystem::path& file, const Surface& surface);
 /// 2000 mm across is refused as being in metres or in micrometres, saying so.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
+/// The same for a surface that has been read, or taken from a volume, already.
+Surface accept_surface(const Surface& raw, Role role);
+
 }  // namespace repose::surface

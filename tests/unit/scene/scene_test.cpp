@@ -34,10 +34,11 @@ void expect_near(const Vec3& a, const Vec3& b) {
 TEST(Scene, MinimalHasTheDefaults) {
   const Folder folder;
   const Scene scene = read_scene(folder.write("scene.yaml", minimal));
-  EXPECT_EQ(scene.skin, folder.path("face.ply"));
+  EXPECT_EQ(scene.skin.file, folder.path("face.ply"));
+  EXPECT_FALSE(scene.skin.volume);
   ASSERT_EQ(scene.bones.size(), 2u);
   EXPECT_EQ(scene.bones[1].name, "mandible");
-  EXPECT_EQ(scene.bones[1].file, folder.path("mandible.ply"));
+  EXPECT_EQ(scene.bones[1].surface.file, folder.path("mandible.ply"));
   EXPECT_TRUE(scene.tissue.depths.empty());
   EXPECT_EQ(scene.tissue.attach_within, 30);
   EXPECT_EQ(scene.tissue.free_thickness, 12);
@@ -141,8 +142,9 @@ TEST(Scene, FullSprings) {
 
 TEST(Scene, FullRest) {
   const Scene scene = read(full);
-  EXPECT_EQ(scene.bones[1].file.filename(), "mandible.ply");
-  EXPECT_EQ(scene.bones[1].file.parent_path(), scene.skin.parent_path()) << "normalised";
+  EXPECT_EQ(scene.bones[1].surface.file.filename(), "mandible.ply");
+  EXPECT_EQ(scene.bones[1].surface.file.parent_path(), scene.skin.file.parent_path())
+      << "normalised";
   EXPECT_EQ(*scene.gravity, Vec3(0, 0, -9.80665));
   EXPECT_FALSE(scene.rim_fixed);
   ASSERT_EQ(scene.forces.size(), 1u);
@@ -267,7 +269,7 @@ TEST(SceneRefuses, MissingKeysAndWrongShapes) {
       {"skin: face.ply\nbones: [skull.ply]\ntissue: {layers: 4}\n",
        "2:9: bones[0] must be a map, it is 'skull.ply'", true},
       {"skin: face.ply\nbones: [{name: skull}]\ntissue: {layers: 4}\n",
-       "2:9: bones[0] lacks the key 'file'", true},
+       "2:9: bones[0] needs either file", true},
       {"solve: energy\n", "6:8: solve must be a map, it is 'energy'"},
       {"solve: {volume: none}\n", "6:17: solve.volume must be a map, it is 'none'"},
       {"gravity: -9.8\n", "6:10: gravity must be three numbers [x, y, z] of N/kg, it is '-9.8'"},
@@ -372,7 +374,7 @@ TEST(SceneRefuses, Files) {
        "1:7: skin names the folder 'sub'; a file is needed", true},
       {"skin: \"\"\nbones: []\ntissue: {layers: 4}\n", "1:7: skin must be a file", true},
       {"skin: [face.ply]\nbones: []\ntissue: {layers: 4}\n",
-       "1:7: skin must be a file, relative to the scene's folder, it is a list", true},
+       "1:7: skin must be a file, relative to the scene's folder, or a map, it is a list", true},
       {"skin: face.ply\nbones: [{name: a, file: /dev/zero}]\ntissue: {layers: 4}\n",
        "2:25: bones[0].file names '/dev/zero', which is no file", true},
       {"moves: [{bone: skull, transform: plan.tfm}]\n",
@@ -437,14 +439,54 @@ TEST(SceneRefuses, WhatThisVersionDoesNotModel) {
       {"collision: {mode: report}\n", "6:1: this version does not model collision; remove it or"},
       {"instruments: []\n", "6:1: this version does not model instruments; remove it or"},
       {"incisions:\n", "6:1: this version does not model incisions; remove it or"},
-      {"skin: {volume: ct.nrrd}\nbones: []\ntissue: {layers: 4}\n",
-       "1:8: this version does not model skin.volume; remove it or give a triangle mesh", true},
-      {"skin: face.ply\nbones: [{name: a, volume: ct.nrrd}]\ntissue: {layers: 4}\n",
-       "2:19: this version does not model bones[0].volume", true},
-      {"skin: face.ply\nbones: [{name: a, file: {volume: ct.nrrd}}]\ntissue: {layers: 4}\n",
-       "this version does not model bones[0].file.volume", true},
       {"gravity: [0, 0, -9.8]\n",
        "6:10: gravity needs a mass to pull; give tissue.mass or tissue.density"},
+  });
+}
+
+TEST(Scene, SurfacesFromVolumes) {
+  const Scene scene = read(
+      "skin: {volume: sub, level: -300, box: [-9, -8, -7, 1, 2, 3], border: open, voxel: 2,"
+      " close_holes: 3, smooth: 0}\n"
+      "bones: [{name: a, volume: face.ply, label: 2}, {name: b, volume: face.ply, level: otsu}]\n"
+      "tissue: {layers: 4}\n");
+  const VolumeEntry& skin = scene.skin.volume.value();
+  EXPECT_EQ(scene.skin.file.filename(), "sub") << "a folder of DICOM slices";
+  EXPECT_EQ(skin.level, -300);
+  EXPECT_FALSE(skin.label);
+  EXPECT_EQ(skin.box.value()[0], Vec3(-9, -8, -7));
+  EXPECT_EQ(skin.box.value()[1], Vec3(1, 2, 3));
+  EXPECT_TRUE(skin.open);
+  EXPECT_EQ(skin.voxel, 2);
+  EXPECT_EQ(skin.close_holes, 3);
+  EXPECT_EQ(skin.smooth, 0);
+  const VolumeEntry& labelled = scene.bones[0].surface.volume.value();
+  EXPECT_EQ(labelled.label, 2);
+  EXPECT_FALSE(labelled.level || labelled.box || labelled.open);
+  EXPECT_EQ(labelled.voxel, 0);
+  EXPECT_EQ(labelled.smooth, 10);
+  const VolumeEntry& otsu = scene.bones[1].surface.volume.value();
+  EXPECT_FALSE(otsu.level || otsu.label);
+}
+
+TEST(SceneRefuses, VolumesThatSayTooLittleOrTooMuch) {
+  const std::string rest = "\nbones: []\ntissue: {layers: 4}\n";
+  const std::string skin = "skin: face.ply\nbones: [{name: a, ", end = "}]\ntissue: {layers: 4}\n";
+  expect_refused({
+      {"skin: {volume: ct.nrrd, level: 1}" + rest,
+       "1:16: skin.volume names 'ct.nrrd', which is no file or folder", true},
+      {"skin: {volume: sub}" + rest, "1:7: skin needs either level (HU, or otsu) or label", true},
+      {"skin: {volume: sub, level: 1, label: 1}" + rest, "1:7: skin needs either level", true},
+      {"skin: {level: 1}" + rest, "1:7: skin lacks the key 'volume'", true},
+      {"skin: {file: face.ply}" + rest, "skin has an unknown key 'file'", true},
+      {"skin: {volume: sub, level: high}" + rest, "skin.level must be a number of HU", true},
+      {"skin: {volume: sub, label: 0}" + rest, "skin.label must be a whole number", true},
+      {"skin: {volume: sub, level: 1, box: [1, 2, 3]}" + rest, "skin.box must have 6", true},
+      {"skin: {volume: sub, level: 1, box: [0, 0, 5, 1, 1, 5]}" + rest,
+       "skin.box must name the lowest x, y, z and then the highest: 5 is not below 5", true},
+      {skin + end, "2:9: bones[0] needs either file", true},
+      {skin + "file: face.ply, volume: sub, level: 1" + end, "bones[0] needs either file", true},
+      {skin + "file: face.ply, voxel: 1" + end, "bones[0].voxel belongs to a volume", true},
   });
 }
 

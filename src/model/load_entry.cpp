@@ -1,0 +1,39 @@
+#include "repose/model/load_entry.h"
+
+#include "repose/base/error.h"
+#include "repose/surface/extract.h"
+
+namespace repose::model {
+namespace {
+
+surface::Extraction extraction_of(const scene::VolumeEntry& entry) {
+  surface::Extraction wanted;
+  wanted.level = entry.level;
+  if (entry.label) wanted.label = *entry.label;
+  wanted.otsu = !entry.level && !entry.label;
+  wanted.box = entry.box;
+  wanted.border = entry.open ? surface::VolumeBorder::open : surface::VolumeBorder::closed;
+  wanted.voxel = entry.voxel;
+  wanted.close_holes = entry.close_holes;
+  wanted.smooth = entry.smooth;
+  wanted.largest = true;
+  return wanted;
+}
+
+std::string name_of(const scene::SurfaceEntry& entry, double level) {
+  const std::string file = entry.file.string();
+  return entry.volume->label ? fmt::format("{} (label {})", file, *entry.volume->label)
+                             : fmt::format("{} (level {:g})", file, level);
+}
+
+}  // namespace
+
+surface::Surface load_entry(const scene::SurfaceEntry& entry, surface::Role role) {
+  if (!entry.volume) return surface::load_surface(entry.file, role);
+  auto [surface, level, remarks] =
+      surface::extract(surface::read_volume(entry.file), extraction_of(*entry.volume));
+  surface.name = name_of(entry, level);
+  return surface::accept_surface(surface, role);
+}
+
+}  // namespace repose::model
