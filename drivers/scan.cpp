@@ -46,6 +46,7 @@ std::vector<base::Option> option_table() {
            {1, 90},
            "DEGREES"},
           {"cylinder", OptionKind::flag, "", "The scanner went round the y axis (head scanners)."},
+          {"largest", OptionKind::flag, "", "Keep the component of the most triangles only."},
           {"output", OptionKind::path, "scan.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
 }
 
@@ -69,6 +70,9 @@ void print_mesh(const std::string& file, const surface::ScanMesh& mesh) {
   std::printf("  steps cut: %lld triangles with an edge > %.3g mm, %lld more too steep\n",
               static_cast<long long>(mesh.cut_long), mesh.longest_edge,
               static_cast<long long>(mesh.cut_steep));
+  if (mesh.dropped > 0)
+    std::printf("  smaller components left out: %lld triangles\n",
+                static_cast<long long>(mesh.dropped));
   std::printf("  points: %lld in no triangle left out, %lld doubled where sheets met in a point\n",
               static_cast<long long>(mesh.unused), static_cast<long long>(mesh.split));
   const auto holes = surface::hole_lengths(mesh.surface);
@@ -93,6 +97,7 @@ void run(const base::Options& options) {
   if (options.text("max_edge") != "auto") wanted.longest_edge = options.number("max_edge");
   wanted.steepest = options.number("max_angle");
   wanted.cylinder = options.flag("cylinder");
+  wanted.largest = options.flag("largest");
   const surface::ScanMesh mesh = surface::mesh_of(grid, wanted);
   surface::write_surface(output, mesh.surface, mesh.data);
   print_mesh(output, mesh);

@@ -98,6 +98,21 @@ void cut_steps(ScanMesh& mesh, const ScanOptions& options) {
   });
 }
 
+void keep_largest(ScanMesh& mesh) {
+  std::vector<Triangle>& triangles = mesh.surface.triangles;
+  const auto all = static_cast<int64_t>(triangles.size());
+  const EdgeTable edges(triangles);
+  UnionFind parts(all);
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    parts.unite(edges[e].front().triangle, edges[e].back().triangle);
+  std::vector<int64_t> size(all, 0);
+  for (int64_t t = 0; t < all; ++t) ++size[parts.find(t)];
+  const int64_t largest = std::max_element(size.begin(), size.end()) - size.begin();
+  int64_t t = 0;
+  std::erase_if(triangles, [&](const Triangle&) { return parts.find(t++) != largest; });
+  mesh.dropped = all - static_cast<int64_t>(triangles.size());
+}
+
 /// Gives each fan of triangles at a point a point of its own, and drops points without triangles.
 void renumber(ScanMesh& mesh, const PointData& data) {
   std::vector<Triangle>& triangles = mesh.surface.triangles;
@@ -148,6 +163,7 @@ ScanMesh mesh_of(const RangeGrid& grid, const ScanOptions& options) {
   if (mesh.surface.triangles.empty())
     base::refuse("{}: no triangle with edges ≤ {:g} mm and less steep than {:g}°; allow more",
                  grid.name, mesh.longest_edge, options.steepest);
+  if (options.largest) keep_largest(mesh);
   mesh.data.fields = grid.data.fields;
   renumber(mesh, grid.data);
   return mesh;

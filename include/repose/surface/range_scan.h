@@ -29,6 +29,7 @@ struct ScanOptions {
   double steepest = 80;     ///< degrees between a triangle's normal and the way to the scanner
   bool cylinder = false;    ///< the scanner went round the y axis: columns close to a ring, and it
                             ///< looks at that axis; otherwise it looks along −z
+  bool largest = false;     ///< keep the component of the most triangles alone
 };
 
 struct ScanMesh {
@@ -37,6 +38,7 @@ struct ScanMesh {
   double longest_edge = 0;  ///< mm, what triangles were cut at
   int64_t cut_long = 0;     ///< triangles left out for an edge
   int64_t cut_steep = 0;    ///< and for their slope alone
+  int64_t dropped = 0;      ///< and of components other than the largest
   int64_t split = 0;        ///< points doubled where two sheets met in one
   int64_t unused = 0;       ///< points in no triangle, left out
 };
