@@ -5,6 +5,7 @@ build_packages=(
   openmpi-bin libopenmpi-dev libpetsc-real-dev libslepc-real-dev libhdf5-openmpi-dev
   libopenblas0-serial # a fast BLAS, serial because MPI ranks already use the cores
   libeigen3-dev libcgal-dev libyaml-cpp-dev libfmt-dev
+  libinsighttoolkit5-dev zlib1g-dev # volumes: DICOM, NIfTI, NRRD, MetaImage
 )
 test_packages=(
   libgtest-dev libbenchmark-dev clang-format

@@ -5,6 +5,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "stored_bytes.h"
 #include "volume_grid.h"
 
 namespace repose::surface {
@@ -139,6 +140,7 @@ Volume read_dicom(const std::filesystem::path& folder, const Watch& watch) {
     volume.axes.col(2) = common_step(slices);
   }
   for (int64_t s = 0; s < count; ++s) {
+    check_stored_bytes(slices[s].file, ImageFormat::dicom, slices[s].header.bytes);
     const auto values = read_image(slices[s].file, ImageFormat::dicom).values;
     volume.values.insert(volume.values.end(), values.begin(), values.end());
     if (watch) watch(static_cast<double>(s + 1) / static_cast<double>(count));

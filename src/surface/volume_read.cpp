@@ -5,6 +5,7 @@
 
 #include "repose/base/error.h"
 #include "soup.h"
+#include "stored_bytes.h"
 #include "volume_grid.h"
 
 namespace repose::surface {
@@ -36,7 +37,8 @@ void check_header(const Image& image, const std::string& name) {
 Volume read_file(const std::filesystem::path& file) {
   const ImageFormat format = format_of(file);
   const std::string name = file.string();
-  Image image = read_header(file, format);
+  if (format == ImageFormat::nifti) check_nifti_spacing(file);
+  const Image image = read_header(file, format);
   check_header(image, name);
   Volume volume{name,
                 {image.size[0], image.size[1], image.size[2]},
@@ -44,6 +46,7 @@ Volume read_file(const std::filesystem::path& file) {
                 origin_of(image),
                 {},
                 {}};
+  check_stored_bytes(file, format, image.bytes);
   volume.values = read_image(file, format).values;
   return volume;
 }

@@ -23,6 +23,7 @@ PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
 LIBRARIES = {
     "CGAL/": ["src/surface"],
     "vtk": ["src/surface"],
+    "itk": ["src/surface"],
     "yaml-cpp": ["src/scene"],
     "slepc": ["src/solve"],
     "petsctao": ["src/solve", "include/repose/solve"],
@@ -107,6 +108,7 @@ def test_includes_stay_in_their_rooms():
     ("include/repose/surface/a.h", "<CGAL/Surface_mesh.h>"),
     ("src/model/a.cpp", "<CGAL/Surface_mesh.h>"),
     ("src/model/a.cpp", "<yaml-cpp/yaml.h>"),
+    ("include/repose/surface/a.h", "<itkImage.h>"),
     ("src/mechanics/a.cpp", "<petscvec.h>"),
     ("src/mechanics/a.cpp", '"repose/base/petsc.h"'),
     ("src/base/a.cpp", "<petsctao.h>"),

@@ -26,8 +26,8 @@ struct VolumeEntry {
 
 /// Where a surface comes from.
 struct SurfaceEntry {
-  std::filesystem::path file;         ///< absolute: a mesh, or the volume
-  std::optional<VolumeEntry> volume;  ///< unset: file is a mesh
+  std::filesystem::path file;           ///< absolute: a mesh, or the volume
+  std::optional<VolumeEntry> volume{};  ///< unset: file is a mesh
 };
 
 struct BoneEntry {

@@ -74,10 +74,22 @@ Image with_reader(const std::filesystem::path& file, ImageFormat format, Work wo
   }
 }
 
-/// NIfTI's library puts 1 in the place of a spacing of 0; the header as stored is among the tags.
+/// The library of DICOM puts 1 in the place of a spacing that is 0 or lacking, so it is read here:
+/// "rows\\columns" of a single slice.
 double spacing_of(const itk::ImageIOBase& io, unsigned axis) {
-  const auto stored = base::parse_number(tag(io, fmt::format("pixdim[{}]", axis + 1)));
-  return stored && *stored == 0 ? 0 : io.GetSpacing(axis);
+  const bool slice = io.GetNumberOfDimensions() < 3 || io.GetDimensions(2) == 1;
+  if (!dynamic_cast<const itk::GDCMImageIO*>(&io) || !slice || axis > 1) return io.GetSpacing(axis);
+  const std::string text = tag(io, "0028|0030");
+  const auto bar = std::min(text.find('\\'), text.size());
+  const auto part = axis == 1 ? text.substr(0, bar) : text.substr(std::min(bar + 1, text.size()));
+  return base::parse_number(part).value_or(0);
+}
+
+/// DICOM's values may be more after rescaling than they are in the file.
+int64_t bytes_of(const itk::ImageIOBase& io) {
+  const auto bits = base::parse_integer(tag(io, "0028|0100"));
+  return static_cast<int64_t>(bits ? io.GetImageSizeInPixels() * *bits / 8
+                                   : io.GetImageSizeInBytes());
 }
 
 Image header_of(const itk::ImageIOBase& io) {
@@ -92,6 +104,7 @@ Image header_of(const itk::ImageIOBase& io) {
     for (unsigned row = 0; there && row < std::min(3u, io.GetNumberOfDimensions()); ++row)
       image.direction[axis][row] = io.GetDirection(axis)[row];
   }
+  image.bytes = bytes_of(io);
   image.series = tag(io, "0020|000e");
   image.title = tag(io, "0008|103e");
   return image;

@@ -16,6 +16,7 @@ struct Image {
   int64_t numbers = 1;                               ///< per voxel
   std::array<double, 3> spacing{}, origin{};         ///< mm, LPS
   std::array<std::array<double, 3>, 3> direction{};  ///< [a] unit vector of axis a, LPS
+  int64_t bytes = 0;                                 ///< of its voxels when not packed
   std::string series, title;                         ///< DICOM: series' UID and description
   std::vector<float> values;                         ///< first axis fastest
 };
