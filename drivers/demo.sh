@@ -1,10 +1,16 @@
 #!/usr/bin/env bash
 # Installs what is missing (apt), builds, solves the shipped head on two MPI ranks, recomputes every
-# number of the result independently and says where to look.
+# number of the result independently and says where to look. With --ct the head is that of the CT in
+# Debian's package invesalius-examples, from its voxels to the solved face.
 # REPOSE_BUILD=FOLDER takes the programs of a build folder that is already there instead.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . drivers/setup.sh
+case "$*" in
+  "") ct= ;;
+  --ct) ct=1 ;;
+  *) echo "demo.sh: unknown argument: $*; it takes none, or --ct" >&2 && exit 1 ;;
+esac
 
 if [ -n "${REPOSE_BUILD:-}" ]; then
   build=$REPOSE_BUILD
@@ -16,9 +22,34 @@ else
 fi
 
 mpi_environment
-result=$build/demo/head_jaw_opening
 mkdir -p "$build/demo"
-mpirun -n 2 "$build/bin/repose-solve" meshes/head_jaw_opening.yaml -output "$result"
+
+# Lays the CT's voxels and a header for them (spacing and size as in its main.plist; InVesalius
+# stores rows from back to front) into a folder, and makes meshes of skin and bone to look at. Where
+# dpkg leaves out documentation, as in containers, the package is unpacked by hand.
+unpack_ct() {
+  local folder=$1 archive=/usr/share/doc/invesalius-examples/examples/Cranium.inv3
+  mkdir -p "$folder"
+  [ -f "$archive" ] || install_packages invesalius-examples
+  if [ ! -f "$archive" ]; then
+    (cd "$folder" && apt-get -q download invesalius-examples &&
+      dpkg-deb -x invesalius-examples_*.deb .)
+    archive=$folder$archive
+  fi
+  tar -xzf "$archive" -C "$folder" --strip-components=1 --wildcards '*/matrix.dat'
+  cp meshes/ct.mhd meshes/ct_maxilla.yaml "$folder"
+  "$build/bin/repose-isosurface" "$folder/ct.mhd" -level -300 -largest -output "$folder/skin.vtp"
+  "$build/bin/repose-isosurface" "$folder/ct.mhd" -level 226 -largest -output "$folder/bone.vtp"
+}
+
+if [ -n "$ct" ]; then
+  unpack_ct "$build/demo/ct"
+  scene=$build/demo/ct/ct_maxilla.yaml
+else
+  scene=meshes/head_jaw_opening.yaml
+fi
+result=$build/demo/$(basename "$scene" .yaml)
+mpirun -n 2 "$build/bin/repose-solve" "$scene" -output "$result"
 "$build/bin/repose-check" "$result.h5" | tee "${result}_check.txt" | tail -n 1
 
 cat <<TEXT

@@ -25,13 +25,13 @@ Volume prepare(const Volume& volume, const Extraction& wanted, const StepWatch& 
   Volume field = wanted.box ? crop(volume, (*wanted.box)[0], (*wanted.box)[1]) : volume;
   if (wanted.box) remarks.push_back("cropped to " + size_text(field));
   if (wanted.label) field = label_field(field, *wanted.label, label_smoothing);
-  if (wanted.voxel > 0) {
-    field = coarsen(field, wanted.voxel);
-    remarks.push_back("averaged to " + size_text(field));
-  }
   if (wanted.close_holes > 0) {
     field = close_gaps(field, wanted.close_holes, watch_step(watch, "closing holes"));
     remarks.push_back(fmt::format("holes closed up to {:g} mm wide", 2 * wanted.close_holes));
+  }
+  if (wanted.voxel > 0) {
+    field = coarsen(field, wanted.voxel);
+    remarks.push_back("averaged to " + size_text(field));
   }
   return field;
 }

@@ -16,8 +16,8 @@ struct Extraction {
   bool otsu = false;                       ///< the level by Otsu's method
   std::optional<int64_t> label;            ///< of a label map
   std::optional<std::array<Vec3, 2>> box;  ///< mm, LPS: lowest and highest corner, see crop()
-  double voxel = 0;                        ///< mm, see coarsen(); 0: as it is
   double close_holes = 0;                  ///< mm, see close_gaps(); 0: none
+  double voxel = 0;                        ///< mm, see coarsen(); 0: as it is
   VolumeBorder border = VolumeBorder::closed;
   bool largest = false;         ///< the largest component alone
   double components_above = 0;  ///< mm³; 0: all components

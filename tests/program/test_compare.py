@@ -1,0 +1,120 @@
+"""repose-compare from outside: the numbers of surfaces at known distances, its files, and what it
+refuses."""
+
+import re
+import subprocess
+import sys
+
+import meshio
+import numpy as np
+import pytest
+
+import volumes as v
+from conftest import PROJECT
+
+
+def sphere(file, radius, n=60):
+    """A closed sphere around the origin, seen from outside counter-clockwise."""
+    points, triangles = [[0, 0, radius], [0, 0, -radius]], []
+    for j in range(1, n):
+        for i in range(2 * n):
+            a, b = np.pi * i / n, np.pi * j / n
+            points.append(radius * np.array([np.sin(b) * np.cos(a), np.sin(b) * np.sin(a), np.cos(b)]))
+
+    def at(i, j):
+        return 2 + (j - 1) * 2 * n + i % (2 * n)
+
+    for i in range(2 * n):
+        triangles += [[0, at(i, 1), at(i + 1, 1)], [1, at(i + 1, n - 1), at(i, n - 1)]]
+        for j in range(1, n - 1):
+            triangles += [[at(i, j), at(i, j + 1), at(i + 1, j + 1)],
+                          [at(i, j), at(i + 1, j + 1), at(i + 1, j)]]
+    meshio.Mesh(np.array(points, float), [("triangle", np.array(triangles))]).write(file)
+    return file
+
+
+def rows(text):
+    """The table's numbers by the name of each row: samples, signed, mean, rms, 90 %, 95 %, max."""
+    pattern = r"^ *(\S.*?)  +(\d+)" + r" +(-?[\d.]+)" * 6 + r"$"
+    return {m[1]: [float(n) for n in m.groups()[1:]] for m in re.finditer(pattern, text, re.M)}
+
+
+def test_spheres_two_millimetres_apart(run, tmp_path):
+    result = run("repose-compare", sphere(tmp_path / "a.ply", 38), sphere(tmp_path / "b.stl", 40),
+                 "-both", "-reach", "3")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    there, back = rows(result.stdout)["PREDICTED to ACTUAL"], rows(result.stdout)["ACTUAL to PREDICTED"]
+    assert there[1:] == pytest.approx([-2, 2, 2, 2, 2, 2], abs=0.06)
+    assert back[1:] == pytest.approx([2, 2, 2, 2, 2, 2], abs=0.06)
+    histogram = np.genfromtxt(tmp_path / "compared.csv", delimiter=",", names=True)
+    assert histogram["share_of_area"].sum() == pytest.approx(1, abs=1e-4)
+    fullest = histogram[np.argmax(histogram["share_of_area"])]
+    assert fullest["low_mm"] <= -1.97 <= fullest["high_mm"] + 0.06
+    assert "Name=\"distance\"" in (tmp_path / "compared.vtp").read_text()
+
+
+def test_regions_by_a_label_map(run, tmp_path):
+    labels = np.zeros((40, 50, 48), "<i2")
+    labels[:20], labels[20:] = 1, 2
+    v.write_meta(tmp_path / "labels.mha", labels)
+    k, j, i = 25, 20, 20
+    middle = v.ORIGIN + v.TURN @ (v.SPACING * [i, j, k])
+    mesh = meshio.read(sphere(tmp_path / "a.ply", 1, n=12))
+    meshio.Mesh(mesh.points + middle, mesh.cells).write(tmp_path / "a.ply")
+    result = run("repose-compare", "a.ply", "a.ply", "-regions", "labels.mha")
+    assert result.returncode == 0, result
+    assert list(rows(result.stdout)) == ["PREDICTED to ACTUAL", "label 2"]
+
+
+def test_beyond_the_rim_is_left_out(run, tmp_path):
+    flat = meshio.Mesh([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]],
+                       [("triangle", [[0, 1, 2], [0, 2, 3]])])
+    flat.write(tmp_path / "small.ply")
+    flat.points = flat.points * 3.0 - [40, 40, -1]
+    flat.write(tmp_path / "large.ply")
+    whole = rows(run("repose-compare", "large.ply", "small.ply").stdout)["PREDICTED to ACTUAL"]
+    inner = rows(run("repose-compare", "large.ply", "small.ply", "-skip_rim").stdout)
+    assert whole[6] > 50
+    assert inner["PREDICTED to ACTUAL"][1:] == [1, 1, 1, 1, 1, 1]
+
+
+def test_the_histogram_is_drawn(run, tmp_path):
+    pytest.importorskip("matplotlib")
+    sphere(tmp_path / "a.ply", 38, n=12), sphere(tmp_path / "b.ply", 40, n=12)
+    assert run("repose-compare", "a.ply", "b.ply", "-output", "d").returncode == 0
+    script = [sys.executable, PROJECT / "drivers/plot_compare.py"]
+    assert subprocess.run([*script, "d"], cwd=tmp_path).returncode == 0
+    assert (tmp_path / "d.png").stat().st_size > 5000
+    bad = subprocess.run([*script, "e"], cwd=tmp_path, text=True, capture_output=True)
+    assert bad.returncode == 1 and len(bad.stderr.splitlines()) == 1
+
+
+CASES = {
+    "no second surface": (["a.ply"], ["ACTUAL is missing"]),
+    "missing file": (["a.ply", "none.ply"], ["none.ply", "no such file"]),
+    "no mesh": (["a.ply", "text.ply"], ["text.ply"]),
+    "no folder": (["a.ply", "a.ply", "-output", "no/such/x"], ["no/such/x"]),
+    "no such regions": (["a.ply", "a.ply", "-regions", "none.nii"], ["none.nii"]),
+    "spacing of zero": (["a.ply", "a.ply", "-spacing", "0"], ["-spacing"]),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_input_is_refused(run, tmp_path, case):
+    arguments, words = CASES[case]
+    sphere(tmp_path / "a.ply", 30, n=6)
+    (tmp_path / "text.ply").write_text("no mesh\n")
+    before = sorted(tmp_path.iterdir())
+    result = run("repose-compare", *arguments)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+    assert [word for word in words if word not in result.stderr] == [], result.stderr
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_isosurfaces_of_two_levels_compare(run, tmp_path):
+    v.write_meta(tmp_path / "ct.mha", v.samples())
+    for name, level in (("inner", 1000), ("outer", 900)):
+        assert run("repose-isosurface", "ct.mha", "-level", level,
+                   "-output", f"{name}.ply").returncode == 0
+    result = run("repose-compare", "inner.ply", "outer.ply")
+    assert -2.1 < rows(result.stdout)["PREDICTED to ACTUAL"][1] < -0.9  # a tenth of the radii

@@ -1,0 +1,83 @@
+"""repose-scan on the range images of a real scanner. They are not shipped: they lie beside the
+project, in ../shared/data/range."""
+
+import re
+
+import meshio
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+
+DATA = PROJECT.parent / "shared/data/range"
+
+real = pytest.mark.skipif(not DATA.is_dir(), reason=f"no range images: {DATA} is missing")
+
+GRID = """ply
+format ascii 1.0
+obj_info num_cols 3
+obj_info num_rows 2
+element vertex 6
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+element range_grid 6
+property list uchar int vertex_indices
+end_header
+"""
+BODY = "".join(f"{x} {y} 0 {100 * x} {90 * y} 5\n" for y in range(2) for x in range(3))
+CELLS = "".join(f"1 {i}\n" for i in range(6))
+
+
+@real
+@pytest.mark.parametrize("name, cells", [("bun000", 40256), ("bun090", 30379)])
+def test_a_real_scan_becomes_a_mesh(run, tmp_path, name, cells):
+    result = run("repose-scan", DATA / f"{name}.ply", "-largest")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert f"512 × 400 cells, {cells} of them with a point" in result.stdout
+    assert "taken as metres" in result.stdout
+    assert "1 component" in result.stdout and "non-manifold" not in result.stdout
+    mesh = meshio.read(tmp_path / "scan.ply")
+    corners = mesh.points[mesh.cells_dict["triangle"]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (normals[:, 2] > 0).all()
+    assert 0.9 * cells < len(mesh.points) <= cells
+    longest = float(re.search(r"edge > ([\d.]+) mm", result.stdout)[1])
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert sides.max() <= longest + 1e-2
+
+
+def test_colours_are_kept(run, tmp_path):
+    (tmp_path / "range.ply").write_text(GRID + BODY + CELLS)
+    result = run("repose-scan", "range.ply", "-unit", "mm")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "with colours" in result.stdout
+    mesh = meshio.read(tmp_path / "scan.ply")
+    assert sorted(mesh.point_data["red"]) == [0, 0, 100, 100, 200, 200]
+
+
+CASES = {
+    "missing": (None, [], ["range.ply", "no such file"]),
+    "no PLY": ("solid\n", [], ["range.ply"]),
+    "a mesh": (GRID.replace("obj_info num_cols 3\n", "") + BODY + CELLS, [], ["num_cols"]),
+    "truncated": (GRID + BODY + CELLS[:-4], [], ["range.ply", "truncated", "range_grid"]),
+    "too many cells": (GRID.replace("num_rows 2", "num_rows 3") + BODY + CELLS, [], ["3 rows"]),
+    "a point that is not there": (GRID + BODY + CELLS[:-2] + "7\n", [], ["names point 7"]),
+    "all cut": (GRID + BODY + CELLS, ["-unit", "mm", "-max_edge", "0.5"], ["range.ply", "0.5"]),
+    "unknown ending": (GRID + BODY + CELLS, ["-output", "scan.off"], ["scan.off"]),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_input_is_refused(run, tmp_path, case):
+    text, options, words = CASES[case]
+    if text is not None:
+        (tmp_path / "range.ply").write_text(text)
+    before = sorted(tmp_path.iterdir())
+    result = run("repose-scan", "range.ply", *options)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+    assert [word for word in words if word not in result.stderr] == [], result.stderr
+    assert sorted(tmp_path.iterdir()) == before
