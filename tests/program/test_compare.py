@@ -67,10 +67,10 @@ def test_regions_by_a_label_map(run, tmp_path):
 
 
 def test_beyond_the_rim_is_left_out(run, tmp_path):
-    flat = meshio.Mesh([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]],
-                       [("triangle", [[0, 1, 2], [0, 2, 3]])])
+    corners = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], float)
+    flat = meshio.Mesh(corners, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
     flat.write(tmp_path / "small.ply")
-    flat.points = flat.points * 3.0 - [40, 40, -1]
+    flat.points = flat.points * 3 - [40, 40, -1]
     flat.write(tmp_path / "large.ply")
     whole = rows(run("repose-compare", "large.ply", "small.ply").stdout)["PREDICTED to ACTUAL"]
     inner = rows(run("repose-compare", "large.ply", "small.ply", "-skip_rim").stdout)
