@@ -4,6 +4,7 @@
 
 #include "repose/base/error.h"
 #include "repose/model/attachment.h"
+#include "repose/model/bones.h"
 #include "repose/model/columns.h"
 #include "repose/model/layers.h"
 #include "repose/model/load_entry.h"
@@ -110,10 +111,12 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 
 BuiltModel build_model(const scene::Scene& scene) {
   const surface::Surface skin = load_entry(scene.skin, surface::Role::skin);
-  std::vector<surface::Surface> bones;
-  for (const scene::BoneEntry& bone : scene.bones)
-    bones.push_back(load_entry(bone.surface, surface::Role::bone));
-  return build_model(scene, skin, bones);
+  const Bones bones = read_bones(scene);
+  BuiltModel built = build_model(scene, skin, bones.surfaces);
+  std::vector<std::string>& remarks = built.report.remarks;
+  remarks.insert(remarks.begin(), scene.remarks.begin(), scene.remarks.end());
+  remarks.insert(remarks.begin(), bones.remarks.begin(), bones.remarks.end());
+  return built;
 }
 
 }  // namespace repose::model

@@ -137,7 +137,13 @@ std::vector<Key> load_keys() {
 
 /// The forms translate and rotate, below an entry of moves and below an item of a transform.
 std::vector<Key> form_keys(const std::string& above) {
-  return {{above + ".translate", vector, "", "Form: a translation.", "mm"},
+  return {{above + ".landmark", map, "",
+           "Form: puts a landmark of the bone in its place; a list of several pairs: the rigid "
+           "motion that fits them best (see below)."},
+          {above + ".landmark.from", place, "required",
+           "Where it is before all moves; earlier moves of the bone carry it along."},
+          {above + ".landmark.to", place, "required", "Where it shall be."},
+          {above + ".translate", vector, "", "Form: a translation.", "mm"},
           {above + ".rotate", map, "", "Form: a rotation by the right-hand rule."},
           {above + ".rotate.axis", vector, "required", "Direction of the axis, of any length."},
           {above + ".rotate.center", vector, "required", "A point on the axis.", "mm"},
@@ -150,7 +156,8 @@ std::vector<Key> move_keys() {
                          "Rigid motions of bones. Each entry has one form, or a list of that "
                          "form's values applied in "
                          "order; several entries of one bone apply in the order of the file."},
-                        {"moves[].bone", text, "required", "The name of a bone."}};
+                        {"moves[].bone", texts, "required",
+                         "The name of a bone or a piece, or several, which all make the move."}};
   const std::vector<Key> forms = form_keys("moves[]"), listed = form_keys("moves[].transform[]");
   rows.insert(rows.end(), forms.begin(), forms.end());
   rows.push_back(
@@ -158,7 +165,7 @@ std::vector<Key> move_keys() {
        "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four rows "
        "of four numbers, or a list of forms."});
   rows.push_back({"moves[].transform[]", transform, "",
-                  "One form of such a list: a file, a matrix, or one of the two below."});
+                  "One form of such a list: a file, a matrix, or one of those below."});
   rows.insert(rows.end(), listed.begin(), listed.end());
   return rows;
 }
@@ -192,10 +199,47 @@ std::vector<Key> solve_keys() {
            {"auto"}}};
 }
 
+std::vector<Key> osteotomy_keys() {
+  return {
+      {"landmarks", file, "",
+       "Landmarks by name, for moves: JSON, {\"name\": [x, y, z], …}, or 3D Slicer's .mrk.json."},
+      {"osteotomies", list, "", "Pieces cut off bones, one after the other."},
+      {"osteotomies[].bone", text, "required",
+       "The bone, or an earlier piece, that is cut; what is left keeps its name."},
+      {"osteotomies[].piece", text, "required", "Name of the piece, from here on a bone."},
+      {"osteotomies[].planes", list, "",
+       "Plane cuts. The piece is what lies in front of all of them."},
+      {"osteotomies[].planes[].point", vector, "required", "A point of the plane.", "mm"},
+      {"osteotomies[].planes[].normal", vector, "required", "Points to the piece; of any length."},
+      {"osteotomies[].planes[].radius", number, "",
+       "Cuts only within this distance of the point; everywhere when not given.", "mm",
+       Range::above(0)},
+      {"osteotomies[].surface", file, "",
+       "A cutting surface, open or closed triangle mesh, facing the piece."},
+      {"osteotomies[].kerf", number, "0", "Thickness of the saw blade, half on either side.", "mm",
+       Range::between(0, 20)},
+      {"osteotomies[].seed", vector, "",
+       "A point inside the piece, which chooses it in place of the sides of the cuts.", "mm"}};
+}
+
+std::vector<Key> collision_keys() {
+  return {{"collision", map, "", "What is done about bones that touch on their way."},
+          {"collision.mode",
+           choice,
+           "report",
+           "report: say so; stop: refuse the scene; clamp: move as far as there is no contact.",
+           "",
+           {},
+           {"report", "stop", "clamp"}},
+          {"collision.clearance", number, "0", "Distance to be kept between bones.", "mm",
+           Range::between(0, 50)},
+          {"collision.tolerance", number, "0.05",
+           "How much sooner than at contact a clamped motion may end.", "mm",
+           Range::between(1e-4, 10)}};
+}
+
 std::vector<Key> later_keys() {
-  return {{"osteotomies", not_modelled, "", "give the cut pieces as bones of their own"},
-          {"collision", not_modelled, "", "plan the moves so that no bones touch"},
-          {"instruments", not_modelled, "", "press on the skin with forces"},
+  return {{"instruments", not_modelled, "", "press on the skin with forces"},
           {"incisions", not_modelled, "", "cut the mesh of the skin beforehand"}};
 }
 
@@ -212,8 +256,9 @@ std::string sentence_column(const Key& key) {
 const std::vector<Key>& all_keys() {
   static const std::vector<Key> table = [] {
     std::vector<Key> rows;
-    for (const auto& part : {surface_keys(), tissue_keys(), spring_keys(), load_keys(), move_keys(),
-                             solve_keys(), later_keys()})
+    for (const auto& part :
+         {surface_keys(), tissue_keys(), spring_keys(), load_keys(), osteotomy_keys(), move_keys(),
+          collision_keys(), solve_keys(), later_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();
@@ -258,6 +303,10 @@ std::string wanted(const Key& key) {
       return fmt::format("one of {}", fmt::join(key.choices, ", "));
     case text:
       return "a text";
+    case texts:
+      return "a text, or a list of texts";
+    case place:
+      return "three numbers [x, y, z] of mm, or the name of a landmark";
     case file:
       return "a file, relative to the scene's folder";
     case mesh:

@@ -1,8 +1,8 @@
 #include "read_moves.h"
 
-#include <algorithm>
-
+#include "bone_names.h"
 #include "repose/base/nearest.h"
+#include "repose/scene/landmarks.h"
 #include "repose/scene/transform_file.h"
 
 namespace repose::scene {
@@ -48,82 +48,131 @@ RigidMotion read_matrix(const Value& value) {
   return located(value, [&] { return RigidMotion::from_matrix(matrix); });
 }
 
-/// Each of several by `read`, the first applied first.
-template <class Read>
-RigidMotion in_order(const Value& list, const std::vector<Value>& several, const Read& read) {
-  if (several.empty()) list.refuse("is an empty list; give a form, or remove the entry");
-  RigidMotion whole;
-  for (const Value& one : several) whole = read(one).after(whole);
-  return whole;
-}
+/// Reads the forms of a move of one bone.
+class Forms {
+ public:
+  Forms(const std::map<std::string, Vec3>& landmarks, std::vector<std::string>& remarks)
+      : landmarks_(landmarks), remarks_(remarks) {}
 
-RigidMotion read_translation(const Value& value) {
-  return RigidMotion::translation(value.vector());
-}
+  /// What an entry adds to the motion `before` of its bone.
+  RigidMotion read_entry(const Map& entry, const RigidMotion& before) {
+    const Value form = only_form(entry, {"translate", "rotate", "landmark", "transform"});
+    if (const auto list = entry.find("translate")) return read_translations(*list);
+    if (const auto list = entry.find("rotate")) return read_rotations(*list);
+    if (entry.find("landmark")) return read_landmark(form, before);
+    const bool several = form.is_list() && !is_matrix(form);
+    if (!several) return read_matrix_or_file(form);
+    return in_order(form, form.items(), [&](const Value& one, const RigidMotion& so_far) {
+      return read_item(one, so_far.after(before));
+    });
+  }
 
-RigidMotion read_matrix_or_file(const Value& value) {
-  if (is_matrix(value)) return read_matrix(value);
-  const std::filesystem::path file = value.file();
-  return located(value, [&] { return read_transform(file); });
-}
+ private:
+  /// The value of the one form that a map holds.
+  static Value only_form(const Map& map, const std::vector<std::string>& names) {
+    std::optional<Value> form;
+    int forms = 0;
+    for (const std::string& name : names)
+      if (const auto value = map.find(name)) {
+        form.emplace(*value);
+        ++forms;
+      }
+    if (forms == 1) return *form;
+    map.itself().refuse(
+        "must hold exactly one of {}; for several give several entries, or a list: transform: "
+        "[{{rotate: ...}}, {{translate: ...}}]",
+        fmt::join(names, ", "));
+  }
 
-RigidMotion read_transform_item(const Value& value) {
-  if (!value.is_map()) return read_matrix_or_file(value);
-  const Map map(value);
-  const auto translate = map.find("translate"), rotate = map.find("rotate");
-  if (translate.has_value() == rotate.has_value())
-    value.refuse("must hold one form, translate or rotate; give each its own item of the list");
-  return translate ? read_translation(*translate) : read_rotation(*rotate);
-}
+  /// Each of several by `read`, the first applied first.
+  template <class Read>
+  static RigidMotion in_order(const Value& list, const std::vector<Value>& several,
+                              const Read& read) {
+    if (several.empty()) list.refuse("is an empty list; give a form, or remove the entry");
+    RigidMotion whole;
+    for (const Value& one : several) whole = read(one, whole).after(whole);
+    return whole;
+  }
 
-RigidMotion read_translations(const Value& value) {
-  const std::vector<Value> parts = value.is_list() ? value.elements() : std::vector<Value>{};
-  const bool several = !parts.empty() && parts[0].is_list();
-  return several ? in_order(value, parts, read_translation) : read_translation(value);
-}
+  static RigidMotion read_translation(const Value& value) {
+    return RigidMotion::translation(value.vector());
+  }
 
-RigidMotion read_rotations(const Value& value) {
-  return value.is_list() ? in_order(value, value.elements(), read_rotation) : read_rotation(value);
-}
+  static RigidMotion read_translations(const Value& value) {
+    const std::vector<Value> parts = value.is_list() ? value.elements() : std::vector<Value>{};
+    if (parts.empty() || !parts[0].is_list()) return read_translation(value);
+    return in_order(value, parts, [](const Value& one, auto&) { return read_translation(one); });
+  }
 
-RigidMotion read_transforms(const Value& value) {
-  const bool several = value.is_list() && !is_matrix(value);
-  return several ? in_order(value, value.items(), read_transform_item) : read_matrix_or_file(value);
-}
+  static RigidMotion read_rotations(const Value& value) {
+    if (!value.is_list()) return read_rotation(value);
+    return in_order(value, value.elements(),
+                    [](const Value& one, auto&) { return read_rotation(one); });
+  }
 
-RigidMotion read_entry(const Map& entry) {
-  const auto translate = entry.find("translate"), rotate = entry.find("rotate"),
-             transform = entry.find("transform");
-  if (translate.has_value() + rotate.has_value() + transform.has_value() != 1)
-    entry.itself().refuse(
-        "must hold exactly one of translate, rotate, transform; for several give several entries, "
-        "or a list: transform: [{{rotate: ...}}, {{translate: ...}}]");
-  if (translate) return read_translations(*translate);
-  return rotate ? read_rotations(*rotate) : read_transforms(*transform);
-}
+  static RigidMotion read_matrix_or_file(const Value& value) {
+    if (is_matrix(value)) return read_matrix(value);
+    const std::filesystem::path file = value.file();
+    return located(value, [&] { return read_transform(file); });
+  }
 
-std::size_t find_bone(const Value& value, const std::vector<BoneEntry>& bones) {
-  const std::string name = value.text();
-  const auto found = std::find_if(bones.begin(), bones.end(),
-                                  [&](const BoneEntry& bone) { return bone.name == name; });
-  if (found != bones.end()) return static_cast<std::size_t>(found - bones.begin());
-  if (bones.empty()) value.refuse("{} is no bone; the scene has none", base::shown(name));
-  std::vector<std::string> names;
-  for (const BoneEntry& bone : bones) names.push_back(bone.name);
-  value.refuse("{} is no bone of the scene; the nearest is '{}'", base::shown(name),
-               base::nearest(name, names));
-}
+  RigidMotion read_item(const Value& value, const RigidMotion& before) {
+    if (!value.is_map()) return read_matrix_or_file(value);
+    const Map map(value);
+    const Value form = only_form(map, {"translate", "rotate", "landmark"});
+    if (map.find("translate")) return read_translation(form);
+    return map.find("rotate") ? read_rotation(form) : read_landmark(form, before);
+  }
+
+  RigidMotion read_landmark(const Value& value, const RigidMotion& before) {
+    std::vector<Vec3> from, to;
+    const std::vector<Value> pairs = value.is_list() ? value.elements() : std::vector{value};
+    if (pairs.empty()) value.refuse("is an empty list; give a pair, or remove the entry");
+    for (const Value& pair : pairs) {
+      const Map map(pair);
+      from.push_back(before.apply(read_place(map.at("from"))));
+      to.push_back(read_place(map.at("to")));
+    }
+    return located(value, [&] {
+      const RigidFit fit = fit_landmarks(from, to);
+      if (fit.residual > residual_worth_saying)
+        remarks_.push_back(
+            fmt::format("{}: a rigid motion brings the landmarks within {:.2f} mm of their places",
+                        value.place(), fit.residual));
+      return fit.motion;
+    });
+  }
+
+  Vec3 read_place(const Value& value) const {
+    if (value.is_list()) return value.vector();
+    const std::string name = value.text();
+    if (const auto found = landmarks_.find(name); found != landmarks_.end()) return found->second;
+    if (landmarks_.empty())
+      value.refuse("names landmark {}, but the scene has none; give landmarks: FILE or [x, y, z]",
+                   base::shown(name));
+    std::vector<std::string> known;
+    for (const auto& [other, position] : landmarks_) known.push_back(other);
+    value.refuse("{} is no landmark of the scene; the nearest is '{}'", base::shown(name),
+                 base::nearest(name, known));
+  }
+
+  static constexpr double residual_worth_saying = 0.05;  // mm
+  const std::map<std::string, Vec3>& landmarks_;
+  std::vector<std::string>& remarks_;
+};
 
 }  // namespace
 
-std::vector<RigidMotion> read_moves(const Value& moves, const std::vector<BoneEntry>& bones) {
-  std::vector<RigidMotion> whole(bones.size());
-  for (const Value& item : moves.items()) {
+void read_moves(const Value& list, const std::map<std::string, Vec3>& landmarks, Scene& scene) {
+  scene.moves.assign(scene.bones.size(), {});
+  Forms forms(landmarks, scene.remarks);
+  for (const Value& item : list.items()) {
     const Map entry(item);
-    RigidMotion& motion = whole[find_bone(entry.at("bone"), bones)];
-    motion = read_entry(entry).after(motion);
+    for (const auto& [name, value] : entry.at("bone").texts()) {
+      RigidMotion& motion = scene.moves[find_bone(name, value, scene.bones)];
+      motion = forms.read_entry(entry, motion).after(motion);
+    }
   }
-  return whole;
 }
 
 }  // namespace repose::scene

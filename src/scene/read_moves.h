@@ -1,12 +1,14 @@
 #pragma once
-#include <vector>
+#include <map>
+#include <string>
 
 #include "repose/scene/scene.h"
 #include "value.h"
 
 namespace repose::scene {
 
-/// The whole motion of each bone: the entries of `moves`, in the order of the file.
-std::vector<RigidMotion> read_moves(const Value& moves, const std::vector<BoneEntry>& bones);
+/// Sets Scene::moves, the whole motion of each bone: the entries of the list, in the order of the
+/// file. `landmarks` are those that may be named, mm.
+void read_moves(const Value& list, const std::map<std::string, Vec3>& landmarks, Scene& scene);
 
 }  // namespace repose::scene

@@ -1,8 +1,11 @@
 #include <algorithm>
 
+#include "bone_names.h"
 #include "read_moves.h"
+#include "read_osteotomies.h"
 #include "read_yaml.h"
 #include "repose/base/nearest.h"
+#include "repose/scene/landmarks.h"
 #include "repose/scene/scene.h"
 #include "value.h"
 
@@ -20,14 +23,6 @@ void set(Target& target, const Map& map, const char* name, Result (Value::*read)
 template <class Enum, class Target>
 void set_choice(Target& target, const Map& map, const char* name) {
   if (const auto value = map.find(name)) target = static_cast<Enum>(value->choice());
-}
-
-std::string read_name(const Value& value) {
-  const std::string name = value.text();
-  const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
-  if (name.size() > 64 || !std::all_of(name.begin(), name.end(), printable))
-    value.refuse("{} must be printable ASCII, 64 characters at most", base::shown(name));
-  return name;
 }
 
 std::array<Vec3, 2> read_box(const Value& value) {
@@ -79,12 +74,7 @@ std::vector<BoneEntry> read_bones(const Value& value) {
   std::vector<BoneEntry> bones;
   for (const Value& item : value.items()) {
     const Map map(item);
-    const Value name = map.at("name");
-    const BoneEntry bone{read_name(name), read_bone_surface(map)};
-    for (const BoneEntry& other : bones)
-      if (other.name == bone.name)
-        name.refuse("{} is the name of two bones; rename one", base::shown(bone.name));
-    bones.push_back(bone);
+    bones.push_back({read_new_name(map.at("name"), bones), read_bone_surface(map)});
   }
   return bones;
 }
@@ -189,6 +179,15 @@ std::vector<Force> read_forces(const Value& value) {
   return forces;
 }
 
+Collision read_collision(const Value& value) {
+  const Map map(value);
+  Collision collision;
+  set_choice<CollisionMode>(collision.mode, map, "mode");
+  set(collision.clearance, map, "clearance", &Value::number);
+  set(collision.tolerance, map, "tolerance", &Value::number);
+  return collision;
+}
+
 Solve read_solve(const Value& value) {
   const Map map(value);
   Solve solve;
@@ -230,8 +229,12 @@ Scene read_scene(const std::filesystem::path& file) {
   scene.bones = read_bones(map.at("bones"));
   scene.tissue = read_tissue(map.at("tissue"));
   read_surroundings(scene, map);
+  if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
-  if (const auto moves = map.find("moves")) scene.moves = read_moves(*moves, scene.bones);
+  std::map<std::string, Vec3> landmarks;
+  if (const auto named = map.find("landmarks")) landmarks = read_landmarks(named->file());
+  if (const auto moves = map.find("moves")) read_moves(*moves, landmarks, scene);
+  if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);
   return scene;
 }

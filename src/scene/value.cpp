@@ -62,6 +62,14 @@ std::string Value::text() const {
   return node_.Scalar();
 }
 
+std::vector<std::pair<std::string, Value>> Value::texts() const {
+  std::vector<std::pair<std::string, Value>> result;
+  if (!is_list()) return {{text(), *this}};
+  for (const Value& element : elements()) result.push_back({element.text(), element});
+  if (result.empty()) refuse_kind();
+  return result;
+}
+
 int Value::choice() const {
   const std::vector<std::string>& choices = find_key(path_).choices;
   const std::string word = node_.IsScalar() ? node_.Scalar() : std::string{};

@@ -27,6 +27,9 @@ class Value {
     refuse_at(mark_, fmt::format(format, std::forward<Args>(args)...));
   }
 
+  /// As a person reads it: moves[1].landmark.
+  const std::string& place() const { return place_; }
+
   bool is_map() const { return node_.IsMap(); }
   bool is_list() const { return node_.IsSequence(); }
   bool is_word(const std::string& word) const { return node_.IsScalar() && node_.Scalar() == word; }
@@ -34,6 +37,8 @@ class Value {
   double number() const;
   int integer() const;
   std::string text() const;
+  /// A text alone is a list of one.
+  std::vector<std::pair<std::string, Value>> texts() const;
   /// Position in the key's choices.
   int choice() const;
   Vec3 vector() const;

@@ -17,6 +17,8 @@ enum class KeyKind {
   vector,   ///< [x, y, z]
   choice,
   text,
+  texts,  ///< a text or a list of texts
+  place,  ///< [x, y, z] or the name of a landmark
   file,
   mesh,         ///< a file, or a map that names a volume
   volume,       ///< a file, or a folder of DICOM slices

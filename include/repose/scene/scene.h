@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -32,7 +33,23 @@ struct SurfaceEntry {
 
 struct BoneEntry {
   std::string name;
-  SurfaceEntry surface;
+  SurfaceEntry surface;  ///< of a piece, that of the bone it is cut from
+};
+
+/// A saw cut in a plane; its front is the side that the normal points to.
+struct CutPlane {
+  Vec3 point;                    ///< mm
+  Vec3 normal;                   ///< any length but 0
+  std::optional<double> radius;  ///< mm: cuts within this disc only
+};
+
+/// How a piece is cut off a bone, which keeps its name.
+struct Osteotomy {
+  std::size_t bone, piece;  ///< rows of Scene::bones
+  std::vector<CutPlane> planes;
+  std::optional<std::filesystem::path> surface;  ///< absolute
+  double kerf = 0;                               ///< mm
+  std::optional<Vec3> seed;                      ///< mm
 };
 
 enum class Law { linear = 0, quadratic = 1, quartic = 2 };  ///< value = exponent p of the law
@@ -81,17 +98,29 @@ struct Solve {
   int load_steps = 0;     ///< 0: automatic
 };
 
+enum class CollisionMode { report, stop, clamp };
+
+/// What is done about bones that touch on their way.
+struct Collision {
+  CollisionMode mode = CollisionMode::report;
+  double clearance = 0;     ///< mm to be kept between bones
+  double tolerance = 0.05;  ///< mm: how much sooner than at contact a clamped motion may end
+};
+
 struct Scene {
   std::filesystem::path file;
   SurfaceEntry skin;
-  std::vector<BoneEntry> bones;
+  std::vector<BoneEntry> bones;  ///< those with a file of their own, then the pieces cut off them
+  std::vector<Osteotomy> osteotomies;  ///< in the order in which they are made, one a piece
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
-  bool rim_fixed = true;             ///< the outermost border loop of an open skin
-  std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
+  bool rim_fixed = true;           ///< the outermost border loop of an open skin
+  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
+  std::optional<Collision> collision;
   std::vector<Force> forces;
   Solve solve;
+  std::vector<std::string> remarks;  ///< lines for a person
 };
 
 /// Reads and checks a scene file. Every refusal is an InputError whose message starts with

@@ -5,8 +5,8 @@
 
 namespace repose::scene {
 
-/// Reads the motion of a bone from an ITK text transform (.tfm, .txt; "#Insight Transform File
-/// V1.0"), as 3D Slicer and ITK's registration programs save it.
+/// Reads the motion of a bone from an ITK transform, as 3D Slicer and ITK's registration programs
+/// save it: text (.tfm, .txt; "#Insight Transform File V1.0") or HDF5 (.h5), told by content.
 ///
 /// Direction: an ITK transform maps points of the fixed space to the moving space, y = A (x − c) +
 /// t + c, because it is made for resampling. A bone goes the other way, from where it is (moving)
@@ -18,8 +18,8 @@ namespace repose::scene {
 ///
 /// Kinds: AffineTransform, MatrixOffsetTransformBase (if rigid), Euler3DTransform,
 /// VersorRigid3DTransform, TranslationTransform, each in double or float, 3 to 3 dimensions; one in
-/// a file. Euler3D: R = Rz Rx Ry, or Rz Ry Rx where a fourth fixed parameter is not 0.
-/// Throws InputError that begins with file:line.
+/// a text file; in HDF5 one, or a CompositeTransform of several. Euler3D: R = Rz Rx Ry, or Rz Ry Rx
+/// where a fourth fixed parameter is not 0. Throws InputError that begins with file:line.
 RigidMotion read_transform(const std::filesystem::path& file);
 
 }  // namespace repose::scene

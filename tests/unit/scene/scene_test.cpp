@@ -193,6 +193,88 @@ TEST(Scene, EveryFormOfAMove) {
   expect_near(moved("transform: [[[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]]"), {6, 0, 0});
 }
 
+const std::string cut_chin =
+    "osteotomies:\n"
+    "  - {bone: mandible, piece: chin, planes: [{point: [1, 2, 3], normal: [0, 0, -2]}], kerf: 1}\n"
+    "  - {bone: chin, piece: tip, surface: skull.ply, seed: [4, 5, 6]}\n";
+
+TEST(Scene, PiecesAreBones) {
+  const Scene scene = read(minimal + cut_chin + "moves: [{bone: tip, translate: [0, 0, 1]}]\n");
+  ASSERT_EQ(scene.bones.size(), 4u);
+  EXPECT_EQ(scene.bones[2].name, "chin");
+  EXPECT_EQ(scene.bones[3].name, "tip");
+  EXPECT_EQ(scene.bones[3].file.filename(), "mandible.ply");
+  ASSERT_EQ(scene.osteotomies.size(), 2u);
+  const Osteotomy& chin = scene.osteotomies[0];
+  EXPECT_EQ(chin.bone, 1u);
+  EXPECT_EQ(chin.piece, 2u);
+  ASSERT_EQ(chin.planes.size(), 1u);
+  expect_near(chin.planes[0].point, {1, 2, 3});
+  expect_near(chin.planes[0].normal, {0, 0, -2});
+  EXPECT_FALSE(chin.planes[0].radius);
+  EXPECT_EQ(chin.kerf, 1);
+  EXPECT_EQ(scene.osteotomies[1].bone, 2u);
+  EXPECT_EQ(scene.osteotomies[1].surface->filename(), "skull.ply");
+  expect_near(*scene.osteotomies[1].seed, {4, 5, 6});
+  EXPECT_TRUE(scene.moves[2].is_identity()) << "a piece is not carried by another";
+  expect_near(scene.moves[3].apply({0, 0, 0}), {0, 0, 1});
+}
+
+TEST(Scene, SeveralBonesMakeOneMove) {
+  const Scene scene =
+      read(minimal + cut_chin + "moves: [{bone: [mandible, chin], translate: [0, 6, 0]}]\n");
+  EXPECT_TRUE(scene.moves[0].is_identity());
+  expect_near(scene.moves[1].apply({0, 0, 0}), {0, 6, 0});
+  expect_near(scene.moves[2].apply({0, 0, 0}), {0, 6, 0});
+}
+
+RigidMotion landmark_move(const std::string& form, std::vector<std::string>* remarks = nullptr) {
+  const Folder folder;
+  folder.write("points.json",
+               "{\"chin\": [1, 2, 3], \"left\": [5, 0, 0], \"axis\": {\"point\": [0, 0, 0]}}");
+  const Scene scene = read_scene(folder.write(
+      "s.yaml", minimal + "landmarks: points.json\nmoves: [{bone: skull, " + form + "}]\n"));
+  if (remarks) *remarks = scene.remarks;
+  return scene.moves[0];
+}
+
+TEST(Scene, LandmarksGoToTheirPlaces) {
+  expect_near(landmark_move("landmark: {from: chin, to: [1, 2, 9]}").apply({0, 0, 0}), {0, 0, 6});
+  const RigidMotion two =
+      landmark_move("landmark: [{from: [0, 0, 0], to: [0, 0, 1]}, {from: left, to: [0, 5, 1]}]");
+  expect_near(two.apply({5, 0, 0}), {0, 5, 1});
+  expect_near(two.apply({0, 0, 7}), {0, 0, 8});
+  std::vector<std::string> remarks;
+  const RigidMotion three = landmark_move(
+      "landmark: [{from: [0, 0, 0], to: [0, 0, 0]}, {from: left, to: [0, 5, 0]}, "
+      "{from: [0, 5, 0], to: [-5, 0, 3]}]",
+      &remarks);
+  EXPECT_LT((three.apply({5, 0, 0}) - Vec3(0, 5, 0)).norm(), 2);
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_NE(remarks[0].find("moves[0].landmark: a rigid motion brings the landmarks within"),
+            std::string::npos);
+}
+
+TEST(Scene, EarlierMovesCarryALandmark) {
+  const std::string list =
+      "transform: [{translate: [10, 0, 0]}, {landmark: {from: chin, to: [1, 2, 9]}}]";
+  expect_near(landmark_move(list).apply({1, 2, 3}), {1, 2, 9});
+  const Scene scene = read(minimal +
+                           "moves:\n  - {bone: skull, translate: [10, 0, 0]}\n"
+                           "  - {bone: skull, landmark: {from: [1, 2, 3], to: [1, 2, 9]}}\n");
+  expect_near(scene.moves[0].apply({1, 2, 3}), {1, 2, 9});
+}
+
+TEST(Scene, Collision) {
+  EXPECT_FALSE(read(minimal).collision);
+  const Scene scene = read(minimal + "collision: {mode: clamp, clearance: 0.5, tolerance: 0.01}\n");
+  EXPECT_EQ(scene.collision->mode, CollisionMode::clamp);
+  EXPECT_EQ(scene.collision->clearance, 0.5);
+  EXPECT_EQ(scene.collision->tolerance, 0.01);
+  EXPECT_EQ(read(minimal + "collision: {}\n").collision->tolerance,
+            base::parse_number(find_key("collision.tolerance").standard));
+}
+
 TEST(Scene, AnchorsAndMergeKeys) {
   const Scene scene = read(minimal + R"(forces:
   - &push {at: [1, 2, 3], radius: 5, force: &f [0, 0, -2]}
@@ -399,7 +481,7 @@ TEST(SceneRefuses, BonesAndMoves) {
       {"moves: [{bone: mandibel, translate: [0, 0, 1]}]\n",
        "6:16: moves[0].bone 'mandibel' is no bone of the scene; the nearest is 'mandible'"},
       {"moves: [{bone: skull}]\n",
-       "6:9: moves[0] must hold exactly one of translate, rotate, transform"},
+       "6:9: moves[0] must hold exactly one of translate, rotate, landmark, transform"},
       {"moves: [{bone: skull, translate: [0, 0, 1], transform: face.ply}]\n",
        "moves[0] must hold exactly one of"},
       {"moves: [{translate: [0, 0, 1]}]\n", "moves[0] lacks the key 'bone'"},
@@ -424,19 +506,51 @@ TEST(SceneRefuses, BonesAndMoves) {
       {"moves: [{bone: skull, transform: {translate: [0, 0, 1]}}]\n",
        "moves[0].transform must be a file, a 4×4 matrix, or a list, it is a map"},
       {"moves: [{bone: skull, transform: [{translate: [0, 0, 1], rotate: 3}]}]\n",
-       "moves[0].transform[0] must hold one form"},
+       "moves[0].transform[0] must hold exactly one of translate, rotate, landmark"},
       {"moves: [{bone: skull, transform: &a [*a]}]\n", "6:34: moves[0].transform"},
       {"moves: [{bone: skull, transform: &a [{transform: *a}]}]\n",
        "moves[0].transform[0] has an unknown key 'transform'"},
   });
 }
 
+TEST(SceneRefuses, OsteotomiesAndLandmarks) {
+  expect_refused({
+      {"osteotomies: [{bone: skul, piece: a, surface: face.ply}]\n",
+       "6:22: osteotomies[0].bone 'skul' is no bone of the scene; the nearest is 'skull'"},
+      {"osteotomies: [{bone: skull, piece: mandible, surface: face.ply}]\n",
+       "osteotomies[0].piece 'mandible' is the name of two bones"},
+      {"osteotomies: [{bone: skull, piece: a}]\n", "osteotomies[0] has no cut; give planes"},
+      {"osteotomies: [{bone: skull, piece: a, planes: []}]\n", "osteotomies[0] has no cut"},
+      {"osteotomies: [{bone: skull, piece: a, planes: [{point: [0, 0, 0], normal: [0, 0, 0]}]}]\n",
+       "osteotomies[0].planes[0].normal must not be zero"},
+      {"osteotomies: [{bone: skull, piece: a, surface: face.ply, kerf: 21}]\n",
+       "osteotomies[0].kerf must be a number of mm, 0 … 20, it is '21'"},
+      {"osteotomies: [{bone: skull, piece: a, surface: no.ply}]\n", "which is no file"},
+      {"moves: [{bone: chin, translate: [0, 0, 1]}]\n",
+       "6:16: moves[0].bone 'chin' is no bone of the scene; the nearest is"},
+      {"moves: [{bone: [], translate: [0, 0, 1]}]\n",
+       "moves[0].bone must be a text, or a list of texts"},
+      {"moves: [{bone: [skull, mandibel], translate: [0, 0, 1]}]\n",
+       "moves[0].bone[1] 'mandibel' is no bone"},
+      {"moves: [{bone: skull, landmark: {from: chin, to: [0, 0, 0]}}]\n",
+       "moves[0].landmark.from names landmark 'chin', but the scene has none"},
+      {"moves: [{bone: skull, landmark: []}]\n", "moves[0].landmark is an empty list"},
+      {"moves: [{bone: skull, landmark: [{from: [0,0,0], to: [0,0,1]}, {from: [0,0,0], to: "
+       "[1,1,1]}]}]\n",
+       "moves[0].landmark is refused: two landmarks in one place fix no turn"},
+      {"landmarks: face.ply\n", "face.ply: holds no landmark"},
+      {"collision: {mode: stopp}\n", "collision.mode must be one of report, stop, clamp"},
+  });
+  const std::string unknown = refusal([] { landmark_move("landmark: {from: chim, to: left}"); });
+  EXPECT_NE(
+      unknown.find("moves[0].landmark.from 'chim' is no landmark of the scene; the nearest is "
+                   "'chin'"),
+      std::string::npos)
+      << unknown;
+}
+
 TEST(SceneRefuses, WhatThisVersionDoesNotModel) {
   expect_refused({
-      {"osteotomies: [{bone: skull}]\n",
-       "scene.yaml:6:1: this version does not model osteotomies; remove it or give the cut pieces "
-       "as bones"},
-      {"collision: {mode: report}\n", "6:1: this version does not model collision; remove it or"},
       {"instruments: []\n", "6:1: this version does not model instruments; remove it or"},
       {"incisions:\n", "6:1: this version does not model incisions; remove it or"},
       {"gravity: [0, 0, -9.8]\n",
@@ -539,7 +653,7 @@ TEST(Keys, DescribedInMarkdown) {
   const std::string table = describe_keys();
   EXPECT_NE(table.find("| `tissue.free_thickness` | a number of mm, > 0 | 12 |"), std::string::npos)
       << table;
-  EXPECT_NE(table.find("| `osteotomies` | – | – | Refused: this version does not model it"),
+  EXPECT_NE(table.find("| `instruments` | – | – | Refused: this version does not model it"),
             std::string::npos);
   const auto lines = std::count(table.begin(), table.end(), '\n');
   EXPECT_EQ(lines, static_cast<long>(all_keys().size()) + 2);

@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "folder.h"
+#include "repose/base/hdf5.h"
 
 namespace repose::scene {
 namespace {
@@ -74,6 +75,85 @@ TEST(TransformFile, Translation) {
               {1, 2, 3}, {0, 0, 0});
 }
 
+/// Writes ITK's layout: a kind and numbers to each group.
+struct Hdf5Part {
+  std::string kind;
+  std::vector<double> parameters, fixed;
+};
+
+void write_text(hid_t file, const std::string& path, const std::string& text) {
+  const base::Hdf5Type type(H5Tcopy(H5T_C_S1));
+  H5Tset_size(type, H5T_VARIABLE);
+  const base::Hdf5Space space(H5Screate(H5S_SCALAR));
+  const base::Hdf5Dataset data(
+      H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  const char* pointer = text.c_str();
+  H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &pointer);
+}
+
+void write_numbers(hid_t file, const std::string& path, const std::vector<double>& numbers) {
+  const hsize_t size = numbers.size();
+  const base::Hdf5Space space(H5Screate_simple(1, &size, nullptr));
+  const base::Hdf5Dataset data(
+      H5Dcreate2(file, path.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+}
+
+RigidMotion read_hdf5(const std::vector<Hdf5Part>& parts, const std::string& name = "Transform") {
+  const Folder folder;
+  const std::filesystem::path path = folder.path("plan.h5");
+  {
+    const base::Hdf5File file = base::create_hdf5(path);
+    const base::Hdf5Group top = base::create_hdf5_group(file, "TransformGroup");
+    for (size_t k = 0; k < parts.size(); ++k) {
+      const std::string group = "/TransformGroup/" + std::to_string(k);
+      const base::Hdf5Group made = base::create_hdf5_group(file, group.c_str());
+      write_text(file, group + "/TransformType", parts[k].kind);
+      if (parts[k].parameters.empty()) continue;
+      write_numbers(file, group + "/" + name + "Parameters", parts[k].parameters);
+      write_numbers(file, group + "/" + name + "FixedParameters", parts[k].fixed);
+    }
+  }
+  return read_transform(path);
+}
+
+const Hdf5Part turn_and_shift{
+    "AffineTransform_double_3_3", {0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 5}, {10, 0, 0}};
+
+TEST(TransformFile, Hdf5HoldsTheSame) {
+  for (const char* name : {"Transform", "Tranform"}) {
+    const RigidMotion motion = read_hdf5({turn_and_shift}, name);
+    expect_maps(motion.inverse(), {11, 0, 0}, {10, 1, 5});
+    expect_maps(motion, {10, 1, 5}, {11, 0, 0});
+  }
+}
+
+// ITK applies the last of a composite first.
+TEST(TransformFile, Hdf5CompositeInItksOrder) {
+  const RigidMotion motion = read_hdf5({{"CompositeTransform_double_3_3", {}, {}},
+                                        turn_and_shift,
+                                        {"TranslationTransform_double_3_3", {1, 0, 0}, {0, 0, 0}}});
+  expect_maps(motion.inverse(), {10, 0, 0}, {10, 1, 5});
+}
+
+TEST(TransformFile, Hdf5RefusesInOneLine) {
+  const auto refused = [](const std::vector<Hdf5Part>& parts) {
+    return refusal([&] { read_hdf5(parts); });
+  };
+  const auto holds = [](const std::string& text, const char* words) {
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  };
+  holds(refused({}), "holds no ITK transform");
+  holds(refused({turn_and_shift, turn_and_shift}), "more than one transform");
+  holds(refused({{"BSplineTransform_double_3_3", {1}, {1}}}), "is not supported");
+  holds(refused({{"AffineTransform_double_3_3", {}, {}}}), "holds no TransformParameters");
+  holds(refused({{"AffineTransform_double_3_3", {1, 2}, {0, 0, 0}}}), "needs 12 numbers");
+  holds(refused({{"CompositeTransform_double_3_3", {}, {}}}), "without parts");
+  const Folder folder;
+  holds(refusal([&] { read_transform(folder.write("cut.h5", "\x89HDF\r\n\x1a\nrest")); }),
+        "cannot be read as an ITK transform in HDF5");
+}
+
 TEST(TransformFile, RefusesInOneLine) {
   const std::string affine = "Transform: AffineTransform_double_3_3\n";
   const std::string identity = "Parameters: 1 0 0 0 1 0 0 0 1 0 0 0\n";
@@ -81,7 +161,6 @@ TEST(TransformFile, RefusesInOneLine) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "holds no transform"},
       {"hello\n", "plan.tfm:1: not an ITK text transform"},
-      {std::string("\x89HDF\r\n\x1a\n\0\0", 10), "plan.tfm:1: not an ITK text transform"},
       {std::string(2 << 20, 'x'), "too large"},
       {head, "holds no transform"},
       {head + affine, "holds no line 'Parameters:'"},

@@ -1,0 +1,118 @@
+/// repose-osteotomy BONE: cuts a closed bone surface into closed, named pieces.
+///
+///     repose-osteotomy mandible.ply -point 0 0 343 -normal 0 0 -1 -piece chin -kerf 0.8
+///     repose-osteotomy mandible.ply -surface split.ply -seed 0 -290 350 -piece jaw
+///     repose-osteotomy scene.yaml -output plan
+///
+/// Of a scene, makes all osteotomies. Writes NAME_PIECE.ply for every part, the rest under the
+/// bone's own name. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
+#include <cstdio>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/model/bones.h"
+#include "repose/surface/osteotomy.h"
+#include "repose/surface/read.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+std::vector<base::Option> option_table() {
+  const auto triple = [](const char* name, const char* help) {
+    return base::Option{name, OptionKind::number, "", help, {}, "mm", {}, 3};
+  };
+  return {triple("point", "A point of the cutting plane."),
+          triple("normal", "Normal of the plane, towards the piece."),
+          {"radius",
+           OptionKind::number,
+           "",
+           "The plane cuts only this near to its point.",
+           {1e-6, 1e6},
+           "mm"},
+          {"surface", OptionKind::path, "",
+           "A cutting surface (PLY, STL, OBJ, OFF) in place of the plane."},
+          {"kerf", OptionKind::number, "0", "Thickness of the saw blade.", {0, 20}, "mm"},
+          triple("seed", "A point inside the piece, which then chooses it."),
+          {"piece", OptionKind::text, "piece", "Name of the piece."},
+          {"output", OptionKind::path, "",
+           "Path of the files without _PIECE.ply; default: the input's name here."}};
+}
+
+Vec3 vector(const base::Options& options, const char* name) {
+  const std::vector<std::string> words = options.texts(name);
+  Vec3 result;
+  for (int axis = 0; axis < 3; ++axis) result[axis] = *base::parse_number(words[axis]);
+  return result;
+}
+
+surface::Osteotomy plan_of(const base::Options& options) {
+  surface::Osteotomy plan{options.text("piece"), {}, {}, options.number("kerf"), {}};
+  if (options.has("point") != options.has("normal"))
+    base::refuse("a plane needs both -point X Y Z and -normal X Y Z");
+  if (options.has("point"))
+    plan.planes.push_back({vector(options, "point"), vector(options, "normal")});
+  if (options.has("radius")) {
+    if (plan.planes.empty()) base::refuse("-radius bounds a plane; give -point and -normal too");
+    plan.planes[0].radius = options.number("radius");
+  }
+  if (options.has("surface")) plan.surface = surface::load_cutter(options.text("surface"));
+  if (options.has("seed")) plan.seed = vector(options, "seed");
+  if (plan.planes.empty() && !plan.surface)
+    base::refuse("no cut is given; give -point and -normal, or -surface");
+  return plan;
+}
+
+struct Parts {
+  std::vector<surface::Surface> surfaces;
+  std::vector<std::string> names, remarks;
+};
+
+Parts parts_of_scene(const base::Options& options, const std::filesystem::path& input) {
+  for (const char* name : {"point", "normal", "radius", "surface", "kerf", "seed", "piece"})
+    if (options.has(name))
+      base::refuse("-{} does not go with a scene, whose osteotomies say how to cut", name);
+  const scene::Scene scene = scene::read_scene(input);
+  if (scene.osteotomies.empty()) base::refuse("{}: has no osteotomies to make", input.string());
+  model::Bones bones = model::read_bones(scene);
+  Parts parts{std::move(bones.surfaces), {}, std::move(bones.remarks)};
+  for (const scene::BoneEntry& bone : scene.bones) parts.names.push_back(bone.name);
+  return parts;
+}
+
+Parts parts_of_bone(const base::Options& options, const std::filesystem::path& input) {
+  const surface::Osteotomy plan = plan_of(options);
+  surface::Pieces pieces =
+      surface::cut_bone(surface::load_surface(input, surface::Role::bone), plan);
+  std::vector<std::string> remarks = pieces.remarks;
+  if (plan.kerf > 0) remarks.push_back(fmt::format("the saw takes {:.1f} mm³", pieces.kerf_volume));
+  return {{pieces.rest, pieces.piece}, {"rest", plan.piece}, remarks};
+}
+
+void cut(const base::Options& options) {
+  const std::filesystem::path input = options.arguments()[0];
+  const bool is_scene = input.extension() == ".yaml" || input.extension() == ".yml";
+  const Parts parts = is_scene ? parts_of_scene(options, input) : parts_of_bone(options, input);
+  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  for (const std::string& remark : parts.remarks) std::printf("  %s\n", remark.c_str());
+  for (size_t k = 0; k < parts.surfaces.size(); ++k) {
+    const std::string file = fmt::format("{}_{}.ply", name, parts.names[k]);
+    surface::write_ply(file, parts.surfaces[k]);
+    std::printf("  wrote %s: %zu triangles, %.1f mm³\n", file.c_str(),
+                parts.surfaces[k].triangles.size(), surface::volume(parts.surfaces[k]));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(
+      argc, argv, "Cuts a closed bone surface into closed, named pieces.",
+      {{"BONE", "a closed surface (PLY, STL, OBJ, OFF), or a scene (.yaml) with osteotomies"}},
+      option_table());
+  return base::run_program(options, [&] {
+    base::on_first_rank(MPI_COMM_WORLD, [&] { cut(options); });
+    return base::Exit::done;
+  });
+}

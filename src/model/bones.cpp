@@ -1,0 +1,51 @@
+#include "repose/model/bones.h"
+
+#include "repose/base/error.h"
+#include "repose/model/load_entry.h"
+#include "repose/surface/osteotomy.h"
+#include "repose/surface/read.h"
+
+namespace repose::model {
+namespace {
+
+surface::Osteotomy plan_of(const scene::Osteotomy& cut, const std::string& piece) {
+  surface::Osteotomy plan{piece, {}, {}, cut.kerf, cut.seed};
+  for (const scene::CutPlane& plane : cut.planes) {
+    plan.planes.push_back({plane.point, plane.normal});
+    if (plane.radius) plan.planes.back().radius = *plane.radius;
+  }
+  if (cut.surface) plan.surface = surface::load_cutter(*cut.surface);
+  return plan;
+}
+
+void make(const scene::Scene& scene, const scene::Osteotomy& cut, Bones& bones) {
+  surface::Surface& bone = bones.surfaces[cut.bone];
+  const std::string& name = scene.bones[cut.piece].name;
+  surface::Pieces parts = surface::cut_bone(bone, plan_of(cut, name));
+  bones.remarks.push_back(fmt::format(
+      "piece '{}' of {:.0f} mm³ is cut off '{}', which keeps {:.0f} mm³; the saw takes {:.0f} mm³",
+      name, surface::volume(parts.piece), scene.bones[cut.bone].name, surface::volume(parts.rest),
+      parts.kerf_volume));
+  bones.remarks.insert(bones.remarks.end(), parts.remarks.begin(), parts.remarks.end());
+  bone = std::move(parts.rest);
+  bones.surfaces.push_back(std::move(parts.piece));
+}
+
+}  // namespace
+
+Bones read_bones(const scene::Scene& scene) {
+  Bones bones;
+  const size_t whole = scene.bones.size() - scene.osteotomies.size();
+  for (size_t b = 0; b < whole; ++b)
+    bones.surfaces.push_back(load_entry(scene.bones[b].surface, surface::Role::bone));
+  for (size_t k = 0; k < scene.osteotomies.size(); ++k) {
+    try {
+      make(scene, scene.osteotomies[k], bones);
+    } catch (const base::InputError& error) {
+      base::refuse("{}: osteotomies[{}]: {}", scene.file.string(), k, error.what());
+    }
+  }
+  return bones;
+}
+
+}  // namespace repose::model
