@@ -5,6 +5,7 @@
 #include "repose/base/error.h"
 #include "repose/model/attachment.h"
 #include "repose/model/bones.h"
+#include "repose/model/collision.h"
 #include "repose/model/columns.h"
 #include "repose/model/layers.h"
 #include "repose/model/load_entry.h"
@@ -111,11 +112,13 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 
 BuiltModel build_model(const scene::Scene& scene) {
   const surface::Surface skin = load_entry(scene.skin, surface::Role::skin);
-  const Bones bones = read_bones(scene);
-  BuiltModel built = build_model(scene, skin, bones.surfaces);
-  std::vector<std::string>& remarks = built.report.remarks;
-  remarks.insert(remarks.begin(), scene.remarks.begin(), scene.remarks.end());
-  remarks.insert(remarks.begin(), bones.remarks.begin(), bones.remarks.end());
+  Bones bones = read_bones(scene);
+  std::vector<std::string> remarks = std::move(bones.remarks);
+  remarks.insert(remarks.end(), scene.remarks.begin(), scene.remarks.end());
+  scene::Scene heeded = scene;
+  heed_collisions(bones.surfaces, heeded, remarks);
+  BuiltModel built = build_model(heeded, skin, bones.surfaces);
+  built.report.remarks.insert(built.report.remarks.begin(), remarks.begin(), remarks.end());
   return built;
 }
 

@@ -1,0 +1,47 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "repose/scene/scene.h"
+#include "repose/surface/surface.h"
+
+/// Bones that touch on their way.
+namespace repose::model {
+
+/// Two bones that move differently. Positions and distances in mm.
+struct BonePair {
+  int32_t a, b;            ///< rows of the scene's bones
+  double gap;              ///< between them before all moves
+  int64_t ignored = 0;     ///< triangles that touch from the start and are not counted
+  double load = 2;         ///< of first contact, 0 … 1; greater: none
+  Vec3 at = Vec3::Zero();  ///< where, at that load
+  int64_t crossings = 0;   ///< pairs of triangles that intersect at the end of the moves
+  double depth = 0;        ///< how deep a vertex of one is inside the other there
+  bool contact() const { return load <= 1; }
+};
+
+struct CollisionReport {
+  std::vector<BonePair> pairs;
+  double safe_load = 1;  ///< all bones can move so far together without a contact
+};
+
+/// Follows the moves, screw motions from load 0 to 1, of all pairs of bones that move differently
+/// by conservative advancement, so that no contact on the way is missed. A contact is two triangles
+/// within clearance + tolerance of each other; it is found before they are within the clearance.
+/// Triangles of both bones that lie within clearance + 2 tolerance of the other bone at the start
+/// are not counted against each other. `bones` and `moves` in the order of the scene.
+CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
+                             const std::vector<scene::RigidMotion>& moves,
+                             const scene::Collision& wanted);
+
+/// Does what the scene wants about contacts: moves are shortened, remarks added; nothing where it
+/// wants nothing. Throws InputError naming the scene and the first contact in mode stop.
+void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
+                     std::vector<std::string>& remarks);
+
+/// One line a pair, for a person.
+std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
+                                  const scene::Collision& wanted);
+
+}  // namespace repose::model

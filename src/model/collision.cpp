@@ -1,0 +1,158 @@
+#include "repose/model/collision.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "repose/base/error.h"
+#include "repose/surface/collision.h"
+#include "repose/surface/distance.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double same_motion = 1e-9;  // largest difference of matrix entries, mm or none
+
+/// The constant twist of a screw motion, the logarithm of a small part of it:
+/// t = (1 + (1−cos θ)/θ² K + (θ−sin θ)/θ³ K²) v with K = [θ u]× for a part that turns by θ.
+surface::Twist twist_of(const scene::RigidMotion& motion) {
+  constexpr double part = 1.0 / 64;
+  const Mat4 step = motion.matrix(part);
+  const Eigen::AngleAxisd turn(Mat3(step.topLeftCorner<3, 3>()));
+  const double angle = turn.angle(), squared = angle * angle;
+  const bool tiny = angle < 1e-4;
+  const double first = tiny ? 0.5 : (1 - std::cos(angle)) / squared,
+               second = tiny ? 1.0 / 6 : (angle - std::sin(angle)) / (squared * angle);
+  const Vec3 w = angle * turn.axis();
+  Mat3 k;
+  k << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  const Mat3 whole = Mat3::Identity() + first * k + second * k * k;
+  const Vec3 shift = step.topRightCorner<3, 1>();
+  return {w / part, whole.inverse() * shift / part};
+}
+
+/// Place of bone b in the frame of bone a.
+Mat4 relative(const scene::RigidMotion& a, const scene::RigidMotion& b, double load) {
+  return scene::RigidMotion::from_matrix(a.matrix(load)).inverse().matrix() * b.matrix(load);
+}
+
+Vec3 placed(const Mat4& pose, const Vec3& point) {
+  return pose.topLeftCorner<3, 3>() * point + pose.topRightCorner<3, 1>();
+}
+
+/// A bone with what questions about it need.
+struct Mover {
+  const surface::Surface& surface;
+  const scene::RigidMotion& motion;
+  surface::CollisionTree tree;
+  std::unique_ptr<surface::DistanceTree> inside;  // made when needed
+
+  /// Depth of the deepest of `points`, placed by `pose`, inside this bone.
+  double depth_of(const std::vector<Vec3>& points, const Mat4& pose) {
+    if (!inside) inside = std::make_unique<surface::DistanceTree>(surface);
+    double depth = 0;
+    for (const Vec3& point : points) {
+      const Vec3 p = placed(pose, point);
+      if (inside->contains(p)) depth = std::max(depth, inside->nearest(p).distance);
+    }
+    return depth;
+  }
+};
+
+void look_at_the_end(Mover& a, Mover& b, BonePair& pair) {
+  const Mat4 pose = relative(a.motion, b.motion, 1);
+  if (!surface::touch(a.tree, b.tree, pose)) return;
+  pair.crossings = static_cast<int64_t>(
+      surface::pairs_within(a.tree, b.tree, pose, surface::contact_margin).size());
+  pair.depth = std::max(a.depth_of(b.surface.points, pose),
+                        b.depth_of(a.surface.points, relative(b.motion, a.motion, 1)));
+}
+
+void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) {
+  surface::Encounter encounter(a.tree, b.tree, twist_of(a.motion), twist_of(b.motion),
+                               wanted.clearance + 2 * wanted.tolerance);
+  pair.ignored = encounter.ignored_triangles();
+  constexpr double caution = 1 - 1e-9;  // of a step: twists are rounded
+  for (double load = 0; load <= 1;) {
+    const auto next = encounter.next(relative(a.motion, b.motion, load), wanted.clearance);
+    if (next.approach.distance <= wanted.clearance + wanted.tolerance) {
+      pair.load = load;
+      pair.at = a.motion.apply(next.approach.at, load);
+      break;
+    }
+    load += caution * next.load;
+  }
+  if (pair.contact()) look_at_the_end(a, b, pair);
+}
+
+bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
+  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same_motion;
+}
+
+}  // namespace
+
+CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
+                             const std::vector<scene::RigidMotion>& moves,
+                             const scene::Collision& wanted) {
+  std::vector<Mover> movers;
+  for (size_t k = 0; k < bones.size(); ++k)
+    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr});
+  CollisionReport report;
+  for (size_t i = 0; i < bones.size(); ++i)
+    for (size_t j = i + 1; j < bones.size(); ++j) {
+      if (move_alike(moves[i], moves[j])) continue;
+      BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
+      pair.gap = surface::nearest(movers[i].tree, movers[j].tree, Mat4::Identity())->distance;
+      follow(movers[i], movers[j], wanted, pair);
+      report.safe_load = std::min(report.safe_load, pair.load);
+      report.pairs.push_back(pair);
+    }
+  return report;
+}
+
+std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
+                                  const scene::Collision& wanted) {
+  std::vector<std::string> lines;
+  for (const BonePair& pair : report.pairs) {
+    std::string line =
+        fmt::format("bones '{}' and '{}', {:.2f} mm apart at the start: ", scene.bones[pair.a].name,
+                    scene.bones[pair.b].name, pair.gap);
+    if (!pair.contact())
+      line += fmt::format("stay {} mm apart", wanted.clearance);
+    else
+      line += fmt::format("come within {} mm at load {:.4f}, at ({:.1f}, {:.1f}, {:.1f})",
+                          wanted.clearance + wanted.tolerance, pair.load, pair.at.x(), pair.at.y(),
+                          pair.at.z());
+    if (pair.crossings > 0)
+      line += fmt::format("; at the end {} pairs of triangles cross, {:.2f} mm deep",
+                          pair.crossings, pair.depth);
+    if (pair.ignored > 0)
+      line += fmt::format("; {} triangles that touch from the start (within {} mm) are not counted",
+                          pair.ignored, wanted.clearance + 2 * wanted.tolerance);
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
+                     std::vector<std::string>& remarks) {
+  if (!scene.collision) return;
+  const CollisionReport report = follow_moves(bones, scene.moves, *scene.collision);
+  const std::vector<std::string> lines = describe(report, scene, *scene.collision);
+  remarks.insert(remarks.end(), lines.begin(), lines.end());
+  if (report.safe_load >= 1 || scene.collision->mode == scene::CollisionMode::report) return;
+  if (scene.collision->mode == scene::CollisionMode::stop) {
+    const auto first =
+        std::min_element(report.pairs.begin(), report.pairs.end(),
+                         [](const BonePair& p, const BonePair& q) { return p.load < q.load; });
+    base::refuse("{}: {}; change the moves, or collision.mode to clamp or report",
+                 scene.file.string(), lines[first - report.pairs.begin()]);
+  }
+  for (scene::RigidMotion& move : scene.moves)
+    move = scene::RigidMotion::from_matrix(move.matrix(report.safe_load));
+  remarks.push_back(fmt::format(
+      "all moves end at load {:.4f} of the plan, before the first contact", report.safe_load));
+}
+
+}  // namespace repose::model

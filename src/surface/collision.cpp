@@ -1,0 +1,260 @@
+#include "repose/surface/collision.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "edges.h"
+#include "repose/base/error.h"
+#include "triangle_distance.h"
+
+namespace repose::surface {
+namespace {
+
+using Node = CollisionTree::Node;
+using Corners = std::array<Vec3, 3>;
+
+/// A pose with what the boxes need of it.
+struct Placement {
+  explicit Placement(const Mat4& pose)
+      : turn(pose.topLeftCorner<3, 3>()),
+        shift(pose.topRightCorner<3, 1>()),
+        spread(turn.cwiseAbs()) {}
+
+  Corners apply(const Corners& t) const {
+    return {turn * t[0] + shift, turn * t[1] + shift, turn * t[2] + shift};
+  }
+  /// Distance between box a and a box b placed so, at most the true one: the greater of those to
+  /// the upright boxes around one in the frame of the other.
+  double least(const Node& a, const Node& b) const {
+    const Vec3 between = turn * b.center + shift - a.center;
+    const Vec3 in_a = between.cwiseAbs() - a.half - spread * b.half;
+    const Vec3 in_b =
+        (turn.transpose() * between).cwiseAbs() - b.half - spread.transpose() * a.half;
+    return std::sqrt(std::max(in_a.cwiseMax(0).squaredNorm(), in_b.cwiseMax(0).squaredNorm()));
+  }
+
+  Mat3 turn;
+  Vec3 shift;
+  Mat3 spread;
+};
+
+/// Between the triangles of leaf i of a and leaf j of b.
+ShortestWay between(const CollisionTree& a, int64_t i, const CollisionTree& b, int64_t j,
+                    const Placement& place) {
+  return shortest_way(a.corners(a.nodes()[i].triangle),
+                      place.apply(b.corners(b.nodes()[j].triangle)));
+}
+
+/// Visits pairs of nodes, the more promising of two first. `visitor.key(i, j, least distance)` is
+/// what the pair may come to at best, `visitor.bound()` what is no longer wanted, `visitor.leaf`
+/// takes a pair of leaves.
+template <class Visitor>
+void traverse(const CollisionTree& a, const CollisionTree& b, const Placement& place,
+              Visitor& visitor) {
+  struct Task {
+    int64_t i, j;
+    double key;
+  };
+  const auto task = [&](int64_t i, int64_t j) -> Task {
+    return {i, j, visitor.key(i, j, place.least(a.nodes()[i], b.nodes()[j]))};
+  };
+  std::vector<Task> stack{task(0, 0)};
+  while (!stack.empty()) {
+    const auto [i, j, key] = stack.back();
+    stack.pop_back();
+    if (!(key <= visitor.bound())) continue;
+    const Node &p = a.nodes()[i], &q = b.nodes()[j];
+    if (p.right < 0 && q.right < 0) {
+      visitor.leaf(i, j);
+      continue;
+    }
+    const bool split_a = q.right < 0 || (p.right >= 0 && p.half.sum() > q.half.sum());
+    const Task first = split_a ? task(i + 1, j) : task(i, j + 1),
+               second = split_a ? task(p.right, j) : task(i, q.right);
+    stack.push_back(first.key < second.key ? second : first);
+    stack.push_back(first.key < second.key ? first : second);
+  }
+}
+
+/// Ends at the first contact.
+struct TouchVisitor {
+  const CollisionTree &a, &b;
+  const Placement& place;
+  bool found = false;
+
+  double key(int64_t, int64_t, double least) const { return least; }
+  double bound() const { return found ? -1 : contact_margin; }
+  void leaf(int64_t i, int64_t j) {
+    const double squared = between(a, i, b, j, place).squared;
+    found = found || squared <= contact_margin * contact_margin;
+  }
+};
+
+struct NearestVisitor {
+  const CollisionTree &a, &b;
+  const Placement& place;
+  Approach best;
+
+  double key(int64_t, int64_t, double least) const { return least; }
+  double bound() const { return best.distance; }
+  void leaf(int64_t i, int64_t j) {
+    const ShortestWay way = between(a, i, b, j, place);
+    const double distance = std::sqrt(way.squared);
+    if (distance < best.distance || (best.triangles[0] < 0 && distance <= best.distance))
+      best = {distance, {a.nodes()[i].triangle, b.nodes()[j].triangle}, way.middle};
+  }
+};
+
+struct AllVisitor {
+  const CollisionTree &a, &b;
+  const Placement& place;
+  double limit;
+  std::vector<std::pair<int64_t, int64_t>> pairs;
+
+  double key(int64_t, int64_t, double least) const { return least; }
+  double bound() const { return limit; }
+  void leaf(int64_t i, int64_t j) {
+    if (between(a, i, b, j, place).squared <= limit * limit)
+      pairs.emplace_back(a.nodes()[i].triangle, b.nodes()[j].triangle);
+  }
+};
+
+}  // namespace
+
+CollisionTree::CollisionTree(const Surface& surface) {
+  require_sound(surface);
+  if (surface.triangles.empty())
+    base::refuse("{}: no triangle to collide with; check the mesh", surface.name);
+  for (const Triangle& t : surface.triangles)
+    corners_.push_back({surface.points[t[0]], surface.points[t[1]], surface.points[t[2]]});
+  std::vector<int64_t> rows(corners_.size());
+  std::iota(rows.begin(), rows.end(), 0);
+  nodes_.reserve(2 * rows.size());
+  build(rows, 0, rows.size());
+}
+
+void CollisionTree::build(std::vector<int64_t>& rows, size_t begin, size_t end) {
+  Eigen::AlignedBox3d box, middles;
+  const auto middle = [&](int64_t row) -> Vec3 {
+    return corners_[row][0] + corners_[row][1] + corners_[row][2];
+  };
+  for (size_t k = begin; k < end; ++k) {
+    for (const Vec3& corner : corners_[rows[k]]) box.extend(corner);
+    middles.extend(middle(rows[k]));
+  }
+  const size_t self = nodes_.size();
+  nodes_.push_back({box.center(), box.sizes() / 2, -1, rows[begin]});
+  if (end - begin == 1) return;
+  int axis;
+  middles.sizes().maxCoeff(&axis);
+  const size_t half = (begin + end) / 2;
+  std::nth_element(rows.begin() + begin, rows.begin() + half, rows.begin() + end,
+                   [&](int64_t s, int64_t t) { return middle(s)[axis] < middle(t)[axis]; });
+  build(rows, begin, half);
+  nodes_[self].right = static_cast<int64_t>(nodes_.size());
+  build(rows, half, end);
+}
+
+bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose) {
+  const Placement place(pose);
+  TouchVisitor visitor{a, b, place};
+  traverse(a, b, place, visitor);
+  return visitor.found;
+}
+
+std::optional<Approach> nearest(const CollisionTree& a, const CollisionTree& b, const Mat4& pose,
+                                double limit) {
+  const Placement place(pose);
+  NearestVisitor visitor{a, b, place, {}};
+  visitor.best.distance = limit;
+  traverse(a, b, place, visitor);
+  if (visitor.best.triangles[0] < 0) return {};
+  return visitor.best;
+}
+
+std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
+                                                      const CollisionTree& b, const Mat4& pose,
+                                                      double limit) {
+  const Placement place(pose);
+  AllVisitor visitor{a, b, place, limit, {}};
+  traverse(a, b, place, visitor);
+  std::sort(visitor.pairs.begin(), visitor.pairs.end());
+  return visitor.pairs;
+}
+
+/// Looks for the pair that could be within the clearance first.
+class Encounter::Sweep {
+ public:
+  Sweep(const Side& a, const Side& b, const Placement& place, double clearance)
+      : a_(a), b_(b), place_(place), clearance_(clearance) {}
+
+  double key(int64_t i, int64_t j, double least) const {
+    if (a_.only_such[i] && b_.only_such[j]) return never;
+    return time(least, a_.speed[i] + b_.speed[j]);
+  }
+  double bound() const { return std::min(next.load, 2.0); }
+  void leaf(int64_t i, int64_t j) {
+    const ShortestWay way = between(*a_.tree, i, *b_.tree, j, place_);
+    const double distance = std::sqrt(way.squared);
+    const double load = time(distance, a_.speed[i] + b_.speed[j]);
+    if (!(load < next.load)) return;
+    next = {load,
+            {distance, {a_.tree->nodes()[i].triangle, b_.tree->nodes()[j].triangle}, way.middle}};
+    leaves = {i, j};
+  }
+
+  static constexpr double never = std::numeric_limits<double>::infinity();
+  std::array<int64_t, 2> leaves{-1, -1};
+  Next next{never, {}};
+
+ private:
+  double time(double distance, double speed) const {
+    if (!(speed > 0)) return never;
+    return std::max(0.0, distance - clearance_ - contact_margin) / speed;
+  }
+
+  const Side &a_, &b_;
+  const Placement& place_;
+  double clearance_;
+};
+
+Encounter::Side Encounter::make_side(const CollisionTree& tree, const Twist& twist) {
+  Side side{&tree, {}, std::vector<char>(tree.triangles(), 0), {}};
+  for (const Node& node : tree.nodes())
+    side.speed.push_back((twist.angular.cross(node.center) + twist.linear).norm() +
+                         twist.angular.norm() * node.half.norm());
+  return side;
+}
+
+void Encounter::summarise(Side& side) {
+  const auto& nodes = side.tree->nodes();
+  side.only_such.assign(nodes.size(), 0);
+  for (size_t i = nodes.size(); i-- > 0;)
+    side.only_such[i] = nodes[i].right < 0
+                            ? side.ignored[nodes[i].triangle]
+                            : side.only_such[i + 1] && side.only_such[nodes[i].right];
+}
+
+Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist& twist_a,
+                     const Twist& twist_b, double touching)
+    : a_(make_side(a, twist_a)), b_(make_side(b, twist_b)) {
+  for (const auto& [s, t] : pairs_within(a, b, Mat4::Identity(), touching)) {
+    ignored_ += !a_.ignored[s] + !b_.ignored[t];
+    a_.ignored[s] = b_.ignored[t] = 1;
+  }
+  summarise(a_);
+  summarise(b_);
+}
+
+Encounter::Next Encounter::next(const Mat4& pose, double clearance) {
+  const Placement place(pose);
+  Sweep sweep(a_, b_, place, clearance);
+  if (last_[0] >= 0) sweep.leaf(last_[0], last_[1]);
+  traverse(*a_.tree, *b_.tree, place, sweep);
+  last_ = sweep.leaves;
+  return sweep.next;
+}
+
+}  // namespace repose::surface
