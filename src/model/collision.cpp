@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "repose/base/error.h"
 #include "repose/surface/collision.h"
@@ -69,9 +70,30 @@ void look_at_the_end(Mover& a, Mover& b, BonePair& pair) {
                         b.depth_of(a.surface.points, relative(b.motion, a.motion, 1)));
 }
 
+/// Length (mm) that triangles which touch from the start shall have at most: small, but not so that
+/// a cut through a large bone has too many.
+double small_side(const surface::Surface& surface) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : surface.points) box.extend(p);
+  return std::max(1.0, box.diagonal().norm() / 200);
+}
+
+/// The trees of two bones, finer where they touch from the start.
+std::pair<surface::CollisionTree, surface::CollisionTree> finer(const Mover& a, const Mover& b,
+                                                                double touching) {
+  const auto one = [&](const Mover& own, const Mover& other) {
+    return surface::CollisionTree(
+        surface::refine_near(own.surface, own.tree, other.tree, touching, small_side(own.surface)));
+  };
+  return {one(a, b), one(b, a)};
+}
+
 void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) {
-  surface::Encounter encounter(a.tree, b.tree, twist_of(a.motion), twist_of(b.motion),
-                               wanted.clearance + 2 * wanted.tolerance);
+  const double touching = wanted.clearance + 2 * wanted.tolerance;
+  std::optional<std::pair<surface::CollisionTree, surface::CollisionTree>> fine;
+  if (pair.gap <= touching) fine.emplace(finer(a, b, touching));
+  surface::Encounter encounter(fine ? fine->first : a.tree, fine ? fine->second : b.tree,
+                               twist_of(a.motion), twist_of(b.motion), touching);
   pair.ignored = encounter.ignored_triangles();
   constexpr double caution = 1 - 1e-9;  // of a step: twists are rounded
   for (double load = 0; load <= 1;) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include <map>
 #include "bone_names.h"
 #include "read_moves.h"
 #include "read_osteotomies.h"

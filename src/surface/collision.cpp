@@ -184,6 +184,51 @@ std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
   return visitor.pairs;
 }
 
+namespace {
+
+double longest_side(const Corners& t) {
+  return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
+}
+
+bool is_near(const Corners& t, const CollisionTree& other, double near) {
+  const CollisionTree alone({"triangle", {t[0], t[1], t[2]}, {{0, 1, 2}}});
+  return nearest(alone, other, Mat4::Identity(), near).has_value();
+}
+
+void append(const Corners& t, Surface& soup) {
+  const auto first = static_cast<int64_t>(soup.points.size());
+  soup.points.insert(soup.points.end(), t.begin(), t.end());
+  soup.triangles.push_back({first, first + 1, first + 2});
+}
+
+}  // namespace
+
+Surface refine_near(const Surface& surface, const CollisionTree& own, const CollisionTree& other,
+                    double near, double longest) {
+  std::vector<char> touching(surface.triangles.size(), 0);
+  for (const auto& [s, t] : pairs_within(own, other, Mat4::Identity(), near)) touching[s] = 1;
+  Surface result{surface.name, surface.points, {}};
+  std::vector<Corners> left;
+  for (size_t t = 0; t < touching.size(); ++t) {
+    if (touching[t])
+      left.push_back(own.corners(static_cast<int64_t>(t)));
+    else
+      result.triangles.push_back(surface.triangles[t]);
+  }
+  while (!left.empty()) {
+    const Corners t = left.back();
+    left.pop_back();
+    if (longest_side(t) <= longest || !is_near(t, other, near)) {
+      append(t, result);
+      continue;
+    }
+    const Vec3 a = (t[1] + t[2]) / 2, b = (t[2] + t[0]) / 2, c = (t[0] + t[1]) / 2;
+    for (const Corners& part : {Corners{t[0], c, b}, {t[1], a, c}, {t[2], b, a}, {a, b, c}})
+      left.push_back(part);
+  }
+  return result;
+}
+
 /// Looks for the pair that could be within the clearance first.
 class Encounter::Sweep {
  public:

@@ -1,6 +1,7 @@
 #include "cut_sheets.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

@@ -17,7 +17,7 @@ struct BonePair {
   double load = 2;         ///< of first contact, 0 … 1; greater: none
   Vec3 at = Vec3::Zero();  ///< where, at that load
   int64_t crossings = 0;   ///< pairs of triangles that intersect at the end of the moves
-  double depth = 0;        ///< how deep a vertex of one is inside the other there
+  double depth = 0;        ///< how deep the deepest vertex of one is inside the other there
   bool contact() const { return load <= 1; }
 };
 
@@ -30,7 +30,8 @@ struct CollisionReport {
 /// by conservative advancement, so that no contact on the way is missed. A contact is two triangles
 /// within clearance + tolerance of each other; it is found before they are within the clearance.
 /// Triangles of both bones that lie within clearance + 2 tolerance of the other bone at the start
-/// are not counted against each other. `bones` and `moves` in the order of the scene.
+/// (there split to 1 mm, more in a large bone) are not counted against each other. `bones` and
+/// `moves` in the order of the scene.
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
                              const scene::Collision& wanted);

@@ -64,13 +64,18 @@ std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
                                                       const CollisionTree& b, const Mat4& pose,
                                                       double limit);
 
+/// The triangles of a surface that lie within `near` mm of another, split until they are no longer
+/// than `longest` mm or farther away; the others as they are. Points of neighbours are not shared.
+Surface refine_near(const Surface& surface, const CollisionTree& own, const CollisionTree& other,
+                    double near, double longest);
+
 /// Two surfaces on their way: conservative advancement (Mirtich, 1996), each part of a surface with
 /// a bound on its own speed.
 class Encounter {
  public:
   /// Both at their initial positions, moving by constant twists in one frame (screw motions). Pairs
   /// of triangles that both lie within `touching` mm of the other surface there are ignored from
-  /// then on: teeth that bite, the faces of a fresh cut.
+  /// then on: teeth that bite, the faces of a fresh cut. So those should be small (refine_near).
   Encounter(const CollisionTree& a, const CollisionTree& b, const Twist& twist_a,
             const Twist& twist_b, double touching);
 

@@ -1,5 +1,6 @@
 #include "repose/surface/osteotomy.h"
 
+#include <map>
 #include <random>
 
 #include "repose/surface/defects.h"

@@ -1,0 +1,142 @@
+#include "repose/model/collision.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "repose/base/error.h"
+#include "repose/surface/osteotomy.h"
+
+namespace repose::model {
+namespace {
+
+using scene::RigidMotion;
+
+/// A box from `low` to `low` + `size`.
+surface::Surface box(const std::string& name, const Vec3& low, const Vec3& size) {
+  surface::Surface s{name, {}, {}};
+  for (int i = 0; i < 8; ++i)
+    s.points.push_back(low + size.cwiseProduct(Vec3(i & 1, (i >> 1) & 1, (i >> 2) & 1)));
+  s.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                 {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return s;
+}
+
+scene::Scene scene_of(const std::vector<surface::Surface>& bones,
+                      const std::vector<RigidMotion>& moves) {
+  scene::Scene scene;
+  scene.file = "plan.yaml";
+  for (const surface::Surface& bone : bones) scene.bones.push_back({bone.name, {}});
+  scene.moves = moves;
+  return scene;
+}
+
+const std::vector<surface::Surface> jaws = {box("upper", {0, 0, 40}, {50, 50, 30}),
+                                            box("lower", {0, 5, 0}, {50, 40, 30})};
+
+TEST(Collisions, a_translation_stops_where_the_gap_is_used_up) {
+  const std::vector<RigidMotion> moves = {{}, RigidMotion::translation({3, 0, 16})};
+  for (const double clearance : {0.0, 1.0})
+    for (const double tolerance : {0.05, 0.001}) {
+      const CollisionReport report =
+          follow_moves(jaws, moves, {scene::CollisionMode::report, clearance, tolerance});
+      ASSERT_EQ(report.pairs.size(), 1u);
+      const BonePair& pair = report.pairs[0];
+      const double contact = (10 - clearance) / 16;
+      EXPECT_NEAR(pair.gap, 10, 1e-12);
+      EXPECT_LE(pair.load, contact);
+      EXPECT_GE(pair.load, contact - tolerance / 16);
+      EXPECT_EQ(report.safe_load, pair.load);
+      EXPECT_NEAR(pair.depth, 3, 1e-9) << "from the nearest side";
+      EXPECT_GT(pair.crossings, 0);
+      EXPECT_EQ(pair.ignored, 0);
+    }
+}
+
+TEST(Collisions, a_turn_stops_at_its_angle) {
+  // The far upper edge of the lower box rises about the near lower edge at the origin.
+  const double length = std::hypot(45, 30), start = std::atan2(30, 45),
+               contact = std::asin(40 / length) - start;
+  const double angle = 30 * M_PI / 180, tolerance = 0.01;
+  const std::vector<RigidMotion> moves = {{}, RigidMotion::rotation({1, 0, 0}, {0, 0, 0}, 30)};
+  const CollisionReport report =
+      follow_moves(jaws, moves, {scene::CollisionMode::report, 0, tolerance});
+  EXPECT_LE(report.safe_load * angle, contact);
+  EXPECT_GT(report.safe_load * angle, contact - 2 * tolerance / 42);
+}
+
+TEST(Collisions, bones_that_move_together_are_left_out) {
+  const RigidMotion turn = RigidMotion::rotation({1, 2, 3}, {4, 5, 6}, 70);
+  EXPECT_TRUE(follow_moves(jaws, {turn, turn}, {}).pairs.empty());
+  EXPECT_EQ(follow_moves(jaws, {turn, turn}, {}).safe_load, 1);
+}
+
+/// Both bones move; the lower meets the upper half way.
+TEST(Collisions, both_may_move) {
+  const CollisionReport report = follow_moves(
+      jaws, {RigidMotion::translation({0, 0, -10}), RigidMotion::translation({0, 0, 10})},
+      {scene::CollisionMode::report, 0, 0.01});
+  EXPECT_NEAR(report.safe_load, 0.5, 0.001);
+  EXPECT_NEAR(report.pairs[0].at.z(), 35, 0.1);
+}
+
+TEST(Collisions, a_fresh_cut_may_part_and_slide_but_not_press) {
+  const surface::Pieces parts = surface::cut_bone(
+      box("bone", {0, 0, 0}, {60, 50, 40}), {"piece", {{{30, 0, 0}, {1, 0, 0.5}}}, {}, 0, {}});
+  const auto report = [&](const Vec3& way) {
+    return follow_moves({parts.rest, parts.piece}, {{}, RigidMotion::translation(way)}, {});
+  };
+  EXPECT_EQ(report({5, 0, 0}).safe_load, 1) << "apart";
+  EXPECT_EQ(report({-2, 0, 4}).safe_load, 1) << "along the cut";
+  const CollisionReport pressed = report({-5, 0, 0});
+  EXPECT_LT(pressed.safe_load, 0.5);
+  EXPECT_GT(pressed.pairs[0].crossings, 0);
+  EXPECT_GT(pressed.pairs[0].ignored, 0);
+}
+
+TEST(Collisions, clamp_shortens_all_moves_alike) {
+  scene::Scene scene =
+      scene_of(jaws, {RigidMotion::translation({4, 0, 0}), RigidMotion::translation({0, 0, 20})});
+  scene.collision = scene::Collision{scene::CollisionMode::clamp, 0.5, 0.01};
+  std::vector<std::string> remarks;
+  heed_collisions(jaws, scene, remarks);
+  const Vec3 lower = scene.moves[1].apply(Vec3::Zero()), upper = scene.moves[0].apply(Vec3::Zero());
+  EXPECT_LE(lower.z(), 9.5);
+  EXPECT_GE(lower.z(), 9.49 - 1e-3);
+  EXPECT_NEAR(upper.x() / 4, lower.z() / 20, 1e-12);
+  ASSERT_EQ(remarks.size(), 2u);
+  EXPECT_NE(remarks[1].find("all moves end at load 0.47"), std::string::npos) << remarks[1];
+}
+
+TEST(Collisions, report_and_none_change_nothing) {
+  scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({0, 0, 20})});
+  std::vector<std::string> remarks;
+  heed_collisions(jaws, scene, remarks);
+  EXPECT_TRUE(remarks.empty());
+  scene.collision = scene::Collision{};
+  heed_collisions(jaws, scene, remarks);
+  EXPECT_EQ(scene.moves[1].apply(Vec3::Zero()).z(), 20);
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_NE(remarks[0].find("bones 'upper' and 'lower', 10.00 mm apart at the start: come within"),
+            std::string::npos)
+      << remarks[0];
+}
+
+TEST(Collisions, stop_refuses_the_scene) {
+  scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({0, 0, 20})});
+  scene.collision = scene::Collision{scene::CollisionMode::stop, 0, 0.05};
+  std::vector<std::string> remarks;
+  try {
+    heed_collisions(jaws, scene, remarks);
+    FAIL() << "accepted";
+  } catch (const base::InputError& error) {
+    const std::string why = error.what();
+    EXPECT_EQ(why.find("plan.yaml: bones 'upper' and 'lower'"), 0u) << why;
+    EXPECT_EQ(why.find('\n'), std::string::npos);
+  }
+  scene.moves[1] = RigidMotion::translation({0, 0, 5});
+  heed_collisions(jaws, scene, remarks);
+}
+
+}  // namespace
+}  // namespace repose::model
