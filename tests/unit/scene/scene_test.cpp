@@ -203,7 +203,7 @@ TEST(Scene, PiecesAreBones) {
   ASSERT_EQ(scene.bones.size(), 4u);
   EXPECT_EQ(scene.bones[2].name, "chin");
   EXPECT_EQ(scene.bones[3].name, "tip");
-  EXPECT_EQ(scene.bones[3].surface.file.surface.filename(), "mandible.ply");
+  EXPECT_EQ(scene.bones[3].surface.file.filename(), "mandible.ply");
   ASSERT_EQ(scene.osteotomies.size(), 2u);
   const Osteotomy& chin = scene.osteotomies[0];
   EXPECT_EQ(chin.bone, 1u);
