@@ -16,6 +16,7 @@ ROOMS = {
     "solve": {"base", "model", "mechanics"},
     "results": {"base", "model"},
     "paper": {"base", "scene", "surface", "model", "mechanics", "solve", "results"},
+    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "solve"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""How the work of a whole solve grows with the mesh: a table.
+
+    tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm]
+                              [-output docs/growth.md]
+
+Synthetic heads of the given numbers of skin vertices, 4 layers, springs by moduli with s_ref = r_0,
+penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method. Says how far each ends
+from the first method's rest position.
+Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
+"""
+
+import argparse
+import pathlib
+import resource
+import subprocess
+import tempfile
+
+import h5py
+import numpy as np
+
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+SCENE = """skin: head_skin.ply
+bones:
+  - {name: skull, file: head_skull.ply}
+  - {name: mandible, file: head_mandible.ply}
+tissue:
+  layers: 4
+  springs:
+    default: {modulus: 0.05, law: quartic, reference: initial}
+moves:
+  - {bone: mandible, translate: [0, -6, 0]}
+solve:
+  volume: {form: penalty}
+  accuracy: 0.01
+"""
+HEAD = ("| skin vertices | unknowns | method | load steps | iterations | evaluations | Hessians | "
+        "CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 2 + "|---" + "|--:" * 7
+        + "|")
+
+
+def children():
+    return resource.getrusage(resource.RUSAGE_CHILDREN)
+
+
+def measure(program, folder, method):
+    """One solve: its attributes summed over steps, CPU s, and the positions at rest."""
+    before = children().ru_utime
+    done = subprocess.run([program, "scene.yaml", "-tao_type", method, "-output", method], cwd=folder,
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    seconds = children().ru_utime - before
+    if done.returncode == 1:
+        raise SystemExit(done.stderr)
+    peak = max(float(line.split()[-4]) for line in done.stdout.splitlines() if "MiB so far" in line)
+    with h5py.File(folder / f"{method}.h5") as h5:
+        steps = [h5["step"][k] for k in sorted(h5["step"])]
+        total = {key: sum(int(step.attrs[key]) for step in steps)
+                 for key in ("iterations", "evaluations")}
+        unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
+        work = next(line for line in done.stdout.splitlines() if "of the Hessian" in line)
+        return (total | {"steps": len(steps) - 1, "hessians": int(work.split("gradient,")[1].split()[0]),
+                         "seconds": seconds, "memory": peak * 2**20 / unknowns, "unknowns": unknowns,
+                         "converged": done.returncode == 0}, steps[-1]["point/position"][()])
+
+
+def rows_of(size, methods, tools):
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        subprocess.run([tools / "repose-phantom", "-skin_vertices", str(size), "-bone_edge", "2",
+                        "-output", "head"], cwd=folder, check=True, capture_output=True)
+        (folder / "scene.yaml").write_text(SCENE)
+        first = None
+        for method in methods:
+            found, position = measure(tools / "repose-solve", folder, method)
+            first = position if first is None else first
+            apart = np.linalg.norm(position - first, axis=1).max()
+            said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
+            yield (f"| {size} | {found['unknowns']} | {method} | {found['steps']} | "
+                   f"{found['iterations']} | {found['evaluations']} | {found['hessians']} | "
+                   f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="growth.py", description=__doc__, add_help=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-help", action="help")
+    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
+    parser.add_argument("-sizes", default="500,2500,12500")
+    parser.add_argument("-methods", default="ntr,lmvm")
+    parser.add_argument("-output", type=pathlib.Path)
+    return parser.parse_args()
+
+
+def main():
+    chosen = arguments()
+    text = HEAD + "\n"
+    print(HEAD)
+    for size in chosen.sizes.split(","):
+        for row in rows_of(int(size), chosen.methods.split(","), chosen.bin.resolve()):
+            print(row, flush=True)
+            text += row + "\n"
+    if chosen.output:
+        before, mark, _ = chosen.output.read_text().partition("<!-- measured -->\n")
+        part = chosen.output.with_suffix(".part")
+        part.write_text(before + mark + "\n" + text)
+        part.rename(chosen.output)
+
+
+main()

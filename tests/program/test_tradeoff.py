@@ -1,0 +1,104 @@
+"""repose-tradeoff: its tables say what was run, what it cost and how far it was from the truth."""
+
+import csv
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+
+SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
+FEW = ("-methods", "ntr,lmvm", "-accuracies", "1,0.01", "-load_steps", "2", "-volumes", "none",
+       "-layers", "2,4")
+
+
+def rows(file):
+    with open(file, newline="") as table:
+        return list(csv.DictReader(table))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, environment):
+    from conftest import runner
+    top = tmp_path_factory.mktemp("tradeoff")
+    result = runner(top, environment)("repose-tradeoff", SCENE, *FEW, "-output", "few")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    return top
+
+
+def test_every_way_is_there_once(folder):
+    found = [(row["study"], row["method"], row["accuracy_mm"], row["volume"], row["load_steps"],
+              row["layers"]) for row in rows(folder / "few.csv")]
+    solver = [("solver", method, accuracy, "penalty", "auto", "4")
+              for method in ("ntr", "lmvm") for accuracy in ("1", "0.01")]
+    assert found == solver + [("load steps", "ntr", "0.1", "penalty", "2", "4"),
+                              ("volume", "ntr", "0.1", "none", "auto", "4"),
+                              ("layers", "ntr", "0.1", "penalty", "auto", "2"),
+                              ("layers", "ntr", "0.1", "penalty", "auto", "4")]
+
+
+def test_estimates_bound_the_errors_and_more_accuracy_costs_more(folder):
+    table = rows(folder / "few.csv")
+    assert all(row["converged"] == "1" for row in table)
+    for row in table:
+        error, estimate = float(row["error_mm"]), float(row["estimate_mm"])
+        assert 0 < error <= estimate <= float(row["accuracy_mm"])
+    cost = [int(row["evaluations"]) for row in table[:4]]
+    assert cost[0] < cost[1] and cost[2] < cost[3] and 5 * cost[1] < cost[3]
+
+
+def test_the_reference_has_the_most_layers(folder):
+    fewer, most = rows(folder / "few.csv")[-2:]
+    assert float(most["skin_max_mm"]) <= float(most["error_mm"]) + 1e-9
+    assert float(fewer["skin_max_mm"]) > 0.5 > float(most["skin_max_mm"])
+    assert float(fewer["skin_rms_mm"]) < float(fewer["skin_95_mm"]) < float(fewer["skin_max_mm"])
+
+
+def test_the_map_is_of_the_whole_face(folder):
+    with open(folder / "few_map.csv", newline="") as file:
+        names, *lines = csv.reader(file)
+    assert names == ["x", "y", "z", "load steps: 2", "volume: none", "layers: 2", "layers: 4"]
+    values = np.array(lines, float)
+    triangles = np.genfromtxt(folder / "few_triangles.csv", delimiter=",", skip_header=1, dtype=int)
+    assert values.shape == (477, 7) and triangles.shape == (874, 3) and triangles.max() == 476
+    largest = [float(row["skin_max_mm"]) for row in rows(folder / "few.csv")[4:]]
+    assert values[:, 3:].max(axis=0) == pytest.approx(largest, rel=1e-3)
+
+
+def test_two_ranks_find_the_same_errors(run, folder, tmp_path):
+    result = run("repose-tradeoff", SCENE, *FEW, "-output", "two", ranks=2)
+    assert result.returncode == 0, result
+    for one, two in zip(rows(folder / "few.csv"), rows(tmp_path / "two.csv"), strict=True):
+        assert float(two["skin_max_mm"]) == pytest.approx(float(one["skin_max_mm"]), abs=0.05)
+        assert float(two["error_mm"]) <= float(two["estimate_mm"])
+
+
+def test_the_pictures_can_be_drawn(folder):
+    pytest.importorskip("matplotlib")
+    done = subprocess.run([sys.executable, PROJECT / "drivers/plot_tradeoff.py", "few"],
+                          cwd=folder, text=True, capture_output=True)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "few.png").stat().st_size > 10000 and "| all | " in done.stdout
+
+
+@pytest.mark.parametrize("options, words", [
+    (["-methods", "newton"], ["-methods newton", "'newton' is not one of", "lmvm"]),
+    (["-accuracies", "1,x"], ["-accuracies 1,x", "'x'"]),
+    (["-layers", "1"], ["-layers 1", "2 … 64"]),
+    (["-load_steps", "2.5"], ["-load_steps", "whole number"])])
+def test_bad_lists_are_refused_in_a_line(run, options, words):
+    result = run("repose-tradeoff", SCENE, *options)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1
+    assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_depths_for_other_layers_are_refused(run, tmp_path):
+    text = SCENE.read_text().replace("layers: 4 ", "depths: [0, 0.2, 0.5, 1]\n  layers: 4 ")
+    for name in ("paper_skin.ply", "paper_skull.ply", "paper_mandible.ply"):
+        shutil.copy(PROJECT / "meshes" / name, tmp_path)
+    (tmp_path / "scene.yaml").write_text(text)
+    result = run("repose-tradeoff", "scene.yaml", *FEW)
+    assert result.returncode == 1 and "tissue.depths" in result.stderr
