@@ -23,37 +23,43 @@ using namespace repose;
 using base::OptionKind;
 
 constexpr double largest_length = 1000;  // mm
+constexpr int64_t rounds_for_labels = 10;
 
 std::vector<base::Option> option_table() {
   const base::Range length{0, largest_length};
-  return {
-      {"level", OptionKind::number, "", "Surface where values cross this one.", {}, "HU"},
-      {"otsu", OptionKind::flag, "", "The level by Otsu's method, from the values."},
-      {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 100000}},
-      {"labels", OptionKind::flag, "", "One mesh for every label: NAME_LABEL.ply."},
-      {"box",
-       OptionKind::number,
-       "",
-       "Lowest x y z and highest: only these voxels.",
-       {},
-       "MM",
-       {},
-       6},
-      {"voxel", OptionKind::number, "0", "Average to voxels this large first; 0: none.", length,
-       "MM"},
-      {"close_holes", OptionKind::number, "0", "Close gaps up to twice as wide.", length, "MM"},
-      {"border",
-       OptionKind::choice,
-       "closed",
-       "Where the volume ends: capped or cut off.",
-       {},
-       "",
-       {"closed", "open"}},
-      {"largest", OptionKind::flag, "", "Keep the largest component only."},
-      {"components_above", OptionKind::number, "0", "Keep components this large.",
-       base::Range::at_least(0), "MM3"},
-      {"smooth", OptionKind::integer, "0", "Rounds of smoothing that does not shrink.", {0, 1000}},
-      {"output", OptionKind::path, "mesh.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
+  return {{"level", OptionKind::number, "", "Surface where values cross this one.", {}, "HU"},
+          {"otsu", OptionKind::flag, "", "The level by Otsu's method, from the values."},
+          {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 100000}},
+          {"labels", OptionKind::flag, "", "One mesh for every label: NAME_LABEL.ply."},
+          {"box",
+           OptionKind::number,
+           "",
+           "Lowest x y z and highest: only these voxels.",
+           {},
+           "MM",
+           {},
+           6},
+          {"voxel", OptionKind::number, "0", "Average to voxels this large first; 0: none.", length,
+           "MM"},
+          {"close_holes", OptionKind::number, "0", "Close gaps up to twice as wide.", length, "MM"},
+          {"border",
+           OptionKind::choice,
+           "closed",
+           "Where the volume ends: capped or cut off.",
+           {},
+           "",
+           {"closed", "open"}},
+          {"largest", OptionKind::flag, "", "Keep the largest component only."},
+          {"components_above", OptionKind::number, "0", "Keep components this large.",
+           base::Range::at_least(0), "MM3"},
+          {"smooth",
+           OptionKind::integer,
+           "auto",
+           "Rounds of smoothing that does not shrink; auto: 10 for labels, else none.",
+           {0, 1000},
+           "",
+           {"auto"}},
+          {"output", OptionKind::path, "mesh.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
 }
 
 surface::Extraction wanted_of(const base::Options& options) {
@@ -75,7 +81,9 @@ surface::Extraction wanted_of(const base::Options& options) {
   if (options.text("border") == "open") wanted.border = surface::VolumeBorder::open;
   wanted.largest = options.flag("largest");
   wanted.components_above = options.number("components_above");
-  wanted.smooth = options.integer("smooth");
+  const bool labels = options.flag("labels") || wanted.label;
+  const bool chosen = options.text("smooth") != "auto";
+  wanted.smooth = chosen ? options.integer("smooth") : labels ? rounds_for_labels : 0;
   return wanted;
 }
 

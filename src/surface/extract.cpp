@@ -19,21 +19,26 @@ std::string size_text(const Volume& volume) {
                      volume.spacing(2));
 }
 
-/// The volume, or the label's field, as it goes into the isosurface.
-Volume prepare(const Volume& volume, const Extraction& wanted, const StepWatch& watch,
-               std::vector<std::string>& remarks) {
-  Volume field = wanted.box ? crop(volume, (*wanted.box)[0], (*wanted.box)[1]) : volume;
-  if (wanted.box) remarks.push_back("cropped to " + size_text(field));
-  if (wanted.label) field = label_field(field, *wanted.label, label_smoothing);
+/// What goes into the isosurface: the volume itself where nothing is done to it, else `changed`.
+const Volume& prepare(const Volume& volume, const Extraction& wanted, const StepWatch& watch,
+                      Volume& changed, std::vector<std::string>& remarks) {
+  const Volume* field = &volume;
+  const auto become = [&](Volume next) {
+    changed = std::move(next);
+    field = &changed;
+  };
+  if (wanted.box) become(crop(*field, (*wanted.box)[0], (*wanted.box)[1]));
+  if (wanted.box) remarks.push_back("cropped to " + size_text(*field));
+  if (wanted.label) become(label_field(*field, *wanted.label, label_smoothing));
   if (wanted.close_holes > 0) {
-    field = close_gaps(field, wanted.close_holes, watch_step(watch, "closing holes"));
+    become(close_gaps(*field, wanted.close_holes, watch_step(watch, "closing holes")));
     remarks.push_back(fmt::format("holes closed up to {:g} mm wide", 2 * wanted.close_holes));
   }
   if (wanted.voxel > 0) {
-    field = coarsen(field, wanted.voxel);
-    remarks.push_back("averaged to " + size_text(field));
+    become(coarsen(*field, wanted.voxel));
+    remarks.push_back("averaged to " + size_text(*field));
   }
-  return field;
+  return *field;
 }
 
 void choose_components(Surface& surface, const Extraction& wanted,
@@ -66,7 +71,8 @@ Extracted extract(const Volume& volume, const Extraction& wanted, const StepWatc
     base::refuse("{}: what the surface is must be said in one way: a level, Otsu's, or a label",
                  volume.name);
   Extracted result{{}, 0, volume.remarks};
-  const Volume field = prepare(volume, wanted, watch, result.remarks);
+  Volume changed;
+  const Volume& field = prepare(volume, wanted, watch, changed, result.remarks);
   if (wanted.level) result.level = *wanted.level;
   if (wanted.otsu) result.level = otsu_level(field);
   result.surface = isosurface(field, result.level, wanted.border, watch_step(watch, "isosurface"));
