@@ -19,6 +19,7 @@
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
 #include "repose/solve/prestress.h"
+#include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
 
 namespace {
@@ -88,9 +89,10 @@ std::vector<base::Option> option_table() {
 /// The model on rank 0, with what the scene asks of the solver.
 struct Job {
   model::Model model;
-  scene::Solve wanted;               // on all ranks
-  bool initial_equilibrium = false;  // on all ranks
-  std::string building;              // what the builder has to say, on rank 0
+  scene::Solve wanted;                     // on all ranks
+  bool initial_equilibrium = false;        // on all ranks
+  std::string building;                    // what the builder has to say, on rank 0
+  std::vector<std::vector<int64_t>> held;  // points of each instrument, on rank 0
 };
 
 /// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
@@ -115,6 +117,7 @@ Job read_job(const std::filesystem::path& input) {
     scene = scene::read_scene(input);
     model::BuiltModel built = model::build_model(scene);
     job.model = std::move(built.model);
+    job.held = std::move(built.held);
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
@@ -187,6 +190,8 @@ class Writer {
 
   void operator()(const model::StepNumbers& numbers, const model::StepRows& rows) {
     file_.append(numbers, rows);
+    last_numbers_ = numbers;
+    last_rows_ = rows;
     int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
     MPI_Bcast(&due, 1, MPI_INT, 0, comm);
     if (!due || !numbers.converged) return;
@@ -196,11 +201,19 @@ class Writer {
     last_ = MPI_Wtime();
   }
   void commit() { file_.commit(); }
+  /// What the tissue does to the instruments in the last step, on rank 0.
+  std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
+    const std::vector<Vec3> forces =
+        solve::reactions(comm, model_, held, last_numbers_, last_rows_);
+    return forces.empty() ? "" : solve::describe_reactions(held, forces);
+  }
 
  private:
   std::filesystem::path name_;
   const model::Model& model_;
   results::ResultFile file_;
+  model::StepNumbers last_numbers_;
+  model::StepRows last_rows_;
   double interval_, last_ = MPI_Wtime();
 };
 
@@ -243,6 +256,7 @@ base::Exit run(const base::Options& options) {
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
+  say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
   return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
 }

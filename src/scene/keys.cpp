@@ -238,9 +238,30 @@ std::vector<Key> collision_keys() {
            Range::between(1e-4, 10)}};
 }
 
+std::vector<Key> instrument_keys() {
+  return {{"instruments", list, "",
+           "Bodies pushed into the skin: each has one shape, where it is before the push."},
+          {"instruments[].push", vector, "required", "How far and where to.", "mm"},
+          {"instruments[].sphere", map, "", "Shape: a ball."},
+          {"instruments[].sphere.center", vector, "required", "Its center.", "mm"},
+          {"instruments[].sphere.radius", number, "required", "Its radius.", "mm", Range::above(0)},
+          {"instruments[].capsule", map, "", "Shape: what is near a segment."},
+          {"instruments[].capsule.from", vector, "required", "One end of the segment.", "mm"},
+          {"instruments[].capsule.to", vector, "required", "The other end.", "mm"},
+          {"instruments[].capsule.radius", number, "required", "Distance from the segment.", "mm",
+           Range::above(0)},
+          {"instruments[].box", map, "", "Shape: a box along the axes."},
+          {"instruments[].box.center", vector, "required", "Its center.", "mm"},
+          {"instruments[].box.size", vector, "required", "Its lengths along x, y, z, > 0.", "mm"},
+          {"instruments[].half_space", map, "", "Shape: all that lies behind a plane."},
+          {"instruments[].half_space.point", vector, "required", "A point of the plane.", "mm"},
+          {"instruments[].half_space.normal", vector, "required",
+           "Its direction out of the body, of any length."},
+          {"instruments[].mesh", file, "", "Shape: a closed triangle mesh."}};
+}
+
 std::vector<Key> later_keys() {
-  return {{"instruments", not_modelled, "", "press on the skin with forces"},
-          {"incisions", not_modelled, "", "cut the mesh of the skin beforehand"}};
+  return {{"incisions", not_modelled, "", "cut the mesh of the skin beforehand"}};
 }
 
 /// The column "value" of the documentation.
@@ -258,7 +279,7 @@ const std::vector<Key>& all_keys() {
     std::vector<Key> rows;
     for (const auto& part :
          {surface_keys(), tissue_keys(), spring_keys(), load_keys(), osteotomy_keys(), move_keys(),
-          collision_keys(), solve_keys(), later_keys()})
+          collision_keys(), instrument_keys(), solve_keys(), later_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

@@ -1,6 +1,7 @@
 #include "read_moves.h"
 
 #include <optional>
+
 #include "bone_names.h"
 #include "repose/base/nearest.h"
 #include "repose/scene/landmarks.h"

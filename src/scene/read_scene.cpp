@@ -1,7 +1,8 @@
 #include <algorithm>
-
 #include <map>
+
 #include "bone_names.h"
+#include "read_instruments.h"
 #include "read_moves.h"
 #include "read_osteotomies.h"
 #include "read_yaml.h"
@@ -217,6 +218,7 @@ void read_surroundings(Scene& scene, const Map& map) {
   }
   if (const auto boundary = map.find("boundary"))
     if (const auto rim = Map(*boundary).find("rim")) scene.rim_fixed = rim->choice() == 0;
+  if (const auto bodies = map.find("instruments")) scene.instruments = read_instruments(*bodies);
   if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);
 }
 

@@ -63,6 +63,18 @@ std::string describe_prestress(const Prestress& p) {
                          p.residual, p.largest_force, p.least_rest_ratio));
 }
 
+std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
+                               const std::vector<Vec3>& forces) {
+  std::string text;
+  for (size_t k = 0; k < held.size(); ++k)
+    text += row(
+        fmt::format("instrument {}", k),
+        fmt::format("holds {} points; the tissue pushes on it with ({:.4g}, {:.4g}, {:.4g}) "
+                    "N, {:.4g} N",
+                    held[k].size(), forces[k].x(), forces[k].y(), forces[k].z(), forces[k].norm()));
+  return text;
+}
+
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())

@@ -23,6 +23,7 @@ struct BuildReport {
 struct BuiltModel {
   Model model;
   BuildReport report;
+  std::vector<std::vector<int64_t>> held;  ///< [instruments] rows of the points that each holds
 };
 
 /// Scene and surfaces to model: columns, layers, springs, prisms, sets, attachment. `bones` in the

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "repose/base/geometry.h"
@@ -89,6 +90,38 @@ struct Force {
   Vec3 force;     ///< N, in total
 };
 
+struct Sphere {
+  Vec3 center;    ///< mm
+  double radius;  ///< mm
+};
+
+/// The points within a radius of a segment.
+struct Capsule {
+  Vec3 from, to;  ///< mm
+  double radius;  ///< mm
+};
+
+/// Along the axes.
+struct Box {
+  Vec3 center, size;  ///< mm
+};
+
+/// What lies behind a plane, away from its normal.
+struct HalfSpace {
+  Vec3 point;   ///< mm
+  Vec3 normal;  ///< any length but 0
+};
+
+struct ClosedMesh {
+  std::filesystem::path file;  ///< absolute
+};
+
+/// A rigid body at its place before it is pushed into the tissue, and by what.
+struct Instrument {
+  std::variant<Sphere, Capsule, Box, HalfSpace, ClosedMesh> shape;
+  Vec3 push;  ///< mm, not 0
+};
+
 struct Solve {
   Functional functional = Functional::energy;
   std::optional<VolumeForm> volume;    ///< unset: penalty; with functional force none
@@ -118,6 +151,7 @@ struct Scene {
   bool rim_fixed = true;           ///< the outermost border loop of an open skin
   std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
+  std::vector<Instrument> instruments;
   std::vector<Force> forces;
   Solve solve;
   std::vector<std::string> remarks;  ///< lines for a person

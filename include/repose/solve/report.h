@@ -17,6 +17,10 @@ std::string describe_build(const model::BuildReport& report);
 /// The initial equilibrium in one row.
 std::string describe_prestress(const Prestress& prestress);
 
+/// How many points each instrument holds, and the force (N) with which the tissue pushes on it.
+std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
+                               const std::vector<Vec3>& forces);
+
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 

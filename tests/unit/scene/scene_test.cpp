@@ -551,7 +551,6 @@ TEST(SceneRefuses, OsteotomiesAndLandmarks) {
 
 TEST(SceneRefuses, WhatThisVersionDoesNotModel) {
   expect_refused({
-      {"instruments: []\n", "6:1: this version does not model instruments; remove it or"},
       {"incisions:\n", "6:1: this version does not model incisions; remove it or"},
       {"gravity: [0, 0, -9.8]\n",
        "6:10: gravity needs a mass to pull; give tissue.mass or tissue.density"},
@@ -653,7 +652,7 @@ TEST(Keys, DescribedInMarkdown) {
   const std::string table = describe_keys();
   EXPECT_NE(table.find("| `tissue.free_thickness` | a number of mm, > 0 | 12 |"), std::string::npos)
       << table;
-  EXPECT_NE(table.find("| `instruments` | – | – | Refused: this version does not model it"),
+  EXPECT_NE(table.find("| `incisions` | – | – | Refused: this version does not model it"),
             std::string::npos);
   const auto lines = std::count(table.begin(), table.end(), '\n');
   EXPECT_EQ(lines, static_cast<long>(all_keys().size()) + 2);

@@ -1,0 +1,41 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "repose/model/model.h"
+#include "repose/scene/scene.h"
+
+/// Rigid bodies pushed into the skin.
+namespace repose::model {
+
+/// A part of a line p + t d, in mm along d.
+struct Stretch {
+  double enter, leave;
+};
+
+/// Where a line meets an instrument at the end of its push: from the point `p` on, along the unit
+/// vector of the push. Of a mesh that the line meets more than once, the first part. Nullopt where
+/// it misses.
+class PushedShape {
+ public:
+  /// Reads the file of a mesh. Throws InputError for one that is not closed, and for a half-space
+  /// that is not pushed out of itself.
+  explicit PushedShape(const scene::Instrument& instrument);
+  ~PushedShape();
+  PushedShape(PushedShape&&) noexcept;
+
+  std::optional<Stretch> along(const Vec3& p) const;
+
+ private:
+  struct Body;
+  std::unique_ptr<Body> body_;
+};
+
+/// Makes held points of the free skin points that an instrument sweeps over or ends on: their
+/// target is where the push takes them, on the surface of the instrument at the end of its push. A
+/// point goes with the first instrument of the scene that reaches it. Returns the rows of the
+/// points that each holds. Throws InputError naming the scene and an instrument that reaches none.
+std::vector<std::vector<int64_t>> hold_by_instruments(const scene::Scene& scene, Model& model);
+
+}  // namespace repose::model

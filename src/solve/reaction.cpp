@@ -1,0 +1,116 @@
+#include "repose/solve/reaction.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "repose/base/agreement.h"
+#include "repose/mechanics/prism_volume.h"
+#include "repose/mechanics/spring_law.h"
+
+namespace repose::solve {
+namespace {
+
+/// All slabs one after the other, on rank 0.
+std::vector<double> gather(MPI_Comm comm, const double* values, size_t count) {
+  const int own = static_cast<int>(count), size = base::size(comm);
+  std::vector<int> counts(size), starts(size + 1, 0);
+  MPI_Gather(&own, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
+  std::partial_sum(counts.begin(), counts.end(), starts.begin() + 1);
+  std::vector<double> all(starts.back());
+  MPI_Gatherv(values, own, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0,
+              comm);
+  return all;
+}
+
+/// Sums forces on points by the group that they belong to.
+class Groups {
+ public:
+  Groups(const model::Model& model, const std::vector<std::vector<int64_t>>& groups)
+      : model_(model),
+        group_(model.points.position.size(), -1),
+        force_(groups.size(), Vec3::Zero()) {
+    for (size_t k = 0; k < groups.size(); ++k)
+      for (const int64_t point : groups[k]) group_[point] = static_cast<int64_t>(k);
+  }
+
+  /// Whether the element has a point of a group and a soft-tissue point.
+  template <size_t K>
+  bool wants(const std::array<int64_t, K>& points) const {
+    return std::any_of(points.begin(), points.end(), [&](int64_t i) { return group_[i] >= 0; }) &&
+           std::any_of(points.begin(), points.end(), [&](int64_t i) {
+             return model_.points.set[i] == model::PointSet::soft_tissue;
+           });
+  }
+  void add(int64_t point, const Vec3& force) {
+    if (group_[point] >= 0) force_[group_[point]] += force;
+  }
+  const std::vector<Vec3>& forces() const { return force_; }
+
+ private:
+  const model::Model& model_;
+  std::vector<int64_t> group_;  // [N] or −1
+  std::vector<Vec3> force_;     // [groups]
+};
+
+void add_springs(const model::Model& model, const std::vector<double>& x, double weight,
+                 Groups& groups) {
+  const model::Springs& s = model.springs;
+  for (size_t j = 0; j < s.points.size(); ++j) {
+    if (!groups.wants(s.points[j])) continue;
+    const auto [p, q] = s.points[j];
+    const Vec3 d = Vec3::Map(&x[3 * q]) - Vec3::Map(&x[3 * p]);
+    if (d.norm() == 0) continue;
+    const double tension = mechanics::with_exponent(s.exponent[j], [&]<int e>() {
+      return mechanics::spring_tension<e>(d.norm() - s.rest_length[j], s.stiffness[j],
+                                          1 / s.reference[j]);
+    });
+    const Vec3 force = weight * tension * d.normalized();
+    groups.add(p, force);
+    groups.add(q, -force);
+  }
+}
+
+/// Φ_v'(v) of prism m.
+double slope(const model::StepNumbers& n, double change, double rest, double pressure) {
+  if (n.volume == "paper") return 2 * (1 - n.lambda) * change;
+  if (n.volume == "penalty") return n.bulk_modulus * change / rest;
+  return -pressure;
+}
+
+void add_prisms(const model::Model& model, const std::vector<double>& x,
+                const std::vector<double>& pressure, const model::StepNumbers& n, Groups& groups) {
+  const model::Prisms& prisms = model.prisms;
+  for (size_t m = 0; m < prisms.points.size(); ++m) {
+    if (!groups.wants(prisms.points[m])) continue;
+    mechanics::PrismTriples<double> corners;
+    for (int c = 0; c < 6; ++c)
+      corners[c] = mechanics::triple(Vec3::Map(&x[3 * prisms.points[m][c]]));
+    const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
+    const double by = slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
+                            pressure.empty() ? 0 : pressure[m]);
+    for (int c = 0; c < 6; ++c)
+      groups.add(prisms.points[m][c], -by * mechanics::vec3(v.gradient[c]));
+  }
+}
+
+}  // namespace
+
+std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
+                            const std::vector<std::vector<int64_t>>& held,
+                            const model::StepNumbers& numbers, const model::StepRows& rows) {
+  auto wanted = static_cast<int64_t>(held.size());
+  MPI_Bcast(&wanted, 1, MPI_INT64_T, 0, comm);
+  if (wanted == 0) return {};
+  const std::vector<double> x =
+      gather(comm, rows.position.empty() ? nullptr : rows.position.data()->data(),
+             3 * rows.position.size());
+  const std::vector<double> pressure = gather(comm, rows.pressure.data(), rows.pressure.size());
+  if (base::rank(comm) != 0) return {};
+  Groups groups(model, held);
+  const bool energy = numbers.functional == "energy";
+  add_springs(model, x, energy && numbers.volume == "paper" ? numbers.lambda : 1, groups);
+  if (energy && numbers.volume != "none") add_prisms(model, x, pressure, numbers, groups);
+  return groups.forces();
+}
+
+}  // namespace repose::solve

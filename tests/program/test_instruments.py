@@ -1,0 +1,98 @@
+"""Instruments pushed into the skin: where they hold it, and the force they feel."""
+
+import re
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import Tissue, last, model_of, prism_volumes
+
+SCENE = (PROJECT / "meshes/head_instrument.yaml").read_text()
+CENTER, RADIUS = np.array([48, -78, -10]), 10  # at the end of the push, mm
+SHAPE = "sphere: {center: [57, -90, -10], radius: 10}"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for file in (PROJECT / "meshes").glob("head_*.ply"):
+        (tmp_path / file.name).symlink_to(file)
+    return tmp_path
+
+
+def press(run, folder, *options, scene=SCENE, ranks=1):
+    (folder / "press.yaml").write_text(scene)
+    result = run("repose-solve", "press.yaml", "-accuracy", "1e-6", *options, ranks=ranks,
+                 cwd=folder)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    found = re.search(r"instrument 0 .*holds (\d+) points; .*with \((.*?)\) N", result.stdout)
+    return int(found[1]), np.array([float(w) for w in found[2].split(",")])
+
+
+def test_skin_lies_on_the_ball_and_pushes_back(run, folder):
+    count, force = press(run, folder, ranks=2)
+    model, step = model_of(folder / "press.h5"), last(folder / "press.h5")
+    held = model["point/set"] == 3
+    assert held.sum() == count > 4
+    from_center = np.linalg.norm(step["point/position"][held] - CENTER, axis=1)
+    assert from_center == pytest.approx(RADIUS, abs=1e-9)
+    assert step["inverted_prisms"] == 0
+    assert force @ np.array([-0.6, 0.8, 0]) < 0, "against the push"
+    assert run("repose-check", "press.h5", cwd=folder).returncode == 0
+
+
+def slope(tissue, x, held):
+    """Of the objective when all held points move as one."""
+    result = np.zeros(3)
+    for axis in range(3):
+        for sign in (-1, 1):
+            moved = x.copy()
+            moved[held, axis] += sign * 1e-5
+            result[axis] += sign * tissue.value_and_gradient(moved)[0] / 2e-5
+    return result
+
+
+@pytest.mark.parametrize("volume", ["none", "penalty", "paper", "exact"])
+def test_the_force_is_the_slope_of_the_objective(run, folder, volume):
+    _, force = press(run, folder, "-volume", volume, "-lambda", "0.9")
+    model, step = model_of(folder / "press.h5"), last(folder / "press.h5")
+    held, x = model["point/set"] == 3, step["point/position"]
+    if volume == "exact":
+        tissue = Tissue(model, "none", 1)
+        expected = -slope(tissue, x, held)
+        gradient = prism_volumes(x, model["prism/points"])[1]
+        pushed = held[model["prism/points"]] & tissue.prism[:, None]
+        expected += np.einsum("m,mca,mc->a", step["prism/pressure"], gradient, pushed)
+    else:
+        weight = step["bulk_modulus"] if volume == "penalty" else step["lambda"]
+        expected = -slope(Tissue(model, volume, weight), x, held)
+    assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
+
+
+BAD = {
+    "no shape": (SHAPE + ", ", "", ["press.yaml:", "instruments[0]", "exactly one of sphere"]),
+    "two shapes": (SHAPE, SHAPE + ", box: {center: [0, 0, 0], size: [1, 1, 1]}",
+                   ["instruments[0]", "exactly one of sphere"]),
+    "no push": ("push: [-9, 12, 0]", "push: [0, 0, 0]", ["instruments[0].push", "not be zero"]),
+    "far from the skin": ("[57, -90, -10]", "[157, -90, -10]",
+                          ["instruments[0]", "reaches no free point"]),
+    "no radius": (", radius: 10", "", ["instruments[0].sphere", "radius"]),
+    "a flat box": (SHAPE, "box: {center: [0, 0, 0], size: [1, 0, 1]}",
+                   ["instruments[0].box.size", "greater than 0"]),
+    "a half-space pulled": (SHAPE, "half_space: {point: [60, -90, 0], normal: [6, -8, 0]}",
+                            ["instruments[0]", "side of its normal"]),
+    "an open mesh": (SHAPE, "mesh: head_skin.ply", ["head_skin.ply", "closed"]),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_instruments_are_refused_in_one_line(run, folder, case):
+    old, new, words = BAD[case]
+    assert old in SCENE
+    (folder / "press.yaml").write_text(SCENE.replace(old, new))
+    before = sorted(folder.iterdir())
+    result = run("repose-solve", "press.yaml", cwd=folder)
+    assert result.returncode == 1, result
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+    assert [word for word in words if word not in result.stderr] == [], result.stderr
+    assert sorted(folder.iterdir()) == before
