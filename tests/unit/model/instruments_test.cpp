@@ -126,6 +126,9 @@ TEST(Instruments, refusals_name_the_instrument) {
   EXPECT_NE(refused({scene::Sphere{{30, 30, 50}, 5}, {0, 0, -4}})
                 .find("scene.yaml: instruments[0]: it reaches no free point of the skin"),
             std::string::npos);
+  EXPECT_NE(refused({scene::Sphere{{30, 30, 50}, 5}, {0, 0, 4}}).find("reaches no free point"),
+            std::string::npos)
+      << "it leaves the skin behind";
   EXPECT_NE(refused({scene::HalfSpace{{0, 0, 5}, {0, 0, 1}}, {0, 0, -4}}).find("half-space"),
             std::string::npos);
 }

@@ -167,6 +167,9 @@ TEST(Osteotomy, shells_that_no_cut_meets) {
   const Pieces p = cut(bone, by_plane({0, 0, 50}, {0, 0, 1}));
   EXPECT_NEAR(volume(p.piece), 5e5 - 3375, 1e-6);
   EXPECT_NEAR(volume(p.rest), 5e5 - 3375, 1e-6);
+  Osteotomy seeded = by_plane({0, 0, 50}, {0, 0, -1});
+  seeded.seed = Vec3(20, 20, 80);
+  EXPECT_NEAR(volume(cut(bone, seeded).piece), 5e5 - 3375, 1e-6) << "its cavity is known by place";
   const Surface with_tooth = together(cube(), cube({40, 40, 105}, 15));
   EXPECT_NEAR(volume(cut(with_tooth, by_plane({0, 0, 50}, {0, 0, 1})).piece), 5e5 + 3375, 1e-6);
   EXPECT_NEAR(volume(cut(with_tooth, by_plane({0, 0, 50}, {0, 0, -1})).piece), 5e5, 1e-6);
