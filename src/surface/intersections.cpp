@@ -13,50 +13,56 @@ namespace {
 
 using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, int64_t>;
 
-/// Whether two triangles with area meet outside the vertices that they share by number.
-class PairTest {
- public:
-  explicit PairTest(const Surface& surface) : surface_(surface) {}
+/// A triangle whose vertices can be brought into another order, numbers and places alike.
+struct Numbered {
+  Triangle numbers;
+  std::array<Point3, 3> points;
 
-  bool operator()(int64_t s, int64_t t) const {
-    Triangle a = surface_.triangles[s], b = surface_.triangles[t];
-    const int shared = shared_first(a, b);
-    if (shared == 0) return CGAL::do_intersect(to_cgal(surface_, a), to_cgal(surface_, b));
-    if (shared == 1)
-      return CGAL::do_intersect(segment(a[1], a[2]), to_cgal(surface_, b)) ||
-             CGAL::do_intersect(segment(b[1], b[2]), to_cgal(surface_, a));
-    if (shared == 2) return folded(a, b);
-    return true;
+  Numbered(const Triangle& vertices, const Corners& corners)
+      : numbers(vertices), points{to_cgal(corners[0]), to_cgal(corners[1]), to_cgal(corners[2])} {}
+
+  void swap(int i, int j) {
+    std::swap(numbers[i], numbers[j]);
+    std::swap(points[i], points[j]);
   }
-
- private:
-  /// Brings shared vertices to the front of both; returns how many there are.
-  static int shared_first(Triangle& a, Triangle& b) {
-    int shared = 0;
-    for (int i = 0; i < 3; ++i)
-      for (int j = shared; j < 3; ++j)
-        if (a[i] == b[j]) {
-          std::swap(a[i], a[shared]);
-          std::swap(b[j], b[shared]);
-          ++shared;
-          break;
-        }
-    return shared;
-  }
-
-  /// Neighbours over an edge overlap only when they lie in one plane, on one side of the edge.
-  bool folded(const Triangle& a, const Triangle& b) const {
-    const Point3 p = point(a[0]), q = point(a[1]), r = point(a[2]), s = point(b[2]);
-    return CGAL::coplanar(p, q, r, s) && CGAL::coplanar_orientation(p, q, r, s) == CGAL::POSITIVE;
-  }
-
-  Point3 point(int64_t i) const { return to_cgal(surface_.points[i]); }
-  Segment3 segment(int64_t i, int64_t j) const { return {point(i), point(j)}; }
-
-  const Surface& surface_;
+  Triangle3 triangle() const { return {points[0], points[1], points[2]}; }
+  Segment3 opposite() const { return {points[1], points[2]}; }
 };
 
+/// Brings shared vertices to the front of both; returns how many there are.
+int shared_first(Numbered& a, Numbered& b) {
+  int shared = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = shared; j < 3; ++j)
+      if (a.numbers[i] == b.numbers[j]) {
+        a.swap(i, shared);
+        b.swap(j, shared);
+        ++shared;
+        break;
+      }
+  return shared;
+}
+
+/// Neighbours over an edge overlap only when they lie in one plane, on one side of the edge.
+bool folded(const Numbered& a, const Numbered& b) {
+  const auto& [p, q, r] = a.points;
+  const Point3& s = b.points[2];
+  return CGAL::coplanar(p, q, r, s) && CGAL::coplanar_orientation(p, q, r, s) == CGAL::POSITIVE;
+}
+
 }  // namespace
+
+bool meet(const Triangle& a, const Corners& a_corners, const Triangle& b,
+          const Corners& b_corners) {
+  Numbered s(a, a_corners), t(b, b_corners);
+  const int shared = shared_first(s, t);
+  if (shared == 0) return CGAL::do_intersect(s.triangle(), t.triangle());
+  if (shared == 1)
+    return CGAL::do_intersect(s.opposite(), t.triangle()) ||
+           CGAL::do_intersect(t.opposite(), s.triangle());
+  if (shared == 2) return folded(s, t);
+  return true;
+}
 
 std::vector<bool> without_area(const Surface& surface) {
   std::vector<bool> flags;
@@ -72,10 +78,11 @@ std::vector<std::pair<int64_t, int64_t>> self_intersections(const Surface& surfa
   for (size_t t = 0; t < surface.triangles.size(); ++t)
     if (!flat[t])
       boxes.emplace_back(to_cgal(surface, surface.triangles[t]).bbox(), static_cast<int64_t>(t));
-  const PairTest meet(surface);
   std::vector<std::pair<int64_t, int64_t>> pairs;
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
-    if (meet(a.info(), b.info())) pairs.push_back(std::minmax(a.info(), b.info()));
+    const Triangle &s = surface.triangles[a.info()], &t = surface.triangles[b.info()];
+    if (meet(s, corners(surface, s), t, corners(surface, t)))
+      pairs.push_back(std::minmax(a.info(), b.info()));
   });
   std::sort(pairs.begin(), pairs.end());
   return pairs;

@@ -2,10 +2,14 @@
 #include <utility>
 #include <vector>
 
-#include "repose/surface/surface.h"
+#include "triangle_tree.h"
 
 /// Exact questions about triangles.
 namespace repose::surface {
+
+/// Whether two triangles with area meet anywhere but in a vertex or an edge that they share by
+/// number (true where they share all three).
+bool meet(const Triangle& a, const Corners& a_corners, const Triangle& b, const Corners& b_corners);
 
 /// For each triangle whether it has no area: its corners lie on one line or coincide (exact).
 std::vector<bool> without_area(const Surface& surface);

@@ -8,7 +8,9 @@ namespace {
 
 constexpr double least_size = 20, largest_size = 2000;  // mm, bounding diagonal
 
-const char* noun(Role role) { return role == Role::skin ? "skin" : "bone"; }
+const char* noun(Role role) {
+  return role == Role::skin ? "skin" : role == Role::bone ? "bone" : "mesh";
+}
 
 std::string position(const Surface& surface, int64_t vertex) {
   const Vec3& p = surface.points[vertex];
@@ -73,7 +75,7 @@ Surface load_surface(const std::filesystem::path& file, Role role) {
 }
 
 Surface accept_surface(const Surface& raw, Role role) {
-  check_size(raw);
+  if (role != Role::mesh) check_size(raw);
   Surface surface = weld_and_orient(raw);
   if (surface.triangles.empty())
     base::refuse("{}: none of its {} triangles has an area; export the mesh anew", surface.name,

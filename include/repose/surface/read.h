@@ -8,7 +8,8 @@ namespace repose::surface {
 /// What a surface is for, which decides what it must satisfy.
 enum class Role {
   skin,  ///< may be open: a manifold patch or a closed surface, one component
-  bone   ///< closed, manifold, oriented outwards; several components are allowed
+  bone,  ///< closed, manifold, oriented outwards; several components are allowed
+  mesh   ///< manifold, open or closed, of any size and any number of components
 };
 
 /// Reads PLY, STL, OBJ or OFF (binary or text, by content and ending) and returns its triangles as
@@ -29,8 +30,8 @@ void write_ply(const std::filesystem::path& file, const Surface& surface);
 
 /// read_surface, weld_and_orient, inspect (defects.h), then refuse what `role` does not allow, in
 /// one line naming file, defect, number and remedy. Self-intersections are not looked for: whoever
-/// cannot bear them inspects. A surface smaller than 20 mm or larger than
-/// 2000 mm across is refused as being in metres or in micrometres, saying so.
+/// cannot bear them inspects. A skin or bone smaller than 20 mm or larger
+/// than 2000 mm across is refused as being in metres or in micrometres, saying so.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
 /// The same for a surface that has been read, or taken from a volume, already.

@@ -1,0 +1,245 @@
+#include "triangle_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace repose::surface {
+namespace {
+
+constexpr int64_t leaf_size = 4;
+
+/// Of a triangle's barycentric regions the one that holds the foot of `q`.
+Vec3 closest_point(const Vec3& q, const Corners& t) {
+  const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = q - t[0], bp = q - t[1], cp = q - t[2];
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
+               d6 = ac.dot(cp);
+  if (d1 <= 0 && d2 <= 0) return t[0];
+  if (d3 >= 0 && d4 <= d3) return t[1];
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return t[0] + d1 / (d1 - d3) * ab;
+  if (d6 >= 0 && d5 <= d6) return t[2];
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return t[0] + d2 / (d2 - d6) * ac;
+  const double va = d3 * d6 - d5 * d4, from_b = d4 - d3, from_c = d5 - d6;
+  if (va <= 0 && from_b >= 0 && from_c >= 0)
+    return t[1] + from_b / (from_b + from_c) * (t[2] - t[1]);
+  const double sum = va + vb + vc;
+  return t[0] + vb / sum * ab + vc / sum * ac;
+}
+
+}  // namespace
+
+int longest_edge(const Corners& t) {
+  int longest = 0;
+  double length = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double squared = (t[(k + 1) % 3] - t[k]).squaredNorm();
+    if (squared > length) {
+      length = squared;
+      longest = k;
+    }
+  }
+  return longest;
+}
+
+double squared_distance(const Vec3& query, const Corners& triangle, Vec3* closest) {
+  const Vec3 point = closest_point(query, triangle);
+  if (closest) *closest = point;
+  return (point - query).squaredNorm();
+}
+
+void TriangleTree::Box::extend(const Vec3& point) {
+  low = low.cwiseMin(point);
+  high = high.cwiseMax(point);
+}
+
+void TriangleTree::Box::extend(const Box& box) {
+  low = low.cwiseMin(box.low);
+  high = high.cwiseMax(box.high);
+}
+
+bool TriangleTree::Box::overlaps(const Box& box) const {
+  return (low.array() <= box.high.array()).all() && (box.low.array() <= high.array()).all();
+}
+
+double TriangleTree::Box::squared_distance(const Vec3& point) const {
+  return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
+}
+
+TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
+  Box box;
+  if (std::isnan(corners[0].x())) return box;
+  for (const Vec3& corner : corners) box.extend(corner);
+  return box;
+}
+
+TriangleTree::TriangleTree(const Surface& surface)
+    : order_(surface.triangles.size()), leaf_of_(surface.triangles.size()) {
+  triangles_.reserve(surface.triangles.size());
+  for (const auto& triangle : surface.triangles) triangles_.push_back(corners(surface, triangle));
+  std::iota(order_.begin(), order_.end(), 0);
+  nodes_.reserve(order_.size());
+  build(0, static_cast<int64_t>(order_.size()), -1);
+}
+
+int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent) {
+  const auto number = static_cast<int64_t>(nodes_.size());
+  nodes_.push_back({{}, first, end - first, -1, parent});
+  Box centres;
+  for (int64_t i = first; i < end; ++i) {
+    const Corners& t = triangles_[order_[i]];
+    nodes_[number].box.extend(box_of(t));
+    centres.extend((t[0] + t[1] + t[2]) / 3);
+    leaf_of_[order_[i]] = number;
+  }
+  if (end - first <= leaf_size) return number;
+  Eigen::Index axis = 0;
+  (centres.high - centres.low).maxCoeff(&axis);
+  const auto middle = first + (end - first) / 2;
+  const auto centre = [&](int64_t t) {
+    return triangles_[t][0][axis] + triangles_[t][1][axis] + triangles_[t][2][axis];
+  };
+  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
+                   [&](int64_t s, int64_t t) { return centre(s) < centre(t); });
+  build(first, middle, number);
+  const int64_t right = build(middle, end, number);
+  nodes_[number].right = right;
+  nodes_[number].count = 0;
+  return number;
+}
+
+TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit) const {
+  Nearest best;
+  best.squared = limit;
+  std::array<std::pair<double, int64_t>, max_depth> stack;
+  int depth = 0;
+  stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
+  while (depth > 0) {
+    const auto [bound, number] = stack[--depth];
+    if (!(bound < best.squared)) continue;
+    const Node& node = nodes_[number];
+    for (int64_t i = node.first; i < node.first + node.count; ++i) {
+      Vec3 point;
+      const double squared = squared_distance(query, triangles_[order_[i]], &point);
+      if (squared < best.squared) best = {squared, order_[i], point};
+    }
+    if (node.count > 0) continue;
+    std::pair left(nodes_[number + 1].box.squared_distance(query), number + 1);
+    std::pair right(nodes_[node.right].box.squared_distance(query), node.right);
+    if (left.first < right.first) std::swap(left, right);
+    stack[depth++] = left;
+    stack[depth++] = right;
+  }
+  return best;
+}
+
+int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) const {
+  if (hint >= 0 && squared_distance(query, triangles_[hint]) <= limit) return hint;
+  int64_t stack[max_depth], depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const int64_t number = stack[--depth];
+    const Node& node = nodes_[number];
+    for (int64_t i = node.first; i < node.first + node.count; ++i)
+      if (squared_distance(query, triangles_[order_[i]]) <= limit) return order_[i];
+    if (node.count > 0) continue;
+    const double left = nodes_[number + 1].box.squared_distance(query);
+    const double right = nodes_[node.right].box.squared_distance(query);
+    const bool left_first = left <= right;
+    if ((left_first ? right : left) <= limit) stack[depth++] = left_first ? node.right : number + 1;
+    if ((left_first ? left : right) <= limit) stack[depth++] = left_first ? number + 1 : node.right;
+  }
+  return -1;
+}
+
+double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
+                                    double enough) const {
+  double best = limit;
+  const auto to_box = [&](int64_t number) {
+    double greatest = 0;
+    for (const Vec3& point : points)
+      greatest = std::max(greatest, nodes_[number].box.squared_distance(point));
+    return greatest;
+  };
+  const auto to_triangle = [&](int64_t t) {
+    double greatest = 0;
+    for (size_t i = 0; i < points.size() && greatest < best; ++i)
+      greatest = std::max(greatest, squared_distance(points[i], triangles_[t]));
+    return greatest;
+  };
+  std::array<std::pair<double, int64_t>, max_depth> stack;
+  int depth = 0;
+  stack[depth++] = {to_box(0), 0};
+  while (depth > 0 && best > enough) {
+    const auto [bound, number] = stack[--depth];
+    if (!(bound < best)) continue;
+    const Node& node = nodes_[number];
+    for (int64_t i = node.first; i < node.first + node.count; ++i)
+      best = std::min(best, to_triangle(order_[i]));
+    if (node.count > 0) continue;
+    std::pair left(to_box(number + 1), number + 1), right(to_box(node.right), node.right);
+    if (left.first < right.first) std::swap(left, right);
+    stack[depth++] = left;
+    stack[depth++] = right;
+  }
+  return best;
+}
+
+bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const {
+  const auto covers = [&](int64_t t) {
+    for (const Vec3& point : points)
+      if (squared_distance(point, triangles_[t]) > limit) return false;
+    hint = t;
+    return true;
+  };
+  if (hint >= 0 && covers(hint)) return true;
+  Box box;
+  for (const Vec3& point : points) box.extend(point);
+  const double margin = std::sqrt(limit);  // a box that serves reaches as far as all corners
+  const Vec3 low = box.low.array() + margin, high = box.high.array() - margin;
+  const auto reaches = [&](const Box& b) {
+    return b.low.x() <= low.x() && b.low.y() <= low.y() && b.low.z() <= low.z() &&
+           b.high.x() >= high.x() && b.high.y() >= high.y() && b.high.z() >= high.z();
+  };
+  int64_t stack[max_depth], depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const int64_t number = stack[--depth];
+    const Node& node = nodes_[number];
+    for (int64_t i = node.first; i < node.first + node.count; ++i)
+      if (order_[i] != hint && covers(order_[i])) return true;
+    if (node.count > 0) continue;
+    if (reaches(nodes_[node.right].box)) stack[depth++] = node.right;
+    if (reaches(nodes_[number + 1].box)) stack[depth++] = number + 1;
+  }
+  return false;
+}
+
+void TriangleTree::exchange(int64_t triangle, const Corners& corners) {
+  triangles_[triangle] = corners;
+  refit(leaf_of_[triangle]);
+}
+
+void TriangleTree::remove(int64_t triangle) {
+  exchange(triangle, {Vec3::Constant(NAN), Vec3::Constant(NAN), Vec3::Constant(NAN)});
+}
+
+TriangleTree::Box TriangleTree::leaf_box(const Node& node) const {
+  Box box;
+  for (int64_t i = node.first; i < node.first + node.count; ++i)
+    box.extend(box_of(triangles_[order_[i]]));
+  return box;
+}
+
+void TriangleTree::refit(int64_t number) {
+  nodes_[number].box = leaf_box(nodes_[number]);
+  for (number = nodes_[number].parent; number >= 0; number = nodes_[number].parent) {
+    Box box = nodes_[number + 1].box;
+    box.extend(nodes_[nodes_[number].right].box);
+    if (box.low == nodes_[number].box.low && box.high == nodes_[number].box.high) return;
+    nodes_[number].box = box;
+  }
+}
+
+}  // namespace repose::surface

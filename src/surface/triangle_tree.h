@@ -1,0 +1,108 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "repose/surface/surface.h"
+
+namespace repose::surface {
+
+using Corners = std::array<Vec3, 3>;  ///< of a triangle, mm
+
+inline Corners corners(const Surface& surface, const Triangle& triangle) {
+  return {surface.points[triangle[0]], surface.points[triangle[1]], surface.points[triangle[2]]};
+}
+
+/// k such that no edge is longer than that from corner k to the next.
+int longest_edge(const Corners& triangle);
+
+/// The square of the distance from `query` to a point of the triangle that is, up to rounding, its
+/// closest (Ericson, Real-Time Collision Detection, 5.1.5). Where a thin triangle spoils the
+/// choice the point is still one of the triangle: never less than the true distance, up to 1e-13
+/// of the coordinates. `closest` receives the point.
+double squared_distance(const Vec3& query, const Corners& triangle, Vec3* closest = nullptr);
+
+/// Triangles in a tree of boxes, in doubles and with early exits: for loops that ask one surface
+/// millions of questions, where DistanceTree's exact arithmetic is not needed. Build O(T log T).
+/// Triangles may be exchanged one by one later, which only refits boxes.
+class TriangleTree {
+ public:
+  struct Box {
+    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+    Vec3 high = Vec3::Constant(-std::numeric_limits<double>::infinity());
+    void extend(const Vec3& point);
+    void extend(const Box& box);
+    bool overlaps(const Box& box) const;
+    double squared_distance(const Vec3& point) const;  ///< mm², 0 inside; ∞ to the empty box
+  };
+  struct Nearest {
+    double squared = std::numeric_limits<double>::infinity();  ///< mm²
+    int64_t triangle = -1;
+    Vec3 point = Vec3::Zero();
+  };
+
+  explicit TriangleTree(const Surface& surface);
+
+  /// The closest point, if nearer than √limit.
+  Nearest nearest(const Vec3& query, double limit = std::numeric_limits<double>::infinity()) const;
+
+  /// A triangle within √limit of the point, −1 for none. `hint` is tried first.
+  int64_t any_within(const Vec3& query, double limit, int64_t hint = -1) const;
+
+  /// Of all triangles the least max over `points` of the squared distance to it, if below `limit`
+  /// (`limit` otherwise); stops at the first one that is at most `enough`.
+  double least_greatest(std::span<const Vec3> points, double limit, double enough) const;
+
+  /// Whether all points lie within √limit of one and the same triangle. `hint` is tried first and
+  /// receives that triangle.
+  bool one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const;
+
+  /// Calls visit(triangle) for each triangle whose box overlaps `box`, until it returns true;
+  /// whether one did.
+  template <class Visit>
+  bool overlapping(const Box& box, Visit&& visit) const {
+    int64_t stack[max_depth], depth = 0;
+    stack[depth++] = 0;
+    while (depth > 0) {
+      const Node& node = nodes_[stack[--depth]];
+      if (!node.box.overlaps(box)) continue;
+      if (node.count == 0) {
+        stack[depth++] = node.right;
+        stack[depth++] = &node - nodes_.data() + 1;
+      }
+      for (int64_t i = node.first; i < node.first + node.count; ++i)
+        if (box_of(triangles_[order_[i]]).overlaps(box) && visit(order_[i])) return true;
+    }
+    return false;
+  }
+
+  /// The triangle takes other corners, or none.
+  void exchange(int64_t triangle, const Corners& corners);
+  void remove(int64_t triangle);
+
+  const Corners& corners_of(int64_t triangle) const { return triangles_[triangle]; }
+
+  static Box box_of(const Corners& corners);
+
+ private:
+  static constexpr int max_depth = 128;
+  struct Node {
+    Box box;
+    int64_t first = 0, count = 0;  ///< of a leaf, in order_
+    int64_t right = -1;            ///< the left child follows its parent
+    int64_t parent = -1;
+  };
+
+  int64_t build(int64_t first, int64_t end, int64_t parent);
+  Box leaf_box(const Node& node) const;
+  void refit(int64_t node);
+
+  std::vector<Corners> triangles_;
+  std::vector<int64_t> order_;    ///< triangles by leaf
+  std::vector<int64_t> leaf_of_;  ///< triangle → node
+  std::vector<Node> nodes_;
+};
+
+}  // namespace repose::surface
