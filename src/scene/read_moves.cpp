@@ -4,7 +4,7 @@
 
 #include "bone_names.h"
 #include "repose/base/nearest.h"
-#include "repose/scene/landmarks.h"
+#include "repose/scene/landmark_fit.h"
 #include "repose/scene/transform_file.h"
 
 namespace repose::scene {

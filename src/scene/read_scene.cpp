@@ -235,7 +235,7 @@ Scene read_scene(const std::filesystem::path& file) {
   if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
   std::map<std::string, Vec3> landmarks;
-  if (const auto named = map.find("landmarks")) landmarks = read_landmarks(named->file());
+  if (const auto named = map.find("landmarks")) landmarks = landmarks_by_name(named->file());
   if (const auto moves = map.find("moves")) read_moves(*moves, landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);

@@ -1,5 +1,6 @@
 #include "repose/scene/transform_file.h"
 
+#include <Eigen/LU>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 #include "stored_transform.h"
 #include "transform_hdf5.h"
 
@@ -95,6 +97,20 @@ RigidMotion read_transform(const std::filesystem::path& file) {
   check_kind(*stored.kind);
   if (!stored.parameters) base::refuse("{}: holds no line 'Parameters:'", name);
   return inverse_motion(matrix_of(stored), stored.parameters->place);
+}
+
+void write_transform(const std::filesystem::path& file, const Mat4& motion) {
+  const Mat3 linear = motion.topLeftCorner<3, 3>().inverse();
+  const Vec3 translation = -(linear * motion.topRightCorner<3, 1>());
+  std::string parameters;
+  for (int i = 0; i < 9; ++i) parameters += fmt::format("{} ", linear(i / 3, i % 3));
+  parameters += fmt::format("{} {} {}", translation.x(), translation.y(), translation.z());
+  base::write_whole_file(file, fmt::format("#Insight Transform File V1.0\n"
+                                           "#Transform 0\n"
+                                           "Transform: AffineTransform_double_3_3\n"
+                                           "Parameters: {}\n"
+                                           "FixedParameters: 0 0 0\n",
+                                           parameters));
 }
 
 }  // namespace repose::scene

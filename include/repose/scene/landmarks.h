@@ -2,21 +2,29 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
-#include "repose/scene/rigid_motion.h"
+#include "repose/base/geometry.h"
 
-/// Anatomical points by name, and moves that put them in their places.
 namespace repose::scene {
 
-/// Landmarks in mm, LPS: JSON with {"name": [x, y, z], …}, of which entries of another shape are
-/// left out, or 3D Slicer's markups (.mrk.json; RAS is turned to LPS). Throws InputError naming the
-/// file where it cannot be read or holds none.
-std::map<std::string, Vec3> read_landmarks(const std::filesystem::path& file);
+/// A named point, LPS, mm.
+struct Landmark {
+  std::string name;  ///< its number from 1 where the file has none
+  Vec3 position;
+};
 
-/// The motion that takes landmarks `from` to `to` (mm, equally many, at least one): one, the
-/// translation; two, middle to middle and the least turn that lines them up; more, the best rigid
-/// motion (fit_rigid_motion). Its residual is the largest distance of a landmark from its place.
-/// Throws InputError where they do not fix a turn.
-RigidFit fit_landmarks(const std::vector<Vec3>& from, const std::vector<Vec3>& to);
+/// Reads landmarks from 3D Slicer's Markups files, .mrk.json and .fcsv, from a plain CSV of rows
+/// "name, x, y, z", or from our own JSON, {"name": [x, y, z], …} in LPS, of which entries of another
+/// shape are left out. Points come as LPS whatever the file's frame, which the file must say:
+/// "coordinateSystem" in .mrk.json, "# CoordinateSystem =" in .fcsv (0 or RAS, 1 or LPS), and in a
+/// plain CSV a comment line "# CoordinateSystem = LPS" (or RAS). RAS differs by the signs of x and
+/// y. Units are mm ("coordinateUnits" in .mrk.json, if there, must say so). Points that are not
+/// placed ("positionStatus" other than "defined") are left out. Throws InputError, naming file and
+/// place, for a frame that is not said or is neither, a coordinate that is not a finite number, a
+/// name that comes twice, and a file that holds no point.
+std::vector<Landmark> read_landmarks(const std::filesystem::path& file);
+/// The same by name; of a name that comes twice the last.
+std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file);
 
 }  // namespace repose::scene

@@ -22,4 +22,10 @@ namespace repose::scene {
 /// where a fourth fixed parameter is not 0. Throws InputError that begins with file:line.
 RigidMotion read_transform(const std::filesystem::path& file);
 
+/// Writes `motion`, an invertible affine map of points in LPS, mm, that takes something (moving) to
+/// its new place (fixed), as an AffineTransform_double_3_3 with all its digits: stored is the
+/// inverse, see above, so that 3D Slicer, resampling with ITK and read_transform (if rigid) all
+/// move it as `motion` does. Complete or not at all. Throws InputError naming the file.
+void write_transform(const std::filesystem::path& file, const Mat4& motion);
+
 }  // namespace repose::scene

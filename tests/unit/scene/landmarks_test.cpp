@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "folder.h"
+#include "repose/scene/landmark_fit.h"
 
 namespace repose::scene {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 TEST(Landmarks, SlicersMarkupsTurnedToLps) {
   const Folder folder;
   const auto read = [&](const char* frame) {
-    return read_landmarks(folder.write(
+    return landmarks_by_name(folder.write(
         "points.mrk.json", std::string(R"({"@schema": "x", "markups": [{"coordinateSystem": ")") +
                                frame +
                                R"(", "controlPoints": [{"id": "1", "label": "pogonion",
@@ -22,8 +23,8 @@ TEST(Landmarks, SlicersMarkupsTurnedToLps) {
 
 TEST(Landmarks, TheShippedFilesAgree) {
   const std::filesystem::path meshes = REPOSE_MESHES;
-  const auto plain = read_landmarks(meshes / "head_landmarks.json"),
-             slicer = read_landmarks(meshes / "head.mrk.json");
+  const auto plain = landmarks_by_name(meshes / "head_landmarks.json"),
+             slicer = landmarks_by_name(meshes / "head.mrk.json");
   EXPECT_GT(plain.size(), 20u);
   for (const auto& [name, position] : slicer)
     EXPECT_LT((plain.at(name) - position).norm(), 1e-3) << name;
