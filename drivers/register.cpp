@@ -1,0 +1,184 @@
+/// repose-register MOVING FIXED: landmark registration of a mesh to another, refined by ICP.
+///
+///     repose-register scan.ply skin.ply -landmarks scan.mrk.json skin.mrk.json -icp -output scan
+///
+/// Writes NAME.tfm (ITK and 3D Slicer: applied to MOVING it brings it to FIXED) and NAME.ply, the
+/// moved mesh. Landmarks come as LPS from files that say LPS or RAS. Exit status: 0 done, 1 bad
+/// input (nothing written), 2 ICP did not converge (written), 3 internal error.
+#include <cmath>
+#include <cstdio>
+
+#include "repose/base/agreement.h"
+#include "repose/base/program.h"
+#include "repose/scene/landmarks.h"
+#include "repose/scene/transform_file.h"
+#include "repose/surface/read.h"
+#include "repose/surface/register.h"
+
+namespace {
+
+using namespace repose;
+using base::OptionKind;
+
+std::vector<base::Option> option_table() {
+  return {
+      {"landmarks",
+       OptionKind::path,
+       "",
+       "Landmarks of MOVING and of FIXED (.mrk.json, .fcsv, .csv).",
+       {},
+       "",
+       {},
+       2},
+      {"match",
+       OptionKind::choice,
+       "name",
+       "How landmarks are paired: by name or by order.",
+       {},
+       "",
+       {"name", "order"}},
+      {"similarity", OptionKind::flag, "", "One scale factor too, from the landmarks."},
+      {"icp", OptionKind::flag, "", "Refine by iterated closest points, point to plane, rigid."},
+      {"trim",
+       OptionKind::number,
+       "0.8",
+       "Share of the pairs of closest points that counts.",
+       {.min = 0, .max = 1, .min_excluded = true}},
+      {"icp_steps", OptionKind::integer, "100", "Most steps of ICP.", {1, 100000}},
+      {"output", OptionKind::path, "registered", "Path of the files without ending."}};
+}
+
+struct Pairs {
+  std::vector<std::string> names;
+  std::vector<Vec3> moving, fixed;
+
+  void add(const scene::Landmark& a, const scene::Landmark& b) {
+    names.push_back(a.name);
+    moving.push_back(a.position);
+    fixed.push_back(b.position);
+  }
+};
+
+const scene::Landmark* find(const std::vector<scene::Landmark>& landmarks, const std::string& name,
+                            const std::string& file) {
+  const scene::Landmark* found = nullptr;
+  for (const auto& landmark : landmarks) {
+    if (landmark.name != name) continue;
+    if (found)
+      base::refuse("{}: landmark {} comes twice; rename one, or use -match order", file,
+                   base::shown(name));
+    found = &landmark;
+  }
+  return found;
+}
+
+Pairs by_name(const std::vector<scene::Landmark>& moving, const std::vector<scene::Landmark>& fixed,
+              const std::vector<std::string>& files) {
+  Pairs pairs;
+  for (const auto& landmark : moving) {
+    find(moving, landmark.name, files[0]);
+    const scene::Landmark* partner = find(fixed, landmark.name, files[1]);
+    if (partner)
+      pairs.add(landmark, *partner);
+    else
+      std::printf("  %s is in %s only: left out\n", landmark.name.c_str(), files[0].c_str());
+  }
+  if (pairs.names.size() < 3)
+    base::refuse(
+        "{} and {}: {} landmark name(s) in common, three are needed; rename them, or use "
+        "-match order if both list the same points in the same order",
+        files[0], files[1], pairs.names.size());
+  return pairs;
+}
+
+Pairs read_pairs(const base::Options& options) {
+  const std::vector<std::string> files = options.texts("landmarks");
+  if (files.empty()) base::refuse("-landmarks MOVING.mrk.json FIXED.mrk.json is not given");
+  const auto moving = scene::read_landmarks(files[0]), fixed = scene::read_landmarks(files[1]);
+  if (options.text("match") == "name") return by_name(moving, fixed, files);
+  if (moving.size() != fixed.size())
+    base::refuse("{} has {} landmarks, {} has {}; -match order needs the same points in both",
+                 files[0], moving.size(), files[1], fixed.size());
+  Pairs pairs;
+  for (size_t i = 0; i < moving.size(); ++i) pairs.add(moving[i], fixed[i]);
+  return pairs;
+}
+
+void print_warnings(const surface::LandmarkFit& fit) {
+  if (fit.rms_mirrored < 0.3 * fit.rms_all)
+    std::printf(
+        "  note: a mirror image fits better (rms %.3g against %.3g mm): left and right are "
+        "exchanged in one of the files\n",
+        fit.rms_mirrored, fit.rms_all);
+  const Mat3& r = fit.transform.rotation;
+  if (r(0, 0) < -0.9 && r(1, 1) < -0.9)
+    std::printf(
+        "  note: the turn is about half a turn about the z axis, as between RAS and LPS; "
+        "check that both files state the frame they are in\n");
+  if (!fit.can_be_checked)
+    std::printf("  note: of three landmarks none can be checked by the others; place more\n");
+}
+
+void print(const surface::LandmarkFit& fit, const Pairs& pairs) {
+  std::printf("  %-20s %12s %12s\n", "landmark", "residual", "leave-one-out");
+  for (size_t i = 0; i < pairs.names.size(); ++i) {
+    std::printf("  %-20s %9.3f mm ", pairs.names[i].c_str(), fit.residual[i]);
+    if (std::isfinite(fit.predicted[i])) std::printf("%9.3f mm", fit.predicted[i]);
+    std::printf("%s\n",
+                fit.left_out[i] ? "   left out: too far off for the scatter of the others" : "");
+  }
+  const auto out = std::count(fit.left_out.begin(), fit.left_out.end(), true);
+  std::printf("  rms %.4g mm of %zu landmarks", fit.rms, pairs.names.size() - out);
+  if (out > 0) std::printf("; %.4g mm of all with none left out", fit.rms_all);
+  std::printf("\n");
+  if (fit.transform.scale != 1) std::printf("  scale %.6g\n", fit.transform.scale);
+  print_warnings(fit);
+}
+
+base::Exit refine(const base::Options& options, const surface::Surface& moving,
+                  const surface::Surface& fixed, surface::Similarity& transform) {
+  surface::IcpOptions wanted;
+  wanted.trim = options.number("trim");
+  wanted.most_steps = static_cast<int>(options.integer("icp_steps"));
+  const surface::IcpResult icp = surface::refine_by_icp(moving, fixed, transform, wanted);
+  transform = icp.transform;
+  std::printf(
+      "  ICP %s after %d step(s): rms %.4g mm point to plane, %.4g mm point to point over "
+      "%lld pairs; half of all samples within %.4g mm\n",
+      icp.converged ? "converged" : "did not converge", icp.steps, icp.rms_plane, icp.rms,
+      static_cast<long long>(icp.pairs), icp.median);
+  return icp.converged ? base::Exit::done : base::Exit::not_converged;
+}
+
+base::Exit run(const base::Options& options) {
+  const auto& files = options.arguments();
+  const Pairs pairs = read_pairs(options);
+  const surface::Surface moving = surface::read_surface(files[0]);
+  const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));
+  const surface::LandmarkFit fit =
+      surface::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
+  print(fit, pairs);
+  surface::Similarity transform = fit.transform;
+  base::Exit exit = base::Exit::done;
+  if (options.flag("icp"))
+    exit = refine(options, surface::weld_and_orient(moving), fixed, transform);
+  const std::string name = options.text("output");
+  surface::write_ply(name + ".ply", surface::moved(moving, transform));
+  scene::write_transform(name + ".tfm", transform.matrix());
+  std::printf("  wrote %s.tfm and %s.ply\n", name.c_str(), name.c_str());
+  return exit;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv, "Landmark registration of a mesh to another, refined by ICP.",
+                        {{"MOVING", "the mesh that moves (PLY, STL, OBJ, OFF)"},
+                         {"FIXED", "the mesh it is brought to"}},
+                        option_table());
+  return base::run_program(options, [&] {
+    base::Exit exit = base::Exit::done;
+    base::on_first_rank(MPI_COMM_WORLD, [&] { exit = run(options); });
+    return exit;
+  });
+}
