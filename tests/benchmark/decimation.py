@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""Decimates one mesh at several distances, by Repose, by CGAL to the same count and within its
+envelope, and by VTK to the same count; measures all with one measure; writes a Markdown table.
+
+    tests/benchmark/decimation.py MESH OUT.md [BIN] [DISTANCE …]
+
+BIN is the folder of the built programs (default build/bin; cmake … -DREPOSE_BENCHMARKS=ON). VTK is
+left out, in words, where Python has none."""
+
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+DISTANCES = ["0.1", "0.25", "0.5", "1", "2"]
+VTK = """
+import sys
+from vtkmodules.vtkFiltersCore import vtkQuadricDecimation
+from vtkmodules.vtkIOPLY import vtkPLYReader, vtkPLYWriter
+reader = vtkPLYReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+decimation = vtkQuadricDecimation()
+decimation.SetInputConnection(reader.GetOutputPort())
+decimation.SetTargetReduction(1 - int(sys.argv[3]) / reader.GetOutput().GetNumberOfPolys())
+writer = vtkPLYWriter()
+writer.SetFileName(sys.argv[2])
+writer.SetInputConnection(decimation.GetOutputPort())
+writer.Write()
+"""
+HEAD = ("| bound | by | triangles | distance to the input | CGAL's figure | the other way | CPU s "
+        "| defects |\n|--:|:--|--:|--:|--:|--:|--:|:--|\n")
+
+
+def cpu_of(command):
+    """CPU seconds of a command; its output is not shown."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+class Race:
+    def __init__(self, mesh, programs, folder):
+        self.mesh, self.programs, self.folder = mesh, programs, folder
+        self.cgal = programs / "benchmark_decimation"
+        self.rows = []
+
+    def measured(self, file):
+        text = subprocess.check_output([self.cgal, "measure", self.mesh, file], text=True)
+        return text.rstrip("\n").split("\t")
+
+    def enter(self, distance, name, command, file):
+        """Runs one way and adds its row; the number of triangles it left."""
+        try:
+            seconds = cpu_of(command)
+        except subprocess.CalledProcessError as error:
+            self.rows.append(f"| {distance} | {name} | failed ({error.returncode}) | | | | | |\n")
+            return 0
+        triangles, lower, upper, cgal, back, defects = self.measured(file)
+        self.rows.append(f"| {distance} | {name} | {triangles} | {float(upper):.4g} | "
+                         f"{float(cgal):.4g} | {float(back):.3g} | {seconds:.1f} | {defects} |\n")
+        print(self.rows[-1], end="", flush=True)
+        return int(triangles)
+
+    def run(self, distance):
+        out = {way: self.folder / f"{way}_{distance}.ply" for way in
+               ("repose", "envelope", "lindstrom_turk", "garland_heckbert", "vtk")}
+        count = self.enter(distance, "**Repose**", [
+            self.programs / "repose-decimate", self.mesh, "-distance", distance,
+            "-output", out["repose"]], out["repose"])
+        self.enter(distance, "CGAL, envelope", [
+            self.cgal, "envelope", self.mesh, out["envelope"], distance], out["envelope"])
+        for way, name in (("lindstrom_turk", "CGAL, Lindstrom–Turk"),
+                          ("garland_heckbert", "CGAL, Garland–Heckbert")):
+            self.enter(distance, name, [self.cgal, way, self.mesh, out[way], count], out[way])
+        if has_vtk():
+            self.enter(distance, "VTK, quadric", [
+                "/usr/bin/python3", "-c", VTK, self.mesh, out["vtk"], count], out["vtk"])
+
+
+def has_vtk():
+    return subprocess.run(["/usr/bin/python3", "-c", "import vtkmodules.vtkFiltersCore"],
+                          stderr=subprocess.DEVNULL).returncode == 0
+
+
+def main():
+    mesh, page = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
+    programs = pathlib.Path(sys.argv[3] if len(sys.argv) > 3 else "build/bin").resolve()
+    start = time.time()
+    with tempfile.TemporaryDirectory() as folder:
+        race = Race(mesh, programs, pathlib.Path(folder))
+        for distance in sys.argv[4:] or DISTANCES:
+            race.run(distance)
+    note = "" if has_vtk() else "\nVTK was not there to compare with.\n"
+    page.write_text(HEAD + "".join(race.rows) + note)
+    print(f"{page} written after {time.time() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
