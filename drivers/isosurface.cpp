@@ -95,14 +95,14 @@ void print_volume(const surface::Volume& volume) {
               volume.spacing(0), volume.spacing(1), volume.spacing(2), range[0], range[1]);
 }
 
-void print_surface(const std::string& file, const surface::Surface& mesh) {
+std::string describe_surface(const surface::Surface& mesh) {
   const surface::Defects defects = surface::inspect(mesh, false);
   const bool manifold = defects.non_manifold_edges + defects.non_manifold_vertices == 0;
-  std::printf("%s: %zu vertices, %zu triangles, area %.6g mm²", file.c_str(), mesh.points.size(),
-              mesh.triangles.size(), surface::area_of(mesh));
-  if (defects.border_edges == 0) std::printf(", volume %.6g mm³", surface::volume_of(mesh));
-  std::printf("\n  %s; %s\n", manifold ? "manifold" : "not manifold",
-              surface::describe(defects).c_str());
+  return fmt::format(
+      "{} vertices, {} triangles, area {:.6g} mm²{}\n  {}; {}", mesh.points.size(),
+      mesh.triangles.size(), surface::area_of(mesh),
+      defects.border_edges > 0 ? "" : fmt::format(", volume {:.6g} mm³", surface::volume_of(mesh)),
+      manifold ? "manifold" : "not manifold", surface::describe(defects));
 }
 
 /// mesh.ply → mesh_2.ply
@@ -116,11 +116,13 @@ void write_one(const surface::Volume& volume, const surface::Extraction& wanted,
   base::Progress progress(MPI_COMM_WORLD);
   const auto result = surface::extract(
       volume, wanted, [&](const std::string& step, double done) { progress.show(step, done); });
+  progress.show("checking and writing", -1);
+  const std::string summary = describe_surface(result.surface);
+  surface::write_surface(file, result.surface);
   progress.clear();
   for (const std::string& remark : result.remarks) std::printf("  %s\n", remark.c_str());
   if (wanted.otsu) std::printf("  level by Otsu's method: %.6g\n", result.level);
-  surface::write_surface(file, result.surface);
-  print_surface(file, result.surface);
+  std::printf("%s: %s\n", file.c_str(), summary.c_str());
 }
 
 void run(const base::Options& options) {
@@ -131,6 +133,7 @@ void run(const base::Options& options) {
   if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
     base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
   base::Progress progress(MPI_COMM_WORLD);
+  progress.show("reading", -1);
   const surface::Volume volume = surface::read_volume(
       options.arguments()[0], [&](double done) { progress.show("reading slices", done); });
   progress.clear();

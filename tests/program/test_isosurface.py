@@ -113,6 +113,15 @@ def spoil_slice(folder):
     return folder
 
 
+def spoil_header(folder, place):
+    """Two bytes of the meta information: at some places Debian's GDCM aborts, at others it no
+    longer takes the file for DICOM."""
+    file = sorted(folder.iterdir())[5]
+    content = file.read_bytes()
+    file.write_bytes(content[:place] + b"??" + content[place + 2:])
+    return folder
+
+
 def text(file, content="no volume\n"):
     file.write_text(content)
     return file
@@ -147,6 +156,12 @@ CASES = {
         lambda f: cut_packed(v.write_nifti(f / "ct.nii.gz", v.samples())), [], ["ct.nii.gz"]),
     "truncated slice": (
         lambda f: spoil_slice(v.write_dicom(f / "ct", v.samples())), [], [".dcm", "truncated"]),
+    "damaged header of a slice": (
+        lambda f: spoil_header(v.write_dicom(f / "ct", v.samples()), 152), [], [".dcm", "damaged"]),
+    "another damaged header of a slice": (
+        lambda f: spoil_header(v.write_dicom(f / "ct", v.samples()), 144), [], [".dcm", "damaged"]),
+    "damaged header of NIfTI": (
+        lambda f: text(f / "ct.nii", "\x5c\x01" + "\0" * 400), [], ["ct.nii"]),
     "MetaImage without spacing": (
         lambda f: v.write_meta(f / "ct.mha", v.samples(), NO_SPACING), [], ["ct.mha", "spacing"]),
     "NRRD without spacing": (

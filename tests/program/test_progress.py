@@ -6,6 +6,7 @@ import subprocess
 
 import pytest
 
+import volumes
 from conftest import PROJECT, TIME_LIMIT, programs
 
 
@@ -50,3 +51,10 @@ def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ran
 def test_a_log_stays_quiet(run, ranks):
     result = run("repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml", ranks=ranks)
     assert result.stderr == "" and "mm to go" not in result.stdout
+
+
+def test_a_volume_shows_its_steps(environment, tmp_path):
+    volume = volumes.write_meta(tmp_path / "ct.mha", volumes.samples())
+    text = seen([programs() / "repose-isosurface", volume, "-level", "1000"], tmp_path, environment)
+    assert "reading" in text and "isosurface" in text
+    assert text.endswith("\r\x1b[K"), "the line is cleared at the end"

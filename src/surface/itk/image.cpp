@@ -6,9 +6,17 @@
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
-#include <iostream>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <functional>
 #include <new>
-#include <sstream>
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
@@ -17,16 +25,44 @@
 namespace repose::surface {
 namespace {
 
-/// Keeps what ITK's libraries write to the terminal on their own.
-class Hush {
+/// What ITK's libraries write to the terminal is dropped, and where one aborts, as Debian's GDCM
+/// does at many a damaged file, for it is built with its assertions, control comes back.
+class Shield {
  public:
-  Hush() : old_(std::cerr.rdbuf(caught_.rdbuf())) { itk::Object::GlobalWarningDisplayOff(); }
-  ~Hush() { std::cerr.rdbuf(old_); }
+  Shield() {
+    itk::Object::GlobalWarningDisplayOff();
+    std::fflush(stderr);
+    terminal_ = dup(STDERR_FILENO);
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    dup2(nowhere, STDERR_FILENO);
+    close(nowhere);
+    struct sigaction action {};
+    action.sa_handler = [](int) { siglongjmp(place_, 1); };
+    sigaction(SIGABRT, &action, &usual_);
+  }
+  ~Shield() {
+    sigaction(SIGABRT, &usual_, nullptr);
+    dup2(terminal_, STDERR_FILENO);
+    close(terminal_);
+  }
+
+  /// Whether `work` came to its end. What it held when it did not is lost.
+  bool survives(const std::function<void()>& work) {
+    if (sigsetjmp(place_, 1) != 0) return false;
+    work();
+    return true;
+  }
 
  private:
-  std::ostringstream caught_;
-  std::streambuf* old_;
+  static inline sigjmp_buf place_;
+  int terminal_;
+  struct sigaction usual_ {};
 };
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& reason) {
+  base::refuse("{}: cannot be read as a volume, truncated or damaged: {}; export it anew",
+               file.string(), reason);
+}
 
 itk::ImageIOBase::Pointer reader_of(ImageFormat format) {
   switch (format) {
@@ -60,18 +96,22 @@ std::string one_line(std::string text) {
 }
 
 /// Does `work` with an image reader whose header has been read.
-template <class Work>
-Image with_reader(const std::filesystem::path& file, ImageFormat format, Work work) {
-  Hush hush;
-  try {
-    const auto io = reader_of(format);
-    io->SetFileName(file.string());
-    io->ReadImageInformation();
-    return work(*io);
-  } catch (const itk::ExceptionObject& problem) {
-    base::refuse("{}: cannot be read as a volume, truncated or damaged: {}; export it anew",
-                 file.string(), one_line(problem.GetDescription()));
-  }
+Image with_reader(const std::filesystem::path& file, ImageFormat format,
+                  const std::function<Image(itk::ImageIOBase&)>& work) {
+  Shield shield;
+  Image image;
+  const bool survived = shield.survives([&] {
+    try {
+      const auto io = reader_of(format);
+      io->SetFileName(file.string());
+      io->ReadImageInformation();
+      image = work(*io);
+    } catch (const itk::ExceptionObject& problem) {
+      refuse(file, one_line(problem.GetDescription()));
+    }
+  });
+  if (!survived) refuse(file, "its library gives up");
+  return image;
 }
 
 /// The library of DICOM puts 1 in the place of a spacing that is 0 or lacking, so it is read here:
@@ -164,8 +204,16 @@ std::vector<float> values_of(itk::ImageIOBase& io) {
 }  // namespace
 
 bool is_dicom(const std::filesystem::path& file) {
-  Hush hush;
-  return itk::GDCMImageIO::New()->CanReadFile(file.string().c_str());
+  std::array<char, 132> begin{};
+  std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
+  const bool marked = std::string_view(begin.data() + 128, 4) == "DICM";
+  Shield shield;
+  bool answer = false;
+  const bool survived = shield.survives(
+      [&] { answer = itk::GDCMImageIO::New()->CanReadFile(file.string().c_str()); });
+  if (!survived) refuse(file, "its library gives up");
+  if (marked && !answer) refuse(file, "it begins as DICOM and does not go on so");
+  return answer;
 }
 
 Image read_header(const std::filesystem::path& file, ImageFormat format) {
