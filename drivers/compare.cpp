@@ -2,6 +2,7 @@
 ///
 ///     repose-compare predicted.ply postoperative.ply
 ///     repose-compare predicted.ply postoperative.ply -both -regions labels.nii.gz -output compared
+///     repose-compare predicted.ply postoperative.ply -landmarks face.mrk.json -radius 20
 ///
 /// Distances are positive where PREDICTED lies in front of ACTUAL (outside it), weighted by area.
 /// Writes NAME.vtp, PREDICTED coloured by them, and NAME.csv, their histogram, which
@@ -15,6 +16,7 @@
 #include "repose/base/program.h"
 #include "repose/base/progress.h"
 #include "repose/base/whole_file.h"
+#include "repose/scene/landmarks.h"
 #include "repose/surface/compare.h"
 #include "repose/surface/read.h"
 #include "repose/surface/write.h"
@@ -32,6 +34,8 @@ std::vector<base::Option> option_table() {
       {"spacing", OptionKind::number, "1", "Longest side of the parts measured.", length, "MM"},
       {"skip_rim", OptionKind::flag, "", "Leave out what lies beyond the rim of an open surface."},
       {"regions", OptionKind::path, "", "Label map: numbers for each label on their own, too."},
+      {"landmarks", OptionKind::path, "", "Numbers around each landmark (.mrk.json, .fcsv, .csv)."},
+      {"radius", OptionKind::number, "15", "How far around a landmark.", length, "MM"},
       {"reach",
        OptionKind::number,
        "auto",
@@ -72,6 +76,15 @@ void print_regions(const std::string& file, const std::vector<Sample>& samples) 
   for (const Sample& sample : samples)
     regions[label_at(labels, to_index, sample.point)].push_back(sample);
   for (const auto& [label, part] : regions) print_row(fmt::format("  label {}", label), part);
+}
+
+void print_landmarks(const std::string& file, double radius, const std::vector<Sample>& samples) {
+  for (const scene::Landmark& landmark : scene::read_landmarks(file)) {
+    std::vector<Sample> near;
+    for (const Sample& sample : samples)
+      if ((sample.point - landmark.position).norm() <= radius) near.push_back(sample);
+    print_row("  " + landmark.name, near);
+  }
 }
 
 /// Distances one way, with a row of the table.
@@ -128,6 +141,8 @@ void run(const base::Options& options) {
   print_header();
   const auto samples = measure(options, predicted, to_actual, "PREDICTED to ACTUAL");
   if (options.has("regions")) print_regions(options.text("regions"), samples);
+  if (options.has("landmarks"))
+    print_landmarks(options.text("landmarks"), options.number("radius"), samples);
   if (options.flag("both"))
     measure(options, actual, surface::SignedDistance(predicted), "ACTUAL to PREDICTED");
   const double widest = std::max(surface::statistics(samples).percentile_95, 1e-3);

@@ -66,6 +66,21 @@ def test_regions_by_a_label_map(run, tmp_path):
     assert list(rows(result.stdout)) == ["PREDICTED to ACTUAL", "label 2"]
 
 
+def test_numbers_around_landmarks(run, tmp_path):
+    sphere(tmp_path / "b.ply", 40)
+    mesh = meshio.read(sphere(tmp_path / "a.ply", 40))
+    bump = mesh.points + np.outer(mesh.points[:, 2] > 35, [0, 0, 3.0])
+    meshio.Mesh(bump, mesh.cells).write(tmp_path / "a.ply")
+    (tmp_path / "marks.csv").write_text(
+        "# CoordinateSystem = RAS\ntop, 0, 0, 40\nside, -40, 0, 0\nfar, 900, 0, 0\n")
+    result = run("repose-compare", "a.ply", "b.ply", "-landmarks", "marks.csv", "-radius", "10")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    found = rows(result.stdout)
+    assert found["top"][1:] == pytest.approx([3] * 6, abs=0.2)
+    assert found["side"][1:] == pytest.approx([0] * 6, abs=0.05)
+    assert found["side"][0] > 100 and found["far"] == [0] * 7
+
+
 def test_beyond_the_rim_is_left_out(run, tmp_path):
     corners = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], float)
     flat = meshio.Mesh(corners, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
@@ -95,6 +110,7 @@ CASES = {
     "no mesh": (["a.ply", "text.ply"], ["text.ply"]),
     "no folder": (["a.ply", "a.ply", "-output", "no/such/x"], ["no/such/x"]),
     "no such regions": (["a.ply", "a.ply", "-regions", "none.nii"], ["none.nii"]),
+    "no such landmarks": (["a.ply", "a.ply", "-landmarks", "none.csv"], ["none.csv"]),
     "spacing of zero": (["a.ply", "a.ply", "-spacing", "0"], ["-spacing"]),
 }
 
