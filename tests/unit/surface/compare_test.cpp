@@ -44,6 +44,21 @@ TEST(Compare, the_sign_is_right_at_edges_and_corners) {
   }
 }
 
+// A surface of noise has edges and corners of every kind, saddles too; the parity of a ray tells
+// the truth.
+TEST(Compare, the_sign_is_right_on_a_surface_of_noise) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> value(0, 1), place(-4, 4);
+  const Surface rough =
+      isosurface(sampled(8, Mat3::Identity(), [&](const Vec3&) { return value(random); }), 0.6);
+  const SignedDistance distance(rough);
+  const DistanceTree tree(rough);
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 point(place(random), place(random), place(random));
+    ASSERT_EQ(distance.at(point).distance < 0, tree.contains(point)) << point.transpose();
+  }
+}
+
 TEST(Compare, statistics_do_not_depend_on_the_meshing) {
   const Surface sheet = patch(), box = cube({-500, -500, -1000}, 1000);  // the sheet lies on top
   Surface tilted = sheet;

@@ -72,6 +72,7 @@ TEST(VolumeFilter, closing_fills_a_narrow_hole_and_leaves_a_wide_one) {
   EXPECT_EQ(handles(plate(2)), 1);
   EXPECT_EQ(handles(close_gaps(plate(2), 3)), 0);
   EXPECT_EQ(handles(close_gaps(plate(6), 3)), 1);
+  EXPECT_EQ(close_gaps(plate(-1), 3).values, plate(-1).values) << "what has no gap stays";
   const Volume before = plate(6), after = close_gaps(before, 3);
   for (size_t v = 0; v < before.values.size(); ++v)
     ASSERT_GE(after.values[v], before.values[v]) << "closing never takes away";
