@@ -25,21 +25,15 @@ std::vector<double> gather(MPI_Comm comm, const double* values, size_t count) {
 /// Sums forces on points by the group that they belong to.
 class Groups {
  public:
-  Groups(const model::Model& model, const std::vector<std::vector<int64_t>>& groups)
-      : model_(model),
-        group_(model.points.position.size(), -1),
-        force_(groups.size(), Vec3::Zero()) {
+  Groups(size_t points, const std::vector<std::vector<int64_t>>& groups)
+      : group_(points, -1), force_(groups.size(), Vec3::Zero()) {
     for (size_t k = 0; k < groups.size(); ++k)
       for (const int64_t point : groups[k]) group_[point] = static_cast<int64_t>(k);
   }
 
-  /// Whether the element has a point of a group and a soft-tissue point.
   template <size_t K>
-  bool wants(const std::array<int64_t, K>& points) const {
-    return std::any_of(points.begin(), points.end(), [&](int64_t i) { return group_[i] >= 0; }) &&
-           std::any_of(points.begin(), points.end(), [&](int64_t i) {
-             return model_.points.set[i] == model::PointSet::soft_tissue;
-           });
+  bool touch(const std::array<int64_t, K>& points) const {
+    return std::any_of(points.begin(), points.end(), [&](int64_t i) { return group_[i] >= 0; });
   }
   void add(int64_t point, const Vec3& force) {
     if (group_[point] >= 0) force_[group_[point]] += force;
@@ -47,7 +41,6 @@ class Groups {
   const std::vector<Vec3>& forces() const { return force_; }
 
  private:
-  const model::Model& model_;
   std::vector<int64_t> group_;  // [N] or −1
   std::vector<Vec3> force_;     // [groups]
 };
@@ -56,7 +49,7 @@ void add_springs(const model::Model& model, const std::vector<double>& x, double
                  Groups& groups) {
   const model::Springs& s = model.springs;
   for (size_t j = 0; j < s.points.size(); ++j) {
-    if (!groups.wants(s.points[j])) continue;
+    if (!groups.touch(s.points[j])) continue;
     const auto [p, q] = s.points[j];
     const Vec3 d = Vec3::Map(&x[3 * q]) - Vec3::Map(&x[3 * p]);
     if (d.norm() == 0) continue;
@@ -81,7 +74,7 @@ void add_prisms(const model::Model& model, const std::vector<double>& x,
                 const std::vector<double>& pressure, const model::StepNumbers& n, Groups& groups) {
   const model::Prisms& prisms = model.prisms;
   for (size_t m = 0; m < prisms.points.size(); ++m) {
-    if (!groups.wants(prisms.points[m])) continue;
+    if (!groups.touch(prisms.points[m])) continue;
     mechanics::PrismTriples<double> corners;
     for (int c = 0; c < 6; ++c)
       corners[c] = mechanics::triple(Vec3::Map(&x[3 * prisms.points[m][c]]));
@@ -106,7 +99,7 @@ std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
              3 * rows.position.size());
   const std::vector<double> pressure = gather(comm, rows.pressure.data(), rows.pressure.size());
   if (base::rank(comm) != 0) return {};
-  Groups groups(model, held);
+  Groups groups(model.points.position.size(), held);
   const bool energy = numbers.functional == "energy";
   add_springs(model, x, energy && numbers.volume == "paper" ? numbers.lambda : 1, groups);
   if (energy && numbers.volume != "none") add_prisms(model, x, pressure, numbers, groups);
