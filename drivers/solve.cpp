@@ -21,6 +21,7 @@
 #include "repose/solve/prestress.h"
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
+#include "repose/solve/sliding.h"
 
 namespace {
 
@@ -93,6 +94,7 @@ struct Job {
   bool initial_equilibrium = false;        // on all ranks
   std::string building;                    // what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;  // points of each instrument, on rank 0
+  std::vector<model::Slider> sliders;      // on rank 0
 };
 
 /// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
@@ -118,6 +120,7 @@ Job read_job(const std::filesystem::path& input) {
     model::BuiltModel built = model::build_model(scene);
     job.model = std::move(built.model);
     job.held = std::move(built.held);
+    job.sliders = std::move(built.sliders);
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
@@ -249,6 +252,8 @@ base::Exit run(const base::Options& options) {
     settings.path.start_load = restart.load;
   }
   const std::string name = result_name(options, input);
+  const solve::Sliding sliding = solve::slide(comm, job.model, job.sliders, settings);
+  if (sliding.rounds > 0) stages.end("slide");
   Writer writer(name, job.model,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary =
@@ -256,9 +261,10 @@ base::Exit run(const base::Options& options) {
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
+  say(solve::describe_sliding(sliding));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
-  return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
+  return summary.path.complete() && sliding.settled ? base::Exit::done : base::Exit::not_converged;
 }
 
 }  // namespace

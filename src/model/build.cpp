@@ -7,7 +7,6 @@
 #include "repose/model/bones.h"
 #include "repose/model/collision.h"
 #include "repose/model/columns.h"
-#include "repose/model/instruments.h"
 #include "repose/model/layers.h"
 #include "repose/model/load_entry.h"
 #include "repose/model/loads.h"
@@ -105,6 +104,7 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   built.model = make_layers(mesh, columns.deep, depths);
   set_points(rim, attachment, scene.moves, built.model);
   built.held = hold_by_instruments(scene, built.model);
+  built.sliders = sliders(scene, built.held);
   require_held(scene, mesh, field, built.model, attachment);
   complete(scene, mesh, bones, built.model);
   report_columns(columns, attachment, built.report);

@@ -19,6 +19,7 @@ Box read_box(const Map& map) {
 
 Instrument read_instrument(const Map& map) {
   Instrument instrument{{}, read_direction(map.at("push"))};
+  if (const auto skin = map.find("skin")) instrument.slide = skin->choice() == 1;
   int shapes = 0;
   const auto shape = [&](const char* name, const auto& read) {
     if (const auto value = map.find(name)) {

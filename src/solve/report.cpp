@@ -75,6 +75,13 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
   return text;
 }
 
+std::string describe_sliding(const Sliding& sliding) {
+  if (sliding.rounds == 0) return "";
+  return row("sliding", fmt::format("{} in {} rounds, {:.2g} mm to go",
+                                    sliding.settled ? "settled" : "NOT SETTLED", sliding.rounds,
+                                    sliding.to_go));
+}
+
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())

@@ -23,9 +23,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def press(run, folder, *options, scene=SCENE, ranks=1):
+def press(run, folder, *options, scene=SCENE, ranks=1, accuracy=1e-6):
     (folder / "press.yaml").write_text(scene)
-    result = run("repose-solve", "press.yaml", "-accuracy", "1e-6", *options, ranks=ranks,
+    result = run("repose-solve", "press.yaml", "-accuracy", accuracy, *options, ranks=ranks,
                  cwd=folder)
     assert (result.returncode, result.stderr) == (0, ""), result
     found = re.search(r"instrument 0 .*holds (\d+) points; .*with \((.*?)\) N", result.stdout)
@@ -71,6 +71,26 @@ def test_the_force_is_the_slope_of_the_objective(run, folder, volume, layers):
         expected += np.einsum("m,mca,mc->a", step["prism/pressure"], gradient,
                               held[model["prism/points"]])
     assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
+
+
+def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):
+    _, stuck = press(run, folder, accuracy=1e-2)
+    sticking = last(folder / "press.h5")["objective"]
+    _, force = press(run, folder, accuracy=1e-2, scene=SCENE.replace(
+        "instruments:\n  - {", "instruments:\n  - {skin: slide, "))
+    model, step = model_of(folder / "press.h5"), last(folder / "press.h5")
+    held, x = np.flatnonzero(model["point/set"] == 3), step["point/position"]
+    outward = (x[held] - CENTER) / RADIUS
+    assert np.linalg.norm(outward, axis=1) == pytest.approx(1, abs=1e-9)
+    tissue = Tissue(model, "penalty", step["bulk_modulus"])
+    tissue.spring[:] = tissue.prism[:] = tissue.soft[:] = True
+    forces = -tissue.value_and_gradient(x)[1][held]
+    assert forces.sum(0) == pytest.approx(force, rel=1e-3, abs=1e-3)
+    normal = (forces * outward).sum(1)
+    along = np.linalg.norm(forces - normal[:, None] * outward, axis=1)
+    assert along.max() < 0.02 * np.abs(normal).max()
+    assert step["objective"] < 0.8 * sticking
+    assert np.linalg.norm(force) < np.linalg.norm(stuck)
 
 
 def test_the_shipped_scene_presses_a_cheek(run):

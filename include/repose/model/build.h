@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "repose/model/instruments.h"
 #include "repose/model/model.h"
 #include "repose/scene/scene.h"
 #include "repose/surface/surface.h"
@@ -24,6 +25,7 @@ struct BuiltModel {
   Model model;
   BuildReport report;
   std::vector<std::vector<int64_t>> held;  ///< [instruments] rows of the points that each holds
+  std::vector<Slider> sliders;             ///< those on which the skin slides
 };
 
 /// Scene and surfaces to model: columns, layers, springs, prisms, sets, attachment. `bones` in the

@@ -119,7 +119,8 @@ struct ClosedMesh {
 /// A rigid body at its place before it is pushed into the tissue, and by what.
 struct Instrument {
   std::variant<Sphere, Capsule, Box, HalfSpace, ClosedMesh> shape;
-  Vec3 push;  ///< mm, not 0
+  Vec3 push;           ///< mm, not 0
+  bool slide = false;  ///< the skin slides on it without friction instead of sticking to it
 };
 
 struct Solve {

@@ -4,6 +4,7 @@
 #include "repose/model/build.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
+#include "repose/solve/sliding.h"
 
 /// What a person reads when a run ends.
 namespace repose::solve {
@@ -20,6 +21,9 @@ std::string describe_prestress(const Prestress& prestress);
 /// How many points each instrument holds, and the force (N) with which the tissue pushes on it.
 std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
                                const std::vector<Vec3>& forces);
+
+/// One row, or nothing where no point slides.
+std::string describe_sliding(const Sliding& sliding);
 
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
