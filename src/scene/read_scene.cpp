@@ -159,8 +159,7 @@ Tissue read_tissue(const Value& value) {
   const Map map(value);
   Tissue tissue;
   tissue.layers = map.at("layers").integer();
-  if (const auto depths = map.find("depths"))
-    tissue.depths = read_depths(*depths, tissue.layers);
+  if (const auto depths = map.find("depths")) tissue.depths = read_depths(*depths, tissue.layers);
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);

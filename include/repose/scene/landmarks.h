@@ -15,11 +15,11 @@ struct Landmark {
 };
 
 /// Reads landmarks from 3D Slicer's Markups files, .mrk.json and .fcsv, from a plain CSV of rows
-/// "name, x, y, z", or from our own JSON, {"name": [x, y, z], …} in LPS, of which entries of another
-/// shape are left out. Points come as LPS whatever the file's frame, which the file must say:
-/// "coordinateSystem" in .mrk.json, "# CoordinateSystem =" in .fcsv (0 or RAS, 1 or LPS), and in a
-/// plain CSV a comment line "# CoordinateSystem = LPS" (or RAS). RAS differs by the signs of x and
-/// y. Units are mm ("coordinateUnits" in .mrk.json, if there, must say so). Points that are not
+/// "name, x, y, z", or from our own JSON, {"name": [x, y, z], …} in LPS, of which entries of
+/// another shape are left out. Points come as LPS whatever the file's frame, which the file must
+/// say: "coordinateSystem" in .mrk.json, "# CoordinateSystem =" in .fcsv (0 or RAS, 1 or LPS), and
+/// in a plain CSV a comment line "# CoordinateSystem = LPS" (or RAS). RAS differs by the signs of x
+/// and y. Units are mm ("coordinateUnits" in .mrk.json, if there, must say so). Points that are not
 /// placed ("positionStatus" other than "defined") are left out. Throws InputError, naming file and
 /// place, for a frame that is not said or is neither, a coordinate that is not a finite number, a
 /// name that comes twice, and a file that holds no point.

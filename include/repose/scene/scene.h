@@ -149,8 +149,8 @@ struct Scene {
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
-  bool rim_fixed = true;           ///< the outermost border loop of an open skin
-  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
+  bool rim_fixed = true;             ///< the outermost border loop of an open skin
+  std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::vector<Instrument> instruments;
   std::vector<Force> forces;
