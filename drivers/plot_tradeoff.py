@@ -131,17 +131,20 @@ def draw_map(name):
 
 
 def judge_estimates(rows):
-    """Markdown rows: how the estimate of each run compares with its true error, by method."""
+    """Markdown rows: how the estimate of each run compares with its true error, by method. A run
+    that is ten times its estimate away is taken to have come to another rest position."""
     print("\n| method | runs | estimate below the error | more than 10 times above | ratio, median "
-          "(5 … 95 %) |\n|---|--:|--:|--:|--:|")
+          "(5 … 95 %) | in another rest position |\n|---|--:|--:|--:|--:|--:|")
     methods = list(dict.fromkeys(row["method"] for row in rows))
     for method in [*methods, "all"]:
         own = [row for row in rows if method in ("all", row["method"])
                and row["error_mm"] > 1e-7 and row["converged"] == "1"]
         ratio = np.array([row["estimate_mm"] / row["error_mm"] for row in own])
+        elsewhere = np.sum(ratio < 0.1)
+        ratio = ratio[ratio >= 0.1]
         low, middle, high = np.percentile(ratio, [5, 50, 95])
         print(f"| {method} | {len(own)} | {np.mean(ratio < 1):.1%} | {np.mean(ratio > 10):.1%} | "
-              f"{middle:.2f} ({low:.2f} … {high:.2f}) |")
+              f"{middle:.2f} ({low:.2f} … {high:.2f}) | {elsewhere} |")
 
 
 def main():

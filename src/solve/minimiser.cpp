@@ -12,7 +12,7 @@ using base::check;
 
 namespace {
 
-constexpr double safety = 1.5;  // the estimate is this many Newton steps long
+constexpr double safety = 2;  // the estimate is this many Newton steps long
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
