@@ -49,10 +49,18 @@ Similarity shortened(const Similarity& step, double share) {
 class Icp {
  public:
   Icp(const Surface& moving, const Surface& fixed, const IcpOptions& options)
-      : fixed_(fixed), options_(options), tree_(fixed), border_(fixed.triangles.size()) {
+      : fixed_(fixed),
+        options_(options),
+        tree_(fixed),
+        border_edge_(fixed.triangles.size()),
+        border_vertex_(fixed.points.size()) {
     const EdgeTable edges(fixed.triangles);
-    for (int64_t e = 0; e < edges.edges(); ++e)
-      if (edges[e].size() == 1) border_[edges[e][0].triangle][edges[e][0].corner] = true;
+    for (int64_t e = 0; e < edges.edges(); ++e) {
+      if (edges[e].size() != 1) continue;
+      const HalfEdge& half = edges[e].front();
+      border_edge_[half.triangle][half.corner] = true;
+      border_vertex_[half.low] = border_vertex_[half.high] = true;
+    }
     std::vector<Vec3> normals(moving.points.size(), Vec3::Zero());
     for (const auto& triangle : moving.triangles) {
       const Corners t = corners(moving, triangle);
@@ -94,14 +102,17 @@ class Icp {
  private:
   double extent() const { return bounding_diagonal(fixed_.points); }
 
-  /// Whether a point of a triangle lies on an edge that no other triangle shares.
+  /// Whether a point of a triangle lies on the surface's border: on an edge that no other triangle
+  /// shares, or in an end of one.
   bool at_border(int64_t triangle, const Vec3& point) const {
-    const Corners t = corners(fixed_, fixed_.triangles[triangle]);
+    const Triangle& vertices = fixed_.triangles[triangle];
+    const Corners t = corners(fixed_, vertices);
     const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
     for (int k = 0; k < 3; ++k) {
-      const Vec3 &a = t[k], &b = t[(k + 1) % 3];
+      const Vec3 &a = t[(k + 1) % 3], &b = t[(k + 2) % 3];
       const double share = (a - point).cross(b - point).dot(normal) / normal.squaredNorm();
-      if (border_[triangle][k] && std::abs(share) < on_border) return true;
+      if (std::abs(share) < on_border && border_edge_[triangle][(k + 1) % 3]) return true;
+      if (std::abs(1 - share) < on_border && border_vertex_[vertices[k]]) return true;
     }
     return false;
   }
@@ -178,7 +189,8 @@ class Icp {
   const Surface& fixed_;
   IcpOptions options_;
   TriangleTree tree_;
-  std::vector<std::array<bool, 3>> border_;  ///< of each triangle's edges, by their first corner
+  std::vector<std::array<bool, 3>> border_edge_;  ///< of each triangle, by their first corner
+  std::vector<bool> border_vertex_;
   std::vector<Vec3> points_, normals_;
 };
 

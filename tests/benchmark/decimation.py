@@ -8,13 +8,16 @@ BIN is the folder of the built programs (default build/bin; cmake … -DREPOSE_B
 left out, in words, where Python has none."""
 
 import pathlib
+import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 
 DISTANCES = ["0.1", "0.25", "0.5", "1", "2"]
+CPU_LIMIT = 240  # seconds of one way at one distance
 VTK = """
 import sys
 from vtkmodules.vtkFiltersCore import vtkQuadricDecimation
@@ -30,16 +33,22 @@ writer.SetFileName(sys.argv[2])
 writer.SetInputConnection(decimation.GetOutputPort())
 writer.Write()
 """
-HEAD = ("| bound | by | triangles | distance to the input | CGAL's figure | the other way | CPU s "
-        "| defects |\n|--:|:--|--:|--:|--:|--:|--:|:--|\n")
+HEAD = ("| bound | by | triangles | to the input | proven | CGAL's figure | from the input | CPU s "
+        "| defects |\n|--:|:--|--:|--:|--:|--:|--:|--:|:--|\n")
+
+
+def limit_cpu():
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT))
 
 
 def cpu_of(command):
-    """CPU seconds of a command; its output is not shown."""
+    """CPU seconds of a command, and the distance that it says it proved."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL,
-                   stderr=subprocess.DEVNULL)
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, text=True, preexec_fn=limit_cpu)
+    proven = re.search(r"bound proven +(\S+)", done.stdout)
+    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    return seconds, proven.group(1) if proven else ""
 
 
 class Race:
@@ -55,13 +64,16 @@ class Race:
     def enter(self, distance, name, command, file):
         """Runs one way and adds its row; the number of triangles it left."""
         try:
-            seconds = cpu_of(command)
+            seconds, proven = cpu_of(command)
         except subprocess.CalledProcessError as error:
-            self.rows.append(f"| {distance} | {name} | failed ({error.returncode}) | | | | | |\n")
+            why = f"status {error.returncode}"
+            if -error.returncode in (signal.SIGXCPU, signal.SIGKILL):
+                why = f"stopped after {CPU_LIMIT} s"
+            self.rows.append(f"| {distance} | {name} | {why} | | | | | | |\n")
             return 0
-        triangles, lower, upper, cgal, back, defects = self.measured(file)
-        self.rows.append(f"| {distance} | {name} | {triangles} | {float(upper):.4g} | "
-                         f"{float(cgal):.4g} | {float(back):.3g} | {seconds:.1f} | {defects} |\n")
+        triangles, reached, _, cgal, back, defects = self.measured(file)
+        self.rows.append(f"| {distance} | {name} | {triangles} | {float(reached):.4f} | "
+                         f"{proven} | {float(cgal):.4f} | {float(back):.3g} | {seconds:.1f} | {defects} |\n")
         print(self.rows[-1], end="", flush=True)
         return int(triangles)
 

@@ -72,13 +72,13 @@ std::set<std::array<double, 3>> places(const Surface& surface,
 
 TEST(Decimate, distance_holds_topology_stays_and_nothing_intersects) {
   for (const unsigned seed : {1u, 2u, 3u}) {
-    const Surface input = bumpy_ball(40, 4, seed);
+    const Surface input = bumpy_ball(26, 4, seed);
     size_t before = input.triangles.size();
-    for (const double distance : {0.05, 0.3, 1.0, 3.0}) {
+    for (const double distance : {0.2, 1.0, 3.0}) {
       const Decimated result = decimated(input, distance);
       EXPECT_LE(result.to_input.upper, distance);
       EXPECT_LE(result.to_input.lower, result.to_input.upper);
-      EXPECT_LE(sampled_distance(result.surface, input, 12), result.to_input.upper);
+      EXPECT_LE(sampled_distance(result.surface, input, 8), result.to_input.upper);
       EXPECT_EQ(describe(inspect(result.surface)), "closed, 1 component, no defect");
       EXPECT_TRUE(inspect(result.surface).outward);
       EXPECT_LT(result.surface.triangles.size(), before);
@@ -121,8 +121,8 @@ TEST(Decimate, borders_and_landmarks_stay) {
 }
 
 TEST(Decimate, thin_walls_do_not_run_through_each_other) {
-  Surface outer = bumpy_ball(32, 0, 1), inner = outer;
-  for (Vec3& p : inner.points) p *= 0.996;  // a wall of 0.2 mm
+  Surface outer = bumpy_ball(24, 0, 1), inner = outer;
+  for (Vec3& p : inner.points) p *= 0.992;  // a wall of 0.4 mm
   for (auto& t : inner.triangles) turn(t);
   const Surface shell = together(outer, inner);
   ASSERT_EQ(inspect(shell).self_intersections, 0);
@@ -130,6 +130,33 @@ TEST(Decimate, thin_walls_do_not_run_through_each_other) {
   EXPECT_EQ(inspect(result.surface).self_intersections, 0);
   EXPECT_EQ(inspect(result.surface).components, 2);
   EXPECT_LT(result.surface.triangles.size(), shell.triangles.size() / 3);
+}
+
+/// A ring of n triangular prisms: three edges around its tube, which must not be pinched.
+Surface thin_ring(int n) {
+  Surface s{"ring", {}, {}};
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const double a = 2 * M_PI * i / n, b = 2 * M_PI * k / 3, r = 40 + 3 * std::cos(b);
+      s.points.emplace_back(r * std::cos(a), r * std::sin(a), 3 * std::sin(b));
+    }
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const int64_t j = (i + 1) % n, l = (k + 1) % 3;
+      s.triangles.push_back({3 * i + k, 3 * j + k, 3 * j + l});
+      s.triangles.push_back({3 * i + k, 3 * j + l, 3 * i + l});
+    }
+  return s;
+}
+
+TEST(Decimate, a_ring_stays_a_ring) {
+  const Surface input = thin_ring(60);
+  for (const double distance : {1.0, 20.0}) {
+    const Surface result = decimated(input, distance).surface;
+    EXPECT_EQ(describe(inspect(result)), "closed, 1 component, no defect");
+    EXPECT_EQ(2 * result.points.size(), result.triangles.size());  // V − E + F = 0
+    EXPECT_LT(result.triangles.size(), 150u);
+  }
 }
 
 TEST(Decimate, a_target_count_is_met_and_its_distance_measured) {
@@ -186,7 +213,7 @@ TEST(Hausdorff, a_point_inside_a_triangle_counts) {
       "lid", {{0, 0, 0}, {80, 0, 0}, {80, 50, 0}, {0, 50, 0}}, {{0, 1, 2}, {0, 2, 3}}};
   const DistanceBounds bounds = one_sided_distance(lid, valley, 1e-4);
   EXPECT_NEAR(bounds.upper, 24, 2e-4);  // 40 · 30 / 50
-  EXPECT_LE(bounds.lower, 24);
+  EXPECT_NEAR(bounds.lower, 24, 2e-4);
   EXPECT_NEAR(bounds.worst.x(), 40, 1e-2);
 }
 
@@ -195,7 +222,7 @@ TEST(Hausdorff, bounds_hold_the_densely_sampled_distance) {
     const Surface a = bumpy_ball(12, 4, seed), b = bumpy_ball(30, 4, seed + 10);
     for (const auto& [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
       const DistanceBounds bounds = one_sided_distance(*from, *to, 1e-3);
-      const double sampled = sampled_distance(*from, *to, 40);
+      const double sampled = sampled_distance(*from, *to, 25);
       EXPECT_LE(sampled, bounds.upper);
       EXPECT_NEAR(sampled, bounds.upper, 0.05);
     }

@@ -167,6 +167,21 @@ TEST(Register, icp_finds_the_place_of_a_part) {
   EXPECT_LT(difference(whole, {}), 5e-3);
 }
 
+// Half of the moving part lies beyond the fixed one's border, to which all of it would be pulled.
+TEST(Register, icp_leaves_out_what_lies_beyond_a_border) {
+  Surface fixed = sheet(40), part = sheet(40);
+  const auto side = [](Surface& s, double low, double high) {
+    std::erase_if(s.triangles, [&](const Triangle& t) {
+      return s.points[t[0]].x() < low || s.points[t[0]].x() > high;
+    });
+  };
+  side(fixed, 0, 110);
+  side(part, 50, 160);
+  const Similarity away{1, Mat3::Identity(), {1, 1, 1}};
+  const IcpResult icp = refine_by_icp(moved(part, away), fixed, {}, {.trim = 1});
+  EXPECT_LT(difference(icp.transform.after(away), {}), 0.05);
+}
+
 TEST(Register, icp_ignores_a_bump_that_the_other_lacks) {
   const Surface fixed = sheet(40);
   Surface moving = sheet(40);
