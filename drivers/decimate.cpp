@@ -4,6 +4,7 @@
 ///     repose-decimate skull.ply -triangles 5000 -output skull_5000.ply
 ///
 /// Writes a PLY. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
+#include <cmath>
 #include <cstdio>
 
 #include "repose/base/agreement.h"

@@ -5,6 +5,7 @@
 /// Writes NAME.tfm (ITK and 3D Slicer: applied to MOVING it brings it to FIXED) and NAME.ply, the
 /// moved mesh. Landmarks come as LPS from files that say LPS or RAS. Exit status: 0 done, 1 bad
 /// input (nothing written), 2 ICP did not converge (written), 3 internal error.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 

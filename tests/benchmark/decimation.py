@@ -17,7 +17,7 @@ import tempfile
 import time
 
 DISTANCES = ["0.1", "0.25", "0.5", "1", "2"]
-CPU_LIMIT = 240  # seconds of one way at one distance
+CPU_LIMIT = 60  # seconds of one way at one distance
 VTK = """
 import sys
 from vtkmodules.vtkFiltersCore import vtkQuadricDecimation
