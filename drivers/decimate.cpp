@@ -34,6 +34,10 @@ std::vector<base::Option> option_table() {
 
 surface::DecimateOptions wanted(const base::Options& options) {
   surface::DecimateOptions wanted;
+  const std::filesystem::path output = options.text("output");
+  if (output.extension() != ".ply")
+    base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
+                 output.string());
   if (!options.has("distance") && !options.has("triangles"))
     base::refuse("neither -distance nor -triangles is given; say how far, e.g. -distance 0.5 (mm)");
   if (options.has("distance")) wanted.distance = options.number("distance");

@@ -130,6 +130,9 @@ CASES = {
         ["fins.ply", "non-manifold edge", "repair"]),
     "neither distance nor count": (
         lambda p: None, ["repose-decimate", "fixed.ply"], ["-distance", "-triangles"]),
+    "output that is no PLY": (
+        lambda p: None, ["repose-decimate", "fixed.ply", "-distance", "1", "-output", "a.stl"],
+        ["a.stl", ".ply"]),
     "distance zero": (
         lambda p: None, ["repose-decimate", "fixed.ply", "-distance", "0"], ["-distance", "> 0"]),
     "two landmarks only": (
