@@ -63,9 +63,8 @@ bool cross(const Triangle& a, const Corners& a_corners, const Triangle& b,
 
 }  // namespace
 
-Collapser::Collapser(const Surface& surface, const Tolerance* tolerance, std::vector<bool> locked)
+Collapser::Collapser(const Surface& surface, std::vector<bool> locked)
     : surface_(surface),
-      tolerance_(tolerance),
       locked_(std::move(locked)),
       tree_(surface),
       star_(surface.points.size()),
@@ -269,7 +268,9 @@ int64_t Collapser::pass(int64_t target, uint64_t since, const std::function<void
   return before - alive_;
 }
 
-void Collapser::run(int64_t target, const std::function<void()>& report) {
+void Collapser::run(int64_t target, const Tolerance* tolerance,
+                    const std::function<void()>& report) {
+  tolerance_ = tolerance;
   uint64_t since = 0;
   int64_t gone = 0;
   do {

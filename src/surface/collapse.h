@@ -14,14 +14,15 @@ namespace repose::surface {
 /// surface (exact predicates). So the surface is in order after every step.
 class Collapser {
  public:
-  /// `tolerance` may be null: no bound. Locked vertices are neither moved nor removed.
-  Collapser(const Surface& surface, const Tolerance* tolerance, std::vector<bool> locked);
+  /// Locked vertices are neither moved nor removed.
+  Collapser(const Surface& surface, std::vector<bool> locked);
 
   int64_t triangles() const { return alive_; }
 
   /// Collapses edges, that of the least quadric error first, until `target` triangles are left or
-  /// no edge can be collapsed. `report` is called now and then.
-  void run(int64_t target, const std::function<void()>& report);
+  /// no edge can be collapsed within the tolerance (null: none). `report` is called now and then.
+  /// May be called again with a wider tolerance.
+  void run(int64_t target, const Tolerance* tolerance, const std::function<void()>& report);
 
   Surface result() const;
 
@@ -52,7 +53,7 @@ class Collapser {
   int64_t pass(int64_t target, uint64_t since, const std::function<void()>& report);
 
   Surface surface_;
-  const Tolerance* tolerance_;
+  const Tolerance* tolerance_ = nullptr;
   std::vector<bool> locked_;
   TriangleTree tree_;
   std::vector<std::vector<int64_t>> star_;  ///< vertex → triangles

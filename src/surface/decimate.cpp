@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "collapse.h"
 #include "edges.h"
@@ -17,6 +16,8 @@ namespace {
 constexpr double proof_accuracy = 5e-4;
 /// The distances of a result without a bound are known to this share of the input's extent.
 constexpr double measure_accuracy = 1e-5;
+/// Of the input's extent: the first and the last tolerance on the way to a count.
+constexpr double first_share = 5e-4, last_share = 0.1;
 
 std::vector<bool> border_vertices(const Surface& surface) {
   std::vector<bool> at_border(surface.points.size(), false);
@@ -54,6 +55,27 @@ void measure(Decimated& decimated, const Surface& input, double distance) {
                                           input.name, distance, decimated.to_input.upper));
 }
 
+/// For a count alone the tolerance widens step by step, so that the distance stays small: the least
+/// quadric error first says little about the worst point.
+void collapse(Collapser& collapser, const Surface& surface, const DecimateOptions& options,
+              const std::function<void(int64_t)>& report) {
+  const TriangleTree tree(surface);
+  const double extent = bounding_diagonal(surface.points);
+  const auto run = [&](const Tolerance* tolerance) {
+    collapser.run(options.triangles, tolerance, [&] { report(collapser.triangles()); });
+  };
+  if (std::isfinite(options.distance)) {
+    const Tolerance tolerance(tree, (1 - proof_accuracy) * options.distance, extent);
+    return run(&tolerance);
+  }
+  for (double distance = first_share * extent; distance < last_share * extent; distance *= 2) {
+    if (collapser.triangles() <= options.triangles) return;
+    const Tolerance tolerance(tree, distance, extent);
+    run(&tolerance);
+  }
+  run(nullptr);
+}
+
 }  // namespace
 
 Decimated decimate(const Surface& surface, const DecimateOptions& options,
@@ -65,13 +87,8 @@ Decimated decimate(const Surface& surface, const DecimateOptions& options,
     locked[vertex] = true;
     decimated.landmark_distance.push_back((surface.points[vertex] - landmark).norm());
   }
-  const TriangleTree tree(surface);
-  std::optional<Tolerance> tolerance;
-  if (std::isfinite(options.distance))
-    tolerance.emplace(tree, (1 - proof_accuracy) * options.distance,
-                      bounding_diagonal(surface.points));
-  Collapser collapser(surface, tolerance ? &*tolerance : nullptr, std::move(locked));
-  collapser.run(options.triangles, [&] { report(collapser.triangles()); });
+  Collapser collapser(surface, std::move(locked));
+  collapse(collapser, surface, options, report);
   decimated.surface = collapser.result();
   check_intersections(decimated.surface, surface);
   measure(decimated, surface, options.distance);
