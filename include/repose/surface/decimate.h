@@ -11,7 +11,9 @@ namespace repose::surface {
 struct DecimateOptions {
   /// Largest one-sided Hausdorff distance of the result to the input, mm; ∞: no bound.
   double distance = std::numeric_limits<double>::infinity();
-  int64_t triangles = 0;             ///< stop when this many are left
+  /// Stop when this many are left. Without a distance the tolerance widens step by step until then,
+  /// so that the count costs little distance.
+  int64_t triangles = 0;
   std::vector<Vec3> landmarks = {};  ///< the vertex nearest to each stays where it is, mm
 };
 
