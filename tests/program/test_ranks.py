@@ -14,10 +14,13 @@ forces:
 
 
 def check_same(one, many):
-    """Models equal in every byte, steps equal to rounding."""
+    """Models equal in every byte but for rest lengths, which a solve over the ranks balances: they,
+    and the steps, equal to rounding."""
     model, other = model_of(one), model_of(many)
     assert model.keys() == other.keys()
-    assert [name for name in model if model[name].tobytes() != other[name].tobytes()] == []
+    different = [name for name in model if model[name].tobytes() != other[name].tobytes()]
+    assert different in ([], ["spring/rest_length"])
+    assert np.abs(model["spring/rest_length"] - other["spring/rest_length"]).max() < 1e-11
     assert len(steps(one)) == len(steps(many))
     rounding = 1e-12 * abs(last(one)["objective"])
     for here, there in zip(steps(one), steps(many)):

@@ -47,6 +47,11 @@ TEST(Landmarks, RasAndLpsDifferByTwoSigns) {
                 {-1.5, 2, 30});
 }
 
+TEST(Landmarks, OurOwnJsonIsLpsAndMayHoldMore) {
+  expect_chin(read("a.json", R"({"units": "mm", "chin": [1.5, -2, 30], "axis": {"angle": 8}})"),
+              {1.5, -2, 30});
+}
+
 TEST(Landmarks, ColumnsOfFcsvMayStandElsewhere) {
   expect_chin(read("a.fcsv",
                    "# CoordinateSystem = LPS\n# columns = label,id,x,y,z\n"
@@ -87,7 +92,9 @@ TEST(Landmarks, BadFilesAreRefusedInOneLine) {
     EXPECT_NE(said.find(word), std::string::npos) << said;
   };
   expect(refused("a.mrk.json", "{\"markups\": ["), "not valid JSON");
-  expect(refused("a.json", "{\"chin\": [1, 2, 3]}"), "markups");
+  expect(refused("a.json", "{\"chin\": [1, 2]}"), "markups");
+  expect(refused("a.json", "{\"chin\": [1, 2, \"x\"]}"), "a.json:1:");
+  expect(refused("a.json", "[1, 2, 3]"), "markups");
   expect(refused("a.mrk.json", markups(lps, "")), "no landmark");
   expect(refused("a.mrk.json", markups(lps, R"({"label": "chin", "position": [1, 2]})")),
          "three numbers");

@@ -538,7 +538,7 @@ TEST(SceneRefuses, OsteotomiesAndLandmarks) {
       {"moves: [{bone: skull, landmark: [{from: [0,0,0], to: [0,0,1]}, {from: [0,0,0], to: "
        "[1,1,1]}]}]\n",
        "moves[0].landmark is refused: two landmarks in one place fix no turn"},
-      {"landmarks: face.ply\n", "face.ply: holds no landmark"},
+      {"landmarks: face.ply\n", "face.ply: the ending is none of .mrk.json"},
       {"collision: {mode: stopp}\n", "collision.mode must be one of report, stop, clamp"},
   });
   const std::string unknown = refusal([] { landmark_move("landmark: {from: chim, to: left}"); });
