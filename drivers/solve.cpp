@@ -14,6 +14,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/model/build.h"
+#include "repose/model/cut.h"
 #include "repose/results/model_file.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
@@ -95,6 +96,7 @@ struct Job {
   std::string building;                    // what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;  // points of each instrument, on rank 0
   std::vector<model::Slider> sliders;      // on rank 0
+  std::vector<model::Cut> cuts;            // on rank 0
 };
 
 /// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
@@ -106,6 +108,18 @@ void bring_into_equilibrium(const scene::Scene& scene, Job& job) {
   const solve::Recording recording{
       scene.tissue.turgor, scene.scan_gravity.value_or(scene.gravity.value_or(Vec3::Zero()))};
   job.building += solve::describe_prestress(solve::prestress(comm, job.model, recording));
+}
+
+/// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut.
+void make_incisions(Job& job) {
+  base::on_first_rank(comm, [&] {
+    for (const model::Cut& cut : job.cuts) {
+      const size_t doubled = model::cut_along(cut, job.model).size();
+      job.building += solve::describe_cut(cut, static_cast<int64_t>(doubled));
+      job.initial_equilibrium = false;
+    }
+  });
+  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
 }
 
 Job read_job(const std::filesystem::path& input) {
@@ -121,10 +135,12 @@ Job read_job(const std::filesystem::path& input) {
     job.model = std::move(built.model);
     job.held = std::move(built.held);
     job.sliders = std::move(built.sliders);
+    job.cuts = std::move(built.cuts);
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
   bring_into_equilibrium(scene, job);
+  make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
     job.wanted.bulk_modulus = 10 * model::effective_modulus(job.model);
   double bulk_modulus = job.wanted.bulk_modulus.value_or(0);

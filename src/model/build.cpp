@@ -85,11 +85,16 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   require_one_of_each(scene, bones);
   const std::vector<double> depths = layer_depths(scene.tissue);
   SkinMesh mesh = make_skin_mesh(skin);
+  BuiltModel built;
+  if (!scene.incisions.empty()) {
+    surface::Surface refined = skin;
+    built.cuts = insert_paths(scene.incisions, scene.file.string(), refined);
+    mesh = make_skin_mesh(refined);
+  }
   const BoneField field(bones);
   require_same_place(skin, bones, field);
   const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);
 
-  BuiltModel built;
   if (face_outwards(nearest, mesh))
     built.report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));

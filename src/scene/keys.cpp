@@ -267,16 +267,14 @@ std::vector<Key> instrument_keys() {
           {"instruments[].mesh", file, "", "Shape: a closed triangle mesh."}};
 }
 
-std::vector<Key> later_keys() {
-  return {{"incisions", not_modelled, "", "cut the mesh of the skin beforehand"}};
-}
-
-/// The column "value" of the documentation.
-std::string value_column(const Key& key) { return key.kind == not_modelled ? "–" : wanted(key); }
-
-std::string sentence_column(const Key& key) {
-  if (key.kind != not_modelled) return key.sentence;
-  return fmt::format("Refused: this version does not model it; {}.", key.sentence);
+std::vector<Key> incision_keys() {
+  return {{"incisions", list, "", "Cuts in the skin along a path, made in the stressed face."},
+          {"incisions[].path", curve, "required",
+           "Where the cut runs, within 5 mm of the skin: points, or 3D Slicer's .mrk.json."},
+          {"incisions[].path[]", vector, "", "One of the points.", "mm"},
+          {"incisions[].layers", integer, "required",
+           "How many point layers it parts, from the skin down; at most tissue.layers.", "",
+           Range::between(1, 64)}};
 }
 
 }  // namespace
@@ -286,7 +284,7 @@ const std::vector<Key>& all_keys() {
     std::vector<Key> rows;
     for (const auto& part :
          {surface_keys(), tissue_keys(), spring_keys(), load_keys(), osteotomy_keys(), move_keys(),
-          collision_keys(), instrument_keys(), solve_keys(), later_keys()})
+          collision_keys(), instrument_keys(), incision_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();
@@ -343,8 +341,8 @@ std::string wanted(const Key& key) {
       return "a file or a folder of DICOM slices, relative to the scene's folder";
     case transform:
       return "a file, a 4×4 matrix, or a list";
-    case not_modelled:
-      return "nothing";
+    case curve:
+      return "a list of points [x, y, z] of mm, or a file, relative to the scene's folder";
   }
   return {};
 }
@@ -352,8 +350,8 @@ std::string wanted(const Key& key) {
 std::string describe_keys() {
   std::string text = "| key | value | default | meaning |\n|---|---|---|---|\n";
   for (const Key& key : all_keys())
-    text += fmt::format("| `{}` | {} | {} | {} |\n", key.path, value_column(key),
-                        key.standard.empty() ? "–" : key.standard, sentence_column(key));
+    text += fmt::format("| `{}` | {} | {} | {} |\n", key.path, wanted(key),
+                        key.standard.empty() ? "–" : key.standard, key.sentence);
   return text;
 }
 

@@ -2,6 +2,7 @@
 #include <map>
 
 #include "bone_names.h"
+#include "read_incisions.h"
 #include "read_instruments.h"
 #include "read_moves.h"
 #include "read_osteotomies.h"
@@ -218,6 +219,8 @@ void read_surroundings(Scene& scene, const Map& map) {
   if (const auto boundary = map.find("boundary"))
     if (const auto rim = Map(*boundary).find("rim")) scene.rim_fixed = rim->choice() == 0;
   if (const auto bodies = map.find("instruments")) scene.instruments = read_instruments(*bodies);
+  if (const auto cuts = map.find("incisions"))
+    scene.incisions = read_incisions(*cuts, scene.tissue.layers);
   if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);
 }
 

@@ -187,10 +187,6 @@ Map::Map(const Value& value) : itself_(value), entries_(value.entries()) {
 void Map::check_known(const Value::Entry& entry) const {
   for (const Key* key : keys_below(itself_.path_)) {
     if (last_word(key->path) != entry.name) continue;
-    if (key->kind == KeyKind::not_modelled)
-      base::refuse("{}:{}:{}: this version does not model {}; remove it or {}",
-                   itself_.file_->string(), entry.mark.line + 1, entry.mark.column + 1,
-                   joined(itself_.place_, entry.name), key->sentence);
     if (!entry.value.IsNull()) return;
     itself_.refuse_at(entry.mark, fmt::format("has no value for '{}': give {}, or remove the key",
                                               entry.name, wanted(*key)));

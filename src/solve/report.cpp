@@ -57,6 +57,11 @@ std::string describe_build(const model::BuildReport& r) {
   return text;
 }
 
+std::string describe_cut(const model::Cut& cut, int64_t doubled) {
+  return row("incision", fmt::format("along {} edges of the skin, {} points doubled in {} layers",
+                                     cut.columns.size() - 1, doubled, cut.layers));
+}
+
 std::string describe_prestress(const Prestress& p) {
   return row("initial equilibrium",
              fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",

@@ -45,6 +45,9 @@ model::Model build(const scene::Scene& scene, const Way& way) {
   if (way.layers != scene.tissue.layers && by_layer)
     base::refuse("{}: tissue.depths and tissue.mass are for {} layers; -layers cannot vary them",
                  scene.file.string(), scene.tissue.layers);
+  if (!scene.incisions.empty())
+    base::refuse("{}: incisions are not compared; take the key out for this study",
+                 scene.file.string());
   scene::Scene wanted = scene;
   wanted.tissue.layers = way.layers;
   return model::build_model(wanted).model;

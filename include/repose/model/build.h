@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "repose/model/cut_path.h"
 #include "repose/model/instruments.h"
 #include "repose/model/model.h"
 #include "repose/scene/scene.h"
@@ -26,6 +27,7 @@ struct BuiltModel {
   BuildReport report;
   std::vector<std::vector<int64_t>> held;  ///< [instruments] rows of the points that each holds
   std::vector<Slider> sliders;             ///< those on which the skin slides
+  std::vector<Cut> cuts;  ///< the incisions, not made yet: cut_along after the prestress (cut.h)
 };
 
 /// Scene and surfaces to model: columns, layers, springs, prisms, sets, attachment. `bones` in the

@@ -23,7 +23,7 @@ enum class KeyKind {
   mesh,         ///< a file, or a map that names a volume
   volume,       ///< a file, or a folder of DICOM slices
   transform,    ///< a file, a 4×4 matrix, or a list of forms
-  not_modelled  ///< known, and refused: this version does not model it
+  curve         ///< a list of [x, y, z], or a file of landmarks
 };
 
 struct Key {
@@ -31,7 +31,7 @@ struct Key {
       path;  ///< "tissue.layers"; [] stands for an item of a list, * for a name of one's own
   KeyKind kind;
   std::string standard;  ///< default as written in a file, "required", or empty: not modelled
-  std::string sentence;  ///< what it is; for not_modelled: what to do instead
+  std::string sentence;  ///< what it is
   std::string unit{};
   base::Range range{};                 ///< of a number, or of each of several
   std::vector<std::string> choices{};  ///< words; for a number those that may stand in its place

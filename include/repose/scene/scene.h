@@ -123,6 +123,12 @@ struct Instrument {
   bool slide = false;  ///< the skin slides on it without friction instead of sticking to it
 };
 
+/// A cut in the skin.
+struct Incision {
+  std::vector<Vec3> path;  ///< mm, at least two points on or near the skin
+  int layers;              ///< point layers that it parts, from the skin down, ≥ 1
+};
+
 struct Solve {
   Functional functional = Functional::energy;
   std::optional<VolumeForm> volume;    ///< unset: penalty; with functional force none
@@ -153,6 +159,7 @@ struct Scene {
   std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::vector<Instrument> instruments;
+  std::vector<Incision> incisions;
   std::vector<Force> forces;
   Solve solve;
   std::vector<std::string> remarks;  ///< lines for a person

@@ -14,6 +14,8 @@ std::string describe_model(const model::Model& model);
 
 /// What the builder did: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
+/// An incision and how many points it doubled.
+std::string describe_cut(const model::Cut& cut, int64_t doubled);
 
 /// The initial equilibrium in one row.
 std::string describe_prestress(const Prestress& prestress);

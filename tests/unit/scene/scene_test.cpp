@@ -549,9 +549,27 @@ TEST(SceneRefuses, OsteotomiesAndLandmarks) {
       << unknown;
 }
 
-TEST(SceneRefuses, WhatThisVersionDoesNotModel) {
+TEST(Scene, IncisionsAsPointsOrACurve) {
+  const Scene scene =
+      read(fmt::format("{}incisions:\n  - {{path: [[1, 2, 3], [4, 5, 6]], layers: 1}}\n"
+                       "  - {{path: {}/head.mrk.json, layers: 2}}\n",
+                       minimal, REPOSE_MESHES));
+  ASSERT_EQ(scene.incisions.size(), 2u);
+  EXPECT_EQ(scene.incisions[0].path, (std::vector<Vec3>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(scene.incisions[0].layers, 1);
+  EXPECT_GT(scene.incisions[1].path.size(), 2u);
+}
+
+TEST(SceneRefuses, WhatCannotBe) {
   expect_refused({
-      {"incisions:\n", "6:1: this version does not model incisions; remove it or"},
+      {"incisions:\n  - {path: [[1, 2, 3]], layers: 1}\n",
+       "incisions[0].path must have two points at least, it has 1"},
+      {"incisions:\n  - {path: [[1, 2], [3, 4]], layers: 1}\n",
+       "incisions[0].path[0] must be three numbers [x, y, z] of mm"},
+      {"incisions:\n  - {path: [[1, 2, 3], [4, 5, 6]], layers: 65}\n",
+       "incisions[0].layers must be a whole number, 1 … 64, it is '65'"},
+      {"incisions:\n  - {path: [[1, 2, 3], [4, 5, 6]], layers: 60}\n",
+       "incisions[0].layers must be a whole number, 1 … 4, as tissue.layers is, it is 60"},
       {"gravity: [0, 0, -9.8]\n",
        "6:10: gravity needs a mass to pull; give tissue.mass or tissue.density"},
   });
@@ -652,8 +670,6 @@ TEST(Keys, DescribedInMarkdown) {
   const std::string table = describe_keys();
   EXPECT_NE(table.find("| `tissue.free_thickness` | a number of mm, > 0 | 12 |"), std::string::npos)
       << table;
-  EXPECT_NE(table.find("| `incisions` | – | – | Refused: this version does not model it"),
-            std::string::npos);
   const auto lines = std::count(table.begin(), table.end(), '\n');
   EXPECT_EQ(lines, static_cast<long>(all_keys().size()) + 2);
 }

@@ -1,0 +1,205 @@
+#include "repose/model/cut_path.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <optional>
+#include <set>
+
+#include "repose/base/error.h"
+#include "repose/model/split_mesh.h"
+#include "repose/surface/distance.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double reach = 5;      // mm from the skin
+constexpr double snap = 0.1;     // of an edge: nearer than this the path goes to its end
+constexpr double spacing = 0.5;  // of an edge, between points of the path
+
+using Chain = std::vector<int64_t>;
+
+std::string shown(const Vec3& x) {
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", x[0], x[1], x[2]);
+}
+
+Vec3 unit_normal(const SplitMesh& mesh, int64_t row) {
+  const auto& [a, b, c] = mesh.triangle(row);
+  return (mesh.point(b) - mesh.point(a)).cross(mesh.point(c) - mesh.point(a)).normalized();
+}
+
+Vec3 vertex_normal(const SplitMesh& mesh, int64_t vertex) {
+  Vec3 sum = Vec3::Zero();
+  for (const int64_t row : mesh.triangles_of(vertex)) sum += unit_normal(mesh, row);
+  return sum.normalized();
+}
+
+/// Weights of a triangle's corners at a point in its plane.
+Vec3 barycentric(const SplitMesh& mesh, int64_t row, const Vec3& x) {
+  const auto& [a, b, c] = mesh.triangle(row);
+  Eigen::Matrix<double, 3, 2> sides;
+  sides << mesh.point(b) - mesh.point(a), mesh.point(c) - mesh.point(a);
+  const Eigen::Vector2d w = sides.colPivHouseholderQr().solve(x - mesh.point(a));
+  return {1 - w.sum(), w[0], w[1]};
+}
+
+/// Makes a path of edges out of one incision.
+class PathCutter {
+ public:
+  PathCutter(std::string place, surface::Surface& skin, std::set<int64_t>& taken,
+             std::set<std::array<int64_t, 2>>& taken_edges)
+      : place_(std::move(place)), skin_(skin), mesh_(skin), taken_(taken), edges_(taken_edges) {}
+
+  Chain cut(const std::vector<Vec3>& path) {
+    Chain stops;
+    for (const Vec3& x : on_skin(path)) {
+      const int64_t vertex = insert(x);
+      if (stops.empty() || stops.back() != vertex) stops.push_back(vertex);
+    }
+    if (stops.size() < 2) refuse_short(path);
+    take(stops.front());
+    for (size_t i = 0; i + 1 < stops.size(); ++i) run(stops[i], stops[i + 1]);
+    if (chain_.size() < 3) refuse_short(path);
+    return chain_;
+  }
+
+ private:
+  template <class... Args>
+  [[noreturn]] void refuse(fmt::format_string<Args...> format, Args&&... args) const {
+    base::refuse("{}: {}", place_, fmt::format(format, std::forward<Args>(args)...));
+  }
+  [[noreturn]] void refuse_short(const std::vector<Vec3>& path) const {
+    refuse(
+        "the path from {} to {} is no longer than an edge of the skin there; lengthen it or "
+        "refine the skin",
+        shown(path.front()), shown(path.back()));
+  }
+
+  /// The points of the path, put on the skin, without those that lie too close together.
+  std::vector<Vec3> on_skin(const std::vector<Vec3>& path) const {
+    const surface::DistanceTree tree(skin_);
+    std::vector<Vec3> kept;
+    double length = 0, edge = 0;
+    std::optional<Vec3> before;
+    for (size_t i = 0; i < path.size(); ++i) {
+      const auto foot = tree.nearest(path[i]);
+      if (foot.distance > reach)
+        refuse(
+            "point {} of the path, {}, is {:.1f} mm from the skin, allowed are {} mm; put the "
+            "path on the skin",
+            i, shown(path[i]), foot.distance, reach);
+      if (before) length += (foot.point - *before).norm();
+      before = foot.point;
+      edge = mesh_.edge_length(foot.triangle);
+      const auto close = [&] { return (foot.point - kept.back()).norm() < spacing * edge; };
+      const bool last = i + 1 == path.size();
+      if (last && kept.size() > 1 && close()) kept.pop_back();
+      if (last || kept.empty() || !close()) kept.push_back(foot.point);
+    }
+    if (!(length > edge)) refuse_short(path);
+    return kept;
+  }
+
+  /// Splits what lies at a point of the skin, so that it is a vertex; an edge or vertex near by
+  /// takes its place.
+  int64_t insert(const Vec3& x) {
+    const surface::DistanceTree tree(skin_);
+    const int64_t row = tree.nearest(x).triangle;
+    const Triangle t = mesh_.triangle(row);
+    const Vec3 weight = barycentric(mesh_, row, x);
+    Eigen::Index largest = 0, least = 0;
+    if (weight.maxCoeff(&largest) > 1 - snap) return t[largest];
+    if (weight.minCoeff(&least) > snap) return mesh_.split_triangle(row, x);
+    const int64_t a = t[(least + 1) % 3], b = t[(least + 2) % 3];
+    const double w = weight[(least + 2) % 3] / (1 - weight[least]);
+    return on_edge(a, b, std::clamp(w, 0.0, 1.0));
+  }
+
+  /// The vertex at the fraction `w` of an edge from a to b: one of its ends, or a new one.
+  int64_t on_edge(int64_t a, int64_t b, double w) {
+    if (w < snap) return a;
+    if (w > 1 - snap) return b;
+    if (edges_.contains({std::min(a, b), std::max(a, b)})) refuse_meeting(mesh_.point(a));
+    return mesh_.split_edge(a, b, (1 - w) * mesh_.point(a) + w * mesh_.point(b));
+  }
+
+  [[noreturn]] void refuse_lost(const Vec3& from, const Vec3& to) const {
+    refuse(
+        "the path leaves the skin near {} on its way to {}; keep it inside its rim, and give "
+        "more points where the skin bends",
+        shown(from), shown(to));
+  }
+
+  [[noreturn]] void refuse_meeting(const Vec3& at) const {
+    refuse("the path meets itself or another incision near {}; cuts must not cross or touch",
+           shown(at));
+  }
+
+  void take(int64_t vertex) {
+    if (mesh_.on_border(vertex))
+      refuse("the path comes to the rim of the skin near {}; keep it inside",
+             shown(mesh_.point(vertex)));
+    if (!taken_.insert(vertex).second) refuse_meeting(mesh_.point(vertex));
+    if (!chain_.empty())
+      edges_.insert({std::min(chain_.back(), vertex), std::max(chain_.back(), vertex)});
+    chain_.push_back(vertex);
+  }
+
+  /// Goes on along the skin from one vertex to another.
+  void run(int64_t from, int64_t to) {
+    const Vec3 normal = (vertex_normal(mesh_, from) + vertex_normal(mesh_, to)).normalized();
+    const size_t most = chain_.size() + skin_.triangles.size();
+    while (!mesh_.has_edge(chain_.back(), to)) {
+      if (chain_.size() > most) refuse_lost(mesh_.point(from), mesh_.point(to));
+      take(next(chain_.back(), to, normal));
+    }
+    take(to);
+  }
+
+  /// Where the plane through two vertices along `normal` leaves the triangles around the first.
+  int64_t next(int64_t vertex, int64_t to, const Vec3& normal) {
+    const Vec3 &here = mesh_.point(vertex), way = mesh_.point(to) - here;
+    const Vec3 across = normal.cross(way), ahead = across.cross(normal);
+    struct {
+      double ahead = 0, w = 0;
+      int64_t a = -1, b = -1;
+    } best;
+    for (const int64_t row : mesh_.triangles_of(vertex)) {
+      const Triangle& t = mesh_.triangle(row);
+      const auto corner = std::find(t.begin(), t.end(), vertex) - t.begin();
+      const int64_t a = t[(corner + 1) % 3], b = t[(corner + 2) % 3];
+      const double of_a = (mesh_.point(a) - here).dot(across),
+                   of_b = (mesh_.point(b) - here).dot(across);
+      if ((of_a > 0) == (of_b > 0)) continue;
+      const double w = of_a / (of_a - of_b);
+      const Vec3 out = (1 - w) * mesh_.point(a) + w * mesh_.point(b) - here;
+      const double forward = out.dot(ahead) / out.norm();
+      if (forward > best.ahead) best = {forward, w, a, b};
+    }
+    if (best.a < 0) refuse_lost(here, mesh_.point(to));
+    return on_edge(best.a, best.b, best.w);
+  }
+
+  std::string place_;
+  surface::Surface& skin_;
+  SplitMesh mesh_;
+  std::set<int64_t>& taken_;                 // vertices of all paths so far
+  std::set<std::array<int64_t, 2>>& edges_;  // their edges, lower vertex first
+  Chain chain_;
+};
+
+}  // namespace
+
+std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
+                              const std::string& scene_file, surface::Surface& skin) {
+  std::vector<Cut> cuts;
+  std::set<int64_t> taken;
+  std::set<std::array<int64_t, 2>> edges;
+  for (size_t i = 0; i < incisions.size(); ++i) {
+    PathCutter cutter(fmt::format("{}: incisions[{}]", scene_file, i), skin, taken, edges);
+    cuts.push_back({cutter.cut(incisions[i].path), incisions[i].layers});
+  }
+  return cuts;
+}
+
+}  // namespace repose::model

@@ -1,0 +1,37 @@
+#include "read_incisions.h"
+
+#include "repose/scene/landmarks.h"
+
+namespace repose::scene {
+namespace {
+
+std::vector<Vec3> read_path(const Value& value) {
+  std::vector<Vec3> path;
+  if (value.is_list())
+    for (const Value& point : value.items()) path.push_back(point.vector());
+  else
+    for (const Landmark& point : read_landmarks(value.file())) path.push_back(point.position);
+  if (path.size() < 2)
+    value.refuse("must have two points at least, it has {}; give where the cut begins and ends",
+                 path.size());
+  return path;
+}
+
+Incision read_incision(const Map& map, int layers) {
+  const Value depth = map.at("layers");
+  const Incision incision{read_path(map.at("path")), depth.integer()};
+  if (incision.layers > layers)
+    depth.refuse("must be a whole number, 1 … {}, as tissue.layers is, it is {}", layers,
+                 incision.layers);
+  return incision;
+}
+
+}  // namespace
+
+std::vector<Incision> read_incisions(const Value& list, int layers) {
+  std::vector<Incision> incisions;
+  for (const Value& item : list.items()) incisions.push_back(read_incision(Map(item), layers));
+  return incisions;
+}
+
+}  // namespace repose::scene

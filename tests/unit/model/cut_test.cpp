@@ -1,0 +1,186 @@
+#include "repose/model/cut.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <numeric>
+
+#include "patches.h"
+#include "repose/base/error.h"
+#include "repose/model/build.h"
+
+namespace repose::model {
+namespace {
+
+const surface::Surface kBone = patches::box({-30, -30, -25}, {130, 130, -10});
+
+scene::Scene cut_scene(int layers, std::vector<scene::Incision> incisions) {
+  scene::Scene scene = patches::scene_of(4, {"jaw"});
+  scene.tissue.layers = layers;
+  scene.tissue.density = 1e-6;
+  scene.incisions = std::move(incisions);
+  return scene;
+}
+
+double area(const surface::Surface& s) {
+  double sum = 0;
+  for (const auto& [a, b, c] : s.triangles)
+    sum += 0.5 * (s.points[b] - s.points[a]).cross(s.points[c] - s.points[a]).norm();
+  return sum;
+}
+
+std::string refusal(const std::vector<scene::Incision>& incisions) {
+  surface::Surface skin = patches::square(6, 60);
+  try {
+    insert_paths(incisions, "scene.yaml", skin);
+  } catch (const base::InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// The distance of a point from a segment in the plane.
+double off(const Vec3& x, const Vec3& a, const Vec3& b) {
+  return ((b - a).normalized().cross(x - a)).norm();
+}
+
+TEST(CutPath, runs_straight_between_its_points_on_edges_of_the_skin) {
+  surface::Surface skin = patches::square(6, 60);
+  const Vec3 a(13.7, 22.3, 0), b(41.9, 35.2, 0);
+  const std::vector<Cut> cuts = insert_paths({{{a, b}, 2}}, "scene.yaml", skin);
+  const SkinMesh mesh = make_skin_mesh(skin);
+  const std::vector<int64_t>& path = cuts[0].columns;
+  EXPECT_EQ(skin.points[path.front()], a);
+  EXPECT_EQ(skin.points[path.back()], b);
+  EXPECT_NEAR(area(skin), 3600, 1e-9);
+  double length = 0;
+  for (size_t i = 0; i + 1 < path.size(); ++i) {
+    const std::array<int64_t, 2> edge = {std::min(path[i], path[i + 1]),
+                                         std::max(path[i], path[i + 1])};
+    EXPECT_NE(std::find(mesh.edges.begin(), mesh.edges.end(), edge), mesh.edges.end());
+    EXPECT_LT(off(skin.points[path[i]], a, b), 1.5) << "a tenth of an edge";
+    length += mesh.edge_length(std::find(mesh.edges.begin(), mesh.edges.end(), edge) -
+                               mesh.edges.begin());
+  }
+  EXPECT_NEAR(length, (b - a).norm(), 0.5);
+}
+
+TEST(CutPath, follows_a_curved_skin) {
+  surface::Surface skin = patches::sphere(50, 3);
+  const double before = area(skin);
+  const std::vector<Cut> cuts =
+      insert_paths({{{{50, 0, 3}, {35, 35, 5}, {0, 50, 4}}, 1}}, "scene.yaml", skin);
+  EXPECT_NEAR(area(skin), before, 1e-9 * before);
+  EXPECT_TRUE(make_skin_mesh(skin).border_loops.empty());
+  for (const int64_t v : cuts[0].columns) EXPECT_NEAR(skin.points[v].z(), 4, 2.5);
+  EXPECT_GT(cuts[0].columns.size(), 8u);
+}
+
+TEST(CutPath, refuses_what_cannot_be_cut) {
+  const auto says = [](const std::vector<scene::Incision>& incisions, const std::string& part) {
+    const std::string text = refusal(incisions);
+    EXPECT_NE(text.find(part), std::string::npos) << text << "\n lacks " << part;
+    EXPECT_EQ(text.find("scene.yaml: incisions["), 0u) << text;
+  };
+  says({{{{15, 15, 0}, {15, 30, 7}}, 1}}, "7.0 mm from the skin, allowed are 5 mm");
+  says({{{{15, 15, 0}, {63, 30, 0}}, 1}}, "comes to the rim");
+  says({{{{15, 0, 0}, {45, 0, 0}}, 1}}, "comes to the rim");
+  says({{{{15, 15, 0}, {20, 15, 0}}, 1}}, "no longer than an edge");
+  const std::vector<Vec3> loop = {{12, 12, 0}, {48, 13, 0}, {47, 40, 0}, {30, 41, 0}, {29, 5, 0}};
+  says({{loop, 1}}, "meets itself");
+  says({{{{15, 15, 0}, {45, 45, 0}}, 1}, {{{15, 44, 0}, {45, 16, 0}}, 1}}, "incisions[1]");
+}
+
+class CutAlong : public testing::Test {
+ protected:
+  void make(int layers, int depth) {
+    built_ =
+        build_model(cut_scene(layers, {{{{13.7, 22.3, 0}, {30, 29, 0}, {41.9, 25.2, 0}}, depth}}),
+                    patches::square(6, 60), {kBone});
+    before_ = built_.model;
+    pairs_ = cut_along(built_.cuts[0], built_.model);
+  }
+  BuiltModel built_;
+  Model before_;
+  std::vector<std::array<int64_t, 2>> pairs_;
+};
+
+double sum(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+TEST_F(CutAlong, doubles_the_points_down_to_the_depth_and_leaves_the_tips) {
+  make(4, 2);
+  const auto inner = static_cast<int64_t>(built_.cuts[0].columns.size()) - 2;
+  EXPECT_EQ(static_cast<int64_t>(pairs_.size()), 2 * inner);
+  const Points& p = built_.model.points;
+  EXPECT_EQ(p.position.size(), before_.points.position.size() + pairs_.size());
+  for (const auto& [row, twin] : pairs_) {
+    EXPECT_GE(twin, static_cast<int64_t>(before_.points.position.size()));
+    EXPECT_EQ(p.position[row], p.position[twin]);
+    EXPECT_EQ(p.layer[row], p.layer[twin]);
+    EXPECT_EQ(p.column[row], p.column[twin]);
+    EXPECT_LT(p.layer[row], 2);
+    for (const int64_t tip : {built_.cuts[0].columns.front(), built_.cuts[0].columns.back()})
+      EXPECT_NE(p.column[row], tip);
+  }
+  EXPECT_NO_THROW(validate(built_.model, "cut"));
+}
+
+TEST_F(CutAlong, keeps_mass_stiffness_and_volume_in_total) {
+  make(4, 3);
+  const Model& m = built_.model;
+  EXPECT_NEAR(sum(m.points.mass), sum(before_.points.mass), 1e-12);
+  EXPECT_NEAR(sum(m.springs.stiffness), sum(before_.springs.stiffness), 1e-9);
+  EXPECT_EQ(m.prisms.rest_volume, before_.prisms.rest_volume);
+  EXPECT_EQ(m.skin.size(), before_.skin.size());
+  EXPECT_GT(m.springs.points.size(), before_.springs.points.size());
+  EXPECT_TRUE(std::is_sorted(m.springs.set.begin(), m.springs.set.end()));
+  for (const double k : m.springs.stiffness) EXPECT_GT(k, 0);
+}
+
+/// Nothing joins the two sides: of each doubled pair one point belongs to elements that lie left of
+/// the path only, the other to elements that lie right of it only.
+TEST_F(CutAlong, parts_all_that_crossed_it) {
+  make(4, 3);
+  const Model& m = built_.model;
+  std::vector<int> side(m.points.position.size(), 0);  // 1 right, 2 left
+  for (const auto& [row, twin] : pairs_) side[row] = 1, side[twin] = 2;
+  const auto once = [&](const auto& element) {
+    int seen = 0;
+    for (const int64_t row : element) seen |= side[row];
+    EXPECT_NE(seen, 3);
+    return seen;
+  };
+  for (const auto& ends : m.springs.points) once(ends);
+  std::array<int, 4> prisms{};
+  for (const auto& corners : m.prisms.points) ++prisms[once(corners)];
+  EXPECT_GT(prisms[1], 0);
+  EXPECT_GT(prisms[2], 0);
+  for (const Triangle& t : m.skin) once(t);
+  const std::vector<int64_t>& path = built_.cuts[0].columns;
+  for (const auto& corners : m.prisms.points) {
+    Vec3 middle = Vec3::Zero();
+    for (const int64_t row : corners) middle += m.points.position[row] / 6;
+    for (const int64_t row : corners) {
+      if (side[row] == 0) continue;
+      const auto at = std::find(path.begin(), path.end(), m.points.column[row]);
+      const int64_t layers = 4;
+      const Vec3 to = m.points.position[at[1] * layers] - m.points.position[at[-1] * layers];
+      const double left = to.cross(middle - m.points.position[row]).z();
+      if (std::abs(left) > 0.35 * to.norm() * (middle - m.points.position[row]).norm())
+        EXPECT_EQ(side[row], left > 0 ? 2 : 1);
+    }
+  }
+}
+
+TEST_F(CutAlong, leaves_points_on_bone_joined) {
+  make(3, 3);
+  for (const auto& [row, twin] : pairs_)
+    EXPECT_EQ(built_.model.points.set[twin], PointSet::soft_tissue);
+  const auto inner = static_cast<int64_t>(built_.cuts[0].columns.size()) - 2;
+  EXPECT_EQ(static_cast<int64_t>(pairs_.size()), 2 * inner);
+}
+
+}  // namespace
+}  // namespace repose::model
