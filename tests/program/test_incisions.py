@@ -61,7 +61,7 @@ def test_without_the_cut_nothing_moves_and_far_away_little_does(run, folder):
     file = cut(run, folder)
     moved = np.linalg.norm(last(file)["point/displacement"], axis=1)
     far = np.linalg.norm(model_of(file)["point/position"] - [48, -75, -8], axis=1) > 60
-    assert moved.max() > 20 * moved[far].max()
+    assert moved.max() > 10 * moved[far].max()
     head, _, tail = SCENE.partition("incisions:")
     whole = cut(run, folder, "whole", head + tail[tail.index("solve:"):])
     assert last(whole)["point/displacement"] == pytest.approx(0, abs=1e-6)
@@ -91,7 +91,7 @@ def test_result_passes_the_check_and_is_solved_again_the_same(run, folder):
 @pytest.mark.parametrize("path, message", [
     ("[[47, -80, 8], [60, -90, -8]]", "mm from the skin, allowed are 5 mm"),
     ("[[47, -80, 8], [47.5, -80, 7]]", "no longer than an edge of the skin"),
-    ("[[47, -80, 8], [46.5, -70, -24], [55, -65, -24], [57, -67, -5], [30, -80, -5]]",
+    ("[[47, -80, 8], [46.5, -70, -24], [55, -65, -24], [57, -67, -5], [38, -82, -5]]",
      "meets itself"),
     ("[[47, -80, 8]]", "must have two points at least"),
     ("missing.mrk.json", "missing.mrk.json"),

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <numeric>
 
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
+#include "repose/model/skin_mesh.h"
 
 namespace repose::model {
 namespace {
@@ -139,39 +141,44 @@ TEST_F(CutAlong, keeps_mass_stiffness_and_volume_in_total) {
   for (const double k : m.springs.stiffness) EXPECT_GT(k, 0);
 }
 
-/// Nothing joins the two sides: of each doubled pair one point belongs to elements that lie left of
-/// the path only, the other to elements that lie right of it only.
+/// 1 for the doubled points, 2 for their doubles, which lie right and left of the path.
+std::vector<int> side_of_points(const Model& model,
+                                const std::vector<std::array<int64_t, 2>>& pairs) {
+  std::vector<int> side(model.points.position.size(), 0);
+  for (const auto& [row, twin] : pairs) side[row] = 1, side[twin] = 2;
+  return side;
+}
+
 TEST_F(CutAlong, parts_all_that_crossed_it) {
   make(4, 3);
-  const Model& m = built_.model;
-  std::vector<int> side(m.points.position.size(), 0);  // 1 right, 2 left
-  for (const auto& [row, twin] : pairs_) side[row] = 1, side[twin] = 2;
-  const auto once = [&](const auto& element) {
+  const std::vector<int> side = side_of_points(built_.model, pairs_);
+  std::array<int, 4> count{};
+  const auto see = [&](const auto& element) {
     int seen = 0;
     for (const int64_t row : element) seen |= side[row];
-    EXPECT_NE(seen, 3);
-    return seen;
+    ++count[seen];
   };
-  for (const auto& ends : m.springs.points) once(ends);
-  std::array<int, 4> prisms{};
-  for (const auto& corners : m.prisms.points) ++prisms[once(corners)];
-  EXPECT_GT(prisms[1], 0);
-  EXPECT_GT(prisms[2], 0);
-  for (const Triangle& t : m.skin) once(t);
-  const std::vector<int64_t>& path = built_.cuts[0].columns;
-  for (const auto& corners : m.prisms.points) {
-    Vec3 middle = Vec3::Zero();
-    for (const int64_t row : corners) middle += m.points.position[row] / 6;
-    for (const int64_t row : corners) {
-      if (side[row] == 0) continue;
-      const auto at = std::find(path.begin(), path.end(), m.points.column[row]);
-      const int64_t layers = 4;
-      const Vec3 to = m.points.position[at[1] * layers] - m.points.position[at[-1] * layers];
-      const double left = to.cross(middle - m.points.position[row]).z();
-      if (std::abs(left) > 0.35 * to.norm() * (middle - m.points.position[row]).norm())
-        EXPECT_EQ(side[row], left > 0 ? 2 : 1);
-    }
-  }
+  for (const auto& ends : built_.model.springs.points) see(ends);
+  for (const auto& corners : built_.model.prisms.points) see(corners);
+  for (const Triangle& t : built_.model.skin) see(t);
+  EXPECT_GT(count[1], 0);
+  EXPECT_GT(count[2], 0);
+  EXPECT_EQ(count[3], 0) << "joined to both sides";
+}
+
+/// The path runs towards +x, so that left of it is +y.
+TEST_F(CutAlong, doubles_belong_to_the_left) {
+  make(4, 3);
+  const Model& m = built_.model;
+  const std::vector<int> side = side_of_points(m, pairs_);
+  std::array<double, 3> across{};  // mm³ mm, how far the prisms of a side lie from their points
+  for (size_t k = 0; k < m.prisms.points.size(); ++k)
+    for (const int64_t corner : m.prisms.points[k])
+      for (const int64_t row : m.prisms.points[k])
+        across[side[row]] +=
+            m.prisms.rest_volume[k] * (m.points.position[corner] - m.points.position[row]).y();
+  EXPECT_LT(across[1], -100);
+  EXPECT_GT(across[2], 100);
 }
 
 TEST_F(CutAlong, leaves_points_on_bone_joined) {
