@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "patches.h"
 #include "repose/base/error.h"
@@ -164,6 +165,19 @@ TEST_F(CutAlong, parts_all_that_crossed_it) {
   EXPECT_GT(count[1], 0);
   EXPECT_GT(count[2], 0);
   EXPECT_EQ(count[3], 0) << "joined to both sides";
+}
+
+TEST_F(CutAlong, springs_and_skin_go_with_their_prisms) {
+  make(4, 3);
+  std::set<std::array<int64_t, 2>> pairs;
+  std::set<std::array<int64_t, 3>> tops;
+  for (const auto& p : built_.model.prisms.points) {
+    tops.insert({p[0], p[2], p[1]});
+    for (const int64_t a : p)
+      for (const int64_t b : p) pairs.insert({a, b});
+  }
+  for (const auto& ends : built_.model.springs.points) EXPECT_TRUE(pairs.contains(ends));
+  for (const Triangle& t : built_.model.skin) EXPECT_TRUE(tops.contains(t));
 }
 
 /// The path runs towards +x, so that left of it is +y.
