@@ -33,6 +33,20 @@ void require_one_of_each(const scene::Scene& scene, const std::vector<surface::S
                                           scene.bones.size(), bones.size(), scene.moves.size()));
 }
 
+void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
+                       const Model& model) {
+  const auto layers = static_cast<int64_t>(scene.tissue.layers);
+  for (size_t i = 0; i < cuts.size(); ++i)
+    for (const int64_t column : cuts[i].columns) {
+      if (model.points.set[column * layers] != PointSet::held) continue;
+      const Vec3& at = model.points.position[column * layers];
+      base::refuse(
+          "{}: incisions[{}]: an instrument holds the skin on the path near ({:.2f}, {:.2f}, "
+          "{:.2f}); move one of them",
+          scene.file.string(), i, at.x(), at.y(), at.z());
+    }
+}
+
 /// Everything of the model but its geometry and point sets.
 void complete(const scene::Scene& scene, const SkinMesh& mesh,
               const std::vector<surface::Surface>& bones, Model& model) {
@@ -109,6 +123,7 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   built.model = make_layers(mesh, columns.deep, depths);
   set_points(rim, attachment, scene.moves, built.model);
   built.held = hold_by_instruments(scene, built.model);
+  require_free_cuts(scene, built.cuts, built.model);
   built.sliders = sliders(scene, built.held);
   require_held(scene, mesh, field, built.model, attachment);
   complete(scene, mesh, bones, built.model);

@@ -4,7 +4,6 @@
 #include <map>
 
 #include "cut_sides.h"
-#include "repose/base/error.h"
 
 namespace repose::model {
 namespace {
@@ -40,11 +39,6 @@ class Knife {
   bool to_be_doubled(int64_t row) const {
     const Points& p = model_.points;
     if (p.layer[row] >= cut_.layers || !sides_.parted(p.column[row])) return false;
-    if (p.set[row] == PointSet::held)
-      base::refuse(
-          "an instrument holds point {} at ({:.2f}, {:.2f}, {:.2f}) on an incision; move one of "
-          "them",
-          row, p.position[row][0], p.position[row][1], p.position[row][2]);
     return p.set[row] == PointSet::soft_tissue;
   }
 

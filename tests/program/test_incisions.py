@@ -10,6 +10,9 @@ from tissue import apart, last, model_of, same_face
 PATH = "[[47, -80, 8], [49, -75, -8], [46.5, -70, -24]]"
 # The shipped scene on the coarser head.
 SCENE = (PROJECT / "meshes/head_incision.yaml").read_text().replace("head_", "paper_")
+BALL = """instruments:
+  - {sphere: {center: [57, -90, -10], radius: 20}, push: [-9, 12, 0]}
+"""
 TURGOR = (0.02, 0.05, 0.1, 0.2)
 
 
@@ -106,9 +109,10 @@ def test_bad_paths_are_refused_in_one_line(run, folder, path, message, ranks):
     assert not list(folder.glob("cut*.h5*"))
 
 
-def test_the_rim_and_too_many_layers_are_refused(run, folder):
+def test_rim_depth_and_instruments_are_refused(run, folder):
     for scene, message in ((SCENE.replace("layers: 2", "layers: 5"), "1 … 4"),
-                           (SCENE.replace(PATH, rim_path(folder)), "comes to the rim")):
+                           (SCENE.replace(PATH, rim_path(folder)), "comes to the rim"),
+                           (SCENE.replace("solve:", BALL + "solve:"), "an instrument holds")):
         (folder / "cut.yaml").write_text(scene)
         result = run("repose-solve", "cut.yaml", cwd=folder)
         assert result.returncode == 1 and message in result.stderr, result.stderr
