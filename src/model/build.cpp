@@ -33,6 +33,16 @@ void require_one_of_each(const scene::Scene& scene, const std::vector<surface::S
                                           scene.bones.size(), bones.size(), scene.moves.size()));
 }
 
+/// The skin with the paths of the incisions as edges.
+SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin,
+                         std::vector<Cut>& cuts) {
+  SkinMesh mesh = make_skin_mesh(skin);
+  if (scene.incisions.empty()) return mesh;
+  surface::Surface refined = skin;
+  cuts = insert_paths(scene.incisions, scene.file.string(), refined);
+  return make_skin_mesh(refined);
+}
+
 void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
                        const Model& model) {
   const auto layers = static_cast<int64_t>(scene.tissue.layers);
@@ -98,13 +108,8 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones) {
   require_one_of_each(scene, bones);
   const std::vector<double> depths = layer_depths(scene.tissue);
-  SkinMesh mesh = make_skin_mesh(skin);
   BuiltModel built;
-  if (!scene.incisions.empty()) {
-    surface::Surface refined = skin;
-    built.cuts = insert_paths(scene.incisions, scene.file.string(), refined);
-    mesh = make_skin_mesh(refined);
-  }
+  SkinMesh mesh = mesh_with_paths(scene, skin, built.cuts);
   const BoneField field(bones);
   require_same_place(skin, bones, field);
   const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);

@@ -10,8 +10,8 @@ namespace repose::model {
 /// A spring that lies in the cut becomes two, its stiffness shared in proportion to the prisms'
 /// volume on either side, and so do the mass and the force of a doubled point. Positions and rest
 /// lengths stay as they are: where the tissue was in equilibrium, the tension that crossed the cut
-/// now opens it. Returns the rows of the doubled points, the double second. InternalError
-/// where the columns are no path of edges.
+/// now opens it. Returns the rows of the doubled points, the double second. Throws
+/// InternalError where the columns are no path of edges.
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model);
 
 }  // namespace repose::model
