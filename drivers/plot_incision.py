@@ -96,6 +96,9 @@ def main():
     if len(sys.argv) < 3:
         print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
         sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
+    for file in sys.argv[2:]:
+        if not h5py.is_hdf5(file):
+            refuse(f"{file}: not there, or no result file; give NAME.h5 of repose-solve")
     target, results = sys.argv[1], [Result(file) for file in sys.argv[2:]]
     for result in results:
         gaps = ", ".join(f"{gap:.3f} mm in layer {a}" for a, gap in enumerate(result.gaps()))
