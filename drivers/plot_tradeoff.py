@@ -77,7 +77,6 @@ def draw_methods(axes, rows, cost, label):
 
 def draw_choices(axes, rows):
     """How far the skin is from the reference for each layer count, volume term and load step."""
-    rows = [row for row in rows if row["study"] not in ("solver",)]
     rows = [row for row in rows if row["skin_95_mm"] == row["skin_95_mm"]]
     key = {"layers": "layers", "volume": "volume", "load steps": "load_steps", "mesh": "resolution_mm"}
     names = [f"{row[key[row['study']]]} {row['study']}" for row in rows]
@@ -96,10 +95,13 @@ def draw_choices(axes, rows):
 
 
 def draw_study(name, rows):
-    figure, panels = plt.subplots(1, 3, figsize=(12, 3.6))
+    others = [row for row in rows if row["study"] != "solver"]
+    count = 3 if others else 2
+    figure, panels = plt.subplots(1, count, figsize=(4 * count, 3.6))
     draw_methods(panels[0], rows, "evaluations", "evaluations of value and gradient")
     draw_methods(panels[1], rows, "cpu_s", "time, relative to the fastest")
-    draw_choices(panels[2], rows)
+    if others:
+        draw_choices(panels[2], others)
     figure.tight_layout()
     save(figure, name + ".png")
 
@@ -155,7 +157,7 @@ def main():
     for name in sys.argv[1:]:
         rows = read(name)
         draw_study(name, rows)
-        if os.path.getsize(name + "_map.csv") > 10:
+        if any(row["study"] in ("layers", "volume", "mesh") for row in rows):
             draw_map(name)
         every += rows
     judge_estimates(every)

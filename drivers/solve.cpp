@@ -252,6 +252,7 @@ base::Exit run(const base::Options& options) {
   override_by(options, job.wanted);
   solve::Settings settings = settings_of(job.wanted);
   settings.stability = options.flag("stability");
+  settings.heeds_signals = true;
   settings.monitor = options.flag("monitor_mm");
   if (options.has("time_limit")) settings.time_limit = options.number("time_limit");
   settings.initial_equilibrium = job.initial_equilibrium;

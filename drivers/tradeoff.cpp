@@ -37,7 +37,12 @@ std::vector<base::Option> option_table() {
           {"volumes", OptionKind::text, "none,paper,penalty", "Volume terms; may be empty."},
           {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; may be empty."},
           {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.", {1e-12, 1}, "mm"},
-          {"time_limit", OptionKind::number, "60", "Of one run.", {1e-3, 1e6}, "s"}};
+          {"time_limit",
+           OptionKind::number,
+           "60",
+           "Of one run; a reference may take four times as long.",
+           {1e-3, 1e6},
+           "s"}};
 }
 
 std::vector<std::string> words_of(const base::Options& options, const char* name) {

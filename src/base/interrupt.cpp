@@ -15,8 +15,10 @@ extern "C" void remember(int) { received = 1; }
 
 }  // namespace
 
-Interrupt::Interrupt(MPI_Comm comm, double limit) : comm_(comm), limit_(limit) {
+Interrupt::Interrupt(MPI_Comm comm, double limit, bool heeds_signals)
+    : comm_(comm), limit_(limit), signals_(heeds_signals) {
   received = 0;
+  if (!signals_) return;
   struct sigaction action = {};
   action.sa_handler = remember;
   action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
@@ -24,6 +26,7 @@ Interrupt::Interrupt(MPI_Comm comm, double limit) : comm_(comm), limit_(limit) {
 }
 
 Interrupt::~Interrupt() {
+  if (!signals_) return;
   for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &before[k], nullptr);
 }
 

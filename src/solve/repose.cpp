@@ -61,7 +61,7 @@ class Watcher {
  public:
   Watcher(MPI_Comm comm, const Settings& settings)
       : progress_(comm),
-        interrupt_(comm, settings.time_limit),
+        interrupt_(comm, settings.time_limit, settings.heeds_signals),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
     const std::string to_go = std::isfinite(i.millimetres_to_go) && i.millimetres_to_go > 0

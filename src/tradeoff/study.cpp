@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
 
 #include "label.h"
 #include "repose/base/agreement.h"
+#include "repose/base/error.h"
 #include "repose/base/scoped_option.h"
 #include "repose/base/usage.h"
 #include "repose/model/build.h"
@@ -22,6 +24,7 @@ namespace repose::tradeoff {
 namespace {
 
 const MPI_Comm comm = MPI_COMM_WORLD;
+constexpr double patience = 4;  // time limits of a run that a reference may take
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// All rows of slabs of points, on rank 0.
@@ -43,7 +46,7 @@ struct Run {
   std::vector<Vec3> position;
 };
 
-/// A model of the scene, and its own rest position found to the reference's accuracy.
+/// A model of the scene, and its own rest position found to the reference's accuracy, if it was.
 struct Discretisation {
   model::Model model;  // on rank 0
   double bulk_modulus = 0;
@@ -77,6 +80,11 @@ class Study {
     tell_("the reference", 0);
     const Discretisation& reference = discretisation(finest);
     base::on_first_rank(comm, [&] {
+      if (reference.rest.empty())
+        base::refuse(
+            "the reference, with {} layers, does not come to {:g} mm in {:g} s; raise -time_limit "
+            "or -reference, or take fewer -layers",
+            finest.layers, plan_.reference_accuracy, patience * plan_.seconds);
       skin_.emplace(reference.model, reference.rest);
       findings_.map.rest = skin_->rest();
       findings_.map.triangles = skin_->triangles();
@@ -97,7 +105,8 @@ class Study {
     Way closely = usual_way(plan_);
     closely.volume = way.volume;
     closely.accuracy = plan_.reference_accuracy;
-    made.rest = solve_as(closely, made).position;
+    Run run = solve_as(closely, made, patience * plan_.seconds);
+    if (run.measurement.converged) made.rest = std::move(run.position);
     return made;
   }
 
@@ -110,11 +119,11 @@ class Study {
     solve::prestress(comm, model, {scene.tissue.turgor, field});
   }
 
-  solve::Settings settings_of(const Way& way, double bulk_modulus) const {
+  solve::Settings settings_of(const Way& way, double bulk_modulus, double limit) const {
     solve::Settings settings;
     settings.path = {.accuracy = way.accuracy, .load_steps = way.load_steps};
     settings.volume = way.volume;
-    settings.time_limit = plan_.seconds;
+    settings.time_limit = limit;
     if (way.volume == "penalty")
       settings.weights = {1, mechanics::VolumeTerm::penalty, bulk_modulus};
     if (way.volume == "paper") {
@@ -124,14 +133,14 @@ class Study {
     return settings;
   }
 
-  Run solve_as(const Way& way, const Discretisation& made) const {
+  Run solve_as(const Way& way, const Discretisation& made, double limit) const {
     const base::ScopedOption method("-tao_type", way.method);
     Run run;
     run.measurement.way = way;
     base::Stages stages(comm);
     const double begin = base::cpu_seconds();
     const solve::Summary summary =
-        solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus), {}, stages,
+        solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus, limit), {}, stages,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              run.position = gather(rows.position);
                            });
@@ -152,7 +161,7 @@ class Study {
 
   void add(const Way& way) {
     const Discretisation& made = discretisation(way);
-    Run run = solve_as(way, made);
+    Run run = solve_as(way, made, plan_.seconds);
     base::on_first_rank(comm, [&] {
       Measurement& m = run.measurement;
       m.error = m.skin_rms = m.skin_95 = m.skin_max = unknown;

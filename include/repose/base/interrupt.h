@@ -2,7 +2,6 @@
 #include <mpi.h>
 
 #include <chrono>
-#include <limits>
 
 namespace repose::base {
 
@@ -11,8 +10,8 @@ namespace repose::base {
 /// SIGTERM ends the program as usual.
 class Interrupt {
  public:
-  /// `limit` in s of wall-clock time from now.
-  explicit Interrupt(MPI_Comm comm, double limit = std::numeric_limits<double>::infinity());
+  /// `limit` in s of wall-clock time from now; without `signals` the limit alone counts.
+  Interrupt(MPI_Comm comm, double limit, bool signals);
   ~Interrupt();  ///< signals do again what they did before
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
@@ -23,6 +22,7 @@ class Interrupt {
   using Clock = std::chrono::steady_clock;
   MPI_Comm comm_;
   double limit_;
+  bool signals_;
   Clock::time_point begin_ = Clock::now();
   bool wanted_ = false;
 };

@@ -19,6 +19,7 @@ struct Settings {
   std::string volume = "none";  ///< name of the volume term, for the result
   double lambda = 1;            ///< paper's weight, for the result
   double time_limit = std::numeric_limits<double>::infinity();  ///< s, of the search
+  bool heeds_signals = false;        ///< SIGINT, SIGTERM, SIGUSR1 end the search as the limit does
   bool monitor = false;              ///< print a line for every iteration
   bool stability = false;            ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
