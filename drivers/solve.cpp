@@ -23,6 +23,7 @@
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
 #include "repose/solve/sliding.h"
+#include "repose/solve/tearing.h"
 
 namespace {
 
@@ -97,6 +98,7 @@ struct Job {
   std::vector<std::vector<int64_t>> held;  // points of each instrument, on rank 0
   std::vector<model::Slider> sliders;      // on rank 0
   std::vector<model::Cut> cuts;            // on rank 0
+  std::optional<double> tearing;           // N, on rank 0
 };
 
 /// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
@@ -136,6 +138,7 @@ Job read_job(const std::filesystem::path& input) {
     job.held = std::move(built.held);
     job.sliders = std::move(built.sliders);
     job.cuts = std::move(built.cuts);
+    job.tearing = scene.tearing;
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
@@ -245,6 +248,14 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   return name;
 }
 
+/// The torn model is solved from where the last tear left its tissue.
+void start_torn(const solve::Tearing& tearing, solve::Settings& settings,
+                results::Restart& restart) {
+  restart.position = tearing.position;
+  settings.path.start_load = 1;
+  settings.initial_equilibrium = false;
+}
+
 base::Exit run(const base::Options& options) {
   base::Stages stages(comm);
   const std::filesystem::path input = options.arguments()[0];
@@ -271,6 +282,10 @@ base::Exit run(const base::Options& options) {
   const std::string name = result_name(options, input);
   const solve::Sliding sliding = solve::slide(comm, job.model, job.sliders, settings);
   if (sliding.rounds > 0) stages.end("slide");
+  const solve::Tearing tearing =
+      solve::tear(comm, job.model, job.tearing, settings, restart.position);
+  if (tearing.rounds > 0) stages.end("tear");
+  if (tearing.torn) start_torn(tearing, settings, restart);
   Writer writer(name, job.model,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary =
@@ -278,10 +293,11 @@ base::Exit run(const base::Options& options) {
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
-  say(solve::describe_sliding(sliding));
+  say(solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
-  return summary.path.complete() && sliding.settled ? base::Exit::done : base::Exit::not_converged;
+  const bool settled = sliding.settled && tearing.settled;
+  return summary.path.complete() && settled ? base::Exit::done : base::Exit::not_converged;
 }
 
 }  // namespace

@@ -267,6 +267,12 @@ std::vector<Key> instrument_keys() {
           {"instruments[].mesh", file, "", "Shape: a closed triangle mesh."}};
 }
 
+std::vector<Key> tearing_keys() {
+  return {
+      {"tearing", map, "", "Springs that a force pulls too hard tear; needs forces."},
+      {"tearing.limit", number, "required", "Tension above which they do.", "N", Range::above(0)}};
+}
+
 std::vector<Key> incision_keys() {
   return {{"incisions", list, "", "Cuts in the skin along a path, made in the stressed face."},
           {"incisions[].path", curve, "required",
@@ -284,7 +290,7 @@ const std::vector<Key>& all_keys() {
     std::vector<Key> rows;
     for (const auto& part :
          {surface_keys(), tissue_keys(), spring_keys(), load_keys(), osteotomy_keys(), move_keys(),
-          collision_keys(), instrument_keys(), incision_keys(), solve_keys()})
+          collision_keys(), instrument_keys(), incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

@@ -206,6 +206,18 @@ Solve read_solve(const Value& value) {
   return solve;
 }
 
+double read_tearing(const Value& value, const Scene& scene) {
+  const double limit = Map(value).at("limit").number();
+  if (scene.forces.empty())
+    value.refuse("needs forces, at whose points springs tear; give forces, or remove it");
+  for (const Instrument& body : scene.instruments)
+    if (body.slide)
+      value.refuse(
+          "and an instrument on which the skin slides exclude each other; give that instrument "
+          "skin: stick, or remove one of them");
+  return limit;
+}
+
 void read_surroundings(Scene& scene, const Map& map) {
   if (const auto gravity = map.find("gravity")) {
     scene.gravity = gravity->vector();
@@ -222,6 +234,7 @@ void read_surroundings(Scene& scene, const Map& map) {
   if (const auto cuts = map.find("incisions"))
     scene.incisions = read_incisions(*cuts, scene.tissue.layers);
   if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);
+  if (const auto tearing = map.find("tearing")) scene.tearing = read_tearing(*tearing, scene);
 }
 
 }  // namespace

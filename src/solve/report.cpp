@@ -87,6 +87,19 @@ std::string describe_sliding(const Sliding& sliding) {
                                     sliding.to_go));
 }
 
+std::string describe_tearing(const Tearing& t) {
+  if (!t.limit) return "";
+  std::string text = row(
+      "tearing", fmt::format("{} in {} rounds at {:g} N; {:.4g} N at most where springs may tear",
+                             t.settled ? "settled" : "NOT SETTLED: MORE MAY TEAR", t.rounds,
+                             *t.limit, t.largest));
+  if (t.springs == 0) return text + row("torn", "nothing");
+  return text + row("torn", fmt::format("{} springs, with them {} prisms and {} triangles of the "
+                                        "skin; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",
+                                        t.springs, t.prisms, t.triangles, t.length, t.middle.x(),
+                                        t.middle.y(), t.middle.z()));
+}
+
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())

@@ -163,6 +163,7 @@ struct Scene {
   std::vector<Force> forces;
   Solve solve;
   std::vector<std::string> remarks;  ///< lines for a person
+  std::optional<double> tearing;     ///< N, tension above which springs tear; unset: none does
 };
 
 /// Reads and checks a scene file. Every refusal is an InputError whose message starts with

@@ -5,6 +5,7 @@
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "repose/solve/sliding.h"
+#include "repose/solve/tearing.h"
 
 /// What a person reads when a run ends.
 namespace repose::solve {
@@ -26,6 +27,9 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 
 /// One row, or nothing where no point slides.
 std::string describe_sliding(const Sliding& sliding);
+
+/// What tore and where, in two rows; nothing where no limit was asked for.
+std::string describe_tearing(const Tearing& tearing);
 
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);

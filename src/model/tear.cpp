@@ -1,0 +1,113 @@
+#include "repose/model/tear.h"
+
+#include <algorithm>
+#include <set>
+
+#include "repose/base/error.h"
+
+namespace repose::model {
+namespace {
+
+using Edge = std::array<int64_t, 2>;
+
+Edge sorted(int64_t p, int64_t q) { return {std::min(p, q), std::max(p, q)}; }
+
+std::set<Edge> torn_edges(const std::vector<char>& torn, const Springs& springs) {
+  std::set<Edge> edges;
+  for (size_t j = 0; j < torn.size(); ++j)
+    if (torn[j]) edges.insert(sorted(springs.points[j][0], springs.points[j][1]));
+  return edges;
+}
+
+/// Points that are held, and those that springs join to them.
+std::vector<char> joined_points(const Model& model, const std::vector<char>& torn) {
+  const size_t n = model.points.position.size();
+  std::vector<std::vector<int64_t>> neighbours(n);
+  for (size_t j = 0; j < torn.size(); ++j) {
+    if (torn[j]) continue;
+    const auto [p, q] = model.springs.points[j];
+    neighbours[p].push_back(q);
+    neighbours[q].push_back(p);
+  }
+  std::vector<char> joined(n, 0);
+  std::vector<int64_t> front;
+  for (size_t i = 0; i < n; ++i)
+    if (model.points.set[i] != PointSet::soft_tissue) {
+      joined[i] = 1;
+      front.push_back(static_cast<int64_t>(i));
+    }
+  while (!front.empty()) {
+    const int64_t i = front.back();
+    front.pop_back();
+    for (const int64_t k : neighbours[i])
+      if (!joined[k]) {
+        joined[k] = 1;
+        front.push_back(k);
+      }
+  }
+  return joined;
+}
+
+void refuse_torn_off(const Model& model, const std::vector<char>& torn, const std::string& what) {
+  const std::vector<char> joined = joined_points(model, torn);
+  const auto lost = std::find(joined.begin(), joined.end(), 0);
+  if (lost == joined.end()) return;
+  const auto row = lost - joined.begin();
+  const Vec3& x = model.points.position[row];
+  base::refuse(
+      "{}: point {} at ({:.4g}, {:.4g}, {:.4g}) mm is torn off: no springs are left between it "
+      "and what holds the tissue; give a higher limit or less force",
+      what, row, x.x(), x.y(), x.z());
+}
+
+template <class T>
+void keep(std::vector<T>& values, const std::vector<char>& gone) {
+  size_t kept = 0;
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!gone[i]) values[kept++] = values[i];
+  values.resize(kept);
+}
+
+bool has_torn_edge(const std::array<int64_t, 6>& p, const std::set<Edge>& edges) {
+  for (int c = 0; c < 3; ++c) {
+    const int d = (c + 1) % 3;
+    if (edges.contains(sorted(p[c], p[d])) || edges.contains(sorted(p[c + 3], p[d + 3])) ||
+        edges.contains(sorted(p[c], p[c + 3])))
+      return true;
+  }
+  return false;
+}
+
+bool has_torn_edge(const Triangle& t, const std::set<Edge>& edges) {
+  return edges.contains(sorted(t[0], t[1])) || edges.contains(sorted(t[1], t[2])) ||
+         edges.contains(sorted(t[2], t[0]));
+}
+
+int64_t remove_prisms(const std::set<Edge>& edges, Prisms& prisms) {
+  std::vector<char> gone;
+  for (const auto& prism : prisms.points) gone.push_back(has_torn_edge(prism, edges));
+  keep(prisms.points, gone);
+  keep(prisms.rest_volume, gone);
+  return std::count(gone.begin(), gone.end(), 1);
+}
+
+}  // namespace
+
+Tear remove_springs(const std::vector<char>& torn, const std::string& what, Model& model) {
+  refuse_torn_off(model, torn, what);
+  const std::set<Edge> edges = torn_edges(torn, model.springs);
+  Springs& s = model.springs;
+  keep(s.points, torn);
+  keep(s.set, torn);
+  keep(s.rest_length, torn);
+  keep(s.stiffness, torn);
+  keep(s.exponent, torn);
+  keep(s.reference, torn);
+  Tear tear;
+  tear.prisms = remove_prisms(edges, model.prisms);
+  tear.triangles = static_cast<int64_t>(
+      std::erase_if(model.skin, [&](const Triangle& t) { return has_torn_edge(t, edges); }));
+  return tear;
+}
+
+}  // namespace repose::model
