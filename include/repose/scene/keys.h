@@ -20,10 +20,10 @@ enum class KeyKind {
   texts,  ///< a text or a list of texts
   place,  ///< [x, y, z] or the name of a landmark
   file,
-  mesh,         ///< a file, or a map that names a volume
-  volume,       ///< a file, or a folder of DICOM slices
-  transform,    ///< a file, a 4×4 matrix, or a list of forms
-  curve         ///< a list of [x, y, z], or a file of landmarks
+  mesh,       ///< a file, or a map that names a volume
+  volume,     ///< a file, or a folder of DICOM slices
+  transform,  ///< a file, a 4×4 matrix, or a list of forms
+  curve       ///< a list of [x, y, z], or a file of landmarks
 };
 
 struct Key {
