@@ -89,13 +89,15 @@ std::string describe_sliding(const Sliding& sliding) {
 
 std::string describe_tearing(const Tearing& t) {
   if (!t.limit) return "";
-  std::string text = row(
-      "tearing", fmt::format("{} in {} rounds at {:g} N; {:.4g} N at most where springs may tear",
-                             t.settled ? "settled" : "NOT SETTLED: MORE MAY TEAR", t.rounds,
-                             *t.limit, t.largest));
+  std::string text =
+      row("tearing",
+          fmt::format("{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
+                      "{:.4g} N",
+                      t.settled ? "settled" : "NOT SETTLED, MORE MAY TEAR", t.rounds, *t.limit,
+                      t.largest));
   if (t.springs == 0) return text + row("torn", "nothing");
-  return text + row("torn", fmt::format("{} springs, with them {} prisms and {} triangles of the "
-                                        "skin; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",
+  return text + row("torn", fmt::format("springs {}, with them prisms {} and triangles of the "
+                                        "skin {}; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",
                                         t.springs, t.prisms, t.triangles, t.length, t.middle.x(),
                                         t.middle.y(), t.middle.z()));
 }

@@ -21,10 +21,11 @@ def folder(tmp_path):
     return tmp_path
 
 
-def solve(run, folder, name, limit=None, ranks=1, accuracy=1e-6, status=0):
+def solve(run, folder, name, limit=None, *options, ranks=1, status=0):
     tearing = "" if limit is None else f"tearing: {{limit: {limit}}}\n"
     (folder / f"{name}.yaml").write_text(SCENE + tearing)
-    result = run("repose-solve", f"{name}.yaml", "-accuracy", accuracy, ranks=ranks, cwd=folder)
+    result = run("repose-solve", f"{name}.yaml", "-accuracy", 1e-6, *options, ranks=ranks,
+                 cwd=folder)
     assert result.returncode == status, result
     return result
 
@@ -47,7 +48,8 @@ def test_what_is_torn_goes_with_its_prisms_and_skin(run, folder):
     whole, torn = model_of(folder / "whole.h5"), model_of(folder / "torn.h5")
     gone = springs(whole) - springs(torn)
     assert gone and springs(torn) < springs(whole)
-    found = re.search(r"torn +(\d+) springs, with them (\d+) prisms and (\d+) triangles", printed)
+    found = re.search(r"springs (\d+), with them prisms (\d+) and triangles of the skin (\d+);",
+                      printed)
     counts = [len(whole[name]) - len(torn[name])
               for name in ("spring/points", "prism/points", "skin/points")]
     assert [int(found[i]) for i in (1, 2, 3)] == counts
@@ -87,13 +89,19 @@ def test_a_limit_that_tears_tissue_off_is_refused_in_one_line(run, folder):
     assert not list(folder.glob("low*.h5*"))
 
 
+def test_an_end_before_its_time_is_said_loudly(run, folder):
+    result = solve(run, folder, "early", LIMIT, "-time_limit", 0, status=2)
+    assert "NOT SETTLED" in result.stdout
+    assert run("repose-check", "early.h5", cwd=folder).returncode == 0
+
+
 @pytest.mark.parametrize("scene, message", [
     (SCENE + "tearing: {limit: 0}\n", "tearing.limit"),
     (SCENE + "tearing: {}\n", "limit"),
     (SCENE + "tearing: {limt: 1}\n", "limit"),
     (SCENE.replace(FORCES, "") + "tearing: {limit: 1}\n", "needs forces"),
-    (SCENE + "tearing: {limit: 1}\ninstruments:\n  - {sphere: {center: [63, -98, -10], radius: 20}, "
-     "push: [-9, 12, 0], skin: slide}\n", "exclude each other"),
+    (SCENE + "tearing: {limit: 1}\ninstruments:\n"
+     "  - {sphere: {center: [63, -98, -10], radius: 20}, push: [-9, 12, 0], skin: slide}\n", "exclude each other"),
 ], ids=["zero", "empty", "misspelt", "no forces", "sliding"])
 def test_bad_lines_are_refused(run, folder, scene, message):
     (folder / "bad.yaml").write_text(scene)
