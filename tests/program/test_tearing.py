@@ -101,7 +101,8 @@ def test_an_end_before_its_time_is_said_loudly(run, folder):
     (SCENE + "tearing: {limt: 1}\n", "limit"),
     (SCENE.replace(FORCES, "") + "tearing: {limit: 1}\n", "needs forces"),
     (SCENE + "tearing: {limit: 1}\ninstruments:\n"
-     "  - {sphere: {center: [63, -98, -10], radius: 20}, push: [-9, 12, 0], skin: slide}\n", "exclude each other"),
+     "  - {sphere: {center: [63, -98, -10], radius: 20}, push: [-9, 12, 0], skin: slide}\n",
+     "exclude each other"),
 ], ids=["zero", "empty", "misspelt", "no forces", "sliding"])
 def test_bad_lines_are_refused(run, folder, scene, message):
     (folder / "bad.yaml").write_text(scene)
