@@ -14,6 +14,7 @@
 #include "repose/base/scoped_option.h"
 #include "repose/base/usage.h"
 #include "repose/model/build.h"
+#include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "skin.h"
@@ -28,16 +29,12 @@ constexpr double patience = 4;  // time limits of a run that a reference may tak
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// All rows of slabs of points, on rank 0.
-std::vector<Vec3> gather(const std::vector<Vec3>& slab) {
-  const int mine = static_cast<int>(3 * slab.size()), ranks = base::size(comm);
-  std::vector<int> counts(ranks), starts(ranks, 0);
-  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
-  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<Vec3> all(base::rank(comm) == 0 ? (starts.back() + counts.back()) / 3 : 0);
-  MPI_Gatherv(slab.empty() ? nullptr : slab.data()->data(), mine, MPI_DOUBLE,
-              all.empty() ? nullptr : all.data()->data(), counts.data(), starts.data(), MPI_DOUBLE,
-              0, comm);
-  return all;
+std::vector<Vec3> gather_points(const std::vector<Vec3>& slab) {
+  const std::vector<double> numbers =
+      solve::gather(comm, slab.empty() ? nullptr : slab.data()->data(), 3 * slab.size());
+  std::vector<Vec3> points(numbers.size() / 3);
+  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
+  return points;
 }
 
 /// What a run left behind, the positions on rank 0.
@@ -142,7 +139,7 @@ class Study {
     const solve::Summary summary =
         solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus, limit), {}, stages,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             run.position = gather(rows.position);
+                             run.position = gather_points(rows.position);
                            });
     Measurement& m = run.measurement;
     m.seconds = base::cpu_seconds() - begin;
