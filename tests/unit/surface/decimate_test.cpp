@@ -24,15 +24,7 @@ Surface bumpy_ball(int n, double bump, unsigned seed) {
       s.points.push_back(r *
                          Vec3(std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b)));
     }
-  const auto at = [n](int i, int j) -> int64_t { return 2 + (j - 1) * n + i % n; };
-  for (int i = 0; i < n; ++i) {
-    s.triangles.push_back({0, at(i, 1), at(i + 1, 1)});
-    s.triangles.push_back({1, at(i + 1, n - 1), at(i, n - 1)});
-    for (int j = 1; j + 1 < n; ++j) {
-      s.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j + 1)});
-      s.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i + 1, j)});
-    }
-  }
+  s.triangles = longitude_latitude(n);
   return s;
 }
 

@@ -89,4 +89,19 @@ class SurfaceFiles : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
+/// Triangles of a ball of n × n − 1 points by longitude and latitude, its two poles first.
+inline std::vector<Triangle> longitude_latitude(int n) {
+  const auto at = [n](int i, int j) -> int64_t { return 2 + (j - 1) * n + i % n; };
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < n; ++i) {
+    triangles.push_back({0, at(i, 1), at(i + 1, 1)});
+    triangles.push_back({1, at(i + 1, n - 1), at(i, n - 1)});
+    for (int j = 1; j + 1 < n; ++j) {
+      triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j + 1)});
+      triangles.push_back({at(i, j), at(i + 1, j + 1), at(i + 1, j)});
+    }
+  }
+  return triangles;
+}
+
 }  // namespace repose::surface
