@@ -11,7 +11,10 @@
 #include <filesystem>
 #include <functional>
 
+#include "repose/adapt/ladder.h"
+#include "repose/adapt/report.h"
 #include "repose/base/agreement.h"
+#include "repose/base/deal_out.h"
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
@@ -67,6 +70,13 @@ std::vector<base::Option> option_table() {
        {1, 100000},
        "",
        {"auto"}},
+      {"nested",
+       OptionKind::choice,
+       "auto",
+       "Solve coarser models first and start from their answer; auto: where it pays.",
+       {},
+       "",
+       {"auto", "on", "off"}},
       {"stability", OptionKind::flag, "",
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
       {"monitor_mm", OptionKind::flag, "",
@@ -92,13 +102,15 @@ std::vector<base::Option> option_table() {
 /// The model on rank 0, with what the scene asks of the solver.
 struct Job {
   model::Model model;
-  scene::Solve wanted;                     // on all ranks
-  bool initial_equilibrium = false;        // on all ranks
-  std::string building;                    // what the builder has to say, on rank 0
-  std::vector<std::vector<int64_t>> held;  // points of each instrument, on rank 0
-  std::vector<model::Slider> sliders;      // on rank 0
-  std::vector<model::Cut> cuts;            // on rank 0
-  std::optional<double> tearing;           // N, on rank 0
+  scene::Solve wanted;                        // on all ranks
+  std::optional<model::Anatomy> anatomy;      // of a scene, on rank 0
+  std::optional<solve::Recording> recording;  // of an initial equilibrium, on all ranks
+  bool initial_equilibrium = false;           // it holds before the bones move, on all ranks
+  std::string building;                       // what the builder has to say, on rank 0
+  std::vector<std::vector<int64_t>> held;     // points of each instrument, on rank 0
+  std::vector<model::Slider> sliders;         // on rank 0
+  std::vector<model::Cut> cuts;               // on rank 0
+  std::optional<double> tearing;              // N, on rank 0
 };
 
 /// Gives the tissue the stress it had when its surfaces were recorded, where the scene knows of
@@ -107,9 +119,9 @@ void bring_into_equilibrium(const scene::Scene& scene, Job& job) {
   job.initial_equilibrium = scene.tissue.turgor > 0 || scene.gravity.has_value();
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
   if (!job.initial_equilibrium) return;
-  const solve::Recording recording{
-      scene.tissue.turgor, scene.scan_gravity.value_or(scene.gravity.value_or(Vec3::Zero()))};
-  job.building += solve::describe_prestress(solve::prestress(comm, job.model, recording));
+  job.recording = {scene.tissue.turgor,
+                   scene.scan_gravity.value_or(scene.gravity.value_or(Vec3::Zero()))};
+  job.building += solve::describe_prestress(solve::prestress(comm, job.model, *job.recording));
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut.
@@ -133,7 +145,8 @@ Job read_job(const std::filesystem::path& input) {
       return;
     }
     scene = scene::read_scene(input);
-    model::BuiltModel built = model::build_model(scene);
+    job.anatomy = model::load_anatomy(scene);
+    model::BuiltModel built = model::build_model(*job.anatomy);
     job.model = std::move(built.model);
     job.held = std::move(built.held);
     job.sliders = std::move(built.sliders);
@@ -256,6 +269,55 @@ void start_torn(const solve::Tearing& tearing, solve::Settings& settings,
   settings.initial_equilibrium = false;
 }
 
+/// Why coarser models cannot be solved first, or nothing.
+std::string obstacle_to_nesting(const Job& job, const solve::Settings& settings, bool restarted) {
+  if (!job.anatomy) return "the input is a model, which does not tell what it was made from";
+  if (restarted) return "the run is restarted";
+  if (settings.path.load_steps > 0) return "load_steps are asked for";
+  if (settings.force) return "the functional is force";
+  if (settings.exact_volume) return "the volume term is exact";
+  if (!job.cuts.empty()) return "the scene has incisions";
+  if (!job.sliders.empty()) return "an instrument slides";
+  if (job.tearing) return "the tissue may tear";
+  return "";
+}
+
+/// The resolutions that are solved before the scene's own, on rank 0.
+std::vector<adapt::Resolution> plan_rungs(const base::Options& options, const Job& job,
+                                          const solve::Settings& settings) {
+  const std::string wanted = options.text("nested");
+  if (wanted == "off") return {};
+  const std::string obstacle = obstacle_to_nesting(job, settings, options.has("restart"));
+  if (!obstacle.empty()) {
+    if (wanted == "on") base::refuse("-nested on: {}; leave the option out", obstacle);
+    return {};
+  }
+  std::vector<adapt::Resolution> rungs = adapt::rungs_below(job.anatomy->scene, job.anatomy->skin);
+  if (wanted == "on" && rungs.empty())
+    base::refuse("-nested on: the skin has only {} vertices; leave the option out",
+                 job.anatomy->skin.points.size());
+  return rungs;
+}
+
+/// Solves coarser models first where that pays; `start` is then the guess they lead to.
+void nest(const base::Options& options, const Job& job, solve::Settings& settings,
+          solve::Start& start, base::Stages& stages, std::string& told) {
+  adapt::Climb climb{{}, job.recording, settings};
+  base::on_first_rank(comm, [&] { climb.rungs = plan_rungs(options, job, settings); });
+  auto rungs = static_cast<int>(climb.rungs.size());
+  MPI_Bcast(&rungs, 1, MPI_INT, 0, comm);
+  if (rungs == 0) return;
+  climb.rungs.resize(rungs);
+  const double begin = MPI_Wtime();
+  const model::Anatomy none;
+  const adapt::Ladder ladder =
+      adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
+  settings.time_limit = ladder.stopped ? 0 : settings.time_limit - (MPI_Wtime() - begin);
+  if (!ladder.rungs.empty()) start = {base::deal_out(comm, ladder.position), true};
+  told = adapt::describe_ladder(ladder);
+  stages.end("coarser models");
+}
+
 base::Exit run(const base::Options& options) {
   base::Stages stages(comm);
   const std::filesystem::path input = options.arguments()[0];
@@ -286,14 +348,17 @@ base::Exit run(const base::Options& options) {
       solve::tear(comm, job.model, job.tearing, settings, restart.position);
   if (tearing.rounds > 0) stages.end("tear");
   if (tearing.torn) start_torn(tearing, settings, restart);
+  solve::Start start{restart.position};
+  std::string nesting;
+  nest(options, job, settings, start, stages, nesting);
   Writer writer(name, job.model,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary =
-      solve::find_repose(comm, job.model, settings, restart.position, stages, std::ref(writer));
+      solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
-  say(solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
+  say(nesting + solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
   const bool settled = sliding.settled && tearing.settled;

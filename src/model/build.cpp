@@ -137,16 +137,23 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   return built;
 }
 
-BuiltModel build_model(const scene::Scene& scene) {
-  const surface::Surface skin = load_entry(scene.skin, surface::Role::skin);
+Anatomy load_anatomy(const scene::Scene& scene) {
+  Anatomy anatomy{scene, load_entry(scene.skin, surface::Role::skin), {}, {}};
   Bones bones = read_bones(scene);
-  std::vector<std::string> remarks = std::move(bones.remarks);
-  remarks.insert(remarks.end(), scene.remarks.begin(), scene.remarks.end());
-  scene::Scene heeded = scene;
-  heed_collisions(bones.surfaces, heeded, remarks);
-  BuiltModel built = build_model(heeded, skin, bones.surfaces);
-  built.report.remarks.insert(built.report.remarks.begin(), remarks.begin(), remarks.end());
+  anatomy.bones = std::move(bones.surfaces);
+  anatomy.remarks = std::move(bones.remarks);
+  anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
+  heed_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
+  return anatomy;
+}
+
+BuiltModel build_model(const Anatomy& anatomy) {
+  BuiltModel built = build_model(anatomy.scene, anatomy.skin, anatomy.bones);
+  built.report.remarks.insert(built.report.remarks.begin(), anatomy.remarks.begin(),
+                              anatomy.remarks.end());
   return built;
 }
+
+BuiltModel build_model(const scene::Scene& scene) { return build_model(load_anatomy(scene)); }
 
 }  // namespace repose::model

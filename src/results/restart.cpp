@@ -2,7 +2,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/results/deal_out.h"
+#include "repose/base/deal_out.h"
 #include "repose/results/model_file.h"
 
 namespace repose::results {
@@ -37,7 +37,7 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
     all = std::move(stored.rows.position);
   });
   MPI_Bcast(&restart.load, 1, MPI_DOUBLE, 0, comm);
-  restart.position = deal_out(comm, all);
+  restart.position = base::deal_out(comm, all);
   return restart;
 }
 

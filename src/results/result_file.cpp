@@ -5,7 +5,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/hdf5.h"
-#include "repose/results/deal_out.h"
+#include "repose/base/deal_out.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
 #include "repose/results/views.h"
@@ -226,7 +226,7 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
   s.name = std::filesystem::absolute(name);
   base::on_first_rank(comm, [&] { s.create(model); });
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
-  s.initial = deal_out(comm, model.points.position);
+  s.initial = base::deal_out(comm, model.points.position);
   s.on_disk([&] { s.file = base::open_hdf5(s.part(), comm); });
 }
 

@@ -17,4 +17,12 @@ std::vector<double> gather(MPI_Comm comm, const double* values, size_t count) {
   return all;
 }
 
+std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab) {
+  const std::vector<double> numbers =
+      gather(comm, slab.empty() ? nullptr : slab.data()->data(), 3 * slab.size());
+  std::vector<Vec3> points(numbers.size() / 3);
+  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
+  return points;
+}
+
 }  // namespace repose::solve

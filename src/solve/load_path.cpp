@@ -69,8 +69,9 @@ bool LoadPath::follows(const Attempt& now, const Attempt* coarser) const {
   if (!now.outcome.converged) return false;
   // Halving shrinks what a smooth path misses by four. What it does not shrink, a jump of the rest
   // position itself or a fold, is the path's own.
-  const bool smooth = now.miss <= trusted_miss * now.expected + settings_.accuracy && !now.folded;
-  return smooth || (coarser && coarser->outcome.converged && now.folded == coarser->folded &&
+  const bool near =
+      settings_.hasty || now.miss <= trusted_miss * now.expected + settings_.accuracy;
+  return (near && !now.folded) || (coarser && coarser->outcome.converged && now.folded == coarser->folded &&
                     now.miss > 0.5 * coarser->miss);
 }
 
@@ -84,11 +85,39 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   on_step(result_.last, result_.load, watch.seconds());
 }
 
-PathOutcome LoadPath::run(Vec displacement, const OnStep& on_step) {
+void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
+  result_.last = outcome;
+  result_.load = load;
+  ++result_.steps;
+  check(VecCopy(trial_, displacement));
+  objective_.positions().update(displacement);
+}
+
+void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
+  const Stopwatch watch;
+  const double before = result_.load;
+  const int64_t folded_before = inverted(displacement);
+  check(VecCopy(guess, trial_));
+  objective_.positions().set_load(1);
+  const Outcome outcome = search_.run(trial_, settings_.accuracy);
+  result_.iterations += outcome.iterations;
+  if (outcome.stopped || (outcome.converged && inverted(trial_) <= folded_before)) {
+    accept(outcome, 1, displacement);
+    result_.leapt = true;
+    on_step(outcome, 1, watch.seconds());
+  } else {
+    objective_.positions().set_load(before);
+    objective_.positions().update(displacement);
+  }
+}
+
+PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   Positions& positions = objective_.positions();
   result_ = {};
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   settle(displacement, on_step);
+  if (guess && result_.last.converged && !result_.last.stopped && result_.load < 1)
+    leap(displacement, guess, on_step);
   const double full_step = first_step();
   double step = full_step;
   int halvings = 0;
@@ -108,14 +137,10 @@ PathOutcome LoadPath::run(Vec displacement, const OnStep& on_step) {
       coarser = tried;
       continue;
     }
-    result_.last = tried.outcome;
-    result_.load = target;
-    ++result_.steps;
+    accept(tried.outcome, target, displacement);
     step = std::min(full_step, 2 * step);
     halvings = std::max(0, halvings - 1);
     coarser.reset();
-    check(VecCopy(trial_, displacement));
-    positions.update(displacement);
     on_step(result_.last, result_.load, watch.seconds());
   }
   return result_;

@@ -160,14 +160,17 @@ void restart_from(MPI_Comm comm, const Part& part, const std::vector<Vec3>& star
 }  // namespace
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
-                    const std::vector<Vec3>& start, base::Stages& stages, const Receiver& receive) {
+                    const Start& start, base::Stages& stages, const Receiver& receive) {
   const Part part = distribute(comm, model);
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   Positions positions(comm, part);
   const NaturalRows natural(comm, part);
   base::VecHandle displacement = positions.make_vector();
-  if (settings.path.start_load > 0) restart_from(comm, part, start, displacement);
+  base::VecHandle guess;
+  if (start.guess) guess = positions.make_vector();
+  if (start.guess || settings.path.start_load > 0)
+    restart_from(comm, part, start.position, start.guess ? guess : displacement);
   stages.end("distribute");
 
   Searcher searcher(positions, settings);
@@ -175,26 +178,27 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   LoadPath path(objective, searcher.predictor(), searcher.search(), settings.path);
   Summary summary;
   int64_t evaluations_before = 0;
-  summary.path = path.run(displacement, [&](const Outcome& outcome, double load, double seconds) {
-    summary.last = numbers_of(objective, settings, outcome, load);
-    summary.last.epsilon = searcher.epsilon();
-    const bool start = load == 0 && settings.initial_equilibrium;
-    const bool end = load == 1 || !outcome.converged;
-    if (settings.stability && (start || end)) {
-      TangentSolver& solver = searcher.elastic_solver();
-      Spectrum spectrum;
-      spectrum.smallest = smallest_eigenvalue(solver, displacement);
-      spectrum.largest = largest_eigenvalue(solver.hessian().exact());
-      if (start) summary.initial_spectrum = spectrum;
-      if (end) summary.final_spectrum = spectrum;
-      summary.last.smallest_eigenvalue = spectrum.smallest;
-      summary.last.largest_eigenvalue = spectrum.largest;
-    }
-    summary.last.seconds = seconds;
-    summary.last.evaluations = searcher.evaluations() - evaluations_before;
-    evaluations_before = searcher.evaluations();
-    receive(summary.last, natural.rows(objective, settings.exact_volume));
-  });
+  summary.path =
+      path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
+        summary.last = numbers_of(objective, settings, outcome, load);
+        summary.last.epsilon = searcher.epsilon();
+        const bool start = load == 0 && settings.initial_equilibrium;
+        const bool end = load == 1 || !outcome.converged;
+        if (settings.stability && (start || end)) {
+          TangentSolver& solver = searcher.elastic_solver();
+          Spectrum spectrum;
+          spectrum.smallest = smallest_eigenvalue(solver, displacement);
+          spectrum.largest = largest_eigenvalue(solver.hessian().exact());
+          if (start) summary.initial_spectrum = spectrum;
+          if (end) summary.final_spectrum = spectrum;
+          summary.last.smallest_eigenvalue = spectrum.smallest;
+          summary.last.largest_eigenvalue = spectrum.largest;
+        }
+        summary.last.seconds = seconds;
+        summary.last.evaluations = searcher.evaluations() - evaluations_before;
+        evaluations_before = searcher.evaluations();
+        receive(summary.last, natural.rows(objective, settings.exact_volume));
+      });
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

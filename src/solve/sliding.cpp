@@ -19,7 +19,7 @@ class Rests {
 
   void find(const model::Model& model) {
     base::Stages unused(comm_);
-    const std::vector<Vec3> start = rows_.position;
+    const Start start{rows_.position};
     find_repose(comm_, model, settings_, start, unused,
                 [&](const model::StepNumbers& numbers, const model::StepRows& rows) {
                   numbers_ = numbers;

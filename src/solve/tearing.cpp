@@ -76,7 +76,7 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
   for (result.settled = false; more && result.rounds < most_rounds;) {
     base::Stages unused(comm);
     std::vector<double> tension;
-    const Summary rest = find_repose(comm, model, search, position, unused,
+    const Summary rest = find_repose(comm, model, search, {position}, unused,
                                      [&](const model::StepNumbers&, const model::StepRows& rows) {
                                        position = rows.position;
                                        tension = rows.tension;

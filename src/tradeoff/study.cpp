@@ -28,15 +28,6 @@ const MPI_Comm comm = MPI_COMM_WORLD;
 constexpr double patience = 4;  // time limits of a run that a reference may take
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
-/// All rows of slabs of points, on rank 0.
-std::vector<Vec3> gather_points(const std::vector<Vec3>& slab) {
-  const std::vector<double> numbers =
-      solve::gather(comm, slab.empty() ? nullptr : slab.data()->data(), 3 * slab.size());
-  std::vector<Vec3> points(numbers.size() / 3);
-  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
-  return points;
-}
-
 /// What a run left behind, the positions on rank 0.
 struct Run {
   Measurement measurement;
@@ -139,7 +130,7 @@ class Study {
     const solve::Summary summary =
         solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus, limit), {}, stages,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             run.position = gather_points(rows.position);
+                             run.position = solve::gather_points(comm, rows.position);
                            });
     Measurement& m = run.measurement;
     m.seconds = base::cpu_seconds() - begin;

@@ -15,8 +15,9 @@ ROOMS = {
     "mechanics": {"base", "model"},
     "solve": {"base", "model", "mechanics"},
     "results": {"base", "model"},
+    "adapt": {"base", "scene", "surface", "model", "mechanics", "solve"},
     "paper": {"base", "scene", "surface", "model", "mechanics", "solve", "results"},
-    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "solve"},
+    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "solve", "adapt"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

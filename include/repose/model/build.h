@@ -35,6 +35,19 @@ struct BuiltModel {
 BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones);
 
+/// What a scene's model is built from, at any resolution.
+struct Anatomy {
+  scene::Scene scene;  ///< with moves that heed collisions
+  surface::Surface skin;
+  std::vector<surface::Surface> bones;  ///< [scene.bones]
+  std::vector<std::string> remarks;     ///< lines for a person, each complete
+};
+
+/// Reads the scene's surfaces, cuts its bones and heeds collisions. Serial.
+Anatomy load_anatomy(const scene::Scene& scene);
+
+BuiltModel build_model(const Anatomy& anatomy);
+
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
 

@@ -13,6 +13,7 @@ struct PathSettings {
   double accuracy = 0.1;  ///< mm, of every step
   int load_steps = 0;     ///< equal steps; 0: as many as the motion needs
   double start_load = 0;  ///< of a restarted run
+  bool hasty = false;     ///< a step is halved where it fails or folds tissue only
 };
 
 /// What a run came to.
@@ -22,6 +23,7 @@ struct PathOutcome {
   int64_t steps = 0;  ///< accepted
   int64_t halvings = 0;
   int64_t iterations = 0;
+  bool leapt = false;  ///< it came from a guess, not along the path
   bool complete() const { return last.converged && load == 1; }
 };
 
@@ -36,8 +38,10 @@ class LoadPath {
            const PathSettings& settings);
 
   /// From `displacement` (changed in place, the start of a restarted run) to load 1. `on_step` is
-  /// called with the positions at each accepted step, and at the last one if it failed.
-  PathOutcome run(Vec displacement, const OnStep& on_step);
+  /// called with the positions at each accepted step, and at the last one if it failed. A `guess`
+  /// of the rest position at load 1, if not null, is tried before the path is followed, and is
+  /// good where the search from it comes to rest without folded tissue.
+  PathOutcome run(Vec displacement, Vec guess, const OnStep& on_step);
 
   /// Steps an automatic path begins with: one for each `automatic_stride` mm of the fastest point.
   static constexpr double automatic_stride = 2.5;
@@ -54,6 +58,8 @@ class LoadPath {
   Attempt attempt(Vec displacement, double load);
   bool follows(const Attempt& now, const Attempt* coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
+  void leap(Vec displacement, Vec guess, const OnStep& on_step);
+  void accept(const Outcome& outcome, double load, Vec displacement);
 
   Objective& objective_;
   Predictor& predictor_;

@@ -40,11 +40,19 @@ struct Summary {
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
 };
 
+/// Where a search begins.
+struct Start {
+  std::vector<Vec3> position =
+      {};  ///< this rank's slab, natural order, mm; empty: the initial state
+  /// `position` is a guess of the rest position at load 1, tried before the path is followed;
+  /// otherwise the state at the settings' start_load.
+  bool guess = false;
+};
+
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
-/// position along the load path, hands every step to `receive`. `start` gives the positions (this
-/// rank's slab, natural order) of a restarted run, or is empty. Ends the stages "distribute" and
+/// position along the load path, hands every step to `receive`. Ends the stages "distribute" and
 /// "solve". Throws InputError where nothing is free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
-                    const std::vector<Vec3>& start, base::Stages& stages, const Receiver& receive);
+                    const Start& start, base::Stages& stages, const Receiver& receive);
 
 }  // namespace repose::solve

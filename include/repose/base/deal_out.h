@@ -5,9 +5,9 @@
 
 #include "repose/base/geometry.h"
 
-namespace repose::results {
+namespace repose::base {
 
 /// Rows that rank 0 holds, as a slab (base::slab) on every rank. Collective.
 std::vector<Vec3> deal_out(MPI_Comm comm, const std::vector<Vec3>& all);
 
-}  // namespace repose::results
+}  // namespace repose::base

@@ -1,17 +1,17 @@
-#include "repose/results/deal_out.h"
+#include "repose/base/deal_out.h"
 
 #include <algorithm>
 
 #include "repose/base/agreement.h"
 
-namespace repose::results {
+namespace repose::base {
 
 // One message each, of whole points: bytes and coordinates may be too many for an int.
 std::vector<Vec3> deal_out(MPI_Comm comm, const std::vector<Vec3>& all) {
-  const int ranks = base::size(comm), rank = base::rank(comm);
+  const int ranks = size(comm), rank = base::rank(comm);
   int64_t total = static_cast<int64_t>(all.size());
   MPI_Bcast(&total, 1, MPI_INT64_T, 0, comm);
-  const base::Slab mine = base::slab(total, rank, ranks);
+  const Slab mine = slab(total, rank, ranks);
   MPI_Datatype point;
   MPI_Type_contiguous(3, MPI_DOUBLE, &point);
   MPI_Type_commit(&point);
@@ -19,7 +19,7 @@ std::vector<Vec3> deal_out(MPI_Comm comm, const std::vector<Vec3>& all) {
   if (rank == 0) {
     std::copy_n(all.begin(), mine.rows(), rows.begin());
     for (int to = 1; to < ranks; ++to) {
-      const base::Slab theirs = base::slab(total, to, ranks);
+      const Slab theirs = slab(total, to, ranks);
       MPI_Send(all.data() + theirs.begin, static_cast<int>(theirs.rows()), point, to, 0, comm);
     }
   } else {
@@ -29,4 +29,4 @@ std::vector<Vec3> deal_out(MPI_Comm comm, const std::vector<Vec3>& all) {
   return rows;
 }
 
-}  // namespace repose::results
+}  // namespace repose::base

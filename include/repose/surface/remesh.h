@@ -1,0 +1,14 @@
+#pragma once
+#include "repose/surface/surface.h"
+
+namespace repose::surface {
+
+/// Mean length of the edges of a surface, mm; each triangle counts its three.
+double mean_edge(const Surface& surface);
+
+/// The surface with nearly equilateral triangles whose edges are about `edge` mm long, its border
+/// loops kept as curves: isotropic remeshing (Botsch & Kobbelt 2004; CGAL). The surface is manifold
+/// (load_surface, Role::skin). Throws InputError where nothing of that size is left of it.
+Surface remesh(const Surface& surface, double edge);
+
+}  // namespace repose::surface

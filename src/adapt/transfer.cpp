@@ -1,0 +1,96 @@
+#include "repose/adapt/transfer.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "repose/surface/distance.h"
+
+namespace repose::adapt {
+
+namespace {
+
+using model::Model;
+
+int64_t layers_of(const Model& model) {
+  return 1 + *std::max_element(model.points.layer.begin(), model.points.layer.end());
+}
+
+/// The skin of a model, vertex = column.
+surface::Surface skin_of(const Model& model, int64_t layers) {
+  surface::Surface skin{"the skin of the coarse model", {}, {}};
+  for (size_t i = 0; i < model.points.position.size(); i += layers)
+    skin.points.push_back(model.points.position[i]);
+  for (const auto& [a, b, c] : model.skin)
+    skin.triangles.push_back({a / layers, b / layers, c / layers});
+  return skin;
+}
+
+/// The weights of a point of a triangle.
+Vec3 barycentric(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
+  Eigen::Matrix<double, 3, 2> edges;
+  edges << b - a, c - a;
+  const Eigen::Vector2d w = edges.colPivHouseholderQr().solve(point - a);
+  return {1 - w.sum(), w[0], w[1]};
+}
+
+/// Depths of the layers as fractions of the thickness, the same in every column.
+std::vector<double> depths_of(const Model& model) {
+  const int64_t layers = layers_of(model);
+  const auto& x = model.points.position;
+  std::vector<double> depths;
+  for (int64_t l = 0; l < layers; ++l)
+    depths.push_back((x[l] - x[0]).norm() / (x[layers - 1] - x[0]).norm());
+  return depths;
+}
+
+}  // namespace
+
+Transfer::Transfer(const Model& from, const Model& to)
+    : to_(to), from_depths_(depths_of(from)), to_depths_(depths_of(to)) {
+  const surface::Surface skin = skin_of(from, layers_of(from));
+  const surface::DistanceTree tree(skin);
+  for (size_t i = 0; i < to.points.position.size(); i += to_depths_.size()) {
+    const auto nearest = tree.nearest(to.points.position[i]);
+    const auto& corner = skin.triangles[nearest.triangle];
+    const auto& x = skin.points;
+    places_.push_back(
+        {corner, barycentric(x[corner[0]], x[corner[1]], x[corner[2]], nearest.point)});
+  }
+}
+
+Vec3 Transfer::interpolate(const std::vector<Vec3>& displacement, const Place& place,
+                           double depth) const {
+  const size_t layers = from_depths_.size();
+  size_t below = 1;
+  while (below + 1 < layers && from_depths_[below] < depth) ++below;
+  const double above = from_depths_[below - 1];
+  const double share = std::clamp((depth - above) / (from_depths_[below] - above), 0.0, 1.0);
+  Vec3 sum = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3* column = &displacement[place.column[k] * layers];
+    sum += place.weight[k] * ((1 - share) * column[below - 1] + share * column[below]);
+  }
+  return sum;
+}
+
+std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
+  const model::Points& points = to_.points;
+  std::vector<Vec3> carried(points.position.size());
+  const size_t layers = to_depths_.size();
+  const auto taken = [&](size_t i) -> Vec3 { return points.target[i] - points.position[i]; };
+  for (size_t c = 0; c < places_.size(); ++c) {
+    const size_t deepest = (c + 1) * layers - 1;
+    Vec3 short_of = Vec3::Zero();
+    if (points.set[deepest] != model::PointSet::soft_tissue)
+      short_of = taken(deepest) - interpolate(displacement, places_[c], 1);
+    for (size_t l = 0; l < layers; ++l) {
+      const size_t i = c * layers + l;
+      carried[i] = interpolate(displacement, places_[c], to_depths_[l]) + to_depths_[l] * short_of;
+      if (points.set[i] != model::PointSet::soft_tissue) carried[i] = taken(i);
+    }
+  }
+  return carried;
+}
+
+}  // namespace repose::adapt
