@@ -39,7 +39,8 @@ const MPI_Comm comm = MPI_COMM_WORLD;
 const std::vector<std::string> functional_words = {"energy", "force"};
 const std::vector<std::string> volume_words = {"none", "paper", "penalty", "exact"};
 
-std::vector<base::Option> option_table() {
+/// What is computed, and how near.
+std::vector<base::Option> method_options() {
   return {
       {"output", OptionKind::path, "",
        "Path of the result without ending; default: the input's name here."},
@@ -70,6 +71,15 @@ std::vector<base::Option> option_table() {
        {1, 100000},
        "",
        {"auto"}},
+      {"profile",
+       OptionKind::choice,
+       "balanced",
+       "preview: a coarse model, 1 mm; balanced: as the scene says; exact: 1e-6 mm, -nested off.",
+       {},
+       "",
+       {"preview", "balanced", "exact"}},
+      {"adapt", OptionKind::flag, "",
+       "Solve the coarsest model of the scene whose skin is within the accuracy."},
       {"nested",
        OptionKind::choice,
        "auto",
@@ -77,6 +87,12 @@ std::vector<base::Option> option_table() {
        {},
        "",
        {"auto", "on", "off"}},
+  };
+}
+
+/// How the run goes on, ends and tells of itself.
+std::vector<base::Option> run_options() {
+  return {
       {"stability", OptionKind::flag, "",
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
       {"monitor_mm", OptionKind::flag, "",
@@ -97,6 +113,13 @@ std::vector<base::Option> option_table() {
        {0, 1e9},
        "s"},
   };
+}
+
+std::vector<base::Option> option_table() {
+  std::vector<base::Option> table = method_options();
+  const std::vector<base::Option> more = run_options();
+  table.insert(table.end(), more.begin(), more.end());
+  return table;
 }
 
 /// The model on rank 0, with what the scene asks of the solver.
@@ -176,10 +199,18 @@ void choose(const base::Options& options, const char* name, const std::vector<st
   value = static_cast<Choice>(place - words.begin());
 }
 
-/// The command line beats the scene.
+/// mm that a profile asks for, if it does.
+std::optional<double> accuracy_of(const std::string& profile) {
+  if (profile == "preview") return 1.0;
+  if (profile == "exact") return 1e-6;
+  return {};
+}
+
+/// The command line beats the scene, and an option of its own the profile.
 void override_by(const base::Options& options, scene::Solve& wanted) {
   choose<scene::Functional>(options, "functional", functional_words, wanted.functional);
   choose<scene::VolumeForm>(options, "volume", volume_words, wanted.volume);
+  wanted.accuracy = accuracy_of(options.text("profile")).value_or(wanted.accuracy);
   if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
   if (options.has("lambda")) wanted.lambda = options.number("lambda");
   if (options.has("bulk_modulus")) wanted.bulk_modulus = options.number("bulk_modulus");
@@ -220,10 +251,17 @@ void say(const std::string& text) {
 /// Writes every step to the result, and from time to time the latest to a checkpoint.
 class Writer {
  public:
-  Writer(const std::filesystem::path& name, const model::Model& model, double interval)
-      : name_(name), model_(model), file_(comm, name, model), interval_(interval) {}
+  Writer(const std::filesystem::path& name, const model::Model& model,
+         std::optional<double> discretisation_error, double interval)
+      : name_(name),
+        model_(model),
+        discretisation_error_(discretisation_error),
+        file_(comm, name, model),
+        interval_(interval) {}
 
-  void operator()(const model::StepNumbers& numbers, const model::StepRows& rows) {
+  void operator()(model::StepNumbers numbers, const model::StepRows& rows) {
+    if (numbers.load == 1 && discretisation_error_)
+      numbers.discretisation_error = *discretisation_error_;
     file_.append(numbers, rows);
     last_numbers_ = numbers;
     last_rows_ = rows;
@@ -246,6 +284,7 @@ class Writer {
  private:
   std::filesystem::path name_;
   const model::Model& model_;
+  std::optional<double> discretisation_error_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
   model::StepRows last_rows_;
@@ -282,40 +321,79 @@ std::string obstacle_to_nesting(const Job& job, const solve::Settings& settings,
   return "";
 }
 
+/// What the options say of coarser models.
+struct Wish {
+  bool preview, adapt, nested;
+  bool insisted;    // not to be passed over where it cannot be
+  std::string who;  // the option that asks for it
+};
+
+Wish wish_of(const base::Options& options) {
+  const std::string profile = options.text("profile");
+  const bool exact = profile == "exact" && !options.has("nested");
+  const std::string nested = exact ? "off" : options.text("nested");
+  const bool adapt = options.flag("adapt");
+  if (adapt && nested == "off")
+    base::refuse("-adapt solves coarser models; leave -nested off or -profile exact out");
+  return {profile == "preview", adapt, nested != "off", adapt || nested == "on",
+          adapt ? "-adapt" : "-nested on"};
+}
+
 /// The resolutions that are solved before the scene's own, on rank 0.
-std::vector<adapt::Resolution> plan_rungs(const base::Options& options, const Job& job,
-                                          const solve::Settings& settings) {
-  const std::string wanted = options.text("nested");
-  if (wanted == "off") return {};
-  const std::string obstacle = obstacle_to_nesting(job, settings, options.has("restart"));
+std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
+                                          const solve::Settings& settings, bool restarted) {
+  constexpr int64_t preview_columns = 4000;
+  if (!wish.nested) return {};
+  const std::string obstacle = obstacle_to_nesting(job, settings, restarted);
   if (!obstacle.empty()) {
-    if (wanted == "on") base::refuse("-nested on: {}; leave the option out", obstacle);
+    if (wish.insisted) base::refuse("{}: {}; leave the option out", wish.who, obstacle);
     return {};
   }
-  std::vector<adapt::Resolution> rungs = adapt::rungs_below(job.anatomy->scene, job.anatomy->skin);
-  if (wanted == "on" && rungs.empty())
-    base::refuse("-nested on: the skin has only {} vertices; leave the option out",
-                 job.anatomy->skin.points.size());
+  const auto columns = static_cast<int64_t>(job.anatomy->skin.points.size());
+  if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);
+  if (wish.preview) return adapt::compared_rungs(*job.anatomy, preview_columns);
+  std::vector<adapt::Resolution> rungs = adapt::guiding_rungs(*job.anatomy);
+  if (wish.insisted && rungs.empty())
+    base::refuse("{}: the skin has only {} vertices; leave the option out", wish.who, columns);
   return rungs;
 }
 
-/// Solves coarser models first where that pays; `start` is then the guess they lead to.
-void nest(const base::Options& options, const Job& job, solve::Settings& settings,
-          solve::Start& start, base::Stages& stages, std::string& told) {
+/// What coarser models gave.
+struct Coarser {
+  std::string told;                            // on rank 0
+  std::optional<double> discretisation_error;  // mm, of the model that was chosen, if one was
+};
+
+/// Solves coarser models first where that pays; `start` is then the guess they lead to, for the
+/// scene's own model or for the coarse one that takes its place in the job.
+Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& settings,
+                      solve::Start& start) {
+  const Wish wish = wish_of(options);
   adapt::Climb climb{{}, job.recording, settings};
-  base::on_first_rank(comm, [&] { climb.rungs = plan_rungs(options, job, settings); });
+  base::on_first_rank(
+      comm, [&] { climb.rungs = plan_rungs(wish, job, settings, options.has("restart")); });
   auto rungs = static_cast<int>(climb.rungs.size());
   MPI_Bcast(&rungs, 1, MPI_INT, 0, comm);
-  if (rungs == 0) return;
+  if (rungs == 0) return {};
   climb.rungs.resize(rungs);
+  if (wish.adapt || wish.preview) climb.enough = settings.path.accuracy;
   const double begin = MPI_Wtime();
   const model::Anatomy none;
-  const adapt::Ladder ladder =
-      adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
+  adapt::Ladder ladder = adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
+  Coarser coarser{adapt::describe_ladder(ladder), {}};
+  if (ladder.near_enough || (wish.preview && ladder.rungs.size() > 1)) {
+    coarser.discretisation_error = ladder.rungs.back().discretisation_error;
+    coarser.told += adapt::describe_choice(ladder, settings.path.accuracy);
+    settings.path.accuracy = ladder.last_settings.path.accuracy;
+    settings.weights = ladder.last_settings.weights;
+    job.model = std::move(ladder.last.model);
+    job.held = std::move(ladder.last.held);
+    start = {base::deal_out(comm, ladder.last_position), true};
+  } else if (!ladder.rungs.empty()) {
+    start = {base::deal_out(comm, ladder.position), true};
+  }
   settings.time_limit = ladder.stopped ? 0 : settings.time_limit - (MPI_Wtime() - begin);
-  if (!ladder.rungs.empty()) start = {base::deal_out(comm, ladder.position), true};
-  told = adapt::describe_ladder(ladder);
-  stages.end("coarser models");
+  return coarser;
 }
 
 base::Exit run(const base::Options& options) {
@@ -349,16 +427,16 @@ base::Exit run(const base::Options& options) {
   if (tearing.rounds > 0) stages.end("tear");
   if (tearing.torn) start_torn(tearing, settings, restart);
   solve::Start start{restart.position};
-  std::string nesting;
-  nest(options, job, settings, start, stages, nesting);
-  Writer writer(name, job.model,
+  const Coarser coarser = solve_coarser(options, job, settings, start);
+  if (start.guess) stages.end("coarser models");
+  Writer writer(name, job.model, coarser.discretisation_error,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary =
       solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
-  say(nesting + solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
+  say(coarser.told + solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
   const bool settled = sliding.settled && tearing.settled;

@@ -81,7 +81,8 @@ bool layers_are_free(const scene::Tissue& tissue) {
          std::none_of(tissue.springs.begin(), tissue.springs.end(), names_a_layer);
 }
 
-Model coarse_model(const model::Anatomy& anatomy, const Model& fine, const Resolution& resolution) {
+model::BuiltModel coarse_model(const model::Anatomy& anatomy, const Model& fine,
+                               const Resolution& resolution) {
   scene::Scene scene = anatomy.scene;
   const int layers = resolution.layers > 0 ? resolution.layers : scene.tissue.layers;
   const bool same_layers = layers == scene.tissue.layers;
@@ -90,9 +91,9 @@ Model coarse_model(const model::Anatomy& anatomy, const Model& fine, const Resol
       {"default", {.stiffness = {}, .modulus = 1.0, .law = {}, .reference = 0.0}}};
   const surface::Surface skin =
       resolution.edge > 0 ? surface::remesh(anatomy.skin, resolution.edge) : anatomy.skin;
-  Model model = model::build_model(scene, skin, anatomy.bones).model;
-  give_material(materials(anatomy.skin, fine, same_layers), same_layers, model);
-  return model;
+  model::BuiltModel built = model::build_model(scene, skin, anatomy.bones);
+  give_material(materials(anatomy.skin, fine, same_layers), same_layers, built.model);
+  return built;
 }
 
 }  // namespace repose::adapt

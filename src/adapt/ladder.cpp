@@ -20,7 +20,11 @@ namespace {
 
 using model::Model;
 
-constexpr double loosest_accuracy = 0.1;  // mm, of a rung
+constexpr double loosest_guide = 0.1;  // mm, accuracy of a rung that only leads on
+constexpr double search_share = 0.2;   // of what is enough, for the search of a rung that may be it
+// A rung is this many times as far from the scene's own model as from the rung before: errors that
+// shrink with the first power of the edge give 1, those that shrink with the second 1/3.
+constexpr double safety = 1.5;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double mean_volume(const Model& model) {
@@ -49,7 +53,7 @@ class Climber {
       } catch (const base::InputError& refusal) {
         ladder_.refusal = refusal.what();
       }
-      if (!done) break;
+      if (!done || ladder_.near_enough) break;
     }
     return std::move(ladder_);
   }
@@ -62,13 +66,14 @@ class Climber {
     Rung rung;
     rung.resolution = resolution;
     const double begin = elapsed();
-    Model model;
-    base::on_first_rank(comm_, [&] { model = coarse_model(anatomy_, fine_, resolution); });
-    if (wanted_.recording) solve::prestress(comm_, model, *wanted_.recording);
+    model::BuiltModel built;
+    base::on_first_rank(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
+    if (wanted_.recording) solve::prestress(comm_, built.model, *wanted_.recording);
     base::Stages unused(comm_);
     std::vector<Vec3> position;
+    const solve::Settings settings = settings_for(built.model);
     const solve::Summary summary =
-        solve::find_repose(comm_, model, settings_for(model), start_for(model), unused,
+        solve::find_repose(comm_, built.model, settings, start_for(built.model), unused,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              position = solve::gather_points(comm_, rows.position);
                            });
@@ -80,15 +85,20 @@ class Climber {
     rung.unknowns = summary.unknowns;
     rung.evaluations = summary.evaluations;
     rung.assemblies = summary.assemblies;
-    base::on_first_rank(comm_, [&] { take(std::move(model), std::move(position), rung); });
+    base::on_first_rank(comm_, [&] { take(std::move(built), std::move(position), rung); });
+    MPI_Bcast(&rung.discretisation_error, 1, MPI_DOUBLE, 0, comm_);
     rung.seconds = elapsed() - begin;
     ladder_.rungs.push_back(rung);
+    ladder_.last_settings = settings;
+    const double error = rung.discretisation_error + summary.last.displacement_error;
+    ladder_.near_enough = wanted_.enough > 0 && error <= wanted_.enough;
     return true;
   }
 
   solve::Settings settings_for(const Model& model) const {
     solve::Settings settings = wanted_.settings;
-    settings.path.accuracy = std::max(settings.path.accuracy, loosest_accuracy);
+    settings.path.accuracy = wanted_.enough > 0 ? search_share * wanted_.enough
+                                                : std::max(settings.path.accuracy, loosest_guide);
     settings.time_limit -= elapsed();
     settings.path.hasty = true;
     settings.monitor = settings.stability = false;
@@ -103,24 +113,28 @@ class Climber {
   solve::Start start_for(const Model& model) const {
     if (ladder_.rungs.empty()) return {};
     std::vector<Vec3> all;
-    if (base::rank(comm_) == 0)
-      all = sum(model.points.position, Transfer(before_, model).carry(displacement_), 1);
+    if (base::rank(comm_) == 0) {
+      const Model& before = ladder_.last.model;
+      const auto moved = sum(ladder_.last_position, before.points.position, -1);
+      all = sum(model.points.position, Transfer(before, model).carry(moved), 1);
+    }
     return {base::deal_out(comm_, all), true};
   }
 
   /// Carries the answer of a rung to the scene's points. On rank 0.
-  void take(Model&& model, std::vector<Vec3>&& position, Rung& rung) {
+  void take(model::BuiltModel&& built, std::vector<Vec3>&& position, Rung& rung) {
     rung.points = static_cast<int64_t>(position.size());
-    displacement_ = sum(position, model.points.position, -1);
-    before_ = std::move(model);
-    position = sum(fine_.points.position, Transfer(before_, fine_).carry(displacement_), 1);
-    rung.change = rung.skin_change = ladder_.rungs.empty() ? infinity : 0;
-    for (size_t i = 0; i < ladder_.position.size(); ++i) {
-      const double change = (position[i] - ladder_.position[i]).norm();
-      rung.change = std::max(rung.change, change);
-      if (fine_.points.layer[i] == 0) rung.skin_change = std::max(rung.skin_change, change);
-    }
-    ladder_.position = std::move(position);
+    const auto moved = sum(position, built.model.points.position, -1);
+    std::vector<Vec3> carried =
+        sum(fine_.points.position, Transfer(built.model, fine_).carry(moved), 1);
+    rung.skin_change = ladder_.rungs.empty() ? infinity : 0;
+    for (size_t i = 0; i < ladder_.position.size(); ++i)
+      if (fine_.points.layer[i] == 0)
+        rung.skin_change = std::max(rung.skin_change, (carried[i] - ladder_.position[i]).norm());
+    rung.discretisation_error = safety * rung.skin_change;
+    ladder_.last = std::move(built);
+    ladder_.last_position = std::move(position);
+    ladder_.position = std::move(carried);
   }
 
   MPI_Comm comm_;
@@ -129,20 +143,38 @@ class Climber {
   const Climb& wanted_;
   const double begin_ = MPI_Wtime();
   Ladder ladder_;
-  Model before_;                    // of the last rung, on rank 0
-  std::vector<Vec3> displacement_;  // of its points, on rank 0
 };
+
+/// Resolutions with edges `coarsening` times as long from rung to rung, down to `fewest` columns,
+/// and, where the scene lets them be any number, one layer fewer.
+std::vector<Resolution> rungs_by(double coarsening, double fewest, const model::Anatomy& anatomy) {
+  constexpr int fewest_layers = 2;
+  const scene::Tissue& tissue = anatomy.scene.tissue;
+  const bool free = layers_are_free(tissue);
+  auto columns = static_cast<double>(anatomy.skin.points.size());
+  Resolution resolution{surface::mean_edge(anatomy.skin), tissue.layers};
+  std::vector<Resolution> rungs;
+  while ((columns /= coarsening * coarsening) >= fewest) {
+    resolution.edge *= coarsening;
+    if (free) resolution.layers = std::max(fewest_layers, resolution.layers - 1);
+    rungs.push_back(resolution);
+  }
+  std::reverse(rungs.begin(), rungs.end());
+  return rungs;
+}
 
 }  // namespace
 
-std::vector<Resolution> rungs_below(const scene::Scene& scene, const surface::Surface& skin) {
-  constexpr double fewest_columns = 400, coarsening = 3;
-  auto columns = static_cast<double>(skin.points.size());
-  double edge = surface::mean_edge(skin);
-  std::vector<Resolution> rungs;
-  while ((columns /= coarsening * coarsening) >= fewest_columns)
-    rungs.push_back({edge *= coarsening, scene.tissue.layers});
-  std::reverse(rungs.begin(), rungs.end());
+std::vector<Resolution> guiding_rungs(const model::Anatomy& anatomy) {
+  return rungs_by(3, 400, anatomy);
+}
+
+std::vector<Resolution> compared_rungs(const model::Anatomy& anatomy, int64_t most_columns) {
+  std::vector<Resolution> rungs = rungs_by(2, 150, anatomy);
+  const double finest =
+      surface::mean_edge(anatomy.skin) * std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
+                                                   static_cast<double>(most_columns));
+  std::erase_if(rungs, [&](const Resolution& r) { return r.edge < finest; });
   return rungs;
 }
 

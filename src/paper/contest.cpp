@@ -88,7 +88,8 @@ Entry Contest::follow_path() {
     WatchedSearch search(problem_, watched);
     solve::LoadPath path(problem_.objective(), predictor, search.search(),
                          {.accuracy = rules_.accuracy});
-    complete = path.run(displacement, nullptr, [](const solve::Outcome&, double, double) {}).complete();
+    complete =
+        path.run(displacement, nullptr, [](const solve::Outcome&, double, double) {}).complete();
   };
   Entry entry =
       race_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.path_seconds}, follow, reference_);

@@ -1,8 +1,8 @@
 #include "repose/results/restart.h"
 
 #include "repose/base/agreement.h"
-#include "repose/base/error.h"
 #include "repose/base/deal_out.h"
+#include "repose/base/error.h"
 #include "repose/results/model_file.h"
 
 namespace repose::results {

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "repose/base/agreement.h"
-#include "repose/base/hdf5.h"
 #include "repose/base/deal_out.h"
+#include "repose/base/hdf5.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
 #include "repose/results/views.h"

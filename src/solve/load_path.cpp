@@ -69,10 +69,9 @@ bool LoadPath::follows(const Attempt& now, const Attempt* coarser) const {
   if (!now.outcome.converged) return false;
   // Halving shrinks what a smooth path misses by four. What it does not shrink, a jump of the rest
   // position itself or a fold, is the path's own.
-  const bool near =
-      settings_.hasty || now.miss <= trusted_miss * now.expected + settings_.accuracy;
-  return (near && !now.folded) || (coarser && coarser->outcome.converged && now.folded == coarser->folded &&
-                    now.miss > 0.5 * coarser->miss);
+  const bool near = settings_.hasty || now.miss <= trusted_miss * now.expected + settings_.accuracy;
+  return (near && !now.folded) || (coarser && coarser->outcome.converged &&
+                                   now.folded == coarser->folded && now.miss > 0.5 * coarser->miss);
 }
 
 void LoadPath::settle(Vec displacement, const OnStep& on_step) {

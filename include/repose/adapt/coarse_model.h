@@ -15,8 +15,8 @@ struct Resolution {
 /// volume) that its springs have in `fine`, the model of the anatomy as it is, so that constant
 /// stiffnesses, too, mean the same material. Without initial stress (solve/prestress.h) and
 /// incisions. Serial. Throws InputError where no valid model exists at that resolution.
-model::Model coarse_model(const model::Anatomy& anatomy, const model::Model& fine,
-                          const Resolution& resolution);
+model::BuiltModel coarse_model(const model::Anatomy& anatomy, const model::Model& fine,
+                               const Resolution& resolution);
 
 /// Whether the number of layers may differ from the scene's: it names none of them.
 bool layers_are_free(const scene::Tissue& tissue);

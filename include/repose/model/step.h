@@ -29,10 +29,14 @@ struct StepNumbers {
   /// Of the exact Hessian over the unknowns, N/mm; NaN, and no attribute, where not asked for.
   double smallest_eigenvalue = std::numeric_limits<double>::quiet_NaN();
   double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
+  /// mm, estimate for the skin of a model coarser than the scene asks for; NaN for the scene's own.
+  double discretisation_error = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// A number of a step that a file may do without; it is NaN then.
-inline bool is_optional(std::string_view name) { return name.ends_with("_eigenvalue"); }
+inline bool is_optional(std::string_view name) {
+  return name.ends_with("_eigenvalue") || name == "discretisation_error";
+}
 
 /// Calls visit(name, member) for every number of a step, in the order of the file.
 template <class Numbers, class Visit>
@@ -60,6 +64,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("converged", numbers.converged);
   visit("smallest_eigenvalue", numbers.smallest_eigenvalue);
   visit("largest_eigenvalue", numbers.largest_eigenvalue);
+  visit("discretisation_error", numbers.discretisation_error);
 }
 
 /// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.

@@ -1,0 +1,132 @@
+"""Coarser models of a scene, solved first to lead to its answer or in its place."""
+
+import h5py
+import pytest
+
+from conftest import runner
+from tissue import apart, last, same_face, steps
+
+SCENE = """skin: head_skin.ply
+bones:
+  - {name: skull, file: head_skull.ply}
+  - {name: mandible, file: head_mandible.ply}
+tissue:
+  layers: 4
+  springs:
+    default: {modulus: 0.05, law: quartic, reference: initial}
+moves:
+  - {bone: mandible, translate: [0, -2, 0]}
+solve:
+  accuracy: 1.0e-6
+"""
+
+
+@pytest.fixture(scope="module")
+def head(tmp_path_factory, environment):
+    """head(*options, ranks=1) → result file and what was said, of a head of 4000 skin vertices whose
+    jaw advances 2 mm. The same is solved once only."""
+    folder = tmp_path_factory.mktemp("head")
+    run, done = runner(folder, environment), {}
+    made = run("repose-phantom", "-skin_vertices", 4000, "-output", "head")
+    assert made.returncode == 0, made
+    (folder / "scene.yaml").write_text(SCENE)
+
+    def solve(*options, ranks=1):
+        key = (options, ranks)
+        if key not in done:
+            name = f"result_{len(done)}"
+            result = run("repose-solve", "scene.yaml", *options, "-output", name, ranks=ranks)
+            assert (result.returncode, result.stderr) == (0, ""), result
+            done[key] = folder / f"{name}.h5", result.stdout
+        return done[key]
+
+    solve.run = run
+    return solve
+
+
+def test_the_answer_is_that_of_the_load_path_in_fewer_evaluations(head):
+    along, _ = head("-nested", "off")
+    nested, said = head()
+    assert said.count("coarse model") == 1 and len(steps(nested)) == 2
+    same_face(along, nested, 2e-6)
+    assert last(nested)["evaluations"] < sum(step["evaluations"] for step in steps(along))
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_find_the_same(head, ranks):
+    one, _ = head()
+    more, said = head(ranks=ranks)
+    assert said.count("coarse model") == 1
+    same_face(one, more, 2e-6)
+
+
+def at_skin(file):
+    """Initial positions and displacements of the skin's points."""
+    with h5py.File(file) as h5:
+        skin = h5["model/point/layer"][()] == 0
+        initial = h5["model/point/position"][()][skin]
+        return initial, last(file)["point/position"][skin] - initial
+
+
+def skin_distance(coarse, fine):
+    """Largest distance of the skins' rest positions, at the coarse skin's vertices, mm; displacements
+    of the fine skin are averaged over the vertices around."""
+    scipy = pytest.importorskip("scipy.spatial")
+    (places, moved), (fine_places, fine_moved) = at_skin(coarse), at_skin(fine)
+    near = scipy.cKDTree(fine_places).query(places, k=3)[1]
+    return ((moved - fine_moved[near].mean(1)) ** 2).sum(1).max() ** 0.5
+
+
+def test_adapt_solves_a_coarser_model_within_the_accuracy(head):
+    coarse, said = head("-adapt", "-accuracy", 10)
+    error = last(coarse)["discretisation_error"]
+    assert error + last(coarse)["displacement_error"] <= 10 and "solved model" in said
+    assert "discretisation_error" not in steps(coarse)[0]
+    assert len(at_skin(coarse)[0]) < 1500
+    assert skin_distance(coarse, head()[0]) < error
+    checked = head.run("repose-check", coarse)
+    assert checked.returncode == 0, checked
+
+
+def test_adapt_keeps_the_scene_s_own_model_where_nothing_else_is_near_enough(head):
+    own, said = head("-adapt", "-accuracy", 1e-3)
+    assert "discretisation_error" not in last(own) and "solved model" not in said
+    assert apart(last(own), last(head()[0])) < 1e-3
+
+
+def test_a_preview_is_a_coarse_model_and_says_what_it_is_worth(head):
+    preview, said = head("-profile", "preview")
+    error = last(preview)["discretisation_error"]
+    assert ("MORE THAN THE 1 mm ASKED FOR" in said) == (error > 1)
+    assert skin_distance(preview, head()[0]) < error
+    assert last(preview)["evaluations"] < 50
+
+
+def test_adapt_on_two_ranks(head):
+    one, two = (head("-adapt", "-accuracy", 10, ranks=ranks)[0] for ranks in (1, 2))
+    assert last(one)["discretisation_error"] == pytest.approx(last(two)["discretisation_error"], 0.1)
+    assert apart(last(one), last(two)) <= (last(one)["displacement_error"]
+                                           + last(two)["displacement_error"])
+
+
+def test_exact_follows_the_load_path_to_a_millionth(head):
+    exact, said = head("-profile", "exact")
+    assert "1e-06 mm asked for" in said and "coarse model" not in said
+    assert len(steps(exact)) == len(steps(head("-nested", "off")[0]))
+
+
+@pytest.mark.parametrize("options, words", [
+    (["-adapt", "-nested", "off"], "-adapt solves coarser models"),
+    (["-adapt", "-load_steps", 3], "load_steps are asked for"),
+    (["-nested", "on", "-functional", "force"], "the functional is force"),
+    (["-profile", "quick"], "preview, balanced, exact"),
+])
+def test_what_cannot_be_is_refused_in_a_line(head, options, words):
+    result = head.run("repose-solve", "scene.yaml", *options, "-output", "refused")
+    assert result.returncode == 1 and words in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_model_file_has_no_coarser_models(head):
+    refused = head.run("repose-solve", head()[0], "-nested", "on", "-output", "refused")
+    assert refused.returncode == 1 and "what it was made from" in refused.stderr
