@@ -78,8 +78,9 @@ def draw_methods(axes, rows, cost, label):
 def draw_choices(axes, rows):
     """How far the skin is from the reference for each layer count, volume term and load step."""
     rows = [row for row in rows if row["skin_95_mm"] == row["skin_95_mm"]]
-    key = {"layers": "layers", "volume": "volume", "load steps": "load_steps", "mesh": "resolution_mm"}
-    names = [f"{row[key[row['study']]]} {row['study']}" for row in rows]
+    key = {"layers": "layers", "volume": "volume", "load steps": "load_steps", "mesh": "edge_mm"}
+    unit = {"mesh": "mm edges"}
+    names = [f"{row[key[row['study']]]} {unit.get(row['study'], row['study'])}" for row in rows]
     place = np.arange(len(rows))
     axes.barh(place, [max(row["skin_max_mm"], 1e-6) for row in rows], color="0.85", label="largest")
     axes.barh(place, [max(row["skin_95_mm"], 1e-6) for row in rows], color="0.6", height=0.5,

@@ -4,8 +4,8 @@
 ///     mpirun -n 2 repose-tradeoff my_head.yaml -methods ntr,lmvm -accuracies 1,0.1,0.01 -layers
 ///     2,4,6 drivers/plot_tradeoff.py paper_jaw_advance_tradeoff
 ///
-/// Solves the scene with methods × accuracies, and varies load steps, volume term and layers one at
-/// a time; each is compared with a reference of its own. Writes NAME.csv, NAME_map.csv and
+/// Solves the scene with methods × accuracies, and varies load steps, volume term, layers and mesh
+/// one at a time; each is compared with a reference of its own. Writes NAME.csv, NAME_map.csv and
 /// NAME_triangles.csv. Exit status: 0 done, 1 bad input, 3 internal error.
 #include <fmt/ranges.h>
 
@@ -36,6 +36,8 @@ std::vector<base::Option> option_table() {
           {"load_steps", OptionKind::text, "1,2,4,8,16", "Numbers of equal steps; may be empty."},
           {"volumes", OptionKind::text, "none,paper,penalty", "Volume terms; may be empty."},
           {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; may be empty."},
+          {"edges", OptionKind::text, "",
+           "mm, mean edges of a remeshed skin; may be empty (default 1.5 and 2 times its own)."},
           {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.", {1e-12, 1}, "mm"},
           {"time_limit",
            OptionKind::number,
@@ -94,6 +96,7 @@ tradeoff::Plan read_plan(const base::Options& options) {
   plan.volumes = choices_of(options, "volumes", {"none", "paper", "penalty"});
   plan.load_steps = integers_of(options, "load_steps", Range::between(1, 100000));
   plan.layers = integers_of(options, "layers", Range::between(2, 64));
+  if (options.has("edges")) plan.edges = numbers_of(options, "edges", Range::between(0.1, 100));
   plan.reference_accuracy = options.number("reference");
   plan.seconds = options.number("time_limit");
   if (plan.methods.empty()) base::refuse("-methods: give one or more");

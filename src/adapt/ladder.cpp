@@ -148,11 +148,11 @@ class Climber {
 /// Resolutions with edges `coarsening` times as long from rung to rung, down to `fewest` columns,
 /// and, where the scene lets them be any number, one layer fewer.
 std::vector<Resolution> rungs_by(double coarsening, double fewest, const model::Anatomy& anatomy) {
-  constexpr int fewest_layers = 2;
   const scene::Tissue& tissue = anatomy.scene.tissue;
+  const int fewest_layers = std::min(3, tissue.layers);  // two are too stiff across to lead
   const bool free = layers_are_free(tissue);
   auto columns = static_cast<double>(anatomy.skin.points.size());
-  Resolution resolution{surface::mean_edge(anatomy.skin), tissue.layers};
+  Resolution resolution{surface::even_edge(anatomy.skin), tissue.layers};
   std::vector<Resolution> rungs;
   while ((columns /= coarsening * coarsening) >= fewest) {
     resolution.edge *= coarsening;
@@ -166,13 +166,13 @@ std::vector<Resolution> rungs_by(double coarsening, double fewest, const model::
 }  // namespace
 
 std::vector<Resolution> guiding_rungs(const model::Anatomy& anatomy) {
-  return rungs_by(3, 400, anatomy);
+  return rungs_by(3, 300, anatomy);
 }
 
 std::vector<Resolution> compared_rungs(const model::Anatomy& anatomy, int64_t most_columns) {
   std::vector<Resolution> rungs = rungs_by(2, 150, anatomy);
   const double finest =
-      surface::mean_edge(anatomy.skin) * std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
+      surface::even_edge(anatomy.skin) * std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
                                                    static_cast<double>(most_columns));
   std::erase_if(rungs, [&](const Resolution& r) { return r.edge < finest; });
   return rungs;

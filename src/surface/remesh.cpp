@@ -3,6 +3,9 @@
 #include <CGAL/Polygon_mesh_processing/remesh.h>
 #include <CGAL/Surface_mesh.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+
 #include "cgal.h"
 #include "repose/base/error.h"
 
@@ -36,13 +39,15 @@ Surface surface_of(Mesh& mesh, const std::string& name) {
 
 }  // namespace
 
-double mean_edge(const Surface& surface) {
-  double sum = 0;
-  for (const auto& [a, b, c] : surface.triangles)
-    sum += (surface.points[b] - surface.points[a]).norm() +
-           (surface.points[c] - surface.points[b]).norm() +
-           (surface.points[a] - surface.points[c]).norm();
-  return sum / (3.0 * static_cast<double>(surface.triangles.size()));
+double even_edge(const Surface& surface) {
+  double area = 0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec3 ab = surface.points[b] - surface.points[a],
+               ac = surface.points[c] - surface.points[a];
+    area += 0.5 * ab.cross(ac).norm();
+  }
+  const double triangle = area / static_cast<double>(surface.triangles.size());
+  return std::sqrt(4 * triangle / std::sqrt(3.0));
 }
 
 Surface remesh(const Surface& surface, double edge) {

@@ -9,8 +9,7 @@ std::string label(const Way& way) {
     return way.load_steps > 0 ? fmt::format("{}", way.load_steps) : "automatic";
   if (way.study == "volume") return way.volume;
   if (way.study == "layers") return fmt::format("{}", way.layers);
-  if (way.study == "mesh")
-    return way.resolution > 0 ? fmt::format("{:g} mm", way.resolution) : "as it is";
+  if (way.study == "mesh") return way.edge > 0 ? fmt::format("{:g} mm", way.edge) : "as it is";
   return fmt::format("{}, {:g} mm", way.method, way.accuracy);
 }
 

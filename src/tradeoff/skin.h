@@ -1,29 +1,25 @@
 #pragma once
 #include "repose/model/model.h"
-#include "repose/surface/surface.h"
-#include "repose/tradeoff/study.h"
 
 namespace repose::tradeoff {
-
-/// The model of the scene that a way asks for: its layers, its skin's resolution.
-model::Model build(const scene::Scene& scene, const Way& way);
 
 /// The skin of the reference, and how far from it another model of the same face leaves it.
 class Skin {
  public:
-  /// `rest` [N] mm: the reference's positions at rest.
+  /// `rest` [N] mm: the reference's positions at rest. `reference` must outlive this.
   Skin(const model::Model& reference, const std::vector<Vec3>& rest);
 
-  const std::vector<Vec3>& rest() const { return rest_; }
-  const std::vector<Triangle>& triangles() const { return triangles_; }
+  const std::vector<Vec3>& rest() const { return rest_; }                ///< [V] mm
+  const std::vector<Triangle>& triangles() const { return triangles_; }  ///< of rows of rest()
 
   /// [V] mm: at each skin vertex of the reference, the distance between its place at rest and
-  /// where the displacement of `model` at `position`, taken at the nearest point of that model's
-  /// skin, takes it.
+  /// where the displacement of `model` at `position`, carried over (adapt/transfer.h), takes it.
   std::vector<double> distances(const model::Model& model, const std::vector<Vec3>& position) const;
 
  private:
-  std::vector<Vec3> initial_, rest_;
+  const model::Model& reference_;
+  std::vector<int64_t> row_;  // [V] of the reference
+  std::vector<Vec3> rest_;
   std::vector<Triangle> triangles_;
 };
 

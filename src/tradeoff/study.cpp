@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "label.h"
+#include "repose/adapt/coarse_model.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/scoped_option.h"
@@ -17,6 +18,7 @@
 #include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
+#include "repose/surface/remesh.h"
 #include "skin.h"
 #include "ways.h"
 
@@ -47,6 +49,8 @@ class Study {
       : plan_(plan), tell_(tell) {}
 
   Findings run() {
+    base::on_first_rank(comm, [&] { load(); });
+    choose_edges();
     const std::vector<Way> ways = ways_of(plan_);
     prepare(ways);
     for (size_t k = 0; k < ways.size(); ++k) {
@@ -58,8 +62,38 @@ class Study {
   }
 
  private:
-  using Key = std::tuple<int, double, std::string>;  // layers, resolution, volume term
-  static Key key_of(const Way& way) { return {way.layers, way.resolution, way.volume}; }
+  using Key = std::tuple<int, double, std::string>;  // layers, edge, volume term
+  static Key key_of(const Way& way) { return {way.layers, way.edge, way.volume}; }
+
+  /// The anatomy and the scene's own model, of whose material the others are made. On rank 0.
+  void load() {
+    const scene::Scene& scene = plan_.scene;
+    const std::string file = scene.file.string();
+    const bool varied = std::any_of(plan_.layers.begin(), plan_.layers.end(),
+                                    [&](int layers) { return layers != scene.tissue.layers; });
+    if (varied && !adapt::layers_are_free(scene.tissue))
+      base::refuse(
+          "{}: tissue.depths, tissue.mass or a set of springs is for {} layers; -layers cannot "
+          "vary them, leave it empty",
+          file, scene.tissue.layers);
+    if (!scene.incisions.empty())
+      base::refuse("{}: incisions are not compared; take the key out for this study", file);
+    anatomy_ = model::load_anatomy(scene);
+    own_ = model::build_model(anatomy_).model;
+  }
+
+  void choose_edges() {
+    if (plan_.edges) return;
+    double edge = base::rank(comm) == 0 ? surface::even_edge(anatomy_.skin) : 0;
+    MPI_Bcast(&edge, 1, MPI_DOUBLE, 0, comm);
+    plan_.edges = {std::round(15 * edge) / 10, std::round(20 * edge) / 10};
+  }
+
+  /// The scene's own model, or one of the same material at another resolution. On rank 0.
+  model::Model build(const Way& way) const {
+    if (way.edge == 0 && way.layers == plan_.scene.tissue.layers) return own_;
+    return adapt::coarse_model(anatomy_, own_, {way.edge, way.layers}).model;
+  }
 
   /// The reference: the most layers, the skin as it is, the scene's volume term.
   void prepare(const std::vector<Way>& ways) {
@@ -84,7 +118,7 @@ class Study {
     if (known != known_.end()) return known->second;
     Discretisation& made = known_[key_of(way)];
     base::on_first_rank(comm, [&] {
-      made.model = build(plan_.scene, way);
+      made.model = build(way);
       made.bulk_modulus =
           plan_.scene.solve.bulk_modulus.value_or(10 * model::effective_modulus(made.model));
     });
@@ -178,8 +212,10 @@ class Study {
     m.skin_max = off.back();
   }
 
-  const Plan& plan_;
+  Plan plan_;
   const std::function<void(const std::string&, double)>& tell_;
+  model::Anatomy anatomy_;  // on rank 0
+  model::Model own_;        // on rank 0
   std::map<Key, Discretisation> known_;
   std::optional<Skin> skin_;  // on rank 0
   Findings findings_;

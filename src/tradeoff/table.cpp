@@ -7,14 +7,14 @@ namespace repose::tradeoff {
 
 std::string table(const std::vector<Measurement>& measurements) {
   std::string text =
-      "study,method,accuracy_mm,volume,load_steps,layers,resolution_mm,points,unknowns,converged,"
+      "study,method,accuracy_mm,volume,load_steps,layers,edge_mm,points,unknowns,converged,"
       "cpu_s,evaluations,hessians,iterations,estimate_mm,error_mm,skin_rms_mm,skin_95_mm,"
       "skin_max_mm,reason\n";
   for (const Measurement& m : measurements) {
     const Way& w = m.way;
     text += fmt::format("{},{},{:g},{},{},{},{:g},{},{},{},", w.study, w.method, w.accuracy,
                         w.volume, w.load_steps > 0 ? std::to_string(w.load_steps) : "auto",
-                        w.layers, w.resolution, m.points, m.unknowns, m.converged ? 1 : 0);
+                        w.layers, w.edge, m.points, m.unknowns, m.converged ? 1 : 0);
     text += fmt::format("{:.4g},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},\"{}\"\n", m.seconds,
                         m.evaluations, m.assemblies, m.iterations, m.estimate, m.error, m.skin_rms,
                         m.skin_95, m.skin_max, m.reason);

@@ -43,7 +43,8 @@ std::vector<Way> ways_of(const Plan& plan) {
   vary("load steps", plan.load_steps, [](Way& way, int steps) { way.load_steps = steps; });
   vary("volume", plan.volumes, [](Way& way, const std::string& form) { way.volume = form; });
   vary("layers", plan.layers, [](Way& way, int layers) { way.layers = layers; });
-  vary("mesh", plan.resolutions, [](Way& way, double mm) { way.resolution = mm; });
+  vary("mesh", plan.edges.value_or(std::vector<double>{}),
+       [](Way& way, double mm) { way.edge = mm; });
   return ways;
 }
 

@@ -12,7 +12,7 @@ from conftest import PROJECT
 
 SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
 FEW = ("-methods", "ntr,lmvm", "-accuracies", "1,0.01", "-load_steps", "2", "-volumes", "none",
-       "-layers", "2,4")
+       "-layers", "2,4", "-edges", "20")
 
 
 def rows(file):
@@ -37,7 +37,8 @@ def test_every_way_is_there_once(folder):
     assert found == solver + [("load steps", "ntr", "0.1", "penalty", "2", "4"),
                               ("volume", "ntr", "0.1", "none", "auto", "4"),
                               ("layers", "ntr", "0.1", "penalty", "auto", "2"),
-                              ("layers", "ntr", "0.1", "penalty", "auto", "4")]
+                              ("layers", "ntr", "0.1", "penalty", "auto", "4"),
+                              ("mesh", "ntr", "0.1", "penalty", "auto", "4")]
 
 
 def test_estimates_bound_the_errors_and_more_accuracy_costs_more(folder):
@@ -51,19 +52,26 @@ def test_estimates_bound_the_errors_and_more_accuracy_costs_more(folder):
 
 
 def test_the_reference_has_the_most_layers(folder):
-    fewer, most = rows(folder / "few.csv")[-2:]
+    fewer, most = rows(folder / "few.csv")[-3:-1]
     assert float(most["skin_max_mm"]) <= float(most["error_mm"]) + 1e-9
     assert float(fewer["skin_max_mm"]) > 0.5 > float(most["skin_max_mm"])
     assert float(fewer["skin_rms_mm"]) < float(fewer["skin_95_mm"]) < float(fewer["skin_max_mm"])
 
 
+def test_a_coarser_mesh_is_further_from_the_reference(folder):
+    coarse, own = rows(folder / "few.csv")[-1], rows(folder / "few.csv")[-2]
+    assert coarse["edge_mm"] == "20" and int(coarse["points"]) < 0.8 * int(own["points"])
+    assert 0.1 < float(coarse["skin_max_mm"]) < 6 and float(coarse["error_mm"]) < 0.1
+
+
 def test_the_map_is_of_the_whole_face(folder):
     with open(folder / "few_map.csv", newline="") as file:
         names, *lines = csv.reader(file)
-    assert names == ["x", "y", "z", "load steps: 2", "volume: none", "layers: 2", "layers: 4"]
+    assert names == ["x", "y", "z", "load steps: 2", "volume: none", "layers: 2", "layers: 4",
+                     "mesh: 20 mm"]
     values = np.array(lines, float)
     triangles = np.genfromtxt(folder / "few_triangles.csv", delimiter=",", skip_header=1, dtype=int)
-    assert values.shape == (477, 7) and triangles.shape == (874, 3) and triangles.max() == 476
+    assert values.shape == (477, 8) and triangles.shape == (874, 3) and triangles.max() == 476
     largest = [float(row["skin_max_mm"]) for row in rows(folder / "few.csv")[4:]]
     assert values[:, 3:].max(axis=0) == pytest.approx(largest, rel=1e-3)
 

@@ -3,8 +3,9 @@
 
 namespace repose::surface {
 
-/// Mean length of the edges of a surface, mm; each triangle counts its three.
-double mean_edge(const Surface& surface);
+/// Edge length of as many equilateral triangles of the same total area, mm: what remesh would need
+/// to keep the number of triangles.
+double even_edge(const Surface& surface);
 
 /// The surface with nearly equilateral triangles whose edges are about `edge` mm long, its border
 /// loops kept as curves: isotropic remeshing (Botsch & Kobbelt 2004; CGAL). The surface is manifold

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,13 +12,13 @@ namespace repose::tradeoff {
 
 /// One way to solve the scene.
 struct Way {
-  std::string study;      ///< what is varied: solver, load steps, volume, layers, mesh
-  std::string method;     ///< -tao_type
-  double accuracy;        ///< mm asked for
-  std::string volume;     ///< none, paper, penalty
-  int load_steps = 0;     ///< 0: automatic
-  int layers = 0;         ///< point layers
-  double resolution = 0;  ///< mm by which the skin was decimated; 0: as it is
+  std::string study;   ///< what is varied: solver, load steps, volume, layers, mesh
+  std::string method;  ///< -tao_type
+  double accuracy;     ///< mm asked for
+  std::string volume;  ///< none, paper, penalty
+  int load_steps = 0;  ///< 0: automatic
+  int layers = 0;      ///< point layers
+  double edge = 0;     ///< mm, mean edge of the remeshed skin; 0: the skin as it is
 };
 
 /// What it cost and how far it came. Errors are largest distances to the reference, mm; NaN where
@@ -43,7 +44,8 @@ struct Plan {
   std::vector<double> accuracies;  ///< mm
   std::vector<std::string> volumes;
   std::vector<int> load_steps, layers;
-  std::vector<double> resolutions;   ///< mm
+  /// mm, of the remeshed skin; nothing: one and a half and two times the skin's own.
+  std::optional<std::vector<double>> edges;
   double reference_accuracy = 1e-8;  ///< mm
   double seconds = 60;               ///< time limit of one run
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "repose/adapt/ladder.h"
+#include "repose/surface/remesh.h"
 
 namespace repose::adapt {
 namespace {
@@ -57,6 +58,12 @@ TEST(Rungs, get_coarser_to_a_least_number_of_columns) {
   ASSERT_EQ(rungs.size(), 1U);
   EXPECT_EQ(rungs[0].layers, anatomy.scene.tissue.layers - 1);
   EXPECT_TRUE(compared_rungs(anatomy, 400).empty());
+}
+
+TEST(Remesh, by_the_even_edge_keeps_the_number_of_triangles) {
+  const surface::Surface skin = head().skin;
+  const surface::Surface same = surface::remesh(skin, surface::even_edge(skin));
+  EXPECT_NEAR(static_cast<double>(same.triangles.size()) / skin.triangles.size(), 1, 0.2);
 }
 
 }  // namespace
