@@ -11,6 +11,9 @@ test_packages=(
   libgtest-dev libbenchmark-dev clang-format
   python3 python3-pytest python3-numpy python3-scipy python3-h5py python3-meshio
 )
+# Nobody needs these: what tests/benchmark compares with, and what its pictures are drawn by.
+# To have them: . drivers/setup.sh; install_packages "${benchmark_packages[@]}"
+benchmark_packages=(liblbfgs-dev python3-matplotlib)
 
 # Prints those of the given Debian packages that are not installed.
 missing_packages() {

@@ -15,6 +15,17 @@ namespace {
 
 const MPI_Comm comm = PETSC_COMM_SELF;
 
+int64_t logged_factorisations() {
+  PetscBool logged = PETSC_FALSE;
+  check(PetscLogIsActive(&logged));
+  if (!logged) return 0;
+  PetscLogEvent event = -1;
+  PetscEventPerfInfo info{};
+  check(PetscLogEventGetId("MatCholFctrNum", &event));
+  check(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
+  return info.count;
+}
+
 double dot(Vec x, Vec y) {
   PetscScalar product = 0;
   check(VecDot(x, y, &product));
@@ -47,16 +58,33 @@ class WatchedSearch {
 }  // namespace
 
 Contest::Contest(const model::Model& model, const Functional& functional, const Rules& rules)
+    : Contest(model, settings_of(functional, rules.accuracy).weights, functional.force, rules) {}
+
+Contest::Contest(const model::Model& model, const mechanics::Weights& weights, bool force,
+                 const Rules& rules)
     : part_(solve::distribute(comm, model)),
       positions_(comm, part_),
-      problem_(positions_, settings_of(functional, rules.accuracy).weights, functional.force),
+      problem_(positions_, weights, force),
       reference_(positions_.make_vector()),
-      rules_(rules) {}
+      rules_(rules) {
+  positions_.set_load(1);
+}
+
+void Contest::set_reference(Vec displacement) { check(VecCopy(displacement, reference_)); }
 
 base::VecHandle Contest::copy_of_reference() const {
   base::VecHandle copy = positions_.make_vector();
   check(VecCopy(reference_, copy));
   return copy;
+}
+
+base::VecHandle Contest::displacement_to(const std::vector<Vec3>& position) const {
+  base::VecHandle displacement = positions_.make_vector();
+  std::vector<Vec3> moved(part_.point_row.size());
+  for (size_t i = 0; i < moved.size(); ++i)
+    moved[i] = position[part_.point_row[i]] - part_.model.points.position[i];
+  positions_.keep_owned(moved, displacement);
+  return displacement;
 }
 
 double Contest::distance(Vec displacement) const {
@@ -68,6 +96,7 @@ double Contest::distance(Vec displacement) const {
 Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
   Referee referee(problem_.function(), goal, rules);
   Entry entry;
+  const int64_t assembled = problem_.assemblies(), factored = logged_factorisations();
   try {
     search(referee, displacement);
     entry.end = Entry::End::elsewhere;
@@ -76,27 +105,38 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
   }
   entry.seconds = referee.seconds();
   entry.evaluations = referee.evaluations();
+  entry.assemblies = problem_.assemblies() - assembled;
+  entry.factorisations = logged_factorisations() - factored;
+  positions_.set_load(1);
   entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : referee.closest();
   return entry;
 }
 
-Entry Contest::follow_path() {
-  positions_.set_load(0);
-  solve::Predictor predictor(problem_.objective(), problem_.elastic_solver());
-  bool complete = false;
-  const Search follow = [&](solve::Function& watched, Vec displacement) {
+Contest::Search Contest::path_search(Vec guess, bool& complete) {
+  return [this, guess, &complete](solve::Function& watched, Vec displacement) {
+    positions_.set_load(0);
+    solve::Predictor predictor(problem_.objective(), problem_.elastic_solver());
     WatchedSearch search(problem_, watched);
     solve::LoadPath path(problem_.objective(), predictor, search.search(),
                          {.accuracy = rules_.accuracy});
-    complete =
-        path.run(displacement, nullptr, [](const solve::Outcome&, double, double) {}).complete();
+    const auto unheard = [](const solve::Outcome&, double, double) {};
+    complete = path.run(displacement, guess, unheard).complete();
   };
-  Entry entry =
-      race_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.path_seconds}, follow, reference_);
+}
+
+Entry Contest::follow_path(Vec guess) {
+  bool complete = false;
+  const Rules rules{.limit = INT64_MAX, .seconds = rules_.path_seconds};
+  check(VecSet(reference_, 0));
+  Entry entry = race_to(nullptr, rules, path_search(guess, complete), reference_);
   entry.method = "default";
   if (complete) entry.end = Entry::End::reached;
-  positions_.set_load(1);
   return entry;
+}
+
+Entry Contest::race_path(Vec guess) {
+  bool complete = false;
+  return race("default", path_search(guess, complete));
 }
 
 bool Contest::refine(double accuracy, Vec start) {

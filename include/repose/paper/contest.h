@@ -20,7 +20,9 @@ struct Entry {
   std::string method;
   End end = End::limit;
   int64_t evaluations = 0;
-  double seconds = 0;   ///< CPU
+  int64_t assemblies = 0;      ///< of the Hessian
+  int64_t factorisations = 0;  ///< Cholesky's, if PETSc's log is on (PetscLogDefaultBegin)
+  double seconds = 0;          ///< CPU
   double distance = 0;  ///< mm from the reference: closest state, own minimum or where it stopped
   double excess = 0;    ///< at its own minimum, (Φ − Φ_reference) / |Φ_reference|
   bool arrived() const { return end == End::reached || end == End::own_minimum; }
@@ -34,15 +36,23 @@ class Contest {
   static constexpr double epsilon = 1e-3;
 
   Contest(const model::Model& model, const Functional& functional, const Rules& rules);
+  /// Any objective: the energy (or, with `force`, the force functional) with a volume term.
+  Contest(const model::Model& model, const mechanics::Weights& weights, bool force,
+          const Rules& rules);
 
   /// As repose-solve does it: load steps, Newton, its own estimate of the distance. Where it
-  /// arrives, its end becomes the reference.
-  Entry follow_path();
+  /// arrives, its end becomes the reference. `guess` as for LoadPath::run.
+  Entry follow_path(Vec guess = nullptr);
   /// Refines the reference to `accuracy` mm, from `start` (where the path did not arrive) or from
   /// itself. Returns whether it is known that well.
   bool refine(double accuracy, Vec start = nullptr);
+  void set_reference(Vec displacement);
   base::VecHandle copy_of_reference() const;
+  /// The unknowns that take the tissue to `position` [N], mm.
+  base::VecHandle displacement_to(const std::vector<Vec3>& position) const;
   double distance(Vec displacement) const;  ///< mm from the reference
+
+  Entry race_path(Vec guess = nullptr);  ///< follow_path, raced to the reference like the others
 
   // The others, in one load step.
   Entry race_polak_ribiere();
@@ -60,6 +70,7 @@ class Contest {
   Curvature curvature();
 
  private:
+  Search path_search(Vec guess, bool& complete);
   Entry race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement);
   bool find_own_minimum(Vec displacement);
 

@@ -1,0 +1,333 @@
+/// One method of the contest of docs/contest.md, which tests/benchmark/contest.py runs:
+///     benchmark_contest RESULT.h5 METHOD [-scene SCENE.yaml] [-accuracy 0.01] [-count]
+/// Takes model, volume term and rest position from a result of repose-solve, starts from the
+/// initial positions and stops at the first evaluated state that is as near to the rest position as
+/// asked for. One line of JSON for each entry. With -scene the default may solve coarser models
+/// first, as repose-solve does. Serial.
+#include <cstdio>
+#include <functional>
+#include <map>
+
+#include "repose/adapt/ladder.h"
+#include "repose/base/program.h"
+#include "repose/base/scoped_option.h"
+#include "repose/base/usage.h"
+#include "repose/paper/contest.h"
+#include "repose/paper/motion_race.h"
+#include "repose/results/model_file.h"
+#include "repose/scene/scene.h"
+#include "repose/solve/polak_ribiere.h"
+
+#ifdef REPOSE_LIBLBFGS
+#include <lbfgs.h>
+#endif
+
+namespace {
+
+using namespace repose;
+using base::check, base::OptionKind;
+using paper::Contest, paper::Entry;
+
+const MPI_Comm comm = MPI_COMM_SELF;
+
+/// Counts the values taken without a gradient.
+class Counter : public solve::Function {
+ public:
+  explicit Counter(solve::Function& inner) : Function(inner.positions()), inner_(inner) {}
+  int64_t values() const { return values_; }
+
+ private:
+  double value_and_gradient(Vec displacement, Vec gradient) override {
+    if (!gradient) ++values_;
+    return inner_.evaluate(displacement, gradient);
+  }
+  solve::Function& inner_;
+  int64_t values_ = 0;
+};
+
+#ifdef REPOSE_LIBLBFGS
+/// liblbfgs with its own defaults (m = 6, Moré and Thuente's line search), its stopping tests off.
+class Liblbfgs {
+ public:
+  explicit Liblbfgs(solve::Function& function)
+      : function_(function),
+        at_(function.positions().make_vector()),
+        gradient_(function.positions().make_vector()) {}
+
+  void minimise(Vec displacement) {
+    PetscInt size = 0;
+    check(VecGetSize(displacement, &size));
+    std::vector<double> x(size);
+    copy(displacement, x.data());
+    lbfgs_parameter_t settings;
+    lbfgs_parameter_init(&settings);
+    settings.epsilon = 0;
+    lbfgs(size, x.data(), nullptr, evaluate, progress, this, &settings);
+    if (thrown_) std::rethrow_exception(thrown_);
+    copy(x.data(), displacement);
+  }
+
+ private:
+  static void copy(Vec from, double* to) {
+    const PetscScalar* values = nullptr;
+    PetscInt size = 0;
+    check(VecGetSize(from, &size));
+    check(VecGetArrayRead(from, &values));
+    std::copy(values, values + size, to);
+    check(VecRestoreArrayRead(from, &values));
+  }
+  static void copy(const double* from, Vec to) {
+    PetscScalar* values = nullptr;
+    PetscInt size = 0;
+    check(VecGetSize(to, &size));
+    check(VecGetArrayWrite(to, &values));
+    std::copy(from, from + size, values);
+    check(VecRestoreArrayWrite(to, &values));
+  }
+  /// Nothing is thrown through C: the gradient is zero then, which ends the line search, and
+  /// progress() ends the rest.
+  static double evaluate(void* me, const double* x, double* gradient, int size, double) {
+    auto* self = static_cast<Liblbfgs*>(me);
+    try {
+      copy(x, self->at_);
+      const double value = self->function_.evaluate(self->at_, self->gradient_);
+      copy(self->gradient_, gradient);
+      return value;
+    } catch (...) {
+      self->thrown_ = std::current_exception();
+      std::fill(gradient, gradient + size, 0.0);
+      return -1e300;
+    }
+  }
+  static int progress(void* me, const double*, const double*, double, double, double, double, int,
+                      int, int) {
+    return static_cast<Liblbfgs*>(me)->thrown_ ? 1 : 0;
+  }
+
+  solve::Function& function_;
+  base::VecHandle at_, gradient_;
+  std::exception_ptr thrown_;
+};
+#endif
+
+/// A result file's model, what was minimised and where it came to rest.
+struct Task {
+  model::Model model;
+  std::string volume;
+  double lambda = 1;
+  mechanics::Weights weights;
+  std::vector<Vec3> rest;  // [N] mm
+};
+
+Task read_task(const std::string& file) {
+  Task task;
+  task.model = results::read_model(file);
+  const int64_t steps = results::step_count(file);
+  if (steps == 0) base::refuse("{}: /step holds no step; solve the model first", file);
+  results::StoredStep last = results::read_step(file, steps - 1, task.model);
+  const model::StepNumbers& numbers = last.numbers;
+  if (numbers.functional != "energy" || numbers.volume == "exact")
+    base::refuse(
+        "{}: functional {}, volume {}: the contest takes an energy with volume none, paper "
+        "or penalty",
+        file, numbers.functional, numbers.volume);
+  task.volume = numbers.volume;
+  task.lambda = numbers.lambda;
+  if (numbers.volume == "penalty")
+    task.weights = {1, mechanics::VolumeTerm::penalty, numbers.bulk_modulus};
+  if (numbers.volume == "paper")
+    task.weights = {numbers.lambda, mechanics::VolumeTerm::paper, 1 - numbers.lambda};
+  task.rest = std::move(last.rows.position);
+  return task;
+}
+
+/// An entry with what only some methods have.
+struct Line {
+  Entry entry;
+  int64_t values = 0;              // of the evaluations, those without gradient
+  int64_t coarse_evaluations = 0;  // on coarser models
+  int64_t coarse_assemblies = 0;
+};
+
+void print(const Line& line) {
+  static const char* const ends[] = {"reached", "own_minimum", "limit", "elsewhere"};
+  const Entry& e = line.entry;
+  std::printf(
+      "%s\n",
+      fmt::format("{{\"method\": \"{}\", \"end\": \"{}\", \"evaluations\": {}, \"values\": {}, "
+                  "\"assemblies\": {}, \"factorisations\": {}, \"coarse_evaluations\": {}, "
+                  "\"coarse_assemblies\": {}, \"seconds\": {}, \"distance\": {}, "
+                  "\"excess\": {}}}",
+                  e.method, ends[static_cast<size_t>(e.end)], e.evaluations, line.values,
+                  e.assemblies, e.factorisations, line.coarse_evaluations, line.coarse_assemblies,
+                  e.seconds, e.distance, e.excess)
+          .c_str());
+}
+
+class Runner {
+ public:
+  Runner(const base::Options& options, const Task& task)
+      : options_(options), task_(task), contest_(task.model, task.weights, false, rules()) {
+    contest_.set_reference(contest_.displacement_to(task.rest));
+  }
+
+  void run(const std::string& method) {
+    if (method == "default" || method == "default_end") return race_default(method);
+    if (method == "polak_ribiere") return race_polak_ribiere();
+    if (method == "motion") return race_motion();
+    if (method == "liblbfgs") return race_liblbfgs();
+    Line line{contest_.race_tao(method)};
+    line.entry.method = method;
+    print(line);
+  }
+
+ private:
+  paper::Rules rules() const {
+    const double seconds = options_.number("seconds");
+    return {.accuracy = options_.number("accuracy"),
+            .limit = options_.integer("limit"),
+            .path_seconds = seconds,
+            .seconds = seconds};
+  }
+
+  /// What coarser models lead to, and what they took; nothing where repose-solve would not.
+  adapt::Ladder climb_coarser_models() {
+    if (!options_.has("scene")) return {};
+    const model::Anatomy anatomy = model::load_anatomy(scene::read_scene(options_.text("scene")));
+    adapt::Climb wanted{adapt::rungs_below(anatomy.scene, anatomy.skin), {}, {}};
+    wanted.settings.weights = task_.weights;
+    wanted.settings.volume = task_.volume;
+    wanted.settings.lambda = task_.lambda;
+    wanted.settings.path.accuracy = options_.number("accuracy");
+    return adapt::climb(comm, anatomy, task_.model, wanted);
+  }
+
+  /// As repose-solve does it, until the rest position is near or, `default_end`, until it says so.
+  void race_default(const std::string& method) {
+    const double begin = base::cpu_seconds();
+    const adapt::Ladder ladder = climb_coarser_models();
+    const double climbed = base::cpu_seconds() - begin;
+    base::VecHandle guess;
+    if (!ladder.rungs.empty()) guess = contest_.displacement_to(ladder.position);
+    Line line;
+    if (method == "default") {
+      line.entry = contest_.race_path(guess);
+    } else {
+      const base::VecHandle rest = contest_.copy_of_reference();
+      line.entry = contest_.follow_path(guess);
+      line.entry.distance = contest_.distance(rest);
+    }
+    line.entry.method = method;
+    line.entry.seconds += climbed;
+    for (const adapt::Rung& rung : ladder.rungs) {
+      line.coarse_evaluations += rung.evaluations;
+      line.coarse_assemblies += rung.assemblies;
+    }
+    print(line);
+  }
+
+  void race_polak_ribiere() {
+    Line line;
+    line.entry = contest_.race("polak_ribiere", [&](solve::Function& function, Vec displacement) {
+      Counter counter(function);
+      try {
+        solve::polak_ribiere(counter, displacement);
+      } catch (...) {
+        line.values = counter.values();
+        throw;
+      }
+    });
+    print(line);
+  }
+
+  void race_motion() {
+    for (const Entry& entry : paper::race_motion(contest_, options_.number("accuracy")))
+      print({entry});
+  }
+
+  void race_liblbfgs() {
+#ifdef REPOSE_LIBLBFGS
+    print({contest_.race("liblbfgs", [](solve::Function& function, Vec displacement) {
+      Liblbfgs(function).minimise(displacement);
+    })});
+#else
+    base::refuse("liblbfgs is not built in: apt-get install liblbfgs-dev, then cmake again");
+#endif
+  }
+
+  const base::Options& options_;
+  const Task& task_;
+  Contest contest_;
+};
+
+/// CPU seconds of `work`, the least of several goes.
+double seconds_of(const std::function<void()>& work) {
+  double least = 1e300, total = 0;
+  for (int go = 0; go < 5 || total < 0.2; ++go) {
+    const double begin = base::cpu_seconds();
+    work();
+    const double took = base::cpu_seconds() - begin;
+    least = std::min(least, took);
+    total += took;
+  }
+  return least;
+}
+
+/// What one evaluation, one assembly of the Hessian and one factorisation take. The load changes
+/// between assemblies, because a state that was just assembled is not assembled again.
+void measure_costs(const Task& task) {
+  const solve::Part part = solve::distribute(comm, task.model);
+  solve::Positions positions(comm, part);
+  solve::Problem problem(positions, task.weights, false);
+  const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
+  double load = 0.1;
+  const auto assemble = [&] {
+    positions.set_load(load += 1e-4);
+    problem.tangent().assemble(at);
+  };
+  const double evaluation = seconds_of([&] { problem.function().evaluate(at, gradient); });
+  const double assembly = seconds_of(assemble);
+  const double both = seconds_of([&] {
+    assemble();
+    check(PCSetUp(problem.solver().preconditioner()));
+  });
+  std::printf("%s\n", fmt::format("{{\"evaluation\": {}, \"assembly\": {}, \"factorisation\": {}}}",
+                                  evaluation, assembly, both - assembly)
+                          .c_str());
+}
+
+const std::vector<std::string> methods = {"default",       "default_end", "ntr",      "lmvm",
+                                          "polak_ribiere", "motion",      "liblbfgs", "costs"};
+
+std::vector<base::Option> option_table() {
+  return {{"scene", OptionKind::path, "", "The result's scene, for coarser models."},
+          {"accuracy", OptionKind::number, "0.01", "Distance from rest.", {1e-6, 10}, "mm"},
+          {"limit", OptionKind::integer, "200000", "Evaluations.", {1, 1000000000}},
+          {"seconds", OptionKind::number, "60", "CPU time of a race.", {1e-3, 1e6}, "s"},
+          {"count", OptionKind::flag, "", "Count factorisations too, which takes a little time."}};
+}
+
+base::Exit run(const base::Options& options) {
+  const std::string method = options.arguments()[1];
+  if (std::find(methods.begin(), methods.end(), method) == methods.end())
+    base::refuse(
+        "'{}' is none of default, default_end, ntr, lmvm, polak_ribiere, motion, liblbfgs, "
+        "costs",
+        method);
+  if (options.flag("count")) check(PetscLogDefaultBegin());
+  const Task task = read_task(options.arguments()[0]);
+  if (method == "costs")
+    measure_costs(task);
+  else
+    Runner(options, task).run(method);
+  return base::Exit::done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  base::Options options(argc, argv, "Races one method to a known rest position.",
+                        {{"RESULT.h5", "a result of repose-solve"}, {"METHOD", "what races"}},
+                        option_table());
+  return base::run_program(options, [&] { return run(options); });
+}
