@@ -7,8 +7,8 @@ page and its picture.
 
 Problems are the shipped heads of the paper's size and as many synthetic heads as there are seeds,
 with random size, layers, springs, moves and loads. Each is solved by several methods to several
-accuracies and some runs are interrupted (-tao_max_it, -time_limit); the displacement_error that each reports is
-compared with its true distance from the rest position. -few leaves all but a handful out.
+accuracies and some runs are interrupted (-tao_max_it, -time_limit); the displacement_error that each
+reports is compared with its true distance from the rest position. -few leaves all but a handful out.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy python3-matplotlib
 """
 
@@ -318,6 +318,7 @@ def page(runs, study, seconds, picture):
     options = (f" -seeds {chosen.seeds}" if chosen.seeds != 8 else "") + " -few" * chosen.few
     shown = f"![Estimates and true errors]({os.path.relpath(picture, chosen.output.parent)})\n\n" if (
         matplotlib) else ""
+    stops = ", ".join(f"{solver} {how} {value:g}" for solver, how, value in INTERRUPTED)
     heads = len({run.problem for run in runs})
     return f"""# Can the estimate be trusted?
 
@@ -330,14 +331,14 @@ to {KNOWN:g} mm. Made by `tests/benchmark/estimate.py{options}` in {seconds / 60
 - Problems: the heads of the paper's size as shipped (jaw forward, jaw opened), and a synthetic head for
   each seed, with 477 to 800 skin vertices, 2 to 4 layers, a spring law, stiffnesses, a move of the jaw and
   in some of them turgor and weight at random; volume term penalty, none or paper, or forces minimised.
-- Runs: {", ".join(SOLVERS)} to {", ".join(ACCURACIES)} mm, and runs to {HARD} mm that are interrupted: {", ".join(
-        f"{solver} {how} {value:g}" for solver, how, value in INTERRUPTED)} (of the time to {TIMED} mm).
+- Runs: {", ".join(SOLVERS)} to {", ".join(ACCURACIES)} mm, and runs to {HARD} mm that are interrupted:
+  {stops} (of the time to {TIMED} mm).
   A load step that comes to its iteration limit is halved five times before the run ends.
 - The true error is the largest distance of a point from the rest position at which the load path ends,
   solved to {KNOWN:g} mm. A run that ends before the last load is compared with the rest position at its own
   load, and one whose error is above its estimate with the rest position that it is near, found from it by
-  Newton's method to {KNOWN:g} mm: if that is more than {SAME:g} mm from the load path's, the run is at another rest
-  position and is counted there.
+  Newton's method to {KNOWN:g} mm: if that is more than {SAME:g} mm from the load path's, the run is at
+  another rest position and is counted there.
 - No minimum yet: the state has negative curvature, and the estimate is infinite. Not counted as within
   10 times.
 {listed(runs, study.left_out)}"""
