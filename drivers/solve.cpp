@@ -22,6 +22,7 @@
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
+#include "repose/solve/active_search.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
@@ -38,6 +39,17 @@ const MPI_Comm comm = MPI_COMM_WORLD;
 // In the order of scene::Functional and scene::VolumeForm.
 const std::vector<std::string> functional_words = {"energy", "force"};
 const std::vector<std::string> volume_words = {"none", "paper", "penalty", "exact"};
+// In the order of solve::Extent.
+const std::vector<std::string> extent_words = {"off", "auto", "on"};
+
+const base::Option active_region_option = {
+    "active_region",
+    OptionKind::choice,
+    "auto",
+    "Search only the tissue that feels what moves; auto: where it pays.",
+    {},
+    "",
+    extent_words};
 
 /// What is computed, and how near.
 std::vector<base::Option> method_options() {
@@ -87,6 +99,7 @@ std::vector<base::Option> method_options() {
        {},
        "",
        {"auto", "on", "off"}},
+      active_region_option,
   };
 }
 
@@ -241,6 +254,15 @@ solve::Settings settings_of(const scene::Solve& wanted) {
     settings.weights = {wanted.lambda, mechanics::VolumeTerm::paper, 1 - wanted.lambda};
   }
   return settings;
+}
+
+/// The part of the tissue that is searched; called when all else is settled.
+void choose_extent(const base::Options& options, solve::Settings& settings) {
+  settings.extent = solve::Extent::automatic;
+  choose<solve::Extent>(options, "active_region", extent_words, settings.extent);
+  const std::string obstacle = solve::obstacle_to_region(settings);
+  if (settings.extent == solve::Extent::region && !obstacle.empty())
+    base::refuse("-active_region on: {}; leave the option out", obstacle);
 }
 
 void say(const std::string& text) {
@@ -419,6 +441,7 @@ base::Exit run(const base::Options& options) {
     restart = results::read_restart(comm, options.text("restart"), job.model);
     settings.path.start_load = restart.load;
   }
+  choose_extent(options, settings);
   const std::string name = result_name(options, input);
   const solve::Sliding sliding = solve::slide(comm, job.model, job.sliders, settings);
   if (sliding.rounds > 0) stages.end("slide");

@@ -98,13 +98,40 @@ model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) cons
   }
   const std::vector<Vec3> residual = objective.residual_force();
   model::StepRows rows;
-  rows.position = as_points(bring(points_, position.data()->data()));
-  rows.residual_force = as_points(bring(points_, residual.data()->data()));
+  rows.position = natural(position);
+  rows.residual_force = natural(residual);
   rows.volume_ratio = bring(prisms_, ratio.data());
   if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective).data());
   rows.elongation = bring(springs_, elongation.data());
   rows.tension = bring(springs_, force.data());
   return rows;
+}
+
+std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
+  return as_points(bring(points_, values.empty() ? nullptr : values.data()->data()));
+}
+
+std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
+  const Route& route = points_;
+  PetscScalar* source = nullptr;
+  check(VecGetArrayWrite(route.natural, &source));
+  for (size_t i = 0; i < slab.size(); ++i) Eigen::Map<Vec3>(source + 3 * i) = slab[i];
+  check(VecRestoreArrayWrite(route.natural, &source));
+  check(VecScatterBegin(route.scatter, route.natural, route.owned, INSERT_VALUES, SCATTER_REVERSE));
+  check(VecScatterEnd(route.scatter, route.natural, route.owned, INSERT_VALUES, SCATTER_REVERSE));
+  const PetscScalar* values = nullptr;
+  check(VecGetArrayRead(route.owned, &values));
+  std::vector<Vec3> rows(part_.owned_points);
+  for (size_t i = 0; i < rows.size(); ++i) rows[i] = Eigen::Map<const Vec3>(values + 3 * i);
+  check(VecRestoreArrayRead(route.owned, &values));
+  return rows;
+}
+
+void NaturalRows::take(const std::vector<Vec3>& slab, const Positions& positions,
+                       Vec displacement) const {
+  std::vector<Vec3> rows = owned(slab);
+  for (size_t i = 0; i < rows.size(); ++i) rows[i] -= part_.model.points.position[i];
+  positions.keep_owned(rows, displacement);
 }
 
 }  // namespace repose::solve

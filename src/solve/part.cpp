@@ -6,6 +6,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/base/pick.h"
 #include "repose/model/motion.h"
 #include "repose/solve/message.h"
 #include "repose/solve/partition.h"
@@ -14,6 +15,7 @@ namespace repose::solve {
 
 namespace {
 
+using base::pick;
 using model::Model;
 using model::PointSet;
 
@@ -29,14 +31,6 @@ struct Plan {
   std::vector<PointSet> set;           // [N] with points of non-rigid bones as held
   std::vector<Mat4> bone_transform;    // [bones]
 };
-
-template <class T>
-std::vector<T> pick(const std::vector<T>& values, const std::vector<int64_t>& rows) {
-  std::vector<T> picked;
-  picked.reserve(rows.size());
-  for (int64_t row : rows) picked.push_back(values[row]);
-  return picked;
-}
 
 void number_points(Plan& plan, const ColumnGraph& graph, int ranks) {
   const int64_t n = static_cast<int64_t>(plan.owner.size());

@@ -28,6 +28,13 @@ std::string stability(const Spectrum& s) {
   return text;
 }
 
+std::string region_row(const RegionSummary& r) {
+  return row("active region",
+             fmt::format("{} of {} columns in {} rounds; up to {:.3g} N hold its border, which is "
+                         "{:.3g} mm of the accuracy",
+                         r.active, r.columns, r.rounds, r.force, r.error));
+}
+
 std::string verdict(const Summary& s) {
   if (s.path.complete()) return "";
   return fmt::format(
@@ -126,6 +133,7 @@ std::string describe_run(const Summary& s, const Settings& settings, int ranks,
                                              s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));
   text += row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
   text += row("unknowns", fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
+  if (s.region) text += region_row(*s.region);
   text += work_rows(s);
   return text + describe_stages(stages);
 }

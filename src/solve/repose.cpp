@@ -10,6 +10,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
 #include "repose/base/progress.h"
+#include "repose/solve/active_search.h"
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/natural_rows.h"
@@ -22,32 +23,16 @@ using base::check;
 
 namespace {
 
-double force_sum(MPI_Comm comm, const std::vector<Vec3>& owned) {
-  double sum = 0;
-  for (const Vec3& f : owned) sum += f.norm();
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, comm);
-  return sum;
-}
-
 model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
                               const Outcome& outcome, double load) {
-  const mechanics::Totals totals = objective.totals();
-  const mechanics::Weights& weights = objective.weights();
   model::StepNumbers n;
   n.load = load;
   n.functional = settings.force ? "force" : "energy";
   n.volume = settings.volume;
   n.lambda = settings.lambda;
-  if (weights.volume == mechanics::VolumeTerm::penalty) n.bulk_modulus = weights.volume_weight;
-  n.f_e = totals.spring_energy;
-  n.potential = objective.potential();
-  n.f_f = force_sum(objective.positions().comm(), objective.residual_force());
-  n.f_v = totals.volume_squares;
-  n.penalty = n.bulk_modulus * totals.penalty_unit;
+  measure(objective, n);
   n.objective = settings.exact_volume ? n.f_e + n.potential : outcome.objective;
   n.gradient_max = outcome.gradient_max;
-  n.volume_error_max = totals.volume_error_max;
-  n.inverted_prisms = totals.inverted;
   n.displacement_error = outcome.displacement_error;
   n.iterations = outcome.iterations;
   n.reason = outcome.reason;
@@ -128,39 +113,29 @@ class Searcher {
   std::optional<ExactVolume> exact_volume_;
 };
 
-/// Sets the unknowns to the displacements that take the initial positions to `start`.
-void restart_from(MPI_Comm comm, const Part& part, const std::vector<Vec3>& start,
-                  Vec displacement) {
-  std::vector<PetscInt> from, to;
-  for (int64_t i = 0; i < part.owned_points; ++i)
-    if (part.unknown[i] >= 0) {
-      from.push_back(static_cast<PetscInt>(part.point_row[i]));
-      to.push_back(static_cast<PetscInt>(part.unknown[i]));
-    }
-  base::VecHandle natural;
-  check(VecCreateMPIWithArray(comm, 3, static_cast<PetscInt>(3 * start.size()), PETSC_DETERMINE,
-                              start.empty() ? nullptr : start.data()->data(), natural.out()));
-  base::IndexSetHandle source, target;
-  const auto count = static_cast<PetscInt>(from.size());
-  check(ISCreateBlock(comm, 3, count, from.data(), PETSC_COPY_VALUES, source.out()));
-  check(ISCreateBlock(comm, 3, count, to.data(), PETSC_COPY_VALUES, target.out()));
-  base::ScatterHandle scatter;
-  check(VecScatterCreate(natural, source, displacement, target, scatter.out()));
-  check(VecScatterBegin(scatter, natural, displacement, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(scatter, natural, displacement, INSERT_VALUES, SCATTER_FORWARD));
-  PetscScalar* values = nullptr;
-  check(VecGetArray(displacement, &values));
-  for (int64_t i = 0; i < part.owned_points; ++i)
-    if (part.unknown[i] >= 0)
-      Eigen::Map<Vec3>(values + 3 * (part.unknown[i] - part.first_unknown)) -=
-          part.model.points.position[i];
-  check(VecRestoreArray(displacement, &values));
-}
-
 }  // namespace
+
+void measure(Objective& objective, model::StepNumbers& numbers) {
+  const mechanics::Totals totals = objective.totals();
+  const mechanics::Weights& weights = objective.weights();
+  if (weights.volume == mechanics::VolumeTerm::penalty)
+    numbers.bulk_modulus = weights.volume_weight;
+  numbers.f_e = totals.spring_energy;
+  numbers.potential = objective.potential();
+  double force = 0;
+  for (const Vec3& f : objective.residual_force()) force += f.norm();
+  MPI_Allreduce(&force, &numbers.f_f, 1, MPI_DOUBLE, MPI_SUM, objective.positions().comm());
+  numbers.f_v = totals.volume_squares;
+  numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
+  numbers.volume_error_max = totals.volume_error_max;
+  numbers.inverted_prisms = totals.inverted;
+}
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive) {
+  if (const std::optional<Summary> summary =
+          find_in_region(comm, model, settings, start, stages, receive))
+    return *summary;
   const Part part = distribute(comm, model);
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
@@ -170,7 +145,7 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   base::VecHandle guess;
   if (start.guess) guess = positions.make_vector();
   if (start.guess || settings.path.start_load > 0)
-    restart_from(comm, part, start.position, start.guess ? guess : displacement);
+    natural.take(start.position, positions, start.guess ? guess : displacement);
   stages.end("distribute");
 
   Searcher searcher(positions, settings);

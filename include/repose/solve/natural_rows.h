@@ -6,13 +6,21 @@
 namespace repose::solve {
 
 /// Brings what each rank knows of its points, springs and prisms into the rows of the result file:
-/// slabs (base::slab) in natural order, whatever the distribution. All members collective.
+/// slabs (base::slab) in natural order, whatever the distribution; and back. All members
+/// collective.
 class NaturalRows {
  public:
   NaturalRows(MPI_Comm comm, const Part& part);
 
   /// The arrays of a step at the objective's last update.
   model::StepRows rows(Objective& objective, bool with_pressure = false) const;
+
+  /// This rank's slab of values [at least owned points] at the points, in natural order.
+  std::vector<Vec3> natural(std::span<const Vec3> values) const;
+  /// [owned points] the values of this rank's points, of which `slab` has this rank's natural rows.
+  std::vector<Vec3> owned(const std::vector<Vec3>& slab) const;
+  /// Sets the unknowns to the displacements that take the initial positions to those of `slab`, mm.
+  void take(const std::vector<Vec3>& slab, const Positions& positions, Vec displacement) const;
 
  private:
   struct Route {  // from owned rows to natural slabs, `block` numbers a row

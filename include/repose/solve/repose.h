@@ -11,6 +11,10 @@
 
 namespace repose::solve {
 
+/// Which soft-tissue points are unknowns: all, those that feel what moves (solve/active_region.h),
+/// or these where that pays.
+enum class Extent { whole, automatic, region };
+
 /// What is asked of a run.
 struct Settings {
   mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
@@ -23,11 +27,20 @@ struct Settings {
   bool monitor = false;              ///< print a line for every iteration
   bool stability = false;            ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
+  Extent extent = Extent::whole;
   PathSettings path;
 };
 
 /// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
 using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
+
+/// What a search in a part of the tissue left out.
+struct RegionSummary {
+  int64_t columns = 0, active = 0;  ///< of the model, and those with unknowns in the end
+  int rounds = 0;                   ///< rest positions found, each of a larger region
+  double force = 0;                 ///< N, largest of those that hold the border
+  double error = 0;                 ///< mm, its share of the displacement error
+};
 
 /// What a run came to, for the closing table.
 struct Summary {
@@ -38,6 +51,7 @@ struct Summary {
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
+  std::optional<RegionSummary> region;       ///< where not the whole was searched
 };
 
 /// Where a search begins.
@@ -51,7 +65,8 @@ struct Start {
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
 /// position along the load path, hands every step to `receive`. Ends the stages "distribute" and
-/// "solve". Throws InputError where nothing is free to move. Collective.
+/// "solve". Throws InputError where nothing is free to move. With an extent other than the whole
+/// the search is left to find_in_region (solve/active_search.h) where that takes it. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive);
 
