@@ -194,7 +194,7 @@ class Runner {
   adapt::Ladder climb_coarser_models() {
     if (!options_.has("scene")) return {};
     const model::Anatomy anatomy = model::load_anatomy(scene::read_scene(options_.text("scene")));
-    adapt::Climb wanted{adapt::rungs_below(anatomy.scene, anatomy.skin), {}, {}};
+    adapt::Climb wanted{adapt::guiding_rungs(anatomy), {}, {}};
     wanted.settings.weights = task_.weights;
     wanted.settings.volume = task_.volume;
     wanted.settings.lambda = task_.lambda;
