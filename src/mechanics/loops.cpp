@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "find_runs.h"
+
 namespace repose::mechanics {
 
 namespace {
@@ -12,20 +14,87 @@ bool touches_soft_tissue(const model::Points& points, const std::array<int64_t, 
                      [&](int64_t i) { return points.set[i] == model::PointSet::soft_tissue; });
 }
 
+/// Rows of elements of a part that a loop evaluates.
+struct Chosen {
+  std::vector<int64_t> counted, others;
+};
+
+template <size_t n, class Wanted>
+Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>>& elements,
+              int64_t owned, Wanted&& wanted) {
+  Chosen chosen;
+  for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
+    if (wanted(e) && touches_soft_tissue(part.points, elements[e]))
+      (e < owned ? chosen.counted : chosen.others).push_back(e);
+  return chosen;
+}
+
+void set_first(const std::array<int32_t, 2>& points, SpringRun& run) {
+  run.first = points[0], run.second = points[1];
+}
+void set_first(const std::array<int32_t, 6>& points, PrismRun& run) {
+  std::copy_n(points.begin(), 3, run.top);
+}
+
+bool may_run(const std::array<int32_t, 2>&) { return true; }
+bool may_run(const std::array<int32_t, 6>& c) {
+  return c[3] == c[0] + 1 && c[4] == c[1] + 1 && c[5] == c[2] + 1;
+}
+
+/// Appends the rows to the loop's points, in order of runs, which are returned; calls add(row).
+template <class Run, class Loop, size_t n, class Add>
+Runs<Run> append(const std::vector<std::array<int64_t, n>>& elements,
+                 const std::vector<int64_t>& rows, int64_t points, Loop& loop, Add&& add) {
+  std::vector<std::array<int32_t, n>> chosen(rows.size());
+  for (size_t k = 0; k < rows.size(); ++k)
+    std::copy_n(elements[rows[k]].begin(), n, chosen[k].begin());
+  const Arrangement arranged = arrange(std::span<const std::array<int32_t, n>>(chosen),
+                                       {Run::most, points}, [](auto& c) { return may_run(c); });
+  Runs<Run> runs;
+  for (const int32_t length : arranged.lengths) {
+    Run& run = runs.runs.emplace_back();
+    set_first(chosen[arranged.order[runs.elements]], run);
+    run.count = length;
+    runs.elements += length;
+  }
+  for (const int64_t k : arranged.order) {
+    loop.points.push_back(chosen[k]);
+    add(rows[k]);
+  }
+  return runs;
+}
+
 SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owned) {
   SpringLoop loop;
   loop.exponent = exponent;
   const model::Springs& springs = part.springs;
-  for (size_t e = 0; e < springs.points.size(); ++e) {
-    if (springs.exponent[e] != exponent) continue;
-    if (!touches_soft_tissue(part.points, springs.points[e])) continue;
-    loop.points.push_back(
-        {static_cast<int32_t>(springs.points[e][0]), static_cast<int32_t>(springs.points[e][1])});
-    loop.stiffness.push_back(springs.stiffness[e]);
-    loop.rest_length.push_back(springs.rest_length[e]);
-    loop.inverse_reference.push_back(1.0 / springs.reference[e]);
-    if (static_cast<int64_t>(e) < owned) ++loop.counted;
-  }
+  const Chosen chosen = choose(part, springs.points, owned,
+                               [&](int64_t e) { return springs.exponent[e] == exponent; });
+  const auto points = static_cast<int64_t>(part.points.position.size());
+  const auto add = [&](int64_t row) {
+    loop.stiffness.push_back(springs.stiffness[row]);
+    loop.rest_length.push_back(springs.rest_length[row]);
+    loop.inverse_reference.push_back(1.0 / springs.reference[row]);
+  };
+  loop.counted = static_cast<int64_t>(chosen.counted.size());
+  loop.counted_runs = append<SpringRun>(springs.points, chosen.counted, points, loop, add);
+  loop.other_runs = append<SpringRun>(springs.points, chosen.others, points, loop, add);
+  return loop;
+}
+
+PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
+  PrismLoop loop;
+  const model::Prisms& prisms = part.prisms;
+  const Chosen chosen = choose(part, prisms.points, owned, [](int64_t) { return true; });
+  const auto points = static_cast<int64_t>(part.points.position.size());
+  const auto add = [&](int64_t row) {
+    loop.rest_volume.push_back(prisms.rest_volume[row]);
+    loop.row.push_back(row);
+  };
+  loop.counted = static_cast<int64_t>(chosen.counted.size());
+  loop.counted_runs = append<PrismRun>(prisms.points, chosen.counted, points, loop, add);
+  loop.other_runs = append<PrismRun>(prisms.points, chosen.others, points, loop, add);
+  loop.target_volume = loop.rest_volume;
   return loop;
 }
 
@@ -37,17 +106,7 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
     SpringLoop loop = make_spring_loop(part, exponent, owned_springs);
     if (loop.size() > 0) loops.springs.push_back(std::move(loop));
   }
-  const model::Prisms& prisms = part.prisms;
-  for (size_t e = 0; e < prisms.points.size(); ++e) {
-    if (!touches_soft_tissue(part.points, prisms.points[e])) continue;
-    std::array<int32_t, 6> corners;
-    std::copy(prisms.points[e].begin(), prisms.points[e].end(), corners.begin());
-    loops.prisms.points.push_back(corners);
-    loops.prisms.rest_volume.push_back(prisms.rest_volume[e]);
-    loops.prisms.row.push_back(static_cast<int64_t>(e));
-    if (static_cast<int64_t>(e) < owned_prisms) ++loops.prisms.counted;
-  }
-  loops.prisms.target_volume = loops.prisms.rest_volume;
+  loops.prisms = make_prism_loop(part, owned_prisms);
   return loops;
 }
 

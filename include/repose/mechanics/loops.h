@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "repose/mechanics/runs.h"
 #include "repose/model/model.h"
 
 /// Springs and prisms laid out for the kernels: one loop a law, no branch inside.
@@ -17,6 +18,8 @@ struct SpringLoop {
   std::vector<double> rest_length;             ///< [S] mm
   std::vector<double> inverse_reference;       ///< [S] 1/s_ref, 1/mm
   int64_t counted = 0;  ///< springs [0, counted) add to energies here, the rest elsewhere
+  Runs<SpringRun> counted_runs = {};  ///< among [0, counted)
+  Runs<SpringRun> other_runs = {};    ///< among [counted, size)
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
@@ -27,6 +30,7 @@ struct PrismLoop {
   std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
   std::vector<int64_t> row;           ///< [M] the prism's row in the part
   int64_t counted = 0;                ///< as in SpringLoop
+  Runs<PrismRun> counted_runs, other_runs;
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
@@ -37,7 +41,8 @@ struct Loops {
 };
 
 /// The loops over the springs and prisms of `part` with a soft-tissue point. Of its rows the first
-/// `owned_springs` and `owned_prisms` are counted here.
+/// `owned_springs` and `owned_prisms` are counted here. What lies in runs comes first, by blocks of
+/// points that fit into the cache together.
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms);
 
 /// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:

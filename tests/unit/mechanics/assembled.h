@@ -25,13 +25,14 @@ struct ValueAndGradient {
 };
 
 inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics::Weights& weights,
-                                 const std::vector<Vec3>& x) {
+                                 const std::vector<Vec3>& x,
+                                 mechanics::Kernels kernels = mechanics::best_kernels()) {
   ValueAndGradient result;
   std::vector<Vec3> gradient(x.size(), Vec3::Zero());
   for (const mechanics::SpringLoop& loop : loops.springs)
-    result.value +=
-        weights.elastic * mechanics::add_spring_gradient(loop, x, weights.elastic, gradient);
-  result.value += mechanics::add_prism_gradient(loops.prisms, x, weights, gradient);
+    result.value += weights.elastic *
+                    mechanics::add_spring_gradient(loop, x, weights.elastic, gradient, kernels);
+  result.value += mechanics::add_prism_gradient(loops.prisms, x, weights, gradient, kernels);
   result.gradient = flattened(gradient);
   return result;
 }
@@ -65,9 +66,10 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
 
 inline Eigen::VectorXd hessian_action(const mechanics::Loops& loops,
                                       const mechanics::Weights& weights, const std::vector<Vec3>& x,
-                                      const std::vector<Vec3>& d) {
+                                      const std::vector<Vec3>& d,
+                                      mechanics::Kernels kernels = mechanics::best_kernels()) {
   std::vector<Vec3> product(x.size(), Vec3::Zero());
-  mechanics::add_hessian_action(loops, x, weights, d, product);
+  mechanics::add_hessian_action(loops, x, weights, d, product, kernels);
   return flattened(product);
 }
 

@@ -93,9 +93,10 @@ TEST(Loops, CarryWhatTheModelSaysOfEachElement) {
   EXPECT_EQ(found, loops.springs[0].size() + loops.springs[1].size() + loops.springs[2].size());
   ASSERT_EQ(loops.prisms.size(), count(model.prisms.points));
   for (int64_t e = 0; e < loops.prisms.size(); ++e) {
-    EXPECT_EQ(loops.prisms.rest_volume[e], model.prisms.rest_volume[e]);
+    const int64_t row = loops.prisms.row[e];
+    EXPECT_EQ(loops.prisms.rest_volume[e], model.prisms.rest_volume[row]);
     EXPECT_TRUE(std::equal(loops.prisms.points[e].begin(), loops.prisms.points[e].end(),
-                           model.prisms.points[e].begin()));
+                           model.prisms.points[row].begin()));
   }
 }
 

@@ -96,8 +96,8 @@ TEST(Gradients, AddToWhatIsThereWhetherCountedOrNot) {
   const Weights weights{0.7, VolumeTerm::paper, 1.3};
   const Loops here = make_loops(model, 161, 6), elsewhere = make_loops(model, 0, 0);
   EXPECT_EQ(test::evaluate(elsewhere, weights, x).value, 0.0);
-  EXPECT_EQ(test::evaluate(elsewhere, weights, x).gradient,
-            test::evaluate(here, weights, x).gradient);
+  const Eigen::VectorXd g = test::evaluate(here, weights, x).gradient;
+  EXPECT_LE((test::evaluate(elsewhere, weights, x).gradient - g).norm(), 1e-14 * g.norm());
   std::vector<Vec3> gradient(x.size(), Vec3(1e3, 0, 0));
   add_spring_gradient(here.springs[0], x, 2.0, gradient);
   std::vector<Vec3> alone(x.size(), Vec3::Zero());
