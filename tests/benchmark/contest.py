@@ -66,7 +66,7 @@ GOALS = [("polak_ribiere", "evaluations", 30), ("polak_ribiere", "seconds", 15),
 # options that change what is measured, in the command that the page names
 SETTINGS = {"cases": ",".join(CASES), "methods": ",".join(METHODS), "accuracy": 0.01, "rounds": 3,
             "seconds": 60.0}
-PATIENCE = 15  # times of the default that one run of the equations of motion may take
+PATIENCE = 5  # times of the default that one run of the equations of motion may take
 LONG = 20  # s: what takes longer is not repeated
 
 

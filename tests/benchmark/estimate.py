@@ -341,6 +341,8 @@ one core of a machine with {os.cpu_count()} cores.
   load, and one whose error is above its estimate with the rest position that it is near, found from it by
   Newton's method to {KNOWN:g} mm: if that is more than {SAME:g} mm from the load path's, the run is at
   another rest position and is counted there.
+- The estimate is that of a quadratic model of what is minimised, and can be too low only where that
+  model is poor: far from rest, or where the energy is hardly convex.
 - No minimum yet: the state has negative curvature, and the estimate is infinite. Not counted as within
   10 times.
 {listed(runs, study.left_out)}"""
