@@ -27,7 +27,8 @@ constexpr double own_share = 0.5;  // of the accuracy, for the search in the reg
 constexpr double decay = 0.7;
 constexpr double border_share = 0.4;  // of the accuracy, the displacement at the first border
 constexpr double narrowest = 3;       // thicknesses, of a region and of half a band
-constexpr double quantum = 0.5;       // thicknesses: reaches are whole multiples, on any ranks
+constexpr double least_growth = 1, most_growth = 6;  // thicknesses
+constexpr double quantum = 0.5;  // thicknesses: reaches are whole multiples, on any ranks
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// How many thicknesses a displacement needs to fall by a factor.
@@ -270,8 +271,9 @@ double RegionSearch::error_on_the_way() {
   return measured_.error * force / measured_.force;
 }
 
-/// The estimate on the narrowest band that says enough.
+/// The estimate on the narrowest band that says enough; none at a state that is not at rest anyhow.
 Border RegionSearch::border() {
+  if (pending_ && !std::isfinite(pending_->displacement_error)) return {outside_force(), 0};
   constexpr double most = 0.5;  // of the force may be passed on
   for (double width = narrowest;; width *= 2) {
     double passed_on = 0;
@@ -340,7 +342,7 @@ Summary RegionSearch::run(const Start& start, base::Stages& stages) {
   for (;;) {
     const double allowed = settings_.path.accuracy - pending_->displacement_error;
     if (!summary_.path.complete() || held.error <= allowed || reach_ >= plan_.largest) break;
-    rest(reach_ + std::max(1.0, reach_of(held.error / allowed)), {});
+    rest(reach_ + std::clamp(reach_of(held.error / allowed), least_growth, most_growth), {});
     held = border();
   }
   emit(*pending_, held.error);

@@ -27,7 +27,7 @@ struct Settings {
   bool monitor = false;              ///< print a line for every iteration
   bool stability = false;            ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
-  Extent extent = Extent::whole;
+  Extent extent = Extent::whole;     ///< what is searched
   PathSettings path;
 };
 

@@ -99,8 +99,8 @@ TEST(ActiveRegion, a_submodel_has_all_that_its_unknowns_feel) {
 
 TEST(ActiveSearch, the_answer_is_as_near_as_it_says) {
   const model::Model m = strip();
-  for (const double accuracy : {0.1, 0.01, 0.001}) {
-    const testing::Rest exact = testing::find_rest(m, wanted(Extent::whole, 1e-9));
+  const testing::Rest exact = testing::find_rest(m, wanted(Extent::whole, 1e-9));
+  for (const double accuracy : {0.1, 0.001}) {
     const testing::Rest found = testing::find_rest(m, wanted(Extent::region, accuracy));
     ASSERT_TRUE(found.summary.region);
     EXPECT_TRUE(found.summary.path.complete());
