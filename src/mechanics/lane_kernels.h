@@ -127,7 +127,7 @@ void for_each_step(const Run* run, int64_t runs, Visit&& visit) {
 template <int widest>
 class SpringBatch {
  public:
-  static constexpr int most_runs = 64;
+  static constexpr int most_runs = 16;
   using Vectors [[gnu::aligned(64)]] = double[most_runs / 2][3][8];
   using Numbers [[gnu::aligned(64)]] = double[4 * most_runs + 8];
 
@@ -146,17 +146,15 @@ class SpringBatch {
     difference(values, d, products,
                [&]<int n>(const Rows<n>&, int64_t row) { return take<n>(row, other); });
   }
-  /// Adds `force(step)` at the second points, and takes it from the first. All of one before all of
-  /// the other: a load from what was stored a moment ago one place further on would have to wait.
+  /// Adds `force(step)` at the second points, and takes it from the first.
   template <class Force>
   void add_forces(Force&& force, double* sums) const {
-    Vectors kept;
     for_each_step<widest>(run_, runs_, [&]<int n>(const Step<n, SpringRun>& step) {
       const Rows<n> here = force(step);
-      put(here, row(step), kept);
-      scatter<n>({-here.a, -here.b, -here.c}, Ends<n>(step).first, sums);
+      const Ends<n> ends(step);
+      scatter<n>({-here.a, -here.b, -here.c}, ends.first, sums);
+      scatter<n>(here, ends.second, sums);
     });
-    for (int64_t k = 0; k < runs_; ++k) scatter<1>(take<1>(k, kept), {run_[k].second}, sums);
   }
   /// s d with a number s of each spring, 0 where a run has no spring.
   template <int n>

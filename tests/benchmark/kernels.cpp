@@ -1,10 +1,18 @@
-/// Time per spring and per prism of each kernel, on regular patches of 1e4 to 1e6 points in four
-/// layers. Best on an idle machine, one core:
-///     benchmark_kernels --benchmark_repetitions=5 --benchmark_report_aggregates_only=true
+/// Time of each kernel per spring and per prism, by instruction set, in the cache and out of it,
+/// beside STREAM's triad and copy in the same run; writes the table. One core, best on an idle
+/// machine; a minute or two:
+///     benchmark_kernels [docs/kernels.md] [--benchmark_repetitions=5]
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <functional>
 #include <map>
 #include <random>
+#include <thread>
 
 #include "../layered_patch.h"
 #include "repose/mechanics/energy.h"
@@ -14,20 +22,25 @@ namespace {
 
 using namespace repose;
 using mechanics::Curvature;
+using mechanics::Kernels;
 using mechanics::VolumeTerm;
 using mechanics::Weights;
 
 constexpr Weights springs_only{1.0, VolumeTerm::none, 0.0};
 constexpr Weights with_penalty{1.0, VolumeTerm::penalty, 0.4};
+constexpr int64_t layers = 4;
+constexpr int64_t sizes[] = {35, 354};       // columns along a side: 5e3 and 5e5 points
+constexpr double out_of_all_caches = 1.5e9;  // bytes of STREAM's three arrays
 
 struct Workload {
-  mechanics::Loops loops;
+  mechanics::Loops springs, prisms;  // one each, for products of one kind
   std::vector<Vec3> position, direction, result;
 
   explicit Workload(int64_t columns) {
-    const model::Model model = test::layered_patch({columns, columns, 4, 1.0, 0.8});
-    loops = mechanics::make_loops(model, static_cast<int64_t>(model.springs.points.size()),
-                                  static_cast<int64_t>(model.prisms.points.size()));
+    const model::Model model = test::layered_patch({columns, columns, layers, 1.0, 0.8});
+    springs = mechanics::make_loops(model, static_cast<int64_t>(model.springs.points.size()),
+                                    static_cast<int64_t>(model.prisms.points.size()));
+    std::swap(prisms.prisms, springs.prisms);
     std::mt19937 engine(1);
     std::uniform_real_distribution<double> noise(-0.1, 0.1);
     for (const Vec3& x : model.points.position) {
@@ -36,97 +49,222 @@ struct Workload {
     }
     result.assign(position.size(), Vec3::Zero());
   }
-  int64_t springs() const { return loops.springs[0].size(); }
-  int64_t prisms() const { return loops.prisms.size(); }
+  const mechanics::SpringLoop& spring_loop() const { return springs.springs[0]; }
+  const mechanics::PrismLoop& prism_loop() const { return prisms.prisms; }
 };
 
 /// One workload a size, made when first asked for.
-Workload& workload(const benchmark::State& state) {
+Workload& workload(int64_t columns) {
   static std::map<int64_t, Workload> made;
-  return made.try_emplace(state.range(0), state.range(0)).first->second;
+  return made.try_emplace(columns, columns).first->second;
 }
 
-void report(benchmark::State& state, const Workload& work, int64_t elements) {
-  state.counters["points"] = static_cast<double>(work.position.size());
-  state.counters["seconds_per_element"] = benchmark::Counter(
-      static_cast<double>(elements),
-      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+/// What is measured: how many elements, what they read and write, and the work.
+struct Kernel {
+  const char* name;
+  std::function<int64_t(const Workload&)> elements;
+  double vectors;  ///< read or written once a point
+  std::function<void(Workload&, Kernels)> work;
+};
+
+int64_t springs(const Workload& w) { return w.spring_loop().size(); }
+int64_t prisms(const Workload& w) { return w.prism_loop().size(); }
+
+const Kernel kernels[] = {
+    {"spring energy and gradient", springs, 3,
+     [](Workload& w, Kernels k) {
+       benchmark::DoNotOptimize(
+           mechanics::add_spring_gradient(w.spring_loop(), w.position, 1.0, w.result, k));
+     }},
+    {"spring Hessian action", springs, 4,
+     [](Workload& w, Kernels k) {
+       mechanics::add_hessian_action(w.springs, w.position, springs_only, w.direction, w.result, k);
+     }},
+    {"prism energy and gradient", prisms, 3,
+     [](Workload& w, Kernels k) {
+       benchmark::DoNotOptimize(
+           mechanics::add_prism_gradient(w.prism_loop(), w.position, with_penalty, w.result, k));
+     }},
+    {"prism Hessian action", prisms, 4,
+     [](Workload& w, Kernels k) {
+       mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result, k);
+     }},
+};
+
+/// Bytes of the places of a loop's elements: of runs, or of each element's points.
+template <class Loop>
+double bytes_of_places(const Loop& loop, Kernels kernels) {
+  const auto& [runs, in_runs] = loop.counted_runs;
+  const auto point_bytes = static_cast<double>(sizeof loop.points[0]);
+  if (kernels == Kernels::plain) return point_bytes * static_cast<double>(loop.size());
+  return static_cast<double>(runs.size() * sizeof runs[0]) +
+         point_bytes * static_cast<double>(loop.size() - in_runs);
 }
 
-void spring_gradient(benchmark::State& state) {
-  Workload& work = workload(state);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(
-        mechanics::add_spring_gradient(work.loops.springs[0], work.position, 1.0, work.result));
-  report(state, work, work.springs());
+/// Bytes that go over a kernel's arrays once, for all elements.
+double bytes(const Kernel& kernel, const Workload& w, Kernels kernels) {
+  const bool spring = kernel.elements(w) == springs(w);
+  const double places =
+      spring ? bytes_of_places(w.spring_loop(), kernels) : bytes_of_places(w.prism_loop(), kernels);
+  const double numbers = (spring ? 3 : 2) * sizeof(double);
+  return places + numbers * static_cast<double>(kernel.elements(w)) +
+         kernel.vectors * sizeof(Vec3) * static_cast<double>(w.position.size());
 }
 
-void prism_gradient(benchmark::State& state) {
-  Workload& work = workload(state);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(
-        mechanics::add_prism_gradient(work.loops.prisms, work.position, with_penalty, work.result));
-  report(state, work, work.prisms());
+/// Bytes of the springs' arrays, a size that STREAM is measured at, too.
+double stream_bytes(int64_t columns) {
+  return bytes(kernels[0], workload(columns), Kernels::plain);
 }
 
-/// The product with springs alone, or with prisms alone.
-void hessian_action(benchmark::State& state, bool prisms) {
-  Workload& work = workload(state);
-  mechanics::Loops loops = work.loops;
-  if (prisms) loops.springs.clear();
+void triad(benchmark::State& state, double bytes) {
+  const auto n = static_cast<size_t>(bytes / 24);
+  std::vector<double> a(n, 1.0), b(n, 2.0), c(n, 3.0);
   for (auto _ : state) {
-    mechanics::add_hessian_action(loops, work.position, prisms ? with_penalty : springs_only,
-                                  work.direction, work.result);
+    for (size_t i = 0; i < n; ++i) a[i] = b[i] + 3.0 * c[i];
     benchmark::ClobberMemory();
   }
-  report(state, work, prisms ? work.prisms() : work.springs());
+  state.SetBytesProcessed(static_cast<int64_t>(24 * n) * state.iterations());
 }
 
-void spring_blocks(benchmark::State& state) {
-  Workload& work = workload(state);
+void copy(benchmark::State& state, double bytes) {
+  const auto n = static_cast<size_t>(bytes / 16);
+  std::vector<double> a(n, 1.0), b(n, 2.0);
+  for (auto _ : state) {
+    std::memcpy(a.data(), b.data(), n * sizeof(double));
+    benchmark::ClobberMemory();
+  }
+  state.SetBytesProcessed(static_cast<int64_t>(16 * n) * state.iterations());
+}
+
+void spring_blocks(benchmark::State& state, int64_t columns) {
+  Workload& work = workload(columns);
   for (auto _ : state)
-    mechanics::for_each_spring_block(work.loops.springs[0], work.position, 1.0, Curvature::convex,
+    mechanics::for_each_spring_block(work.spring_loop(), work.position, 1.0, Curvature::convex,
                                      [](int64_t, const Mat3& block) {
                                        benchmark::DoNotOptimize(block.data());
                                        benchmark::ClobberMemory();
                                      });
-  report(state, work, work.springs());
 }
 
-void prism_blocks(benchmark::State& state, Curvature curvature) {
-  Workload& work = workload(state);
+void prism_blocks(benchmark::State& state, int64_t columns) {
+  Workload& work = workload(columns);
   for (auto _ : state)
-    mechanics::for_each_prism_block(work.loops.prisms, work.position, with_penalty, curvature,
+    mechanics::for_each_prism_block(work.prism_loop(), work.position, with_penalty,
+                                    Curvature::exact,
                                     [](int64_t, const mechanics::PrismBlocks& blocks) {
                                       benchmark::DoNotOptimize(&blocks);
                                       benchmark::ClobberMemory();
                                     });
-  report(state, work, work.prisms());
 }
 
-void totals(benchmark::State& state) {
-  Workload& work = workload(state);
-  for (auto _ : state) {
-    mechanics::Totals sum = mechanics::totals(work.loops, work.position);
-    benchmark::DoNotOptimize(sum);
+const char* name_of(Kernels kernels) {
+  constexpr const char* names[] = {"plain", "AVX2", "AVX-512"};
+  return names[static_cast<int>(kernels)];
+}
+
+std::string name_of(const Kernel& kernel, int64_t columns, Kernels kernels) {
+  return fmt::format("{}/{}/{}", kernel.name, name_of(kernels), columns);
+}
+
+std::string name_of_stream(const char* which, double bytes) {
+  return fmt::format("STREAM {}/{:.1f} MB", which, bytes / 1e6);
+}
+
+void register_stream(double bytes) {
+  benchmark::RegisterBenchmark(name_of_stream("triad", bytes).c_str(), triad, bytes);
+  benchmark::RegisterBenchmark(name_of_stream("copy", bytes).c_str(), copy, bytes);
+}
+
+void register_size(int64_t columns) {
+  register_stream(stream_bytes(columns));
+  for (const Kernel& kernel : kernels)
+    for (const Kernels set : mechanics::available_kernels())
+      benchmark::RegisterBenchmark(name_of(kernel, columns, set).c_str(),
+                                   [&kernel, columns, set](benchmark::State& state) {
+                                     Workload& work = workload(columns);
+                                     for (auto _ : state) {
+                                       kernel.work(work, set);
+                                       benchmark::ClobberMemory();
+                                     }
+                                   });
+  benchmark::RegisterBenchmark(fmt::format("spring blocks/{}", columns).c_str(), spring_blocks,
+                               columns);
+  benchmark::RegisterBenchmark(fmt::format("prism blocks/{}", columns).c_str(), prism_blocks,
+                               columns);
+}
+
+/// Prints as usual and keeps the least CPU seconds of each benchmark's repetitions.
+class Times : public benchmark::ConsoleReporter {
+ public:
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration || run.iterations == 0) continue;
+      const double seconds = run.cpu_accumulated_time / static_cast<double>(run.iterations);
+      const auto [place, first] = least_.try_emplace(run.run_name.function_name, seconds);
+      place->second = std::min(place->second, seconds);
+    }
+    ConsoleReporter::ReportRuns(runs);
   }
-  report(state, work, work.springs() + work.prisms());
+  double of(const std::string& name) const { return least_.at(name); }
+
+ private:
+  std::map<std::string, double> least_;
+};
+
+/// Bytes a second of STREAM over arrays of so many bytes together.
+double bandwidth(const Times& times, const char* which, double bytes) {
+  return bytes / times.of(name_of_stream(which, bytes));
 }
 
-/// Columns along a side: 1e4, 1e5 and 1e6 points.
-void sizes(benchmark::internal::Benchmark* b) {
-  b->ArgName("columns")->Arg(50)->Arg(158)->Arg(500)->Unit(benchmark::kMillisecond);
+std::string rows(const Times& times, int64_t columns) {
+  const Workload& w = workload(columns);
+  const double triad = bandwidth(times, "triad", stream_bytes(columns));
+  std::string text;
+  for (const Kernel& kernel : kernels)
+    for (const Kernels set : mechanics::available_kernels()) {
+      const double seconds = times.of(name_of(kernel, columns, set));
+      const double all = bytes(kernel, w, set), n = static_cast<double>(kernel.elements(w));
+      text += fmt::format("| {} | {} | {} | {:.2f} | {:.0f} | {:.1f} |\n", kernel.name,
+                          w.position.size(), name_of(set), 1e9 * seconds / n, all / n,
+                          seconds * triad / all);
+    }
+  return text;
 }
 
-BENCHMARK(spring_gradient)->Apply(sizes);
-BENCHMARK(prism_gradient)->Apply(sizes);
-BENCHMARK_CAPTURE(hessian_action, springs, false)->Apply(sizes);
-BENCHMARK_CAPTURE(hessian_action, prisms, true)->Apply(sizes);
-BENCHMARK(spring_blocks)->Apply(sizes);
-BENCHMARK_CAPTURE(prism_blocks, exact, Curvature::exact)->Apply(sizes);
-BENCHMARK_CAPTURE(prism_blocks, convex, Curvature::convex)->Apply(sizes);
-BENCHMARK(totals)->Apply(sizes);
+std::string stream_rows(const Times& times) {
+  std::string text = "| arrays, MB | triad, GB/s | copy, GB/s |\n|--:|--:|--:|\n";
+  for (const double bytes : {stream_bytes(sizes[0]), stream_bytes(sizes[1]), out_of_all_caches})
+    text +=
+        fmt::format("| {:.1f} | {:.1f} | {:.1f} |\n", bytes / 1e6,
+                    bandwidth(times, "triad", bytes) / 1e9, bandwidth(times, "copy", bytes) / 1e9);
+  return text;
+}
+
+/// Writes the tables below the page's mark.
+void write_page(const std::string& path, const Times& times) {
+  const std::string mark = "<!-- measured -->\n";
+  std::ifstream file(path);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  text.resize(std::min(text.find(mark), text.size()));
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
+                        static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 30);
+  text += mark + fmt::format("\nOne core of a machine with {} cores, {:.0f} GiB of memory.\n\n",
+                             std::thread::hardware_concurrency(), memory);
+  text += stream_rows(times) +
+          "\n| kernel | points | instructions | ns/element | bytes/element | × triad |\n"
+          "|---|--:|---|--:|--:|--:|\n";
+  for (const int64_t columns : sizes) text += rows(times, columns);
+  std::ofstream(path) << text;
+}
 
 }  // namespace
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  for (const int64_t columns : sizes) register_size(columns);
+  register_stream(out_of_all_caches);
+  Times times;
+  benchmark::RunSpecifiedBenchmarks(&times);
+  if (argc == 2) write_page(argv[1], times);
+  return 0;
+}
