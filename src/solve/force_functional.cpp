@@ -136,6 +136,7 @@ void ForceHessian::assemble(Vec displacement) {
   check(MatAXPY(exact_, -functional_.weights().elastic, third_, SUBSET_NONZERO_PATTERN));
   if (volume_) {
     volume_->assemble(displacement);
+    volume_->renew();
     check(MatAXPY(exact_, 1, volume_->exact(), SUBSET_NONZERO_PATTERN));
     check(MatAXPY(convex_, 1, volume_->convex(), SUBSET_NONZERO_PATTERN));
   }

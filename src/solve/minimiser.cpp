@@ -69,7 +69,7 @@ struct Minimiser::Callbacks {
 
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
     return guarded(me, [&](Minimiser& self) {
-      self.solver_.hessian().assemble(x);
+      self.solver_.prepare(x);
       self.set_forcing();
     });
   }
@@ -126,7 +126,7 @@ void Minimiser::make_tao() {
   if (!newton_) return;
   KSP inner = nullptr;
   check(TaoGetKSP(tao_, &inner));
-  check(KSPSetPC(inner, solver_.preconditioner()));
+  solver_.lend_preconditioner(inner);
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   base::check_options(KSPSetFromOptions(inner));

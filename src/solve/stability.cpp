@@ -130,7 +130,7 @@ double largest_eigenvalue(Mat hessian) {
 double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t direct_limit) {
   constexpr double tolerance = 1e-8;  // of the eigenvalue
   constexpr int most = 2000;          // iterations
-  solver.hessian().assemble(displacement);
+  solver.prepare(displacement);
   const Mat exact = solver.hessian().exact();
   PetscInt unknowns = 0;
   check(MatGetSize(exact, &unknowns, nullptr));

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "repose/base/agreement.h"
+#include "repose/base/petsc_versions.h"
 
 namespace repose::solve {
 
@@ -14,7 +15,8 @@ Tangent::Tangent(Objective& objective)
       part_(objective.positions().part()),
       diagonal_(objective.positions().make_vector()) {
   make_pattern();
-  make_matrices();
+  make_matrix();
+  make_action();
   find_slots();
 }
 
@@ -48,19 +50,19 @@ void Tangent::make_pattern() {
   }
 }
 
-void Tangent::make_matrices() {
+void Tangent::make_matrix() {
   const auto owned = static_cast<PetscInt>(part_.owned_unknowns);
   std::vector<PetscInt> count[2];
   for (int side = 0; side < 2; ++side)
     for (PetscInt k = 0; k < owned; ++k)
       count[side].push_back(rows_[side].begin[k + 1] - rows_[side].begin[k]);
   const auto total = static_cast<PetscInt>(part_.total_unknowns);
-  check(MatCreate(objective_.positions().comm(), exact_.out()));
-  check(MatSetSizes(exact_, 3 * owned, 3 * owned, 3 * total, 3 * total));
-  check(MatSetBlockSize(exact_, 3));
-  check(MatSetType(exact_, MATAIJ));
-  check(MatXAIJSetPreallocation(exact_, 3, count[0].data(), count[1].data(), nullptr, nullptr));
-  check(MatSetOption(exact_, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  check(MatCreate(objective_.positions().comm(), convex_.out()));
+  check(MatSetSizes(convex_, 3 * owned, 3 * owned, 3 * total, 3 * total));
+  check(MatSetBlockSize(convex_, 3));
+  check(MatSetType(convex_, MATAIJ));
+  check(MatXAIJSetPreallocation(convex_, 3, count[0].data(), count[1].data(), nullptr, nullptr));
+  check(MatSetOption(convex_, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   for (PetscInt k = 0; k < owned; ++k) {
     const auto row = static_cast<PetscInt>(part_.first_unknown + k);
     for (const BlockRows& rows : rows_) {
@@ -68,18 +70,43 @@ void Tangent::make_matrices() {
       const std::vector<PetscScalar> zeros(9 * n, 0.0);
       const std::vector<PetscInt> columns(rows.column.begin() + rows.begin[k],
                                           rows.column.begin() + rows.begin[k + 1]);
-      check(MatSetValuesBlocked(exact_, 1, &row, n, columns.data(), zeros.data(), INSERT_VALUES));
+      check(MatSetValuesBlocked(convex_, 1, &row, n, columns.data(), zeros.data(), INSERT_VALUES));
     }
   }
-  check(MatAssemblyBegin(exact_, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(exact_, MAT_FINAL_ASSEMBLY));
-  check(MatDuplicate(exact_, MAT_SHARE_NONZERO_PATTERN, convex_.out()));
-  for (Mat matrix : {static_cast<Mat>(exact_), static_cast<Mat>(convex_)}) {
-    check(MatSetOption(matrix, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
-    check(MatSetOption(matrix, MAT_SYMMETRIC, PETSC_TRUE));
-    check(MatSetOption(matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  }
+  check(MatAssemblyBegin(convex_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(convex_, MAT_FINAL_ASSEMBLY));
+  check(MatSetOption(convex_, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(convex_, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
+}
+
+void Tangent::make_action() {
+  const auto owned = static_cast<PetscInt>(3 * part_.owned_unknowns);
+  const auto total = static_cast<PetscInt>(3 * part_.total_unknowns);
+  direction_.assign(part_.point_row.size(), Vec3::Zero());
+  work_ = direction_;
+  check(MatCreateShell(objective_.positions().comm(), owned, owned, total, total, this,
+                       action_.out()));
+  check(MatSetBlockSize(action_, 3));
+  check(MatShellSetOperation(action_, MATOP_MULT, reinterpret_cast<void (*)()>(multiply)));
+  check(MatSetOption(action_, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(action_, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+}
+
+PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
+  Tangent* self = nullptr;
+  if (const PetscErrorCode code = MatShellGetContext(matrix, &self)) return code;
+  try {
+    const Objective& objective = self->objective_;
+    objective.positions().spread(direction, self->direction_);
+    std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
+    mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
+                                  self->direction_, self->work_);
+    objective.positions().keep_owned(self->work_, product);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
 }
 
 Tangent::Slot Tangent::find(int32_t row_point, int32_t column_point) const {
@@ -148,13 +175,12 @@ void Tangent::refill(Mat matrix, Work&& add_blocks) {
 
 void Tangent::fill(Mat matrix, Curvature curvature) {
   refill(matrix, [&](double* const values[2]) {
-    const auto position = objective_.positions().local();
     for (size_t l = 0; l < spring_slots_.size(); ++l)
       mechanics::for_each_spring_block(
-          objective_.loops().springs[l], position, objective_.weights().elastic, curvature,
+          objective_.loops().springs[l], at_, objective_.weights().elastic, curvature,
           [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
     const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-    mechanics::for_each_prism_block(prisms, position, objective_.weights(), curvature,
+    mechanics::for_each_prism_block(prisms, at_, objective_.weights(), curvature,
                                     [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                       for (int i = 0; i < 6; ++i)
                                         for (int j = 0; j < 6; ++j)
@@ -166,7 +192,8 @@ void Tangent::fill(Mat matrix, Curvature curvature) {
 
 base::MatHandle Tangent::make_third() const {
   base::MatHandle matrix;
-  check(MatDuplicate(exact_, MAT_DO_NOT_COPY_VALUES, matrix.out()));
+  check(MatDuplicate(convex_, MAT_DO_NOT_COPY_VALUES, matrix.out()));
+  check(MatSetOption(matrix, MAT_SPD, PETSC_FALSE));
   check(MatSetOption(matrix, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   return matrix;
 }
@@ -197,15 +224,24 @@ void Tangent::assemble(Vec displacement) {
   Positions& positions = objective_.positions();
   positions.update(displacement);
   const auto now = positions.local();
-  int same = assembled_at_.size() == now.size() &&
-             std::equal(now.begin(), now.end(), assembled_at_.begin());
+  int same = at_.size() == now.size() && std::equal(now.begin(), now.end(), at_.begin());
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
   if (same) return;
-  fill(exact_, Curvature::exact);
+  at_.assign(now.begin(), now.end());
+  ++assemblies_;
+}
+
+void Tangent::renew() {
   fill(convex_, Curvature::convex);
   lift_diagonal();
-  assembled_at_.assign(now.begin(), now.end());
-  ++assemblies_;
+}
+
+Mat Tangent::exact() {
+  if (!exact_) exact_ = make_third();
+  if (filled_at_ == assemblies_) return exact_;
+  fill(exact_, Curvature::exact);
+  filled_at_ = assemblies_;
+  return exact_;
 }
 
 }  // namespace repose::solve

@@ -1,6 +1,8 @@
 #include "repose/solve/tangent_solver.h"
 
 #include "repose/base/error.h"
+#include "repose/base/petsc_versions.h"
+#include "repose/solve/tangent_hierarchy.h"
 
 namespace repose::solve {
 
@@ -8,33 +10,48 @@ using base::check;
 
 namespace {
 
-void set_default(const char* name, const char* value) {
-  PetscBool given = PETSC_FALSE;
-  check(PetscOptionsHasName(nullptr, nullptr, name, &given));
-  if (!given) check(PetscOptionsSetValue(nullptr, name, value));
+bool given(const char* option) {
+  PetscBool set = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, nullptr, option, &set));
+  return set;
 }
 
-void choose_preconditioner(PC pc, int64_t unknowns) {
-  if (unknowns <= TangentSolver::direct_limit) {
-    check(PCSetType(pc, PCCHOLESKY));
-    check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-    return;
-  }
-  check(PCSetType(pc, PCGAMG));
-  set_default("-mg_levels_ksp_type", "chebyshev");
-  set_default("-mg_levels_pc_type", "jacobi");
+void choose_factors(PC pc) {
+  check(PCSetType(pc, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+void choose_preconditioner(PC pc, int64_t unknowns, bool elliptic) {
+  const int64_t limit = elliptic ? TangentSolver::direct_limit : TangentSolver::factors_limit;
+  if (unknowns <= limit)
+    choose_factors(pc);
+  else
+    check(PCSetType(pc, elliptic ? PCMG : PCGAMG));
+}
+
+bool is_hierarchy(PC pc) {
+  PetscBool same = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCMG, &same));
+  return same;
 }
 
 }  // namespace
 
 TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
-    : hessian_(hessian), work_(positions.make_vector()) {
+    : hessian_(hessian),
+      unknowns_(3 * positions.part().total_unknowns),
+      work_(positions.make_vector()),
+      measured_(positions.make_vector()) {
+  const Part& part = positions.part();
+  for (int64_t i = 0; i < part.owned_points; ++i)
+    if (part.unknown[i] >= 0) layer_.push_back(part.model.points.layer[i]);
   check(KSPCreate(positions.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
-  choose_preconditioner(preconditioner(), 3 * positions.part().total_unknowns);
-  check(KSPSetOperators(krylov_, hessian_.exact(), hessian_.convex()));
+  choose_preconditioner(preconditioner(), unknowns_, hessian_.elliptic());
+  check(KSPSetOperators(krylov_, hessian_.action(), hessian_.convex()));
+  lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
 }
 
@@ -44,9 +61,47 @@ PC TangentSolver::preconditioner() {
   return pc;
 }
 
-bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
+void TangentSolver::lend_preconditioner(KSP other) {
+  if (other != krylov_) check(KSPSetPC(other, preconditioner()));
+  check(KSPSetResidualHistory(other, nullptr, PETSC_DECIDE, PETSC_TRUE));
+  check(KSPSetPostSolve(other, after_solve, this));
+}
+
+PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
+  try {
+    static_cast<TangentSolver*>(me)->wear_.take(krylov);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
+void TangentSolver::prepare(Vec displacement) {
   hessian_.assemble(displacement);
-  check(KSPSetOperators(krylov_, hessian_.exact(), hessian_.convex()));
+  if (hessian_.assemblies() != made_at_) wear_.move();
+  const bool renew = renewals_ == 0 || wear_.out();
+  check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
+  if (renew) renew_preconditioner();
+}
+
+void TangentSolver::renew_preconditioner() {
+  hessian_.renew();
+  if (is_hierarchy(preconditioner())) {
+    const bool hopeless = wear_.new_rate() > slowest && unknowns_ <= factors_limit;
+    if (hopeless && !given("-pc_type")) {
+      choose_factors(preconditioner());
+    } else if (renewals_ == 0) {
+      make_hierarchy(preconditioner(), hessian_.convex(), layer_);
+    }
+  }
+  wear_.renew();
+  made_at_ = hessian_.assemblies();
+  ++renewals_;
+}
+
+bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
+  prepare(displacement);
+  check(KSPSetOperators(krylov_, hessian_.action(), hessian_.convex()));
   check(KSPSetTolerances(krylov_, relative_tolerance, 0.0, PETSC_DEFAULT, PETSC_DEFAULT));
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
@@ -57,9 +112,16 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
 }
 
 double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
+  hessian_.assemble(displacement);
+  PetscBool same = PETSC_FALSE;  // asked again at the same state
+  if (measured_at_ == hessian_.assemblies()) check(VecEqual(gradient, measured_, &same));
+  if (same) return distance_;
   check(VecSet(work_, 0));
   const bool convex = solve(displacement, gradient, work_, 0.05);
-  return convex ? largest_block(work_) : std::numeric_limits<double>::infinity();
+  distance_ = convex ? largest_block(work_) : std::numeric_limits<double>::infinity();
+  measured_at_ = hessian_.assemblies();
+  check(VecCopy(gradient, measured_));
+  return distance_;
 }
 
 }  // namespace repose::solve

@@ -42,9 +42,10 @@ class ForceHessian : public Hessian {
   ForceHessian(ForceFunctional& functional, Tangent& elastic);  ///< assembled at no displacement
 
   void assemble(Vec displacement) override;  ///< collective
-  Mat exact() const override { return exact_; }
+  Mat exact() override { return exact_; }
   Mat convex() const override { return convex_; }
-  Mat model() const override { return convex_; }
+  Mat model() override { return convex_; }
+  bool elliptic() const override { return false; }  // its square
 
  private:
   void make_metric();

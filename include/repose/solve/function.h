@@ -30,7 +30,8 @@ class Function {
 };
 
 /// A function's second derivatives as matrices of 3×3 blocks: the exact ones (or what stands for
-/// them), which act, and a positive definite relative from which a preconditioner is made.
+/// them), which act, and a positive definite relative from which a preconditioner is made. The
+/// relative may stay behind: it is brought to the state only by renew().
 class Hessian {
  public:
   Hessian() = default;
@@ -38,12 +39,18 @@ class Hessian {
   Hessian& operator=(const Hessian&) = delete;
   virtual ~Hessian() = default;
 
-  /// Assembles both at `displacement`; may do nothing where that was done last. Collective.
+  /// Goes to `displacement`; may do nothing where it is already. Collective.
   virtual void assemble(Vec displacement) = 0;
-  virtual Mat exact() const = 0;
+  /// Brings convex() to the state of the last assemble(). Collective.
+  virtual void renew() {}
+  virtual Mat exact() = 0;  ///< its entries; collective
   virtual Mat convex() const = 0;
+  /// What acts as exact(), with or without entries.
+  virtual Mat action() { return exact(); }
   /// The one whose quadratic model a Newton method steps by.
-  virtual Mat model() const { return exact(); }
+  virtual Mat model() { return action(); }
+  /// Whether multigrid can precondition it: it couples neighbours as elasticity does.
+  virtual bool elliptic() const { return true; }
   int64_t assemblies() const { return assemblies_; }
 
  protected:

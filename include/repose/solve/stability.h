@@ -23,6 +23,6 @@ double largest_eigenvalue(Mat hessian);
 /// shift that MUMPS' inertia shows to be below every eigenvalue (Sylvester); above by LOBPCG
 /// (Knyazev 2001) with the preconditioner of `solver`. `-eps_…` and `-st_…` options apply.
 double smallest_eigenvalue(TangentSolver& solver, Vec displacement,
-                           int64_t direct_limit = TangentSolver::direct_limit);
+                           int64_t direct_limit = TangentSolver::factors_limit);
 
 }  // namespace repose::solve

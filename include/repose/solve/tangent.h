@@ -6,27 +6,31 @@
 
 namespace repose::solve {
 
-/// The Hessian of an objective as assembled matrices of 3×3 blocks (MATAIJ, block size 3): the
-/// exact one, which acts, and the convex one, from which a positive definite preconditioner is
-/// made. Each rank assembles its own rows; nothing is added across ranks.
+/// The Hessian of an objective: the exact one acts spring by spring and prism by prism, without
+/// entries (MATSHELL); the convex one, from which a positive definite preconditioner is made, is
+/// assembled of 3×3 blocks (MATAIJ, block size 3), and so is the exact one where its entries are
+/// asked for. Each rank assembles its own rows; nothing is added across ranks.
 class Tangent : public Hessian {
  public:
   explicit Tangent(Objective& objective);  ///< collective; O(elements) memory
 
-  /// Nothing is done if `displacement` is the state assembled last, and nothing has changed since.
+  /// Nothing is done if `displacement` is the state it is at, and nothing has changed since.
   void assemble(Vec displacement) override;
+  void renew() override;
   /// The next assembly is done in any case: the elements have changed.
-  void forget() { assembled_at_.clear(); }
+  void forget() { at_.clear(); }
 
   base::MatHandle make_third() const;  ///< a matrix for third(); collective
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
   /// update, into `matrix` of make_third(). Collective.
   void third(std::span<const Vec3> direction, Mat matrix);
 
-  Mat exact() const override { return exact_; }
+  Mat exact() override;
   Mat convex() const override { return convex_; }
+  Mat action() override { return action_; }
 
  private:
+  static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
   /// The block columns of this rank's rows in one part of the matrix, in compressed rows.
   struct BlockRows {
     std::vector<int32_t> begin;   // [owned unknowns + 1]
@@ -37,7 +41,8 @@ class Tangent : public Hessian {
   using Slot = int32_t;
 
   void make_pattern();
-  void make_matrices();
+  void make_matrix();
+  void make_action();
   void find_slots();
   bool owns(int32_t point) const;
   Slot find(int32_t row_point, int32_t column_point) const;
@@ -51,11 +56,13 @@ class Tangent : public Hessian {
   Objective& objective_;
   const Part& part_;
   BlockRows rows_[2];  // diagonal part, off-diagonal part
-  base::MatHandle exact_, convex_;
+  base::MatHandle exact_, convex_, action_;
   base::VecHandle diagonal_;
   std::vector<std::vector<std::array<Slot, 4>>> spring_slots_;  // [loop][spring] ii ij ji jj
   std::vector<std::array<Slot, 36>> prism_slots_;
-  std::vector<Vec3> assembled_at_;  // [local points] of the last assembly
+  std::vector<Vec3> at_;                // [local points] positions of the last assembly
+  std::vector<Vec3> direction_, work_;  // [local points]
+  int64_t filled_at_ = 0;               // assemblies() when exact_ was filled
 };
 
 }  // namespace repose::solve

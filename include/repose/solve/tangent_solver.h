@@ -2,26 +2,36 @@
 #include <petscksp.h>
 
 #include <limits>
+#include <vector>
 
 #include "repose/solve/function.h"
+#include "repose/solve/tangent_wear.h"
 
 namespace repose::solve {
 
 using KspHandle = base::Handle<KSP, KSPDestroy>;
 
-/// Linear solves with a Hessian: conjugate gradients on the exact matrix,
-/// preconditioned from the convex one, by default by MUMPS' Cholesky factors up to
-/// `direct_limit` unknowns and by smoothed-aggregation multigrid (GAMG) above. `-ksp_…` and
-/// `-pc_…` options apply. All members collective.
+/// Linear solves with a Hessian: conjugate gradients on the exact action, preconditioned from the
+/// convex matrix, by default by MUMPS' Cholesky factors up to `direct_limit` unknowns and by the
+/// tissue's own multigrid (tangent_hierarchy.h) above. A preconditioner made at one state serves
+/// the next ones until it is worn out (tangent_wear.h); multigrid that is hopelessly slow gives way
+/// to factors. `-ksp_…` and `-pc_…` options apply. All members collective.
 class TangentSolver {
  public:
-  static constexpr int64_t direct_limit = 600000;  ///< scalar unknowns
+  // Scalar unknowns: where multigrid begins to win, and where factors no longer fit.
+  static constexpr int64_t direct_limit = 40000, factors_limit = 600000;
 
   TangentSolver(Positions& positions, Hessian& hessian);
 
-  /// Solves H δ = rhs at `displacement` (assembled there, factors renewed if it moved), to a
-  /// relative natural residual. Returns whether the Hessian showed no negative curvature on the
-  /// way; where it did, δ is the iterate reached.
+  /// Takes the Hessian to `displacement`, and renews the preconditioner there if it is worn out.
+  void prepare(Vec displacement);
+
+  /// Makes `other` use the preconditioner, whose wear its solves add to.
+  void lend_preconditioner(KSP other);
+
+  /// Solves H δ = rhs at `displacement` (prepared there), to a relative natural residual. Returns
+  /// whether the Hessian showed no negative curvature on the way; where it did, δ is the iterate
+  /// reached.
   bool solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance);
 
   /// The Newton step −H⁻¹ ∇Φ at `displacement`, its largest block in mm: how far the rest position
@@ -33,12 +43,24 @@ class TangentSolver {
 
   Hessian& hessian() { return hessian_; }
   PC preconditioner();
-  KSP krylov() const { return krylov_; }
+  int64_t renewals() const { return renewals_; }  ///< of the preconditioner
 
  private:
+  static constexpr double slowest = 15;  // multigrid's iterations per e-fold before it is given up
+
+  static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
+  void renew_preconditioner();
+
   Hessian& hessian_;
+  int64_t unknowns_;  // scalar, of all ranks
   KspHandle krylov_;
-  base::VecHandle work_;
+  base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
+  double distance_ = 0;              // its length, …
+  int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
+  std::vector<int32_t> layer_;       // of the unknown points of this rank
+  Wear wear_;
+  int64_t renewals_ = 0;
+  int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal
 };
 
 }  // namespace repose::solve

@@ -1,0 +1,39 @@
+#include "repose/solve/tangent_wear.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "repose/base/petsc.h"
+
+namespace repose::solve {
+
+using base::check;
+
+void Wear::renew() {
+  new_ = true;
+  spent_ = new_iterations_ = folds_ = 0;
+}
+
+void Wear::move() { new_ = false; }
+
+void Wear::take(KSP krylov) {
+  KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
+  check(KSPGetConvergedReason(krylov, &reason));
+  const bool failed = reason == KSP_DIVERGED_ITS || reason == KSP_DIVERGED_INDEFINITE_PC;
+  if (failed && !new_) spent_ = std::numeric_limits<double>::infinity();
+  const PetscReal* norm = nullptr;
+  PetscInt norms = 0;
+  check(KSPGetResidualHistory(krylov, &norm, &norms));
+  if (norms < 2 || !(norm[norms - 1] > 0) || !(norm[0] > norm[norms - 1])) return;
+  const double folds = std::log(norm[0] / norm[norms - 1]);
+  const auto iterations = static_cast<double>(norms - 1);
+  if (new_) {
+    new_iterations_ += iterations;
+    folds_ += folds;
+  } else {
+    spent_ += std::max(0.0, iterations - new_rate() * folds);
+  }
+}
+
+}  // namespace repose::solve

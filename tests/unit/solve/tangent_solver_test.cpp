@@ -1,0 +1,86 @@
+#include "repose/solve/tangent_solver.h"
+
+#include <gtest/gtest.h>
+
+#include "moved_block.h"
+#include "repose/base/agreement.h"
+#include "repose/base/scoped_option.h"
+#include "repose/solve/tangent.h"
+
+namespace repose {
+namespace {
+
+using base::check;
+
+/// A slab of tissue on bone, its springs at rest, large enough for several levels.
+model::Model slab_on_bone() {
+  return testing::block(24, 24, 4, 2, [](int, int, int a) {
+    return a == 3 ? model::PointSet::bone : model::PointSet::soft_tissue;
+  });
+}
+
+struct Solved : testing::MovedBlock {
+  solve::Objective objective;
+  solve::Tangent tangent{objective};
+  solve::TangentSolver solver{positions, tangent};
+  base::VecHandle rhs = vector(5, 1.0), answer = positions.make_vector();
+
+  explicit Solved(mechanics::VolumeTerm term = mechanics::VolumeTerm::penalty)
+      : MovedBlock(slab_on_bone()), objective(positions, {1, term, 0.4}) {}
+  /// Drawn out along x, the more the farther: springs a thousand times stiffer than others.
+  base::VecHandle drawn_out() const {
+    std::vector<Vec3> values = part.model.points.position;
+    for (Vec3& at : values) at = {5e-3 * at.x() * at.x(), 0, 0};
+    base::VecHandle v = positions.make_vector();
+    positions.keep_owned(values, v);
+    return v;
+  }
+  bool solve(Vec at, double tolerance) {
+    check(VecSet(answer, 0));
+    return solver.solve(at, rhs, answer, tolerance);
+  }
+  /// Of the entries of the exact Hessian, not of its action.
+  double residual(Vec at) {
+    tangent.assemble(at);
+    base::VecHandle left = positions.make_vector();
+    check(MatMult(tangent.exact(), answer, left));
+    check(VecAXPY(left, -1, rhs));
+    return solve::largest_block(left) / solve::largest_block(rhs);
+  }
+};
+
+class Preconditioner : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(Preconditioner, SolvesForTheExactHessian) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s;
+  const base::VecHandle at = s.vector(1, 0.05);
+  ASSERT_TRUE(s.solve(at, 1e-12));
+  EXPECT_LT(s.residual(at), 1e-9);
+}
+
+TEST_P(Preconditioner, MadeElsewhereChangesNoAnswer) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s;
+  const base::VecHandle before = s.vector(1, 0.05), after = s.vector(2, 0.05);
+  s.solve(before, 1e-12);
+  ASSERT_TRUE(s.solve(after, 1e-12));
+  EXPECT_EQ(s.solver.renewals(), 1);
+  EXPECT_LT(s.residual(after), 1e-9);
+}
+
+TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s(mechanics::VolumeTerm::none);
+  const base::VecHandle before = s.positions.make_vector(), after = s.drawn_out();
+  s.solve(before, 1e-6);
+  s.solve(after, 1e-6);
+  EXPECT_EQ(s.solver.renewals(), 1);
+  s.solve(after, 1e-6);
+  EXPECT_EQ(s.solver.renewals(), 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "mg"));
+
+}  // namespace
+}  // namespace repose
