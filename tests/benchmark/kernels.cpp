@@ -219,14 +219,15 @@ double bandwidth(const Times& times, const char* which, double bytes) {
 std::string rows(const Times& times, int64_t columns) {
   const Workload& w = workload(columns);
   const double triad = bandwidth(times, "triad", stream_bytes(columns));
+  const double memory = bandwidth(times, "triad", out_of_all_caches);
   std::string text;
   for (const Kernel& kernel : kernels)
     for (const Kernels set : mechanics::available_kernels()) {
       const double seconds = times.of(name_of(kernel, columns, set));
       const double all = bytes(kernel, w, set), n = static_cast<double>(kernel.elements(w));
-      text += fmt::format("| {} | {} | {} | {:.2f} | {:.0f} | {:.1f} |\n", kernel.name,
+      text += fmt::format("| {} | {} | {} | {:.2f} | {:.0f} | {:.1f} | {:.1f} |\n", kernel.name,
                           w.position.size(), name_of(set), 1e9 * seconds / n, all / n,
-                          seconds * triad / all);
+                          seconds * triad / all, seconds * memory / all);
     }
   return text;
 }
@@ -251,8 +252,8 @@ void write_page(const std::string& path, const Times& times) {
   text += mark + fmt::format("\nOne core of a machine with {} cores, {:.0f} GiB of memory.\n\n",
                              std::thread::hardware_concurrency(), memory);
   text += stream_rows(times) +
-          "\n| kernel | points | instructions | ns/element | bytes/element | × triad |\n"
-          "|---|--:|---|--:|--:|--:|\n";
+          "\n| kernel | points | instructions | ns/element | bytes/element | × triad |"
+          " × triad of memory |\n|---|--:|---|--:|--:|--:|--:|\n";
   for (const int64_t columns : sizes) text += rows(times, columns);
   std::ofstream(path) << text;
 }
