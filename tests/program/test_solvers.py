@@ -2,7 +2,7 @@
 
 import pytest
 
-from tissue import apart, last, same_face
+from tissue import apart, last, same_face, steps
 
 ACCURACY = 1e-6  # mm; two answers this near to the truth are twice as far apart at most
 ADVANCE, OPENING = "paper_jaw_advance.yaml", "paper_jaw_opening.yaml"
@@ -41,7 +41,7 @@ def test_trust_region_and_line_search_find_the_same_face_of_the_finer_head(solve
 
 
 @pytest.mark.parametrize("options", [
-    ["-pc_type", "pbjacobi"], ["-pc_type", "bjacobi"],
+    ["-pc_type", "mg"], ["-pc_type", "pbjacobi"], ["-pc_type", "bjacobi"],
     ["-pc_type", "cholesky", "-pc_factor_mat_solver_type", "mumps"], ["-pc_type", "lu"],
     ["-ksp_type", "preonly"], ["-ksp_type", "minres", "-ksp_norm_type", "preconditioned"],
     ["-tao_ntr_ksp_type", "nash"]],
@@ -50,12 +50,18 @@ def test_every_linear_solver_finds_the_same_face(check, options):
     check(ADVANCE, *options)
 
 
-def test_multigrid_on_ranks(check):
-    check(ADVANCE, "-pc_type", "gamg", ranks=2)
+@pytest.mark.parametrize("multigrid", ["mg", "gamg"])
+def test_multigrid_on_ranks(check, multigrid):
+    check(ADVANCE, "-pc_type", multigrid, ranks=2)
+
+
+def test_a_weak_preconditioner_needs_no_more_load_steps(solved):
+    weak = solved(ADVANCE, "-accuracy", ACCURACY, "-pc_type", "gamg")
+    assert len(steps(weak)) == len(steps(solved(ADVANCE, "-accuracy", ACCURACY)))
 
 
 @pytest.mark.parametrize("options", [[], ["-tao_type", "cg"], ["-tao_type", "lmvm"],
-                                     ["-pc_type", "gamg"]], ids=lambda o: "".join(o[-1:]))
+                                     ["-pc_type", "gamg"], ["-pc_type", "mg"]], ids=lambda o: "".join(o[-1:]))
 @pytest.mark.parametrize("accuracy", [1, 0.1])
 def test_the_rest_position_is_as_near_as_estimated(solved, options, accuracy):
     rest = last(solved(ADVANCE, "-accuracy", ACCURACY))
