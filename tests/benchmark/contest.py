@@ -382,8 +382,8 @@ def conclusion(contests):
     if not over["seconds"]:
         return ""
     return f"""
-The goals are counted with the first row of each table. The paper's algorithm takes {spread(over['evaluations'])}
-times the evaluations of the default, and {spread(over['seconds'])} times its time: one factorisation takes as long
+The goals are counted with the first row of each table, evaluations on the smaller, coarser model left
+out. The paper's algorithm takes {spread(over['evaluations'])} times the evaluations of the default, and {spread(over['seconds'])} times its time: one factorisation takes as long
 as {spread(factor)} evaluations, so that few evaluations are not little time. {astray} of the other {len(others)} races, which
 start with the bones in their places, came to another minimum than the load path's.
 """
