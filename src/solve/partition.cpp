@@ -31,50 +31,12 @@ std::vector<std::array<int64_t, 2>> column_pairs(const model::Model& model,
   return pairs;
 }
 
-/// This rank's slab of a vector that lives on rank 0, as PetscInt in PETSc's own memory.
-PetscInt* scatter_slab(MPI_Comm comm, const std::vector<PetscInt>& all,
-                       const std::vector<int>& counts) {
-  std::vector<int> starts(counts.size(), 0);
-  std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
-  const int mine = counts[base::rank(comm)];
-  PetscInt* slab = nullptr;
-  check(PetscMalloc1(std::max(mine, 1), &slab));
-  MPI_Scatterv(all.data(), counts.data(), starts.data(), MPIU_INT, slab, mine, MPIU_INT, 0, comm);
-  return slab;
-}
-
-std::vector<int> slab_counts(MPI_Comm comm, int64_t n) {
-  std::vector<int> counts(base::size(comm));
-  for (size_t r = 0; r < counts.size(); ++r)
-    counts[r] = static_cast<int>(base::slab(n, static_cast<int>(r), base::size(comm)).rows());
-  return counts;
-}
-
-/// The column graph as a distributed adjacency matrix, rows in slabs.
-base::MatHandle adjacency(MPI_Comm comm, const ColumnGraph& graph, int64_t columns,
-                          const std::vector<int>& rows) {
-  std::vector<int> entries(rows.size(), 0);
-  std::vector<PetscInt> row_length, neighbour(graph.neighbour.begin(), graph.neighbour.end());
-  for (int64_t c = 0; c < graph.columns(); ++c)
-    row_length.push_back(static_cast<PetscInt>(graph.row_begin[c + 1] - graph.row_begin[c]));
-  if (base::rank(comm) == 0)
-    for (size_t r = 0; r < rows.size(); ++r) {
-      const auto slab = base::slab(columns, static_cast<int>(r), base::size(comm));
-      entries[r] = static_cast<int>(graph.row_begin[slab.end] - graph.row_begin[slab.begin]);
-    }
-  MPI_Bcast(entries.data(), static_cast<int>(entries.size()), MPI_INT, 0, comm);
-  PetscInt* lengths = scatter_slab(comm, row_length, rows);
-  PetscInt* columns_of_row = scatter_slab(comm, neighbour, entries);
-  const int mine = rows[base::rank(comm)];
-  PetscInt* begin = nullptr;
-  check(PetscMalloc1(mine + 1, &begin));
-  begin[0] = 0;
-  std::partial_sum(lengths, lengths + mine, begin + 1);
-  check(PetscFree(lengths));
-  base::MatHandle matrix;
-  check(MatCreateMPIAdj(comm, mine, static_cast<PetscInt>(columns), begin, columns_of_row, nullptr,
-                        matrix.out()));
-  return matrix;
+/// A copy in PETSc's own memory, which PETSc frees.
+PetscInt* handed_over(const std::vector<int64_t>& values) {
+  PetscInt* copy = nullptr;
+  check(PetscMalloc1(std::max<size_t>(values.size(), 1), &copy));
+  std::copy(values.begin(), values.end(), copy);
+  return copy;
 }
 
 std::vector<int> in_order(int64_t columns, int ranks) {
@@ -86,27 +48,27 @@ std::vector<int> in_order(int64_t columns, int ranks) {
   return owner;
 }
 
-std::vector<int> by_scotch(MPI_Comm comm, const ColumnGraph& graph, int64_t columns) {
-  const std::vector<int> rows = slab_counts(comm, columns);
-  const base::MatHandle matrix = adjacency(comm, graph, columns, rows);
+/// Rank 0 alone: it has the graph, and PT-Scotch 7.0 on several ranks can fold a graph of few
+/// columns a rank for ever (dgraphFoldComm).
+std::vector<int> by_scotch(const ColumnGraph& graph, int ranks) {
+  const auto columns = static_cast<PetscInt>(graph.columns());
+  base::MatHandle matrix;
+  check(MatCreateMPIAdj(PETSC_COMM_SELF, columns, columns, handed_over(graph.row_begin),
+                        handed_over(graph.neighbour), nullptr, matrix.out()));
   base::Handle<MatPartitioning, MatPartitioningDestroy> partitioning;
-  check(MatPartitioningCreate(comm, partitioning.out()));
+  check(MatPartitioningCreate(PETSC_COMM_SELF, partitioning.out()));
   check(MatPartitioningSetAdjacency(partitioning, matrix));
   check(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
-  const std::vector<PetscInt> weights(graph.weight.begin(), graph.weight.end());
-  check(MatPartitioningSetVertexWeights(partitioning, scatter_slab(comm, weights, rows)));
+  check(MatPartitioningSetNParts(partitioning, ranks));
+  check(MatPartitioningSetVertexWeights(partitioning, handed_over(graph.weight)));
   base::check_options(MatPartitioningSetFromOptions(partitioning));
   base::IndexSetHandle assignment;
   check(MatPartitioningApply(partitioning, assignment.out()));
-  const PetscInt* mine = nullptr;
-  check(ISGetIndices(assignment, &mine));
-  std::vector<PetscInt> all(base::rank(comm) == 0 ? columns : 0);
-  std::vector<int> starts(rows.size(), 0);
-  std::partial_sum(rows.begin(), rows.end() - 1, starts.begin() + 1);
-  MPI_Gatherv(mine, rows[base::rank(comm)], MPIU_INT, all.data(), rows.data(), starts.data(),
-              MPIU_INT, 0, comm);
-  check(ISRestoreIndices(assignment, &mine));
-  return {all.begin(), all.end()};
+  const PetscInt* owner = nullptr;
+  check(ISGetIndices(assignment, &owner));
+  std::vector<int> all(owner, owner + columns);
+  check(ISRestoreIndices(assignment, &owner));
+  return all;
 }
 
 /// Adds the connected piece of `start`, breadth first, to `visited`; `round` marks what is met.
@@ -161,13 +123,14 @@ ColumnGraph column_graph(const model::Model& model) {
 }
 
 std::vector<int> partition(MPI_Comm comm, const ColumnGraph& graph) {
-  int64_t columns = graph.columns();
-  MPI_Bcast(&columns, 1, MPI_INT64_T, 0, comm);
   const int ranks = base::size(comm);
   constexpr int64_t worth_a_partition = 8;  // columns a rank
-  if (ranks > 1 && columns >= worth_a_partition * ranks) return by_scotch(comm, graph, columns);
-  if (base::rank(comm) != 0) return {};
-  return in_order(columns, ranks);
+  std::vector<int> owner;
+  base::on_first_rank(comm, [&] {
+    const bool worth = ranks > 1 && graph.columns() >= worth_a_partition * ranks;
+    owner = worth ? by_scotch(graph, ranks) : in_order(graph.columns(), ranks);
+  });
+  return owner;
 }
 
 }  // namespace repose::solve

@@ -23,7 +23,7 @@ ColumnGraph column_graph(const model::Model& model);
 /// connected piece (Cuthill & McKee 1969, without sorting by degree). Linear in the graph.
 std::vector<int64_t> memory_order(const ColumnGraph& graph);
 
-/// Owner rank of each column, on rank 0 (empty elsewhere). `graph` is looked at on rank 0 only.
+/// Owner rank of each column, on rank 0 (empty elsewhere), by rank 0 alone, where `graph` is.
 /// Few columns a rank (< 8) are dealt out in order instead of by PT-Scotch. Collective.
 std::vector<int> partition(MPI_Comm comm, const ColumnGraph& graph);
 
