@@ -119,6 +119,7 @@ class RegionSearch {
   double error_on_the_way();
   Border border();
   Border border(double width, double& passed_on);
+  double growth(double error, double allowed) const;
   double correct(Shared& band, const Submodel& part, Vec step, Vec mask);
   void go_to(const std::vector<Vec3>& position, double load);
   double outside_force() { return largest_block(masked(whole_->gradient, outside_)); }
@@ -135,10 +136,11 @@ class RegionSearch {
   std::optional<Objective> objective_;  // of the whole
   double value_ = 0;                    // of the objective
   base::VecHandle outside_;             // 1 at the whole's unknowns that are held
-  double reach_ = 0;
-  Submodel part_;                              // on rank 0
-  std::vector<Vec3> position_;                 // [N] on rank 0, of the state reached
-  double load_ = 0;                            // of that state
+  double reach_ = 0;                    // thicknesses, of the region
+  double width_ = narrowest;            // thicknesses, of the band on either side of its border
+  Submodel part_;                       // on rank 0
+  std::vector<Vec3> position_;          // [N] on rank 0, of the state reached
+  double load_ = 0;                     // of that state
   std::optional<model::StepNumbers> pending_;  // of the last step, not handed on yet
   double quiet_ = 0;  // N, largest force outside in the initial state: rounding
   Border measured_;   // last, for the steps on the way
@@ -271,18 +273,25 @@ double RegionSearch::error_on_the_way() {
   return measured_.error * force / measured_.force;
 }
 
-/// The estimate on the narrowest band that says enough; none at a state that is not at rest anyhow.
+/// The estimate on the narrowest band that says enough, beginning with the one that did last; none
+/// at a state that is not at rest anyhow.
 Border RegionSearch::border() {
   if (pending_ && !std::isfinite(pending_->displacement_error)) return {outside_force(), 0};
   constexpr double most = 0.5;  // of the force may be passed on
-  for (double width = narrowest;; width *= 2) {
+  for (;; width_ *= 2) {
     double passed_on = 0;
-    Border found = border(width, passed_on);
-    if (passed_on <= most || width > plan_.largest) {
+    Border found = border(width_, passed_on);
+    if (passed_on <= most || width_ > plan_.largest) {
       found.error /= 1 - std::min(passed_on, most);
       return found;
     }
   }
+}
+
+/// Thicknesses by which the region is to grow where its border may err by no more than `allowed`
+/// mm. Tissue whose band had to be some times as wide carries displacements as many times as far.
+double RegionSearch::growth(double error, double allowed) const {
+  return width_ / narrowest * std::clamp(reach_of(error / allowed), least_growth, most_growth);
 }
 
 /// The Newton step of the forces on the held points, on a band of columns: its largest block with
@@ -342,7 +351,7 @@ Summary RegionSearch::run(const Start& start, base::Stages& stages) {
   for (;;) {
     const double allowed = settings_.path.accuracy - pending_->displacement_error;
     if (!summary_.path.complete() || held.error <= allowed || reach_ >= plan_.largest) break;
-    rest(reach_ + std::clamp(reach_of(held.error / allowed), least_growth, most_growth), {});
+    rest(reach_ + growth(held.error, allowed), {});
     held = border();
   }
   emit(*pending_, held.error);

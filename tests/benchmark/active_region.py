@@ -65,12 +65,11 @@ def write_ply(file, points, triangles):
 
 
 def crop(folder, active):
-    """The skin's triangles around active columns; returns the vertices that are kept."""
+    """Writes the skin's triangles around active columns."""
     points, triangles = read_ply(folder / "head_skin.ply")
     kept = triangles[active[triangles].any(axis=1)]
     vertices, numbers = np.unique(kept, return_inverse=True)
     write_ply(folder / "cropped_skin.ply", points[vertices], numbers.reshape(-1, 3))
-    return vertices
 
 
 def solve(program, folder, skin, *options):
@@ -109,10 +108,6 @@ def row(size, way, found, cropped, distance):
             f"{distance} |")
 
 
-def farthest(one, other):
-    return f"{np.linalg.norm(one - other, axis=1).max():.3f}"
-
-
 def rows_of(size, with_whole, tools):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -120,18 +115,15 @@ def rows_of(size, with_whole, tools):
                         "-output", "head"], cwd=folder, check=True, capture_output=True)
         program = tools / "repose-solve"
         region = solve(program, folder, "head_skin.ply", "-active_region", "on")
-        vertices = crop(folder, region["active"])
+        crop(folder, region["active"])
         cropped = solve(program, folder, "cropped_skin.ply", "-active_region", "off")
-        distance = {"region": "", "cropped": ""}
+        distance = ""
         if with_whole:
             whole = solve(program, folder, "head_skin.ply", "-active_region", "off")
-            layers = region["points"] // size
-            same = (vertices[:, None] * layers + np.arange(layers)).ravel()
-            distance = {"region": farthest(region["position"], whole["position"]),
-                        "cropped": farthest(cropped["position"], whole["position"][same])}
+            distance = f"{np.linalg.norm(region['position'] - whole['position'], axis=1).max():.3f}"
             yield row(size, "whole", whole, cropped, "0")
-        yield row(size, "active region", region, cropped, distance["region"])
-        yield row(size, "cropped", cropped, cropped, distance["cropped"])
+        yield row(size, "active region", region, cropped, distance)
+        yield row(size, "cropped", cropped, cropped, "")
 
 
 def arguments():
