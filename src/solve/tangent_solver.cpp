@@ -21,12 +21,17 @@ void choose_factors(PC pc) {
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-void choose_preconditioner(PC pc, int64_t unknowns, bool elliptic) {
-  const int64_t limit = elliptic ? TangentSolver::direct_limit : TangentSolver::factors_limit;
-  if (unknowns <= limit)
+void choose_preconditioner(PC pc, int64_t unknowns, int64_t direct_limit, bool elliptic) {
+  if (unknowns <= (elliptic ? direct_limit : TangentSolver::factors_limit))
     choose_factors(pc);
   else
     check(PCSetType(pc, elliptic ? PCMG : PCGAMG));
+}
+
+double price_of_renewal() {
+  PetscReal price = 20;  // MUMPS' factors of a sheet of tissue cost 20 to 25 iterations with them
+  check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
+  return price;
 }
 
 bool is_hierarchy(PC pc) {
@@ -37,11 +42,12 @@ bool is_hierarchy(PC pc) {
 
 }  // namespace
 
-TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
+TangentSolver::TangentSolver(Positions& positions, Hessian& hessian, int64_t limit)
     : hessian_(hessian),
       unknowns_(3 * positions.part().total_unknowns),
       work_(positions.make_vector()),
-      measured_(positions.make_vector()) {
+      measured_(positions.make_vector()),
+      wear_(price_of_renewal()) {
   const Part& part = positions.part();
   for (int64_t i = 0; i < part.owned_points; ++i)
     if (part.unknown[i] >= 0) layer_.push_back(part.model.points.layer[i]);
@@ -49,7 +55,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
-  choose_preconditioner(preconditioner(), unknowns_, hessian_.elliptic());
+  choose_preconditioner(preconditioner(), unknowns_, limit, hessian_.elliptic());
   check(KSPSetOperators(krylov_, hessian_.action(), hessian_.convex()));
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
@@ -79,21 +85,22 @@ PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
 void TangentSolver::prepare(Vec displacement) {
   hessian_.assemble(displacement);
   if (hessian_.assemblies() != made_at_) wear_.move();
-  const bool renew = renewals_ == 0 || wear_.out();
+  const bool renew = renewals_ == 0 || wear_.out() || hopeless();
   check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
   if (renew) renew_preconditioner();
 }
 
+bool TangentSolver::hopeless() {
+  return wear_.new_rate() > slowest && unknowns_ <= factors_limit && !given("-pc_type") &&
+         is_hierarchy(preconditioner());
+}
+
 void TangentSolver::renew_preconditioner() {
   hessian_.renew();
-  if (is_hierarchy(preconditioner())) {
-    const bool hopeless = wear_.new_rate() > slowest && unknowns_ <= factors_limit;
-    if (hopeless && !given("-pc_type")) {
-      choose_factors(preconditioner());
-    } else if (renewals_ == 0) {
-      make_hierarchy(preconditioner(), hessian_.convex(), layer_);
-    }
-  }
+  if (hopeless())
+    choose_factors(preconditioner());
+  else if (renewals_ == 0 && is_hierarchy(preconditioner()))
+    make_hierarchy(preconditioner(), hessian_.convex(), layer_);
   wear_.renew();
   made_at_ = hessian_.assemblies();
   ++renewals_;

@@ -20,13 +20,17 @@ void Wear::move() { new_ = false; }
 void Wear::take(KSP krylov) {
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov, &reason));
-  const bool failed = reason == KSP_DIVERGED_ITS || reason == KSP_DIVERGED_INDEFINITE_PC;
-  if (failed && !new_) spent_ = std::numeric_limits<double>::infinity();
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  const bool indefinite = reason == KSP_DIVERGED_INDEFINITE_PC;
+  const bool failed = indefinite || reason == KSP_DIVERGED_ITS;
+  if (failed && !new_) spent_ = endless;
+  if (indefinite && new_) new_iterations_ = endless;
   const PetscReal* norm = nullptr;
   PetscInt norms = 0;
   check(KSPGetResidualHistory(krylov, &norm, &norms));
-  if (norms < 2 || !(norm[norms - 1] > 0) || !(norm[0] > norm[norms - 1])) return;
-  const double folds = std::log(norm[0] / norm[norms - 1]);
+  if (norms < 2 || !(norm[norms - 1] > 0)) return;
+  const double folds = std::max(0.0, std::log(norm[0] / norm[norms - 1]));
+  if (folds == 0 && !failed) return;
   const auto iterations = static_cast<double>(norms - 1);
   if (new_) {
     new_iterations_ += iterations;

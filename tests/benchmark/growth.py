@@ -2,7 +2,7 @@
 """How the work of a whole solve grows with the mesh: a table.
 
     tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm]
-                              [-output docs/growth.md]
+                              [-ranks 1] [-output docs/growth.md]
 
 Synthetic heads of the given numbers of skin vertices, 4 layers, springs by moduli with s_ref = r_0,
 penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method. Says how far each ends
@@ -43,10 +43,10 @@ def children():
     return resource.getrusage(resource.RUSAGE_CHILDREN)
 
 
-def measure(program, folder, method):
+def measure(command, folder, method):
     """One solve: its attributes summed over steps, CPU s, and the positions at rest."""
     before = children().ru_utime
-    done = subprocess.run([program, "scene.yaml", "-tao_type", method, "-output", method], cwd=folder,
+    done = subprocess.run([*command, "scene.yaml", "-tao_type", method, "-output", method], cwd=folder,
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     seconds = children().ru_utime - before
     if done.returncode == 1:
@@ -63,21 +63,30 @@ def measure(program, folder, method):
                          "converged": done.returncode == 0}, steps[-1]["point/position"][()])
 
 
-def rows_of(size, methods, tools):
+def rows_of(size, methods, tools, ranks):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         subprocess.run([tools / "repose-phantom", "-skin_vertices", str(size), "-bone_edge", "2",
                         "-output", "head"], cwd=folder, check=True, capture_output=True)
         (folder / "scene.yaml").write_text(SCENE)
         first = None
+        command = [*(["mpirun", "-n", str(ranks)] if ranks > 1 else []), tools / "repose-solve"]
         for method in methods:
-            found, position = measure(tools / "repose-solve", folder, method)
+            found, position = measure(command, folder, method)
             first = position if first is None else first
             apart = np.linalg.norm(position - first, axis=1).max()
             said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
             yield (f"| {size} | {found['unknowns']} | {method} | {found['steps']} | "
                    f"{found['iterations']} | {found['evaluations']} | {found['hessians']} | "
                    f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
+
+
+def replace_measured(page, text):
+    """Puts a table in the place of the one below a page's mark."""
+    before, mark, _ = page.read_text().partition("<!-- measured -->\n")
+    part = page.with_suffix(".part")
+    part.write_text(before + mark + "\n" + text)
+    part.rename(page)
 
 
 def arguments():
@@ -87,6 +96,7 @@ def arguments():
     parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
     parser.add_argument("-sizes", default="500,2500,12500")
     parser.add_argument("-methods", default="ntr,lmvm")
+    parser.add_argument("-ranks", type=int, default=1)
     parser.add_argument("-output", type=pathlib.Path)
     return parser.parse_args()
 
@@ -96,14 +106,13 @@ def main():
     text = HEAD + "\n"
     print(HEAD)
     for size in chosen.sizes.split(","):
-        for row in rows_of(int(size), chosen.methods.split(","), chosen.bin.resolve()):
+        for row in rows_of(int(size), chosen.methods.split(","), chosen.bin.resolve(),
+                           chosen.ranks):
             print(row, flush=True)
             text += row + "\n"
     if chosen.output:
-        before, mark, _ = chosen.output.read_text().partition("<!-- measured -->\n")
-        part = chosen.output.with_suffix(".part")
-        part.write_text(before + mark + "\n" + text)
-        part.rename(chosen.output)
+        replace_measured(chosen.output, text)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -15,13 +15,14 @@ using KspHandle = base::Handle<KSP, KSPDestroy>;
 /// convex matrix, by default by MUMPS' Cholesky factors up to `direct_limit` unknowns and by the
 /// tissue's own multigrid (tangent_hierarchy.h) above. A preconditioner made at one state serves
 /// the next ones until it is worn out (tangent_wear.h); multigrid that is hopelessly slow gives way
-/// to factors. `-ksp_…` and `-pc_…` options apply. All members collective.
+/// to factors. `-ksp_…` and `-pc_…` options apply, and `-pc_renewal_price`: the iterations that a
+/// preconditioner may cost before it is renewed. All members collective.
 class TangentSolver {
  public:
   // Scalar unknowns: where multigrid begins to win, and where factors no longer fit.
-  static constexpr int64_t direct_limit = 40000, factors_limit = 600000;
+  static constexpr int64_t direct_limit = 100000, factors_limit = 600000;
 
-  TangentSolver(Positions& positions, Hessian& hessian);
+  TangentSolver(Positions& positions, Hessian& hessian, int64_t limit = direct_limit);
 
   /// Takes the Hessian to `displacement`, and renews the preconditioner there if it is worn out.
   void prepare(Vec displacement);
@@ -49,6 +50,7 @@ class TangentSolver {
   static constexpr double slowest = 15;  // multigrid's iterations per e-fold before it is given up
 
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
+  bool hopeless();
   void renew_preconditioner();
 
   Hessian& hessian_;
