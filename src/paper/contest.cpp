@@ -15,13 +15,14 @@ namespace {
 
 const MPI_Comm comm = PETSC_COMM_SELF;
 
-int64_t logged_factorisations() {
-  PetscBool logged = PETSC_FALSE;
-  check(PetscLogIsActive(&logged));
-  if (!logged) return 0;
+/// How often PETSc's log has seen an event.
+int64_t logged(const char* name) {
+  PetscBool on = PETSC_FALSE;
+  check(PetscLogIsActive(&on));
+  if (!on) return 0;
   PetscLogEvent event = -1;
   PetscEventPerfInfo info{};
-  check(PetscLogEventGetId("MatCholFctrNum", &event));
+  check(PetscLogEventGetId(name, &event));
   check(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
   return info.count;
 }
@@ -96,7 +97,8 @@ double Contest::distance(Vec displacement) const {
 Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
   Referee referee(problem_.function(), goal, rules);
   Entry entry;
-  const int64_t assembled = problem_.assemblies(), factored = logged_factorisations();
+  const int64_t assembled = problem_.assemblies(), factored = logged("MatCholFctrNum"),
+                acted = logged("MatMult");
   try {
     search(referee, displacement);
     entry.end = Entry::End::elsewhere;
@@ -106,7 +108,8 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
   entry.seconds = referee.seconds();
   entry.evaluations = referee.evaluations();
   entry.assemblies = problem_.assemblies() - assembled;
-  entry.factorisations = logged_factorisations() - factored;
+  entry.factorisations = logged("MatCholFctrNum") - factored;
+  entry.actions = logged("MatMult") - acted;
   positions_.set_load(1);
   entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : referee.closest();
   return entry;

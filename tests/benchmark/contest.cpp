@@ -155,12 +155,13 @@ void print(const Line& line) {
   std::printf(
       "%s\n",
       fmt::format("{{\"method\": \"{}\", \"end\": \"{}\", \"evaluations\": {}, \"values\": {}, "
-                  "\"assemblies\": {}, \"factorisations\": {}, \"coarse_evaluations\": {}, "
+                  "\"assemblies\": {}, \"factorisations\": {}, \"actions\": {}, "
+                  "\"coarse_evaluations\": {}, "
                   "\"coarse_assemblies\": {}, \"seconds\": {}, \"distance\": {}, "
                   "\"excess\": {}}}",
                   e.method, ends[static_cast<size_t>(e.end)], e.evaluations, line.values,
-                  e.assemblies, e.factorisations, line.coarse_evaluations, line.coarse_assemblies,
-                  e.seconds, e.distance, e.excess)
+                  e.assemblies, e.factorisations, e.actions, line.coarse_evaluations,
+                  line.coarse_assemblies, e.seconds, e.distance, e.excess)
           .c_str());
 }
 
@@ -273,8 +274,9 @@ double seconds_of(const std::function<void()>& work) {
   return least;
 }
 
-/// What one evaluation, one assembly of the Hessian and one factorisation take. The load changes
-/// between assemblies, because a state that was just assembled is not assembled again.
+/// What one evaluation, one assembly of the Hessian, one factorisation, and an action of the
+/// Hessian with that of the factors take. The load changes between assemblies, because a state that
+/// was just assembled is not assembled again.
 void measure_costs(const Task& task) {
   const solve::Part part = solve::distribute(comm, task.model);
   solve::Positions positions(comm, part);
@@ -284,6 +286,7 @@ void measure_costs(const Task& task) {
   const auto assemble = [&] {
     positions.set_load(load += 1e-4);
     problem.tangent().assemble(at);
+    problem.tangent().renew();
   };
   const double evaluation = seconds_of([&] { problem.function().evaluate(at, gradient); });
   const double assembly = seconds_of(assemble);
@@ -291,8 +294,14 @@ void measure_costs(const Task& task) {
     assemble();
     check(PCSetUp(problem.solver().preconditioner()));
   });
-  std::printf("%s\n", fmt::format("{{\"evaluation\": {}, \"assembly\": {}, \"factorisation\": {}}}",
-                                  evaluation, assembly, both - assembly)
+  check(VecSet(at, 1e-3));
+  const double action = seconds_of([&] {
+    check(MatMult(problem.tangent().action(), at, gradient));
+    check(PCApply(problem.solver().preconditioner(), gradient, at));
+  });
+  std::printf("%s\n", fmt::format("{{\"evaluation\": {}, \"assembly\": {}, \"factorisation\": {}, "
+                                  "\"action\": {}}}",
+                                  evaluation, assembly, both - assembly, action)
                           .c_str());
 }
 
@@ -304,7 +313,8 @@ std::vector<base::Option> option_table() {
           {"accuracy", OptionKind::number, "0.01", "Distance from rest.", {1e-6, 10}, "mm"},
           {"limit", OptionKind::integer, "200000", "Evaluations.", {1, 1000000000}},
           {"seconds", OptionKind::number, "60", "CPU time of a race.", {1e-3, 1e6}, "s"},
-          {"count", OptionKind::flag, "", "Count factorisations too, which takes a little time."}};
+          {"count", OptionKind::flag, "",
+           "Count factorisations and actions too, which takes a little time."}};
 }
 
 base::Exit run(const base::Options& options) {

@@ -312,7 +312,7 @@ def row(contest, method, entry):
         count += f" ({entry['evaluations'] - entry['values']} with gradient)"
     hessians = "–"
     if entry["assemblies"]:
-        hessians = f"{entry['assemblies']}, {entry['factorisations']}"
+        hessians = f"{entry['assemblies']}, {entry['factorisations']}, {entry['actions']}"
         if entry.get("coarse_assemblies"):
             hessians += f" and {entry['coarse_assemblies']} coarse"
     return (f"| {name} | {count} | {hessians} | {entry['seconds'] / unit:.2g}× | "
@@ -322,16 +322,17 @@ def row(contest, method, entry):
 def table(contest):
     cost, unit = contest.costs, contest.costs["evaluation"]
     text = (f"## {contest.title}\n\n{contest.unknowns} unknowns. In evaluations of Repose's kernel, "
-            f"one assembly of the Hessian takes {cost['assembly'] / unit:.0f}, one factorisation\n"
-            f"{cost['factorisation'] / unit:.0f}")
+            f"one assembly of the convex Hessian takes {cost['assembly'] / unit:.0f}, one\nfactorisation "
+            f"{cost['factorisation'] / unit:.0f}, one action with the factors' {cost['action'] / unit:.1f}")
     if "numpy" in cost:
         text += f", one evaluation in NumPy {cost['numpy'] / unit:.0f}"
     own = contest.entries["default", 0]
-    spent = own["assemblies"] * cost["assembly"] + own["factorisations"] * cost["factorisation"]
-    text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its Hessians and factors "
+    spent = (own["factorisations"] * (cost["assembly"] + cost["factorisation"])
+             + own["actions"] * cost["action"])
+    text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its linear systems "
              f"{'on this model ' * bool(own['coarse_evaluations'])}are about "
              f"{100 * spent / own['seconds']:.0f} %.\n\n"
-             "| method | evaluations | Hessians, factorisations | time | distance |\n"
+             "| method | evaluations | Hessians, factorisations, actions | time | distance |\n"
              "|---|--:|--:|--:|---|\n")
     for (method, _), entry in contest.entries.items():
         text += row(contest, method, entry)
@@ -408,7 +409,8 @@ model file, and is stopped at the first state it evaluates that is within {accur
 of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default takes load
 steps (and, where the skin is large enough, solves a coarser model first): their cost is in its
 figures. An evaluation is one of the value, or of the value with its gradient, which in Repose's kernel
-cost the same. Hessians are counted apart; their time is in the times. Times are CPU times over that
+cost the same. Counted apart are the states at which a Hessian is taken, the factorisations of a
+convex one and the actions of the exact one, each with those of the factors; their time is in the times. Times are CPU times over that
 of the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up
 (reading, sharing out, index arrays) is in nobody's.
 

@@ -22,6 +22,7 @@ struct Entry {
   int64_t evaluations = 0;
   int64_t assemblies = 0;      ///< of the Hessian
   int64_t factorisations = 0;  ///< Cholesky's, if PETSc's log is on (PetscLogDefaultBegin)
+  int64_t actions = 0;         ///< of the Hessian on a vector, likewise
   double seconds = 0;          ///< CPU
   double distance = 0;  ///< mm from the reference: closest state, own minimum or where it stopped
   double excess = 0;    ///< at its own minimum, (Φ − Φ_reference) / |Φ_reference|
