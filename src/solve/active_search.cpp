@@ -28,6 +28,7 @@ constexpr double decay = 0.7;
 constexpr double border_share = 0.4;  // of the accuracy, the displacement at the first border
 constexpr double narrowest = 3;       // thicknesses, of a region and of half a band
 constexpr double least_growth = 1, most_growth = 6;  // thicknesses
+constexpr double finer = 0.2;    // of own_share, in a region that grew: what it freed has to go
 constexpr double quantum = 0.5;  // thicknesses: reaches are whole multiples, on any ranks
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -209,6 +210,7 @@ void RegionSearch::rest(double reach, const Start& start) {
   Start from = restricted(start);
   if (pending_) {
     settings.path.start_load = 1;
+    settings.path.accuracy *= finer;
     from = {base::deal_out(comm_, first() ? pick(position_, part_.point_row) : position_)};
   }
   base::Stages unused(comm_);
