@@ -84,8 +84,9 @@ PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
 
 void TangentSolver::prepare(Vec displacement) {
   hessian_.assemble(displacement);
-  if (hessian_.assemblies() != made_at_) wear_.move();
-  const bool renew = renewals_ == 0 || wear_.out() || hopeless();
+  const bool moved = hessian_.assemblies() != made_at_;
+  if (moved) wear_.move();
+  const bool renew = renewals_ == 0 || hopeless() || (moved && wear_.out());
   check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
   if (renew) renew_preconditioner();
 }
