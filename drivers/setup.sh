@@ -54,6 +54,11 @@ install_packages() {
 # Exports what mpirun needs here, for Open MPI 4 (OMPI_) and 5 (PRTE_).
 mpi_environment() {
   export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+  # OpenBLAS takes a processor that is newer than itself for a very old one.
+  case $(grep -m1 '^flags' /proc/cpuinfo 2>/dev/null) in
+    *avx512vl*) export OPENBLAS_CORETYPE=${OPENBLAS_CORETYPE:-SkylakeX} ;;
+    *avx2*) export OPENBLAS_CORETYPE=${OPENBLAS_CORETYPE:-Haswell} ;;
+  esac
   if [ "$(id -u)" = 0 ]; then
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
     export PRTE_ALLOW_RUN_AS_ROOT=1 PRTE_ALLOW_RUN_AS_ROOT_CONFIRM=1

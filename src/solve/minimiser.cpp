@@ -12,7 +12,9 @@ using base::check;
 
 namespace {
 
-constexpr double safety = 2;  // the estimate is this many Newton steps long
+constexpr double safety = 2;     // the estimate is this many Newton steps long
+constexpr double linear = 1e-6;  // mm, below which a Newton step need not be confirmed
+constexpr double most_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
@@ -107,6 +109,8 @@ Minimiser::Minimiser(Function& function, TangentSolver& solver, const Certificat
       watch_(watch),
       gradient_(function.positions().make_vector()),
       saved_(function.positions().make_vector()),
+      step_(function.positions().make_vector()),
+      trial_(function.positions().make_vector()),
       certified_gradient_(function.positions().make_vector()) {
   make_tao();
 }
@@ -151,7 +155,24 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
     certificate_.function.evaluate(displacement, certified_gradient_);
     gradient = certified_gradient_;
   }
-  return safety * certificate_.solver.newton_distance(displacement, gradient);
+  const double step = certificate_.solver.newton_distance(displacement, gradient);
+  const double estimate = safety * step;
+  const bool curved = estimate > linear && estimate <= accuracy_;
+  return curved ? std::max(estimate, step / (1 - contraction(displacement, step))) : estimate;
+}
+
+double Minimiser::contraction(Vec displacement, double step) {
+  TangentSolver& solver = certificate_.solver;
+  if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
+  check(VecCopy(solver.latest(), step_));
+  check(VecWAXPY(trial_, -1.0, step_, displacement));
+  certificate_.function.evaluate(trial_, certified_gradient_);
+  check(VecSet(step_, 0));
+  const bool convex = solver.solve(displacement, certified_gradient_, step_, 0.05);
+  contraction_ =
+      convex ? std::min(largest_block(step_) / step, most_contraction) : most_contraction;
+  contracted_at_ = solver.hessian().assemblies();
+  return contraction_;
 }
 
 bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {

@@ -39,6 +39,11 @@ class Minimiser : public RestSearch {
   void make_tao();
   void set_forcing();
   double strict_estimate(Vec displacement, Vec gradient);
+  /// How much shorter than the latest Newton step, of length `step`, the next would be with the
+  /// same Hessian: θ < ½ where Newton's method converges, and the rest is |δ| / (1 − θ) away at
+  /// most (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1). Where it is larger, the
+  /// quadratic model is not to be trusted yet.
+  double contraction(Vec displacement, double step);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
@@ -62,7 +67,9 @@ class Minimiser : public RestSearch {
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long
   bool stopped_ = false;                // the watcher did not want to go on
-  base::VecHandle gradient_, saved_, certified_gradient_;
+  double contraction_ = 0;              // of the latest Newton step, …
+  int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian
+  base::VecHandle gradient_, saved_, step_, trial_, certified_gradient_;
   std::exception_ptr thrown_;
 };
 
