@@ -67,6 +67,8 @@ mpi_environment() {
   export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   # Runs at the same time must not be pinned to the same cores.
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+  # Ranks that wait let others go on: on a busy machine a message takes no time slice then.
+  export OMPI_MCA_mpi_yield_when_idle=1
   # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd, and
   # whose libraries take most of a start, one second of it asleep at the end.
   export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,ofi,openib

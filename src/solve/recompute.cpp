@@ -131,7 +131,8 @@ void Recomputation::springs() {
     for (const int64_t end : {p, q}) at_point_[end] += s.noise();
     if (!any_soft(model_.springs.points[j])) continue;
     step_.f_e.value += s.energy;
-    uncertain += rounding * (s.energy + std::abs(s.tension) * s.length);
+    const double slack = rounding * s.length;  // of the elongation
+    uncertain += rounding * s.energy + (std::abs(s.tension) + s.tangent * slack) * slack;
     if (soft(p)) step_.rows.residual_force[p] += s.tension * s.direction;
     if (soft(q)) step_.rows.residual_force[q] -= s.tension * s.direction;
   }

@@ -223,6 +223,9 @@ void Tangent::lift_diagonal() {
 void Tangent::assemble(Vec displacement) {
   Positions& positions = objective_.positions();
   positions.update(displacement);
+  // Takes back the multiples of 1 that TAO's line searches add to a Hessian.
+  check(MatAssemblyBegin(action_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(action_, MAT_FINAL_ASSEMBLY));
   const auto now = positions.local();
   int same = at_.size() == now.size() && std::equal(now.begin(), now.end(), at_.begin());
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());

@@ -13,14 +13,14 @@ Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 
 import argparse
 import pathlib
-import resource
 import subprocess
 import tempfile
 
 import h5py
 import numpy as np
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
+from page import PROJECT, children, print_table
+
 SCENE = """skin: SKIN
 bones:
   - {name: skull, file: head_skull.ply}
@@ -75,10 +75,10 @@ def crop(folder, active):
 def solve(program, folder, skin, *options):
     """One solve: what it says, CPU s, and the positions at rest."""
     (folder / "scene.yaml").write_text(SCENE.replace("SKIN", skin))
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    before = children().ru_utime
     done = subprocess.run([program, "scene.yaml", "-output", "result", *options], cwd=folder,
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    seconds = children().ru_utime - before
     if done.returncode == 1:
         raise SystemExit(done.stderr)
     stages = {line.split()[2]: float(line.split()[-6]) for line in done.stdout.splitlines()
@@ -139,17 +139,9 @@ def arguments():
 
 def main():
     chosen = arguments()
-    text = HEAD + "\n"
-    print(HEAD)
-    for size in map(int, chosen.sizes.split(",")):
-        for line in rows_of(size, size <= chosen.whole, chosen.bin.resolve()):
-            print(line, flush=True)
-            text += line + "\n"
-    if chosen.output:
-        before, mark, _ = chosen.output.read_text().partition("<!-- measured -->\n")
-        part = chosen.output.with_suffix(".part")
-        part.write_text(before + mark + "\n" + text)
-        part.rename(chosen.output)
+    sizes, tools = map(int, chosen.sizes.split(",")), chosen.bin.resolve()
+    print_table(HEAD, (line for size in sizes for line in rows_of(size, size <= chosen.whole, tools)),
+                chosen.output)
 
 
 main()

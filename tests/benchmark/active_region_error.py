@@ -17,7 +17,8 @@ import tempfile
 import h5py
 import numpy as np
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
+from page import PROJECT, print_table
+
 CHIN = "head_genioplasty"
 TURGOR = [("layers: 4", "layers: 4\n  turgor: 0.05\n  mass: [.1, .1, .1, .1]")]
 STIFF_SKIN = [("default: {", '"layer 0": {stiffness: 20.0}\n    default: {')]
@@ -87,18 +88,9 @@ def arguments():
 
 def main():
     chosen = arguments()
-    text = HEAD + "\n"
-    print(HEAD)
-    for case in CASES:
-        for line in rows_of(case, chosen.accuracies.split(","), chosen.bin.resolve() / "repose-solve"):
-            print(line, flush=True)
-            text += line + "\n"
-    if chosen.output:
-        before, mark, rest = chosen.output.read_text().partition("<!-- estimates -->\n")
-        _, end, after = rest.partition("<!-- end of the estimates -->\n")
-        part = chosen.output.with_suffix(".part")
-        part.write_text(before + mark + "\n" + text + "\n" + end + after)
-        part.rename(chosen.output)
+    program, accuracies = chosen.bin.resolve() / "repose-solve", chosen.accuracies.split(",")
+    print_table(HEAD, (line for case in CASES for line in rows_of(case, accuracies, program)),
+                chosen.output, "estimates")
 
 
 main()

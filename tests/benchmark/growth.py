@@ -12,14 +12,14 @@ Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 
 import argparse
 import pathlib
-import resource
 import subprocess
 import tempfile
 
 import h5py
 import numpy as np
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
+from page import PROJECT, children, print_table
+
 SCENE = """skin: head_skin.ply
 bones:
   - {name: skull, file: head_skull.ply}
@@ -37,10 +37,6 @@ solve:
 HEAD = ("| skin vertices | unknowns | method | load steps | iterations | evaluations | Hessians | "
         "CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 2 + "|---" + "|--:" * 7
         + "|")
-
-
-def children():
-    return resource.getrusage(resource.RUSAGE_CHILDREN)
 
 
 def measure(command, folder, method):
@@ -81,14 +77,6 @@ def rows_of(size, methods, tools, ranks):
                    f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
 
 
-def replace_measured(page, text):
-    """Puts a table in the place of the one below a page's mark."""
-    before, mark, _ = page.read_text().partition("<!-- measured -->\n")
-    part = page.with_suffix(".part")
-    part.write_text(before + mark + "\n" + text)
-    part.rename(page)
-
-
 def arguments():
     parser = argparse.ArgumentParser(prog="growth.py", description=__doc__, add_help=False,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -103,15 +91,9 @@ def arguments():
 
 def main():
     chosen = arguments()
-    text = HEAD + "\n"
-    print(HEAD)
-    for size in chosen.sizes.split(","):
-        for row in rows_of(int(size), chosen.methods.split(","), chosen.bin.resolve(),
-                           chosen.ranks):
-            print(row, flush=True)
-            text += row + "\n"
-    if chosen.output:
-        replace_measured(chosen.output, text)
+    tools, methods = chosen.bin.resolve(), chosen.methods.split(",")
+    print_table(HEAD, (row for size in chosen.sizes.split(",")
+                       for row in rows_of(int(size), methods, tools, chosen.ranks)), chosen.output)
 
 
 if __name__ == "__main__":

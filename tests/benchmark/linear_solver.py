@@ -15,7 +15,8 @@ import pathlib
 import subprocess
 import tempfile
 
-from growth import PROJECT, SCENE, children, replace_measured
+from growth import SCENE
+from page import PROJECT, children, print_table
 
 HEAD = ("| skin vertices | ranks | linear solver | load steps | Hessians | made | applied | "
         "make, ms | apply, ms | all, CPU s | memory, MiB |\n" + "|--:" * 2 + "|---"
@@ -82,23 +83,21 @@ def arguments():
     return parser.parse_args()
 
 
+def rows_of(size, chosen):
+    tools = chosen.bin.resolve()
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        subprocess.run([tools / "repose-phantom", "-skin_vertices", size, "-bone_edge", "2",
+                        "-output", "head"], cwd=folder, check=True, capture_output=True)
+        (folder / "scene.yaml").write_text(SCENE)
+        for solver in chosen.solvers.split(";"):
+            yield f"| {size} | {chosen.ranks} {measure(tools, folder, solver, chosen)}"
+
+
 def main():
     chosen = arguments()
-    tools = chosen.bin.resolve()
-    text = HEAD + "\n"
-    print(HEAD)
-    for size in chosen.sizes.split(","):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            subprocess.run([tools / "repose-phantom", "-skin_vertices", size, "-bone_edge", "2",
-                            "-output", "head"], cwd=folder, check=True, capture_output=True)
-            (folder / "scene.yaml").write_text(SCENE)
-            for solver in chosen.solvers.split(";"):
-                row = f"| {size} | {chosen.ranks} {measure(tools, folder, solver, chosen)}"
-                print(row, flush=True)
-                text += row + "\n"
-    if chosen.output:
-        replace_measured(chosen.output, text)
+    print_table(HEAD, (row for size in chosen.sizes.split(",") for row in rows_of(size, chosen)),
+                chosen.output)
 
 
 main()

@@ -12,7 +12,6 @@ Needs: apt-get install --no-install-recommends python3-h5py python3-scipy
 import argparse
 import pathlib
 import re
-import resource
 import subprocess
 import tempfile
 
@@ -20,7 +19,8 @@ import h5py
 import numpy as np
 from scipy.spatial import cKDTree
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
+from page import PROJECT, children, print_table
+
 WAYS = [["-nested", "off", "-accuracy", "0.01"], ["-accuracy", "0.01"], ["-adapt", "-accuracy", "3"],
         ["-profile", "preview"]]
 HEAD = ("| scene | points | options | coarse models, points | evaluations | Hessians | time | "
@@ -60,12 +60,12 @@ def carried(places, triangles, moved, points):
 
 def solve(program, scene, options, file):
     """What a solve says and the CPU seconds it takes."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    before = children().ru_utime
     done = subprocess.run([program, scene, *options, "-output", file.with_suffix("")],
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     if done.returncode == 1:
         raise SystemExit(done.stderr)
-    return done.stdout, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    return done.stdout, children().ru_utime - before
 
 
 def work(said, own_points):
@@ -110,17 +110,9 @@ def arguments():
 
 def main():
     chosen = arguments()
-    text = HEAD + "\n"
-    print(HEAD)
-    for scene in chosen.scenes:
-        for row in rows_of(chosen.bin.resolve() / "repose-solve", scene):
-            print(row, flush=True)
-            text += row + "\n"
-    if chosen.output:
-        before, mark, _ = chosen.output.read_text().partition("<!-- measured -->\n")
-        part = chosen.output.with_suffix(".part")
-        part.write_text(before + mark + "\n" + text)
-        part.rename(chosen.output)
+    program = chosen.bin.resolve() / "repose-solve"
+    print_table(HEAD, (row for scene in chosen.scenes for row in rows_of(program, scene)),
+                chosen.output)
 
 
 main()

@@ -51,8 +51,8 @@ def test_counts_are_in_their_order(contest):
     assert default < count["Repose `-tao_type lmvm`, no load steps"]
     assert default < count["SciPy L-BFGS-B, NumPy kernel"]
     assert 10 * default < count["the paper's: Polak–Ribière, Brent"]
-    hessians, factors = map(int, contest["**Repose**, its default"][1].split(","))
-    assert 2 < factors <= hessians < default
+    hessians, factors, actions = map(int, contest["**Repose**, its default"][1].split(","))
+    assert 0 < factors <= hessians < min(default, actions)
 
 
 def test_goals_have_verdicts(contest):
@@ -87,7 +87,7 @@ def test_estimates_of_a_few_runs(estimate):
         error, told = float(row["error"]), float(row["estimate"])
         assert error <= told + 1e-9 and float(row["elsewhere"]) == 0, row
         assert row["interrupted"] or 1e-7 < told <= float(row["accuracy"]), row
-        assert (row["converged"] == "True") != bool(row["interrupted"]), row
+        assert row["converged"] == "True" or row["interrupted"], row
 
 
 def test_the_page_says_how_many(estimate):

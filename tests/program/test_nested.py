@@ -15,7 +15,7 @@ tissue:
   springs:
     default: {modulus: 0.05, law: quartic, reference: initial}
 moves:
-  - {bone: mandible, translate: [0, -2, 0]}
+  - {bone: mandible, translate: [0, -6, 0]}
 solve:
   accuracy: 1.0e-6
 """
@@ -24,7 +24,7 @@ solve:
 @pytest.fixture(scope="module")
 def head(tmp_path_factory, environment):
     """head(*options, ranks=1) → result file and what was said, of a head of 4000 skin vertices whose
-    jaw advances 2 mm. The same is solved once only."""
+    jaw advances 6 mm. The same is solved once only."""
     folder = tmp_path_factory.mktemp("head")
     run, done = runner(folder, environment), {}
     made = run("repose-phantom", "-skin_vertices", 4000, "-output", "head")

@@ -9,6 +9,7 @@ namespace repose::solve {
 /// solves took beyond what the same reductions of the residual took when it was new. Renewed when
 /// that exceeds the price of a new one, total work is at most about twice that of the best times
 /// of renewal, whichever these are (the ski-rental rule: Karlin, Manasse, Rudolph & Sleator 1988).
+/// One with which a solve failed or was cut short is worn out.
 class Wear {
  public:
   explicit Wear(double price) : price_(price) {}  ///< of a renewal, in iterations

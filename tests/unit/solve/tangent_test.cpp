@@ -31,6 +31,20 @@ TEST_P(Terms, TheMatrixActsAsTheHessian) {
   EXPECT_LT(solve::largest_block(action), 1e-12 * solve::largest_block(product));
 }
 
+TEST_P(Terms, WhatALineSearchAddsIsTakenBack) {
+  Moved m(GetParam());
+  base::VecHandle at = m.vector(1, 0.4), direction = m.vector(2, 1.0);
+  solve::Tangent tangent(m.objective);
+  tangent.assemble(at);
+  base::VecHandle before = m.positions.make_vector(), after = m.positions.make_vector();
+  check(MatMult(tangent.action(), direction, before));
+  check(MatShift(tangent.action(), 3.0));
+  tangent.assemble(at);
+  check(MatMult(tangent.action(), direction, after));
+  check(VecAXPY(after, -1, before));
+  EXPECT_LT(solve::largest_block(after), 1e-12 * solve::largest_block(before));
+}
+
 TEST_P(Terms, TheGradientChangesByTheMatrix) {
   Moved m(GetParam());
   base::VecHandle at = m.vector(1, 0.4), direction = m.vector(2, 1.0);
