@@ -2,10 +2,11 @@
 """How the work of a whole solve grows with the mesh: a table.
 
     tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm]
-                              [-ranks 1] [-output docs/growth.md]
+                              [-layers 4,…] [-turgor 0] [-nested auto] [-ranks 1]
+                              [-output docs/growth.md] [-mark measured]
 
-Synthetic heads of the given numbers of skin vertices, 4 layers, springs by moduli with s_ref = r_0,
-penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method. Says how far each ends
+Synthetic heads of the given numbers of skin vertices, each with its number of layers, springs by
+moduli with s_ref = r_0, penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method. Says how far each ends
 from the first method's rest position.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
@@ -26,6 +27,7 @@ bones:
   - {name: mandible, file: head_mandible.ply}
 tissue:
   layers: 4
+  turgor: 0
   springs:
     default: {modulus: 0.05, law: quartic, reference: initial}
 moves:
@@ -34,8 +36,8 @@ solve:
   volume: {form: penalty}
   accuracy: 0.01
 """
-HEAD = ("| skin vertices | unknowns | method | load steps | iterations | evaluations | Hessians | "
-        "CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 2 + "|---" + "|--:" * 7
+HEAD = ("| skin vertices | layers | unknowns | method | load steps | iterations | evaluations | Hessians | "
+        "CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 3 + "|---" + "|--:" * 7
         + "|")
 
 
@@ -59,20 +61,23 @@ def measure(command, folder, method):
                          "converged": done.returncode == 0}, steps[-1]["point/position"][()])
 
 
-def rows_of(size, methods, tools, ranks):
+def rows_of(size, layers, chosen):
+    tools, ranks = chosen.bin.resolve(), chosen.ranks
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        subprocess.run([tools / "repose-phantom", "-skin_vertices", str(size), "-bone_edge", "2",
+        subprocess.run([tools / "repose-phantom", "-skin_vertices", size, "-bone_edge", "2",
                         "-output", "head"], cwd=folder, check=True, capture_output=True)
-        (folder / "scene.yaml").write_text(SCENE)
+        (folder / "scene.yaml").write_text(SCENE.replace("layers: 4", f"layers: {layers}")
+                                           .replace("turgor: 0", f"turgor: {chosen.turgor}"))
         first = None
-        command = [*(["mpirun", "-n", str(ranks)] if ranks > 1 else []), tools / "repose-solve"]
-        for method in methods:
+        command = [*(["mpirun", "-n", str(ranks)] if ranks > 1 else []), tools / "repose-solve",
+                   "-nested", chosen.nested]
+        for method in chosen.methods.split(","):
             found, position = measure(command, folder, method)
             first = position if first is None else first
             apart = np.linalg.norm(position - first, axis=1).max()
             said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
-            yield (f"| {size} | {found['unknowns']} | {method} | {found['steps']} | "
+            yield (f"| {size} | {layers} | {found['unknowns']} | {method} | {found['steps']} | "
                    f"{found['iterations']} | {found['evaluations']} | {found['hessians']} | "
                    f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
 
@@ -84,16 +89,22 @@ def arguments():
     parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
     parser.add_argument("-sizes", default="500,2500,12500")
     parser.add_argument("-methods", default="ntr,lmvm")
+    parser.add_argument("-layers", default="4", help="one number, or one for each size")
+    parser.add_argument("-turgor", type=float, default=0)
+    parser.add_argument("-nested", default="auto")
     parser.add_argument("-ranks", type=int, default=1)
     parser.add_argument("-output", type=pathlib.Path)
+    parser.add_argument("-mark", default="measured")
     return parser.parse_args()
 
 
 def main():
     chosen = arguments()
-    tools, methods = chosen.bin.resolve(), chosen.methods.split(",")
-    print_table(HEAD, (row for size in chosen.sizes.split(",")
-                       for row in rows_of(int(size), methods, tools, chosen.ranks)), chosen.output)
+    sizes = chosen.sizes.split(",")
+    layers = chosen.layers.split(",")
+    layers = layers * (len(sizes) if len(layers) == 1 else 1)
+    print_table(HEAD, (row for size, count in zip(sizes, layers, strict=True)
+                       for row in rows_of(size, count, chosen)), chosen.output, chosen.mark)
 
 
 if __name__ == "__main__":
