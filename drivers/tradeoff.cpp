@@ -30,27 +30,29 @@ using base::OptionKind;
 const MPI_Comm comm = MPI_COMM_WORLD;
 
 std::vector<base::Option> option_table() {
-  return {{"output", OptionKind::path, "", "Path of the tables without ending (SCENE_tradeoff)."},
-          {"methods", OptionKind::text, "ntr,nls,lmvm,cg", "TAO's methods, the usual one first."},
-          {"accuracies", OptionKind::text, "1,0.3,0.1,0.03,0.01,0.001", "mm."},
-          {"load_steps", OptionKind::text, "1,2,4,8,16", "Numbers of equal steps; may be empty."},
-          {"volumes", OptionKind::text, "none,paper,penalty", "Volume terms; may be empty."},
-          {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; may be empty."},
-          {"edges", OptionKind::text, "",
-           "mm, mean edges of a remeshed skin; may be empty (default 1.5 and 2 times its own)."},
-          {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.", {1e-12, 1}, "mm"},
-          {"time_limit",
-           OptionKind::number,
-           "60",
-           "Of one run; a reference may take four times as long.",
-           {1e-3, 1e6},
-           "s"}};
+  return {
+      {"output", OptionKind::path, "", "Path of the tables without ending (SCENE_tradeoff)."},
+      {"methods", OptionKind::text, "ntr,nls,lmvm,cg", "TAO's methods, the usual one first."},
+      {"accuracies", OptionKind::text, "1,0.3,0.1,0.03,0.01,0.001", "mm."},
+      {"load_steps", OptionKind::text, "1,2,4,8,16", "Numbers of equal steps; a comma for none."},
+      {"volumes", OptionKind::text, "none,paper,penalty", "Volume terms; a comma for none."},
+      {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; a comma for none."},
+      {"edges", OptionKind::text, "",
+       "mm, edges of a remeshed skin; a comma for none (default 1.5 and 2 times its own)."},
+      {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.", {1e-12, 1}, "mm"},
+      {"time_limit",
+       OptionKind::number,
+       "60",
+       "Of one run; a reference may take four times as long.",
+       {1e-3, 1e6},
+       "s"}};
 }
 
 std::vector<std::string> words_of(const base::Options& options, const char* name) {
   std::vector<std::string> words;
   std::istringstream list(options.text(name));
-  for (std::string word; std::getline(list, word, ',');) words.push_back(word);
+  for (std::string word; std::getline(list, word, ',');)
+    if (!word.empty()) words.push_back(word);
   return words;
 }
 

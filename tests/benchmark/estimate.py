@@ -355,7 +355,7 @@ def page(runs, weak, study, seconds, picture):
     return f"""# Can the estimate be trusted?
 
 Every result says how far it is from the rest position (`displacement_error`): twice the largest
-block of its Newton step. Here {len(runs)} runs on {heads} problems are compared with rest positions known
+block of its Newton step, confirmed by the next one. Here {len(runs)} runs on {heads} problems are compared with rest positions known
 to {KNOWN:g} mm. Made by `tests/benchmark/estimate.py{options}` in {seconds / 60:.0f} minutes of CPU time on
 one core of a machine with {os.cpu_count()} cores.
 

@@ -92,6 +92,13 @@ def test_the_pictures_can_be_drawn(folder):
     assert (folder / "few.png").stat().st_size > 10000 and "| all | " in done.stdout
 
 
+def test_a_comma_leaves_a_study_out(run, tmp_path):
+    result = run("repose-tradeoff", SCENE, "-methods", "ntr", "-accuracies", "1", "-load_steps", ",",
+                 "-volumes", ",", "-layers", ",", "-edges", ",", "-output", "one")
+    assert result.returncode == 0, result
+    assert [row["study"] for row in rows(tmp_path / "one.csv")] == ["solver"]
+
+
 @pytest.mark.parametrize("options, words", [
     (["-methods", "newton"], ["-methods newton", "'newton' is not one of", "lmvm"]),
     (["-accuracies", "1,x"], ["-accuracies 1,x", "'x'"]),
