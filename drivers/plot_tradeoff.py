@@ -70,6 +70,8 @@ def draw_methods(axes, rows, cost, label):
     kept = front(rows, cost, "error_mm")
     axes.loglog([row[cost] / unit for row in kept], [row["error_mm"] for row in kept], "o", ms=9,
                 mfc="none", mec=ACCENT, label="cheapest")
+    if max(row[cost] for row in rows) < 10 * min(row[cost] for row in rows):
+        axes.set_xscale("linear")
     axes.set_xlabel(label)
     axes.set_ylabel("true error, mm")
     axes.legend(fontsize=7)
