@@ -119,7 +119,7 @@ void Minimiser::make_tao() {
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, TAONTR));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
-  check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.hessian().convex(),
+  check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner_matrix(),
                       Callbacks::hessian, this));
   check(TaoSetTolerances(tao_, 0, 0, 0));
   check(TaoSetMaximumIterations(tao_, 5000));

@@ -92,7 +92,7 @@ void choose_preconditioned(EPS eps, TangentSolver& solver) {
   check(EPSSetWhichEigenpairs(eps, EPS_SMALLEST_REAL));
   check(EPSGetST(eps, &st));
   check(STSetType(st, STPRECOND));
-  check(STSetPreconditionerMat(st, solver.hessian().convex()));
+  check(STSetPreconditionerMat(st, solver.preconditioner_matrix()));
   check(STGetKSP(st, &krylov));
   check(KSPSetType(krylov, KSPPREONLY));
   check(KSPSetPC(krylov, solver.preconditioner()));

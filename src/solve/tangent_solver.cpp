@@ -2,7 +2,8 @@
 
 #include "repose/base/error.h"
 #include "repose/base/petsc_versions.h"
-#include "repose/solve/tangent_hierarchy.h"
+
+extern "C" PetscErrorCode PCCreate_Shell(PC pc);  // in no public header
 
 namespace repose::solve {
 
@@ -10,55 +11,58 @@ using base::check;
 
 namespace {
 
-bool given(const char* option) {
-  PetscBool set = PETSC_FALSE;
-  check(PetscOptionsHasName(nullptr, nullptr, option, &set));
-  return set;
-}
+constexpr const char* columns_type = "columns";
 
 void choose_factors(PC pc) {
   check(PCSetType(pc, PCCHOLESKY));
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-void choose_preconditioner(PC pc, int64_t unknowns, int64_t direct_limit, bool elliptic) {
-  if (unknowns <= (elliptic ? direct_limit : TangentSolver::factors_limit))
-    choose_factors(pc);
-  else
-    check(PCSetType(pc, elliptic ? PCMG : PCGAMG));
-}
-
 double price_of_renewal() {
-  PetscReal price = 20;  // MUMPS' factors of a sheet of tissue cost 20 to 25 iterations with them
+  PetscReal price = 20;  // a new multigrid costs about as much as 20 iterations with it
   check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
   return price;
 }
 
-bool is_hierarchy(PC pc) {
+bool is_columns(PC pc) {
   PetscBool same = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCMG, &same));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), columns_type, &same));
   return same;
 }
 
 }  // namespace
 
-TangentSolver::TangentSolver(Positions& positions, Hessian& hessian, int64_t limit)
-    : hessian_(hessian),
+TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
+    : positions_(positions),
+      hessian_(hessian),
       unknowns_(3 * positions.part().total_unknowns),
       work_(positions.make_vector()),
       measured_(positions.make_vector()),
       wear_(price_of_renewal()) {
-  const Part& part = positions.part();
-  for (int64_t i = 0; i < part.owned_points; ++i)
-    if (part.unknown[i] >= 0) layer_.push_back(part.model.points.layer[i]);
   check(KSPCreate(positions.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
-  choose_preconditioner(preconditioner(), unknowns_, limit, hessian_.elliptic());
-  check(KSPSetOperators(krylov_, hessian_.action(), hessian_.convex()));
+  choose_preconditioner();
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
+}
+
+void TangentSolver::choose_preconditioner() {
+  const PC pc = preconditioner();
+  check(PCRegister(columns_type, PCCreate_Shell));
+  if (!hessian_.elliptic()) {
+    if (unknowns_ <= factors_limit)
+      choose_factors(pc);
+    else
+      check(PCSetType(pc, PCGAMG));
+    return;
+  }
+  check(PCSetType(pc, columns_type));
+}
+
+Mat TangentSolver::preconditioner_matrix() {
+  return is_columns(preconditioner()) ? hessian_.model() : hessian_.convex();
 }
 
 PC TangentSolver::preconditioner() {
@@ -91,25 +95,56 @@ void TangentSolver::prepare(Vec displacement) {
   if (renew) renew_preconditioner();
 }
 
-bool TangentSolver::hopeless() {
-  return wear_.new_rate() > slowest && unknowns_ <= factors_limit && !given("-pc_type") &&
-         is_hierarchy(preconditioner());
+bool TangentSolver::hopeless() const {
+  return columns_ && wear_.new_rate() > slowest && unknowns_ <= factors_limit;
 }
 
 void TangentSolver::renew_preconditioner() {
-  hessian_.renew();
-  if (hopeless())
-    choose_factors(preconditioner());
-  else if (renewals_ == 0 && is_hierarchy(preconditioner()))
-    make_hierarchy(preconditioner(), hessian_.convex(), layer_);
+  const PC pc = preconditioner();
+  if (is_columns(pc))
+    renew_columns();
+  else
+    hessian_.renew();
   wear_.renew();
   made_at_ = hessian_.assemblies();
   ++renewals_;
 }
 
+void TangentSolver::renew_columns() {
+  const BlockSource blocks = [this](const BlockVisitor& visit) { hessian_.visit_convex(visit); };
+  if (hopeless()) {
+    columns_.reset();
+    check(PCCreate(positions_.comm(), factors_.out()));
+    choose_factors(factors_);
+  }
+  if (factors_) {
+    hessian_.renew();
+    check(PCSetOperators(factors_, hessian_.convex(), hessian_.convex()));
+    check(PCSetUp(factors_));
+  } else if (columns_) {
+    columns_->refill(blocks);
+  } else {
+    columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
+    check(PCSetApplicationContext(preconditioner(), this));
+    check(PCShellSetApply(preconditioner(), apply_columns));
+  }
+}
+
+PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
+  TangentSolver* self = nullptr;
+  if (const PetscErrorCode code = PCGetApplicationContext(pc, &self)) return code;
+  if (self->factors_) return PCApply(self->factors_, r, z);
+  try {
+    self->columns_->apply(r, z);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
   prepare(displacement);
-  check(KSPSetOperators(krylov_, hessian_.action(), hessian_.convex()));
+  check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
   check(KSPSetTolerances(krylov_, relative_tolerance, 0.0, PETSC_DEFAULT, PETSC_DEFAULT));
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;

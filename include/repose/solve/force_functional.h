@@ -43,7 +43,7 @@ class ForceHessian : public Hessian {
 
   void assemble(Vec displacement) override;  ///< collective
   Mat exact() override { return exact_; }
-  Mat convex() const override { return convex_; }
+  Mat convex() override { return convex_; }
   Mat model() override { return convex_; }
   bool elliptic() const override { return false; }  // its square
 

@@ -1,4 +1,6 @@
 #pragma once
+#include <functional>
+
 #include "repose/solve/positions.h"
 
 namespace repose::solve {
@@ -29,9 +31,12 @@ class Function {
   int64_t evaluations_ = 0;
 };
 
+/// Takes a block B of a symmetric matrix: of local points p and q; where p ≠ q, Bᵀ is that of q and
+/// p. Blocks of the same points add up.
+using BlockVisitor = std::function<void(int32_t p, int32_t q, const Mat3& block)>;
+
 /// A function's second derivatives as matrices of 3×3 blocks: the exact ones (or what stands for
-/// them), which act, and a positive definite relative from which a preconditioner is made. The
-/// relative may stay behind: it is brought to the state only by renew().
+/// them), which act, and a positive definite relative from which a preconditioner is made.
 class Hessian {
  public:
   Hessian() = default;
@@ -41,16 +46,21 @@ class Hessian {
 
   /// Goes to `displacement`; may do nothing where it is already. Collective.
   virtual void assemble(Vec displacement) = 0;
-  /// Brings convex() to the state of the last assemble(). Collective.
+  virtual Mat exact() = 0;  ///< its entries, at the state of the last assemble(); collective
+  /// The entries of the relative, which may stay behind: renew() brings them to the state of the
+  /// last assemble(). Collective.
+  virtual Mat convex() = 0;
   virtual void renew() {}
-  virtual Mat exact() = 0;  ///< its entries; collective
-  virtual Mat convex() const = 0;
   /// What acts as exact(), with or without entries.
   virtual Mat action() { return exact(); }
   /// The one whose quadratic model a Newton method steps by.
   virtual Mat model() { return action(); }
-  /// Whether multigrid can precondition it: it couples neighbours as elasticity does.
+  /// Whether multigrid can precondition it: it couples neighbours as elasticity does, and its
+  /// relative can be visited.
   virtual bool elliptic() const { return true; }
+  /// Shows all blocks of the relative that touch this rank's points, at the state of the last
+  /// assemble(). Not collective.
+  virtual void visit_convex(const BlockVisitor&) const {}
   int64_t assemblies() const { return assemblies_; }
 
  protected:

@@ -2,27 +2,28 @@
 #include <petscksp.h>
 
 #include <limits>
-#include <vector>
+#include <memory>
 
-#include "repose/solve/function.h"
+#include "repose/solve/column_multigrid.h"
 #include "repose/solve/tangent_wear.h"
 
 namespace repose::solve {
 
 using KspHandle = base::Handle<KSP, KSPDestroy>;
+using PcHandle = base::Handle<PC, PCDestroy>;
 
 /// Linear solves with a Hessian: conjugate gradients on the exact action, preconditioned from the
-/// convex matrix, by default by MUMPS' Cholesky factors up to `direct_limit` unknowns and by the
-/// tissue's own multigrid (tangent_hierarchy.h) above. A preconditioner made at one state serves
-/// the next ones until it is worn out (tangent_wear.h); multigrid that is hopelessly slow gives way
-/// to factors. `-ksp_…` and `-pc_…` options apply, and `-pc_renewal_price`: the iterations that a
-/// preconditioner may cost before it is renewed. All members collective.
+/// convex relative, by default by multigrid on columns (`-pc_type columns`, column_multigrid.h);
+/// that which is hopelessly slow gives way to MUMPS' Cholesky factors, which also serve where
+/// multigrid does not work, up to `factors_limit` unknowns. A preconditioner made at one state
+/// serves the next ones until it is worn out (tangent_wear.h). `-ksp_…` and `-pc_…` options apply,
+/// and `-pc_renewal_price`: the iterations that a preconditioner may cost before it is renewed. All
+/// members collective.
 class TangentSolver {
  public:
-  // Scalar unknowns: where multigrid begins to win, and where factors no longer fit.
-  static constexpr int64_t direct_limit = 100000, factors_limit = 600000;
+  static constexpr int64_t factors_limit = 600000;  ///< scalar unknowns
 
-  TangentSolver(Positions& positions, Hessian& hessian, int64_t limit = direct_limit);
+  TangentSolver(Positions& positions, Hessian& hessian);
 
   /// Takes the Hessian to `displacement`, and renews the preconditioner there if it is worn out.
   void prepare(Vec displacement);
@@ -44,22 +45,31 @@ class TangentSolver {
 
   Hessian& hessian() { return hessian_; }
   PC preconditioner();
-  int64_t renewals() const { return renewals_; }  ///< of the preconditioner
+  /// What is to be given as the matrix that the preconditioner is made from.
+  Mat preconditioner_matrix();
+  /// Makes the preconditioner anew, at the state of the Hessian's last assembly.
+  void renew_preconditioner();
+  bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
+  int64_t renewals() const { return renewals_; }           ///< of the preconditioner
 
  private:
   static constexpr double slowest = 15;  // multigrid's iterations per e-fold before it is given up
 
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
-  bool hopeless();
-  void renew_preconditioner();
+  static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
+  void choose_preconditioner();
+  bool hopeless() const;
+  void renew_columns();
 
+  Positions& positions_;
   Hessian& hessian_;
   int64_t unknowns_;  // scalar, of all ranks
+  std::unique_ptr<ColumnMultigrid> columns_;
+  PcHandle factors_;  // in the place of columns_
   KspHandle krylov_;
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
   double distance_ = 0;              // its length, …
   int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
-  std::vector<int32_t> layer_;       // of the unknown points of this rank
   Wear wear_;
   int64_t renewals_ = 0;
   int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal
