@@ -36,6 +36,7 @@ ColumnLevel::ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<in
       ghost_(std::move(ghost)),
       pattern_(std::move(pattern)),
       value_(9 * pattern_.column.size() + 1),
+      damping_(place_.size()),
       inverse_(9 * place_.size() + 1) {
   find_columns();
   connect(comm);
@@ -110,20 +111,32 @@ void ColumnLevel::mirror() {
     }
 }
 
+void ColumnLevel::damp() {
+  constexpr float lift = 1e-4f;  // of the mean diagonal: above what single precision rounds off
+  for (int32_t i = 0; i < own(); ++i) {
+    float stiffness = 0, beyond = 0;
+    for (int64_t k = pattern_.begin[i]; k < pattern_.begin[i + 1]; ++k) {
+      const Eigen::Map<const Mat3f> entries(block(k));
+      if (pattern_.column[k] == i) stiffness = entries.trace() / 3;
+      if (pattern_.column[k] >= own()) beyond += entries.norm();
+    }
+    damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
+  }
+}
+
 void ColumnLevel::factor() {
-  constexpr double lift = 1e-4;  // of the mean diagonal: above what single precision rounds off
+  damp();
   for (size_t c = 0; c + 1 < chain_.size(); ++c) {
     Mat3 above = Mat3::Zero();  // inverse of what elimination left of the point above
     for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
       const bool first = i == chain_[c];
       const int64_t own_column = pattern_.begin[i] + left_[i];
       Mat3 pivot = Eigen::Map<const Mat3f>(block(own_column + !first)).cast<double>();
-      const double stiffness = pivot.trace() / 3;
       if (!first) {
         const Mat3 link = Eigen::Map<const Mat3f>(block(own_column)).cast<double>();
         pivot -= link * above * link.transpose();
       }
-      pivot += (stiffness > 0 ? lift * stiffness : 1.0) * Mat3::Identity();
+      pivot += damping_[i] * Mat3::Identity();
       above = pivot.inverse();
       above = (0.5 * (above + above.transpose())).eval();
       Eigen::Map<Mat3f>(inverse_.data() + 9 * i) = above.cast<float>();
@@ -157,7 +170,7 @@ void ColumnLevel::forward(std::span<const Lanes> b, std::span<Lanes> x) const {
 
 void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const {
   for (int32_t i = 0; i < own(); ++i) {
-    Lanes sum{};
+    Lanes sum = damping_[i] * x[i];
     for (int64_t k = pattern_.begin[i] + left_[i] + within_[i]; k < pattern_.begin[i + 1]; ++k)
       sum -= times(block(k), x[pattern_.column[k]]);
     r[i] = sum;
@@ -167,7 +180,7 @@ void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes>
 void ColumnLevel::backward(std::span<const Lanes> b, std::span<Lanes> x) const {
   for (size_t c = chain_.size() - 1; c-- > 0;) {
     for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
-      Lanes sum = b[i];
+      Lanes sum = b[i] + damping_[i] * x[i];
       const int64_t column = pattern_.begin[i] + left_[i];
       for (int64_t k = pattern_.begin[i]; k < column; ++k)
         sum -= times(block(k), x[pattern_.column[k]]);

@@ -74,7 +74,9 @@ class ColumnLevel {
   /// Factors the columns' own blocks, after the entries have changed. Not collective.
   void factor();
 
-  /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0, D the columns' blocks. Own points.
+  /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0. D: the columns' blocks, and what keeps
+  /// sweeps convergent although ranks sweep at once: half of the norms of the blocks of ghosts on
+  /// the diagonal (Baker, Falgout, Kolev & Yang 2011). Own points.
   void forward(std::span<const Lanes> b, std::span<Lanes> x) const;
   /// r = b − A x for the x of forward(), whose ghosts are up to date.
   void residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const;
@@ -87,6 +89,7 @@ class ColumnLevel {
 
  private:
   using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
+  void damp();
   void find_columns();
   void connect(MPI_Comm comm);
   void solve_column(int32_t begin, int32_t end, std::span<Lanes> x) const;
@@ -98,6 +101,7 @@ class ColumnLevel {
   std::vector<int32_t> chain_;          // [columns + 1] first points
   std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
   std::vector<float> value_;            // [9 blocks + 1]
+  std::vector<float> damping_;          // [own] added to the columns' blocks
   std::vector<float> inverse_;          // [9 own + 1] of what elimination down columns leaves
   StarForest forest_;
   FloatsType lanes_{4};
