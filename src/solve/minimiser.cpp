@@ -19,6 +19,12 @@ constexpr double most_contraction = 0.99;
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
 
+bool has_type(Tao tao, TaoType type) {
+  PetscBool same = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(tao), type, &same));
+  return same;
+}
+
 bool uses_hessian(Tao tao) {
   PetscBool newton = PETSC_FALSE;
   check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(tao), &newton, TAONLS, TAONTR,
@@ -79,8 +85,9 @@ struct Minimiser::Callbacks {
   static PetscErrorCode converged(Tao tao, void* me) {
     return guarded(me, [&](Minimiser& self) {
       PetscInt iteration = 0;
-      PetscReal value = 0;
-      check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, nullptr, nullptr));
+      PetscReal value = 0, length = 0;
+      check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, &length, nullptr));
+      iteration += self.iterations_;
       Vec x = nullptr, g = nullptr;
       check(TaoGetSolution(tao, &x));
       check(TaoGetGradient(tao, &g, nullptr, nullptr));
@@ -92,8 +99,9 @@ struct Minimiser::Callbacks {
         self.stopped_ = !self.watch_({iteration, self.function_.positions().load(), value, force,
                                       self.error_, self.function_.evaluations()});
       check(TaoDefaultConvergenceTest(tao, nullptr));
-      if (done || self.stopped_ || self.stalled(iteration, value))
-        check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+      const bool over = done || self.stopped_ || self.stalled(iteration, value);
+      self.slowed_ = !over && self.initial_ && self.initial_->worn_out(force, length);
+      if (over || self.slowed_) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
   }
 };
@@ -126,6 +134,7 @@ void Minimiser::make_tao() {
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
+  if (has_type(tao_, TAOLMVM) && begins_with_stiffness()) initial_.emplace(tao_, solver_);
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
   KSP inner = nullptr;
@@ -186,7 +195,8 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   const double hopeful = newton_ ? 20 : 2;
   constexpr int64_t seldom = 20;  // evaluations: a look costs other methods as much as many of them
   const bool far = largest_force > hopeful * softest_ * accuracy_;
-  const bool soon = !newton_ && function_.evaluations() - looked_at_ < seldom;
+  const bool quick = newton_ || initial_;
+  const bool soon = !quick && function_.evaluations() - looked_at_ < seldom;
   if (softest_ > 0 && (far || soon)) {
     error_ = largest_force / softest_;
     return false;
@@ -252,10 +262,8 @@ Outcome Minimiser::summary(Vec displacement) {
   outcome.stable = std::isfinite(error_);
   outcome.converged = error_ <= accuracy_;
   TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
-  PetscInt iterations = 0;
   check(TaoGetConvergedReason(tao_, &reason));
-  check(TaoGetIterationNumber(tao_, &iterations));
-  outcome.iterations = iterations + corrections;
+  outcome.iterations = iterations_ + corrections;
   outcome.stopped = stopped_;
   outcome.reason = reason_of(outcome, reason);
   if (corrections > 0)
@@ -264,14 +272,36 @@ Outcome Minimiser::summary(Vec displacement) {
   return outcome;
 }
 
+bool Minimiser::worth_going_on(int64_t iterations) {
+  PetscInt most = 0;
+  TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
+  check(TaoGetMaximumIterations(tao_, &most));
+  check(TaoGetConvergedReason(tao_, &reason));
+  if (!initial_ || iterations_ >= most) return false;
+  // The iteration in which a line search fails counts too.
+  return slowed_ || (reason == TAO_DIVERGED_LS_FAILURE && iterations > 1);
+}
+
+void Minimiser::search(Vec displacement) {
+  PetscInt iterations = 0;
+  iterations_ = 0;
+  do {
+    slowed_ = false;
+    if (initial_) initial_->renew(displacement);
+    const PetscErrorCode code = TaoSolve(tao_);
+    if (thrown_) std::rethrow_exception(thrown_);
+    check(code);
+    check(TaoGetIterationNumber(tao_, &iterations));
+    iterations_ += iterations;
+  } while (worth_going_on(iterations));
+}
+
 Outcome Minimiser::run(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
   stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
-  const PetscErrorCode code = TaoSolve(tao_);
-  if (thrown_) std::rethrow_exception(thrown_);
-  check(code);
+  search(displacement);
   return summary(displacement);
 }
 

@@ -95,6 +95,13 @@ void TangentSolver::prepare(Vec displacement) {
   if (renew) renew_preconditioner();
 }
 
+void TangentSolver::renew(Vec displacement) {
+  hessian_.assemble(displacement);
+  if (hessian_.assemblies() == made_at_) return;
+  check(PCSetReusePreconditioner(preconditioner(), PETSC_FALSE));
+  renew_preconditioner();
+}
+
 bool TangentSolver::hopeless() const {
   return columns_ && wear_.new_rate() > slowest && unknowns_ <= factors_limit;
 }

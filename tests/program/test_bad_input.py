@@ -200,6 +200,8 @@ CASES = {
         lambda i: i.option("-tao_type", "fast"), ["option", "fast"]),
     "PETSc's option not a number": (
         lambda i: i.option("-tao_max_it", "many"), ["option", "many"]),
+    "initial Hessian of unknown name": (
+        lambda i: i.option("-tao_type", "lmvm", "-tao_lmvm_initial", "stif"), ["stif", "stiffness"]),
     "force with a penalty": (
         lambda i: i.option("-functional", "force", "-volume", "penalty"), ["force", "penalty"]),
     "two inputs": (

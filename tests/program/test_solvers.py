@@ -34,6 +34,30 @@ def test_every_method_finds_the_same_face_on_ranks(check, tao):
     check(ADVANCE, "-tao_type", tao, ranks=2)
 
 
+STIFFNESS = "-tao_type", "lmvm", "-tao_lmvm_initial", "stiffness"
+
+
+def work(path, key="evaluations"):
+    return sum(int(step[key]) for step in steps(path))
+
+
+@pytest.mark.parametrize("scene", [ADVANCE, OPENING])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, solved, scene, ranks):
+    check(scene, *STIFFNESS, ranks=ranks)
+    few = solved(scene, "-accuracy", ACCURACY, *STIFFNESS, ranks=ranks)
+    many = solved(scene, "-accuracy", ACCURACY, "-tao_type", "lmvm")
+    assert 8 * work(few) < work(many)
+    assert work(few) < 1.5 * work(solved(scene, "-accuracy", ACCURACY))
+    assert work(few) < 2 * work(few, "iterations")  # full steps, nearly always
+
+
+def test_lmvm_from_the_stiffness_minimises_forces(solved):
+    forces = "-functional", "force", "-volume", "none", "-accuracy", ACCURACY
+    default, other = (last(solved(ADVANCE, *forces, *more)) for more in ((), STIFFNESS))
+    assert apart(default, other) <= 2 * ACCURACY
+
+
 def test_trust_region_and_line_search_find_the_same_face_of_the_finer_head(solved):
     trusting = solved(FINER, "-accuracy", ACCURACY, ranks=2)
     searching = solved(FINER, "-accuracy", ACCURACY, "-tao_type", "nls", ranks=2)

@@ -3,7 +3,9 @@
 
 #include <exception>
 #include <functional>
+#include <optional>
 
+#include "repose/solve/initial_hessian.h"
 #include "repose/solve/rest_search.h"
 #include "repose/solve/tangent_solver.h"
 
@@ -20,7 +22,9 @@ struct Certificate {
 
 /// Minimises a function with TAO until the rest position is near enough, in mm. Newton by default;
 /// `-tao_type` chooses any unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options
-/// apply. All members collective.
+/// apply. `-tao_type lmvm -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the
+/// stiffness at the start of the search, and again where it has slowed (initial_hessian.h). All
+/// members collective.
 class Minimiser : public RestSearch {
  public:
   /// Sees each iteration; returns whether to go on, the same on all ranks.
@@ -38,6 +42,9 @@ class Minimiser : public RestSearch {
   struct Callbacks;
   void make_tao();
   void set_forcing();
+  void search(Vec displacement);
+  /// Whether the search that ended after so many iterations is to be begun again where it ended.
+  bool worth_going_on(int64_t iterations);
   double strict_estimate(Vec displacement, Vec gradient);
   /// How much shorter than the latest Newton step, of length `step`, the next would be with the
   /// same Hessian: θ < ½ where Newton's method converges, and the rest is |δ| / (1 − θ) away at
@@ -56,7 +63,10 @@ class Minimiser : public RestSearch {
   Certificate certificate_;
   Watch watch_;
   TaoHandle tao_;
-  bool newton_ = true;  // the TAO method uses the Hessian
+  std::optional<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
+  bool newton_ = true;                     // the TAO method uses the Hessian
+  bool slowed_ = false;                    // the initial Hessian is to be renewed
+  int64_t iterations_ = 0;                 // of the run under way, before TAO's present ones
   bool automatic_forcing_ = true;
   double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate
   double accuracy_ = 0;                 // mm, of the run under way

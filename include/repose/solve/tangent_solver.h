@@ -28,6 +28,10 @@ class TangentSolver {
   /// Takes the Hessian to `displacement`, and renews the preconditioner there if it is worn out.
   void prepare(Vec displacement);
 
+  /// Takes the Hessian to `displacement` and makes the preconditioner there, unless it was made
+  /// there.
+  void renew(Vec displacement);
+
   /// Makes `other` use the preconditioner, whose wear its solves add to.
   void lend_preconditioner(KSP other);
 
