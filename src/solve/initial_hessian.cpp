@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 
 #include "repose/base/petsc_versions.h"
 
@@ -12,11 +11,32 @@ using base::check;
 
 namespace {
 
-double price_of_renewal() {
-  PetscReal price = 12;
-  check(PetscOptionsGetReal(nullptr, nullptr, "-tao_lmvm_renewal_price", &price, nullptr));
-  return price;
+struct Wanted {
+  PetscInt initial = 0;  // of choices
+  PetscReal price = 12;  // of a renewal, in iterations
+};
+
+/// PETSc's way, so that `-help petsc` lists them.
+PetscErrorCode read_options(MPI_Comm comm, Wanted& wanted) {
+  const char* const choices[] = {"diagonal", "stiffness"};
+  PetscFunctionBegin;
+  PetscOptionsBegin(comm, nullptr, "Initial Hessian of limited-memory BFGS", "");
+  PetscCall(PetscOptionsEList("-tao_lmvm_initial", "What it begins with", "", choices, 2,
+                              choices[wanted.initial], &wanted.initial, nullptr));
+  PetscCall(PetscOptionsReal("-tao_lmvm_renewal_price",
+                             "Iterations that the stiffness may cost before it is renewed", "",
+                             wanted.price, &wanted.price, nullptr));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+Wanted wanted_by_options(MPI_Comm comm) {
+  Wanted wanted;
+  base::check_options(read_options(comm, wanted));
+  return wanted;
+}
+
+MPI_Comm comm_of(Mat matrix) { return PetscObjectComm(reinterpret_cast<PetscObject>(matrix)); }
 
 }  // namespace
 
@@ -40,13 +60,12 @@ bool StepWear::take(double force, double length) {
 }
 
 InitialHessian::InitialHessian(Tao tao, TangentSolver& solver)
-    : solver_(solver), wear_(price_of_renewal()) {
+    : solver_(solver), wear_(wanted_by_options(comm_of(solver.hessian().convex())).price) {
   const Mat convex = solver.hessian().convex();
   PetscInt rows = 0, all_rows = 0;
   check(MatGetLocalSize(convex, &rows, nullptr));
   check(MatGetSize(convex, &all_rows, nullptr));
-  check(MatCreateShell(PetscObjectComm(reinterpret_cast<PetscObject>(convex)), rows, rows, all_rows,
-                       all_rows, this, inverse_.out()));
+  check(MatCreateShell(comm_of(convex), rows, rows, all_rows, all_rows, this, inverse_.out()));
   check(MatShellSetOperation(inverse_, MATOP_SOLVE, reinterpret_cast<void (*)()>(apply)));
   check(MatSetUp(inverse_));
   check(TaoLMVMSetH0(tao, inverse_));
@@ -70,14 +89,6 @@ bool InitialHessian::worn_out(double force, double length) {
   return wear_.take(force, length);
 }
 
-bool begins_with_stiffness() {
-  char chosen[32] = "diagonal";
-  check(
-      PetscOptionsGetString(nullptr, nullptr, "-tao_lmvm_initial", chosen, sizeof chosen, nullptr));
-  const std::string_view name(chosen);
-  if (name != "diagonal" && name != "stiffness")
-    base::refuse("-tao_lmvm_initial: '{}' is none of diagonal, stiffness", name);
-  return name == "stiffness";
-}
+bool begins_with_stiffness(MPI_Comm comm) { return wanted_by_options(comm).initial == 1; }
 
 }  // namespace repose::solve

@@ -134,7 +134,8 @@ void Minimiser::make_tao() {
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
-  if (has_type(tao_, TAOLMVM) && begins_with_stiffness()) initial_.emplace(tao_, solver_);
+  if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions().comm()))
+    initial_.emplace(tao_, solver_);
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
   KSP inner = nullptr;

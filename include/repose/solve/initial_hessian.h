@@ -27,7 +27,7 @@ class StepWear {
 
 /// The initial inverse Hessian of TAO's limited-memory BFGS (J0; Nocedal & Wright 2006, Numerical
 /// Optimization, 7.2): the preconditioner of a tangent solver, made of the convex stiffness at a
-/// state of the search. Each step applies it once.
+/// state of the search. Each step applies it once. `-tao_lmvm_renewal_price`: see StepWear.
 class InitialHessian {
  public:
   /// Makes `tao`, of type TAOLMVM, use it. `solver` and this must outlive the solves. Collective.
@@ -50,7 +50,7 @@ class InitialHessian {
 };
 
 /// Whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial stiffness`) or
-/// with the diagonal that TAO estimates (`diagonal`, the default). Throws InputError.
-bool begins_with_stiffness();
+/// with the diagonal that TAO estimates (`diagonal`, the default). Throws InputError. Collective.
+bool begins_with_stiffness(MPI_Comm comm);
 
 }  // namespace repose::solve
