@@ -98,7 +98,7 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
   Referee referee(problem_.function(), goal, rules);
   Entry entry;
   const int64_t assembled = problem_.assemblies(), factored = logged("MatCholFctrNum"),
-                acted = logged("MatMult");
+                acted = logged("MatMult"), applied = logged("PCApply");
   try {
     search(referee, displacement);
     entry.end = Entry::End::elsewhere;
@@ -110,18 +110,19 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
   entry.assemblies = problem_.assemblies() - assembled;
   entry.factorisations = logged("MatCholFctrNum") - factored;
   entry.actions = logged("MatMult") - acted;
+  entry.applications = logged("PCApply") - applied;
   positions_.set_load(1);
   entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : referee.closest();
   return entry;
 }
 
-Contest::Search Contest::path_search(Vec guess, bool& complete) {
-  return [this, guess, &complete](solve::Function& watched, Vec displacement) {
+Contest::Search Contest::path_search(Vec guess, int load_steps, bool& complete) {
+  return [this, guess, load_steps, &complete](solve::Function& watched, Vec displacement) {
     positions_.set_load(0);
     solve::Predictor predictor(problem_.objective(), problem_.elastic_solver());
     WatchedSearch search(problem_, watched);
     solve::LoadPath path(problem_.objective(), predictor, search.search(),
-                         {.accuracy = rules_.accuracy});
+                         {.accuracy = rules_.accuracy, .load_steps = load_steps});
     const auto unheard = [](const solve::Outcome&, double, double) {};
     complete = path.run(displacement, guess, unheard).complete();
   };
@@ -131,15 +132,15 @@ Entry Contest::follow_path(Vec guess) {
   bool complete = false;
   const Rules rules{.limit = INT64_MAX, .seconds = rules_.path_seconds};
   check(VecSet(reference_, 0));
-  Entry entry = race_to(nullptr, rules, path_search(guess, complete), reference_);
+  Entry entry = race_to(nullptr, rules, path_search(guess, 0, complete), reference_);
   entry.method = "default";
   if (complete) entry.end = Entry::End::reached;
   return entry;
 }
 
-Entry Contest::race_path(Vec guess) {
+Entry Contest::race_path(Vec guess, int load_steps) {
   bool complete = false;
-  return race("default", path_search(guess, complete));
+  return race("default", path_search(guess, load_steps, complete));
 }
 
 bool Contest::refine(double accuracy, Vec start) {

@@ -156,12 +156,12 @@ void print(const Line& line) {
       "%s\n",
       fmt::format("{{\"method\": \"{}\", \"end\": \"{}\", \"evaluations\": {}, \"values\": {}, "
                   "\"assemblies\": {}, \"factorisations\": {}, \"actions\": {}, "
-                  "\"coarse_evaluations\": {}, "
+                  "\"applications\": {}, \"coarse_evaluations\": {}, "
                   "\"coarse_assemblies\": {}, \"seconds\": {}, \"distance\": {}, "
                   "\"excess\": {}}}",
                   e.method, ends[static_cast<size_t>(e.end)], e.evaluations, line.values,
-                  e.assemblies, e.factorisations, e.actions, line.coarse_evaluations,
-                  line.coarse_assemblies, e.seconds, e.distance, e.excess)
+                  e.assemblies, e.factorisations, e.actions, e.applications,
+                  line.coarse_evaluations, line.coarse_assemblies, e.seconds, e.distance, e.excess)
           .c_str());
 }
 
@@ -174,6 +174,7 @@ class Runner {
 
   void run(const std::string& method) {
     if (method == "default" || method == "default_end") return race_default(method);
+    if (method == "stiffness" || method == "stiffness_step") return race_stiffness(method);
     if (method == "polak_ribiere") return race_polak_ribiere();
     if (method == "motion") return race_motion();
     if (method == "liblbfgs") return race_liblbfgs();
@@ -211,7 +212,7 @@ class Runner {
     base::VecHandle guess;
     if (!ladder.rungs.empty()) guess = contest_.displacement_to(ladder.position);
     Line line;
-    if (method == "default") {
+    if (method != "default_end") {
       line.entry = contest_.race_path(guess);
     } else {
       const base::VecHandle rest = contest_.copy_of_reference();
@@ -224,6 +225,15 @@ class Runner {
       line.coarse_evaluations += rung.evaluations;
       line.coarse_assemblies += rung.assemblies;
     }
+    print(line);
+  }
+
+  /// The same with L-BFGS from the stiffness, with its load steps or in one predicted step.
+  void race_stiffness(const std::string& method) {
+    const base::ScopedOption type("-tao_type", "lmvm"), initial("-tao_lmvm_initial", "stiffness");
+    if (method == "stiffness") return race_default(method);
+    Line line{contest_.race_path(nullptr, 1)};
+    line.entry.method = method;
     print(line);
   }
 
@@ -305,8 +315,9 @@ void measure_costs(const Task& task) {
                           .c_str());
 }
 
-const std::vector<std::string> methods = {"default",       "default_end", "ntr",      "lmvm",
-                                          "polak_ribiere", "motion",      "liblbfgs", "costs"};
+const std::vector<std::string> methods = {
+    "default", "default_end",   "stiffness", "stiffness_step", "ntr",
+    "lmvm",    "polak_ribiere", "motion",    "liblbfgs",       "costs"};
 
 std::vector<base::Option> option_table() {
   return {{"scene", OptionKind::path, "", "The result's scene, for coarser models."},
@@ -320,10 +331,7 @@ std::vector<base::Option> option_table() {
 base::Exit run(const base::Options& options) {
   const std::string method = options.arguments()[1];
   if (std::find(methods.begin(), methods.end(), method) == methods.end())
-    base::refuse(
-        "'{}' is none of default, default_end, ntr, lmvm, polak_ribiere, motion, liblbfgs, "
-        "costs",
-        method);
+    base::refuse("'{}' is none of {}", method, fmt::join(methods, ", "));
   if (options.flag("count")) check(PetscLogDefaultBegin());
   const Task task = read_task(options.arguments()[0]);
   if (method == "costs")

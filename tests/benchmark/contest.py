@@ -50,6 +50,8 @@ CASES = {
 METHODS = {
     "default": "**Repose**, its default",
     "default_end": "the same until its own estimate says so",
+    "stiffness": "Repose, L-BFGS from the stiffness",
+    "stiffness_step": "the same, in one predicted load step",
     "ntr": "Repose, Newton, no load steps",
     "lmvm": "Repose `-tao_type lmvm`, no load steps",
     "polak_ribiere": "the paper's: Polak–Ribière, Brent",
@@ -60,7 +62,8 @@ METHODS = {
 }
 SCIPY = {"L-BFGS-B": {"maxiter": 10**9, "maxfun": 10**9, "ftol": 0, "gtol": 0},
          "Newton-CG": {"maxiter": 10**9, "xtol": 1e-15}}
-# whom Repose's default is to beat, by what, by how many times
+COUNTED = ("default", "default_end", "stiffness", "stiffness_step", "ntr")  # their linear systems
+# whom Repose is to beat, by what, by how many times
 GOALS = [("polak_ribiere", "evaluations", 30), ("polak_ribiere", "seconds", 15),
          ("liblbfgs", "seconds", 3), ("L-BFGS-B", "seconds", 20)]
 # options that change what is measured, in the command that the page names
@@ -256,7 +259,7 @@ class Contest:
     def race(self, method):
         """Counts first where that takes time of its own, then so many rounds."""
         measure = self.of_scipy if method in SCIPY else self.of_program
-        if method in ("default", "default_end", "ntr"):
+        if method in COUNTED:
             counted, *_ = measure(method, "-count")
             self.add(method, [counted | {"seconds": np.inf}])
         begin = time.time()
@@ -312,7 +315,8 @@ def row(contest, method, entry):
         count += f" ({entry['evaluations'] - entry['values']} with gradient)"
     hessians = "–"
     if entry["assemblies"]:
-        hessians = f"{entry['assemblies']}, {entry['factorisations']}, {entry['actions']}"
+        hessians = ", ".join(str(entry[what]) for what in ("assemblies", "factorisations", "actions",
+                                                           "applications"))
         if entry.get("coarse_assemblies"):
             hessians += f" and {entry['coarse_assemblies']} coarse"
     return (f"| {name} | {count} | {hessians} | {entry['seconds'] / unit:.2g}× | "
@@ -332,36 +336,37 @@ def table(contest):
     text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its linear systems "
              f"{'on this model ' * bool(own['coarse_evaluations'])}are about "
              f"{100 * spent / own['seconds']:.0f} %.\n\n"
-             "| method | evaluations | Hessians, factorisations, actions | time | distance |\n"
+             "| method | evaluations | Hessians, factorisations, actions, applications | time | distance |\n"
              "|---|--:|--:|--:|---|\n")
     for (method, _), entry in contest.entries.items():
         text += row(contest, method, entry)
     return text + "".join(f"\nLeft out: {why}\n" for why in contest.left_out)
 
 
-def verdict(contest, rival, what, times):
+def verdict(contest, own, rival, what, times):
     """How many times fewer, and whether that is the goal."""
-    entry, own = contest.entries.get((rival, 0)), contest.entries["default", 0]
-    if not entry:
+    entry, own = contest.entries.get((rival, 0)), contest.entries.get((own, 0))
+    if not entry or not own:
         return "not measured"
     ratio = entry[what] / own[what]
     said = f"{ratio:.0f}×" if ratio >= 10 else f"{ratio:.2g}×"
     reached = "**reached**" if ratio >= times else "missed"
     if entry["end"] in ("limit", "elsewhere"):
         return f"≥ {said}: " + (reached if ratio >= times else "not known")
-    other = ", to another minimum" if entry["end"] == "own_minimum" else ""
+    other = ", to another minimum" if "own_minimum" in (entry["end"], own["end"]) else ""
     return f"{said}: {reached}{other}"
 
 
-def verdicts(contests):
+def verdicts(contests, own, name):
+    """By how much one of Repose's methods beats the others."""
     names = {"polak_ribiere": "the paper's algorithm", "liblbfgs": "liblbfgs on the same kernel",
              "L-BFGS-B": "SciPy L-BFGS-B"}
-    text = "| by how much Repose's default beats | " + " | ".join(contests) + " |\n"
+    text = f"| by how much {name} beats | " + " | ".join(contests) + " |\n"
     text += "|---|" + "---|" * len(contests) + "\n"
     for rival, what, times in GOALS:
         word = "evaluations" if what == "evaluations" else "time"
         text += f"| {names[rival]}, {word}; goal {times}× | " + " | ".join(
-            verdict(contest, rival, what, times) for contest in contests.values()) + " |\n"
+            verdict(contest, own, rival, what, times) for contest in contests.values()) + " |\n"
     return text
 
 
@@ -406,14 +411,16 @@ Made by `{" ".join(["tests/benchmark/contest.py", *words])}` in one run, on {whe
 
 Every method starts from the initial positions, with the bones in their places at once, on the same
 model file, and is stopped at the first state it evaluates that is within {accuracy} (largest distance
-of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default takes load
-steps (and, where the skin is large enough, solves a coarser model first): their cost is in its
-figures. An evaluation is one of the value, or of the value with its gradient, which in Repose's kernel
+of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default and
+L-BFGS from the stiffness take load steps (and, where the skin is large enough, solve a coarser model
+first): their cost is in their figures. An evaluation is one of the value, or of the value with its gradient, which in Repose's kernel
 cost the same. Counted apart are the states at which a Hessian is taken, the factorisations of a
-convex one and the actions of the exact one, each with those of the factors; their time is in the times. Times are CPU times over that
+convex one, the actions of the exact one and the applications of the factors; their time is in the times. Times are CPU times over that
 of the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up
 (reading, sharing out, index arrays) is in nobody's.
 
+- L-BFGS from the stiffness: `-tao_type lmvm -tao_lmvm_initial stiffness`, see
+  [linear_solver.md](linear_solver.md).
 - The equations of motion: unit masses, damping c and step h the best of a scan, which a person would
   have to find first; one evaluation of the forces a step (Euler) or three (Runge–Kutta); a run
   that takes {PATIENCE} times the default's time is stopped.
@@ -426,7 +433,9 @@ of the default, the least of {chosen.rounds} rounds, or of fewer where they take
 
 ## The goals
 
-{verdicts(contests)}{conclusion(contests)}
+{verdicts(contests, "default", "Repose's default")}{conclusion(contests)}
+{verdicts(contests, "stiffness", "Repose's L-BFGS from the stiffness")}
+{verdicts(contests, "stiffness_step", "the same in one predicted load step")}
 """
     return text + "\n".join(table(contest) for contest in contests.values())
 

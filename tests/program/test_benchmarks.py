@@ -10,7 +10,7 @@ import pytest
 from conftest import PROJECT, finish, programs
 
 
-METHODS = "default,default_end,lmvm,polak_ribiere,liblbfgs,L-BFGS-B"
+METHODS = "default,default_end,stiffness,stiffness_step,lmvm,polak_ribiere,liblbfgs,L-BFGS-B"
 
 
 def run_script(name, folder, environment, *options):
@@ -38,9 +38,9 @@ def evaluations(row):
 
 def test_every_method_comes_to_rest(contest):
     ends = {name: row for name, row in contest.items() if row[-1].endswith(" mm")}
-    if len(ends) == 5 and not any(name.startswith("liblbfgs") for name in ends):
+    if len(ends) == 7 and not any(name.startswith("liblbfgs") for name in ends):
         pytest.skip("liblbfgs is not built in: apt-get install liblbfgs-dev")
-    assert len(ends) == 6, ends
+    assert len(ends) == 8, ends
     own = [row for name, row in ends.items() if "own estimate" not in name]
     assert all(float(row[-1].split()[0]) <= 0.5 and evaluations(row) > 2 for row in own)
 
@@ -51,8 +51,9 @@ def test_counts_are_in_their_order(contest):
     assert default < count["Repose `-tao_type lmvm`, no load steps"]
     assert default < count["SciPy L-BFGS-B, NumPy kernel"]
     assert 10 * default < count["the paper's: Polak–Ribière, Brent"]
-    hessians, factors, actions = map(int, contest["**Repose**, its default"][1].split(","))
-    assert 0 < factors <= hessians < min(default, actions)
+    hessians, factors, actions, applied = map(int, contest["**Repose**, its default"][1].split(","))
+    assert 0 < factors <= hessians < min(default, actions) and actions <= applied
+    assert count["Repose, L-BFGS from the stiffness"] < default
 
 
 def test_goals_have_verdicts(contest):

@@ -23,6 +23,7 @@ struct Entry {
   int64_t assemblies = 0;      ///< of the Hessian
   int64_t factorisations = 0;  ///< Cholesky's, if PETSc's log is on (PetscLogDefaultBegin)
   int64_t actions = 0;         ///< of the Hessian on a vector, likewise
+  int64_t applications = 0;    ///< of preconditioners on a vector, likewise
   double seconds = 0;          ///< CPU
   double distance = 0;  ///< mm from the reference: closest state, own minimum or where it stopped
   double excess = 0;    ///< at its own minimum, (Φ − Φ_reference) / |Φ_reference|
@@ -53,7 +54,8 @@ class Contest {
   base::VecHandle displacement_to(const std::vector<Vec3>& position) const;
   double distance(Vec displacement) const;  ///< mm from the reference
 
-  Entry race_path(Vec guess = nullptr);  ///< follow_path, raced to the reference like the others
+  /// follow_path, raced to the reference like the others; `load_steps` 0: as many as needed.
+  Entry race_path(Vec guess = nullptr, int load_steps = 0);
 
   // The others, in one load step.
   Entry race_polak_ribiere();
@@ -71,7 +73,7 @@ class Contest {
   Curvature curvature();
 
  private:
-  Search path_search(Vec guess, bool& complete);
+  Search path_search(Vec guess, int load_steps, bool& complete);
   Entry race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement);
   bool find_own_minimum(Vec displacement);
 
