@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """How the work of a whole solve grows with the mesh: a table.
 
-    tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm]
+    tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm,stiffness]
                               [-layers 4,…] [-turgor 0] [-nested auto] [-ranks 1]
                               [-output docs/growth.md] [-mark measured]
 
 Synthetic heads of the given numbers of skin vertices, each with its number of layers, springs by
-moduli with s_ref = r_0, penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method. Says how far each ends
-from the first method's rest position.
+moduli with s_ref = r_0, penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method: TAO's
+types, and stiffness for L-BFGS from the stiffness. Says how far each ends from the first method's
+rest position. Preconditioners made and applied are PETSc's counts, those on coarser models included.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
@@ -19,7 +20,7 @@ import tempfile
 import h5py
 import numpy as np
 
-from page import PROJECT, children, print_table
+from page import PROJECT, children, events, print_table
 
 SCENE = """skin: head_skin.ply
 bones:
@@ -37,19 +38,22 @@ solve:
   accuracy: 0.01
 """
 HEAD = ("| skin vertices | layers | unknowns | method | load steps | iterations | evaluations | Hessians | "
-        "CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 3 + "|---" + "|--:" * 7
-        + "|")
+        "made | applied | CPU, µs/unknown | memory, B/unknown | from the first, mm |\n" + "|--:" * 3
+        + "|---" + "|--:" * 9 + "|")
+OPTIONS = {"stiffness": ["-tao_type", "lmvm", "-tao_lmvm_initial", "stiffness"]}
 
 
 def measure(command, folder, method):
     """One solve: its attributes summed over steps, CPU s, and the positions at rest."""
     before = children().ru_utime
-    done = subprocess.run([*command, "scene.yaml", "-tao_type", method, "-output", method], cwd=folder,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    options = OPTIONS.get(method, ["-tao_type", method])
+    done = subprocess.run([*command, "scene.yaml", *options, "-output", method, "-log_view", ":log"],
+                          cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     seconds = children().ru_utime - before
     if done.returncode == 1:
         raise SystemExit(done.stderr)
     peak = max(float(line.split()[-4]) for line in done.stdout.splitlines() if "MiB so far" in line)
+    logged = events(folder / "log")
     with h5py.File(folder / f"{method}.h5") as h5:
         steps = [h5["step"][k] for k in sorted(h5["step"])]
         total = {key: sum(int(step.attrs[key]) for step in steps)
@@ -57,6 +61,7 @@ def measure(command, folder, method):
         unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
         work = next(line for line in done.stdout.splitlines() if "of the Hessian" in line)
         return (total | {"steps": len(steps) - 1, "hessians": int(work.split("gradient,")[1].split()[0]),
+                         "made": logged["PCSetUp"][0], "applied": logged["PCApply"][0],
                          "seconds": seconds, "memory": peak * 2**20 / unknowns, "unknowns": unknowns,
                          "converged": done.returncode == 0}, steps[-1]["point/position"][()])
 
@@ -79,6 +84,7 @@ def rows_of(size, layers, chosen):
             said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
             yield (f"| {size} | {layers} | {found['unknowns']} | {method} | {found['steps']} | "
                    f"{found['iterations']} | {found['evaluations']} | {found['hessians']} | "
+                   f"{found['made']} | {found['applied']} | "
                    f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
 
 
@@ -88,7 +94,7 @@ def arguments():
     parser.add_argument("-help", action="help")
     parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
     parser.add_argument("-sizes", default="500,2500,12500")
-    parser.add_argument("-methods", default="ntr,lmvm")
+    parser.add_argument("-methods", default="ntr,lmvm,stiffness")
     parser.add_argument("-layers", default="4", help="one number, or one for each size")
     parser.add_argument("-turgor", type=float, default=0)
     parser.add_argument("-nested", default="auto")

@@ -15,8 +15,8 @@ import pathlib
 import subprocess
 import tempfile
 
-from growth import SCENE
-from page import PROJECT, children, print_table
+from growth import OPTIONS, SCENE
+from page import PROJECT, children, events, print_table
 
 HEAD = ("| skin vertices | ranks | linear solver | load steps | Hessians | made | applied | "
         "make, ms | apply, ms | all, CPU s | memory, MiB |\n" + "|--:" * 2 + "|---"
@@ -34,17 +34,9 @@ SOLVERS = {
     "mg, Chebyshev and Jacobi": ["-pc_type", "mg", *JACOBI],
     "mg, each Hessian": ["-pc_type", "mg", *ALWAYS_NEW],
     "gamg": ["-pc_type", "gamg", *JACOBI],
+    "L-BFGS from the stiffness": OPTIONS["stiffness"],
+    "the same, mg": [*OPTIONS["stiffness"], "-pc_type", "mg"],
 }
-
-
-def events(log):
-    """Count and seconds of PETSc's events."""
-    found = {}
-    for line in log.read_text(errors="replace").splitlines():
-        words = line.split()
-        if len(words) > 10 and words[0] in ("PCSetUp", "PCApply"):
-            found[words[0]] = int(words[1]), float(words[3])
-    return found
 
 
 def measure(tools, folder, name, chosen):

@@ -11,6 +11,16 @@ def children():
     return resource.getrusage(resource.RUSAGE_CHILDREN)
 
 
+def events(log):
+    """Count and seconds of PETSc's events of preconditioners, from a -log_view."""
+    found = {}
+    for line in log.read_text(errors="replace").splitlines():
+        words = line.split()
+        if len(words) > 10 and words[0] in ("PCSetUp", "PCApply"):
+            found[words[0]] = int(words[1]), float(words[3])
+    return found
+
+
 def print_table(head, rows, page=None, mark="measured"):
     """Prints a table row by row, and puts it in the place of the one below a page's mark, down to
     the mark "end of MARK" if there is one."""
