@@ -2,6 +2,7 @@
 
 import pytest
 
+from conftest import PROJECT
 from tissue import apart, last, same_face, steps
 
 ACCURACY = 1e-6  # mm; two answers this near to the truth are twice as far apart at most
@@ -50,6 +51,15 @@ def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, s
     assert 8 * work(few) < work(many)
     assert work(few) < 1.5 * work(solved(scene, "-accuracy", ACCURACY))
     assert work(few) < 2 * work(few, "iterations")  # full steps, nearly always
+
+
+def test_lmvm_from_the_stiffness_keeps_volumes(solved, tmp_path):
+    text = (PROJECT / "meshes" / ADVANCE).read_text().replace("[0, -6, 0]", "[0, -0.3, 0]")
+    scene = tmp_path / "small.yaml"
+    scene.write_text(text.replace(": paper_", f": {PROJECT}/meshes/paper_"))
+    exact = "-volume", "exact", "-accuracy", 1e-3
+    default, other = (last(solved(scene, *exact, *more)) for more in ((), STIFFNESS))
+    assert apart(default, other) <= 2e-3 and other["volume_error_max"] < 1e-6
 
 
 def test_lmvm_from_the_stiffness_minimises_forces(solved):
