@@ -53,6 +53,14 @@ def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, s
     assert work(few) < 2 * work(few, "iterations")  # full steps, nearly always
 
 
+def test_the_stiffness_is_renewed_where_the_search_has_slowed(solved):
+    """In one load step the predicted state, where it is made first, is far from rest."""
+    far = ADVANCE, "-accuracy", ACCURACY, "-load_steps", 1, *STIFFNESS
+    once = solved(*far, "-tao_lmvm_renewal_price", 1e9)
+    assert work(solved(*far)) < 0.75 * work(once)
+    assert apart(last(solved(*far)), last(once)) <= 2 * ACCURACY
+
+
 def test_lmvm_from_the_stiffness_keeps_volumes(solved, tmp_path):
     text = (PROJECT / "meshes" / ADVANCE).read_text().replace("[0, -6, 0]", "[0, -0.3, 0]")
     scene = tmp_path / "small.yaml"
