@@ -60,12 +60,12 @@ bool StepWear::take(double force, double length) {
 }
 
 InitialHessian::InitialHessian(Tao tao, TangentSolver& solver)
-    : solver_(solver), wear_(wanted_by_options(comm_of(solver.hessian().convex())).price) {
-  const Mat convex = solver.hessian().convex();
+    : solver_(solver), wear_(wanted_by_options(comm_of(solver.hessian().action())).price) {
+  const Mat action = solver.hessian().action();
   PetscInt rows = 0, all_rows = 0;
-  check(MatGetLocalSize(convex, &rows, nullptr));
-  check(MatGetSize(convex, &all_rows, nullptr));
-  check(MatCreateShell(comm_of(convex), rows, rows, all_rows, all_rows, this, inverse_.out()));
+  check(MatGetLocalSize(action, &rows, nullptr));
+  check(MatGetSize(action, &all_rows, nullptr));
+  check(MatCreateShell(comm_of(action), rows, rows, all_rows, all_rows, this, inverse_.out()));
   check(MatShellSetOperation(inverse_, MATOP_SOLVE, reinterpret_cast<void (*)()>(apply)));
   check(MatSetUp(inverse_));
   check(TaoLMVMSetH0(tao, inverse_));

@@ -178,7 +178,7 @@ double Minimiser::contraction(Vec displacement, double step) {
   check(VecWAXPY(trial_, -1.0, step_, displacement));
   certificate_.function.evaluate(trial_, certified_gradient_);
   check(VecSet(step_, 0));
-  const bool convex = solver.solve(displacement, certified_gradient_, step_, 0.05);
+  const bool convex = solver.solve(displacement, certified_gradient_, step_, 0.2);
   contraction_ =
       convex ? std::min(largest_block(step_) / step, most_contraction) : most_contraction;
   contracted_at_ = solver.hessian().assemblies();
@@ -201,6 +201,13 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   if (softest_ > 0 && (far || soon)) {
     error_ = largest_force / softest_;
     return false;
+  }
+  if (quick && &certificate_.function == &function_) {
+    const double glance = certificate_.solver.glance(gradient);
+    if (glance > accuracy_) {
+      error_ = safety * glance;
+      return false;
+    }
   }
   looked_at_ = function_.evaluations();
   error_ = strict_estimate(displacement, gradient);

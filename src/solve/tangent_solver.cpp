@@ -161,6 +161,13 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
   return reason != KSP_DIVERGED_INDEFINITE_MAT && reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 
+double TangentSolver::glance(Vec gradient) {
+  if (renewals_ == 0) return 0;
+  measured_at_ = -1;
+  check(PCApply(preconditioner(), gradient, work_));
+  return largest_block(work_);
+}
+
 double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
   hessian_.assemble(displacement);
   PetscBool same = PETSC_FALSE;  // asked again at the same state

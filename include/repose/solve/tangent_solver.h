@@ -44,6 +44,9 @@ class TangentSolver {
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.
   double newton_distance(Vec displacement, Vec gradient);
 
+  /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none yet.
+  double glance(Vec gradient);
+
   /// H⁻¹ ∇Φ of the last newton_distance.
   Vec latest() const { return work_; }
 
