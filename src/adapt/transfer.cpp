@@ -47,7 +47,10 @@ std::vector<double> depths_of(const Model& model) {
 }  // namespace
 
 Transfer::Transfer(const Model& from, const Model& to)
-    : to_(to), from_depths_(depths_of(from)), to_depths_(depths_of(to)) {
+    : to_(to),
+      from_points_(from.points.position.size()),
+      from_depths_(depths_of(from)),
+      to_depths_(depths_of(to)) {
   const surface::Surface skin = skin_of(from, layers_of(from));
   const surface::DistanceTree tree(skin);
   for (size_t i = 0; i < to.points.position.size(); i += to_depths_.size()) {
@@ -59,38 +62,80 @@ Transfer::Transfer(const Model& from, const Model& to)
   }
 }
 
-Vec3 Transfer::interpolate(const std::vector<Vec3>& displacement, const Place& place,
-                           double depth) const {
+Transfer::Stencil Transfer::stencil(const Place& place, double depth) const {
   const size_t layers = from_depths_.size();
   size_t below = 1;
   while (below + 1 < layers && from_depths_[below] < depth) ++below;
   const double above = from_depths_[below - 1];
   const double share = std::clamp((depth - above) / (from_depths_[below] - above), 0.0, 1.0);
-  Vec3 sum = Vec3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const Vec3* column = &displacement[place.column[k] * layers];
-    sum += place.weight[k] * ((1 - share) * column[below - 1] + share * column[below]);
+  Stencil stencil{};
+  for (size_t k = 0; k < 3; ++k) {
+    const auto deeper = static_cast<int64_t>(place.column[k] * layers + below);
+    stencil.point[2 * k] = deeper - 1;
+    stencil.point[2 * k + 1] = deeper;
+    stencil.weight[2 * k] = place.weight[k] * (1 - share);
+    stencil.weight[2 * k + 1] = place.weight[k] * share;
   }
-  return sum;
+  return stencil;
 }
 
-std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
+bool Transfer::fixed(size_t point) const {
+  return to_.points.set[point] != model::PointSet::soft_tissue;
+}
+
+std::vector<Vec3> Transfer::interpolate(const std::vector<Vec3>& field, bool follow_targets) const {
   const model::Points& points = to_.points;
-  std::vector<Vec3> carried(points.position.size());
+  std::vector<Vec3> found(points.position.size());
   const size_t layers = to_depths_.size();
-  const auto taken = [&](size_t i) -> Vec3 { return points.target[i] - points.position[i]; };
+  const auto at = [&](const Place& place, double depth) {
+    const Stencil from = stencil(place, depth);
+    Vec3 sum = Vec3::Zero();
+    for (size_t k = 0; k < from.point.size(); ++k) sum += from.weight[k] * field[from.point[k]];
+    return sum;
+  };
+  const auto taken = [&](size_t i) -> Vec3 {
+    return follow_targets ? Vec3(points.target[i] - points.position[i]) : Vec3::Zero();
+  };
   for (size_t c = 0; c < places_.size(); ++c) {
     const size_t deepest = (c + 1) * layers - 1;
     Vec3 short_of = Vec3::Zero();
-    if (points.set[deepest] != model::PointSet::soft_tissue)
-      short_of = taken(deepest) - interpolate(displacement, places_[c], 1);
+    if (fixed(deepest)) short_of = taken(deepest) - at(places_[c], 1);
     for (size_t l = 0; l < layers; ++l) {
       const size_t i = c * layers + l;
-      carried[i] = interpolate(displacement, places_[c], to_depths_[l]) + to_depths_[l] * short_of;
-      if (points.set[i] != model::PointSet::soft_tissue) carried[i] = taken(i);
+      found[i] =
+          fixed(i) ? taken(i) : Vec3(at(places_[c], to_depths_[l]) + to_depths_[l] * short_of);
     }
   }
-  return carried;
+  return found;
+}
+
+std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
+  return interpolate(displacement, true);
+}
+
+std::vector<Vec3> Transfer::prolong(const std::vector<Vec3>& increment) const {
+  return interpolate(increment, false);
+}
+
+std::vector<Vec3> Transfer::restrict_gradient(const std::vector<Vec3>& gradient) const {
+  std::vector<Vec3> restricted(from_points_, Vec3::Zero());
+  const size_t layers = to_depths_.size();
+  const auto add = [&](const Vec3& value, const Place& place, double depth) {
+    const Stencil from = stencil(place, depth);
+    for (size_t k = 0; k < from.point.size(); ++k)
+      restricted[from.point[k]] += from.weight[k] * value;
+  };
+  for (size_t c = 0; c < places_.size(); ++c) {
+    Vec3 of_deepest = Vec3::Zero();
+    for (size_t l = 0; l < layers; ++l) {
+      const size_t i = c * layers + l;
+      if (fixed(i)) continue;
+      add(gradient[i], places_[c], to_depths_[l]);
+      of_deepest -= to_depths_[l] * gradient[i];
+    }
+    if (fixed((c + 1) * layers - 1)) add(of_deepest, places_[c], 1);
+  }
+  return restricted;
 }
 
 }  // namespace repose::adapt
