@@ -3,11 +3,12 @@
 /// L-BFGS, all from the answer of a coarser model; docs/growth.md, which
 /// tests/benchmark/multigrid_opt.py fills:
 ///     benchmark_multigrid_opt SCENE.yaml [-methods default,lbfgs,cycles,…] [-coarsening 3]
-///                             [-smoothing 10] [-switch 0.2] [-accuracy 0.01]
+///                             [-smoothing 10] [-switch 0.05] [-accuracy 0.01]
 /// A race ends at the first evaluated state that is as near to the rest position as asked for,
 /// which is known from the default. One line of JSON for the start and one for each method. Serial.
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 
 #include "repose/adapt/ladder.h"
 #include "repose/adapt/transfer.h"
@@ -26,6 +27,9 @@ using model::Model;
 using paper::Contest, paper::Entry;
 
 const MPI_Comm comm = MPI_COMM_SELF;
+
+const std::vector<std::string> known_methods = {
+    "default", "lbfgs", "cycles", "injected", "default_end", "cycles_newton", "lbfgs_newton"};
 
 double dot(Vec x, Vec y) {
   PetscScalar product = 0;
@@ -254,8 +258,7 @@ class Runner {
     climb();
     find_reference();
     const std::string methods = "," + options_.text("methods") + ",";
-    for (const std::string method :
-         {"default", "lbfgs", "cycles", "injected", "default_end", "cycles_newton"})
+    for (const std::string& method : known_methods)
       if (methods.find("," + method + ",") != std::string::npos) race(method);
   }
 
@@ -305,7 +308,7 @@ class Runner {
 
   /// With solvers of its own, so that no method finds another's factors.
   void race(const std::string& method) {
-    if (method == "default_end" || method == "cycles_newton") return settle(method);
+    if (method == "default_end" || method.ends_with("_newton")) return settle(method);
     Contest contest = make_contest();
     contest.set_reference(reference_);
     const VecHandle start = contest.displacement_to(start_);
@@ -315,16 +318,13 @@ class Runner {
       State state(function.positions());
       check(VecCopy(start, state.x));
       evaluate(function, state);
-      if (method == "lbfgs")
-        Lbfgs(function.positions()).run(function, state, options_.integer("limit"));
-      else
-        minimise(method, function, state, extra);
+      minimise(method, function, state, extra);
       check(VecCopy(state.x, displacement));
     });
     print(method, entry, extra);
   }
 
-  /// Newton's method, after cycles or without, until its own estimate is below the accuracy.
+  /// Newton's method, after another or alone, until its own estimate is below the accuracy.
   void settle(const std::string& method) const {
     const solve::Part part = solve::distribute(comm, fine_);
     solve::Positions positions(comm, part);
@@ -336,7 +336,7 @@ class Runner {
     take(positions, difference(start_, fine_.points.position), state.x);
     evaluate(referee, state);
     Extra extra;
-    if (method == "cycles_newton") minimise(method, referee, state, extra);
+    if (method != "default_end") minimise(method, referee, state, extra);
     solve::Minimiser(referee, problem.solver(), nullptr).run(state.x, options_.number("accuracy"));
     Entry entry;
     entry.end = Entry::End::elsewhere;
@@ -348,20 +348,25 @@ class Runner {
     print(method, entry, extra);
   }
 
-  /// Cycles until the function no longer falls or, before Newton, until one moves the tissue
-  /// little.
+  /// Cycles, or L-BFGS in bouts of as many evaluations, until the function no longer falls or,
+  /// before Newton, until one moves the tissue little.
   void minimise(const std::string& method, solve::Function& function, State& state,
                 Extra& extra) const {
-    const double little = method == "cycles_newton" ? options_.number("switch") : 0;
+    const double little = method.ends_with("_newton") ? options_.number("switch") : 0;
+    const int64_t smoothing = options_.integer("smoothing");
     const auto& referee = dynamic_cast<const paper::Referee&>(function);
-    Cycles cycles(function.positions(), fine_, coarse_, weights_,
-                  method == "injected" ? Base::injected : Base::rest);
+    Lbfgs lbfgs(function.positions());
+    std::optional<Cycles> cycles;
+    if (!method.starts_with("lbfgs"))
+      cycles.emplace(function.positions(), fine_, coarse_, weights_,
+                     method == "injected" ? Base::injected : Base::rest);
     const VecHandle moved = function.positions().make_vector();
     extra = {};
     const auto note = [&] {
-      extra.coarse = cycles.coarse_evaluations();
-      extra.corrections = cycles.corrections();
-      extra.refused = cycles.refused();
+      if (!cycles) return;
+      extra.coarse = cycles->coarse_evaluations();
+      extra.corrections = cycles->corrections();
+      extra.refused = cycles->refused();
       extra.distances.push_back(referee.closest());
     };
     try {
@@ -369,7 +374,10 @@ class Runner {
            note()) {
         before = state.value;
         check(VecCopy(state.x, moved));
-        cycles.run(function, state, options_.integer("smoothing"));
+        if (cycles)
+          cycles->run(function, state, smoothing);
+        else
+          lbfgs.run(function, state, 2 * smoothing);
         check(VecAXPY(moved, -1, state.x));
         way = solve::largest_block(moved);
       }
@@ -401,7 +409,7 @@ class Runner {
 };
 
 std::vector<base::Option> option_table() {
-  return {{"methods", OptionKind::text, "default,lbfgs,cycles,injected,default_end,cycles_newton",
+  return {{"methods", OptionKind::text, fmt::format("{}", fmt::join(known_methods, ",")),
            "What races."},
           {"accuracy", OptionKind::number, "0.01", "Distance from rest.", {1e-6, 10}, "mm"},
           {"coarsening", OptionKind::number, "3", "Of edges.", {1.2, 10}},
@@ -412,8 +420,8 @@ std::vector<base::Option> option_table() {
            {1, 10000}},
           {"switch",
            OptionKind::number,
-           "0.2",
-           "Newton follows cycles after one that moves the tissue less.",
+           "0.05",
+           "Newton follows a cycle (or as many evaluations) that moves the tissue less.",
            {1e-6, 100},
            "mm"},
           {"limit", OptionKind::integer, "5000", "Evaluations.", {1, 1000000000}},
