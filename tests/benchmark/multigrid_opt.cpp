@@ -337,7 +337,9 @@ class Runner {
     evaluate(referee, state);
     Extra extra;
     if (method != "default_end") minimise(method, referee, state, extra);
-    solve::Minimiser(referee, problem.solver(), nullptr).run(state.x, options_.number("accuracy"));
+    solve::Minimiser newton(referee, problem.solver(), nullptr);
+    if (!newton.run(state.x, options_.number("accuracy")).converged)
+      base::refuse("{}: the default's estimate did not come below the accuracy", method);
     Entry entry;
     entry.end = Entry::End::elsewhere;
     entry.evaluations = referee.evaluations();
