@@ -71,6 +71,10 @@ SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owne
   const Chosen chosen = choose(part, springs.points, owned,
                                [&](int64_t e) { return springs.exponent[e] == exponent; });
   const auto points = static_cast<int64_t>(part.points.position.size());
+  const size_t size = chosen.counted.size() + chosen.others.size();
+  loop.points.reserve(size);
+  for (auto* values : {&loop.stiffness, &loop.rest_length, &loop.inverse_reference})
+    values->reserve(size);
   const auto add = [&](int64_t row) {
     loop.stiffness.push_back(springs.stiffness[row]);
     loop.rest_length.push_back(springs.rest_length[row]);
@@ -87,6 +91,10 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
   const model::Prisms& prisms = part.prisms;
   const Chosen chosen = choose(part, prisms.points, owned, [](int64_t) { return true; });
   const auto points = static_cast<int64_t>(part.points.position.size());
+  const size_t size = chosen.counted.size() + chosen.others.size();
+  loop.points.reserve(size);
+  loop.rest_volume.reserve(size);
+  loop.row.reserve(size);
   const auto add = [&](int64_t row) {
     loop.rest_volume.push_back(prisms.rest_volume[row]);
     loop.row.push_back(row);

@@ -6,26 +6,27 @@ namespace repose::solve {
 
 namespace {
 
-constexpr int64_t piece = int64_t{1} << 30;
+/// Calls work(begin, length) for pieces that fit MPI's int counts.
+template <class Work>
+void in_pieces(size_t size, Work&& work) {
+  constexpr size_t most = size_t{1} << 30;
+  for (size_t at = 0; at < size; at += most) work(at, static_cast<int>(std::min(most, size - at)));
+}
 
 }  // namespace
 
-void send(MPI_Comm comm, int to, const std::vector<char>& bytes) {
-  const int64_t total = static_cast<int64_t>(bytes.size());
-  MPI_Send(&total, 1, MPI_INT64_T, to, 0, comm);
-  for (int64_t at = 0; at < total; at += piece)
-    MPI_Send(bytes.data() + at, static_cast<int>(std::min(piece, total - at)), MPI_CHAR, to, 0,
-             comm);
+void Sender::send_bytes(const void* data, size_t size) {
+  const auto* bytes = static_cast<const char*>(data);
+  in_pieces(size, [&](size_t begin, int length) {
+    MPI_Send(bytes + begin, length, MPI_BYTE, to_, 0, comm_);
+  });
 }
 
-std::vector<char> receive(MPI_Comm comm, int from) {
-  int64_t total = 0;
-  MPI_Recv(&total, 1, MPI_INT64_T, from, 0, comm, MPI_STATUS_IGNORE);
-  std::vector<char> bytes(total);
-  for (int64_t at = 0; at < total; at += piece)
-    MPI_Recv(bytes.data() + at, static_cast<int>(std::min(piece, total - at)), MPI_CHAR, from, 0,
-             comm, MPI_STATUS_IGNORE);
-  return bytes;
+void Receiver::receive_bytes(void* data, size_t size) {
+  auto* bytes = static_cast<char*>(data);
+  in_pieces(size, [&](size_t begin, int length) {
+    MPI_Recv(bytes + begin, length, MPI_BYTE, from_, 0, comm_, MPI_STATUS_IGNORE);
+  });
 }
 
 }  // namespace repose::solve

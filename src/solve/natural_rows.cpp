@@ -29,101 +29,97 @@ std::vector<double> owned_pressures(Objective& objective) {
   return owned;
 }
 
-std::vector<Vec3> as_points(const std::vector<double>& numbers) {
-  std::vector<Vec3> points(numbers.size() / 3);
-  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
-  return points;
+const double* numbers(std::span<const Vec3> points) {
+  return points.empty() ? nullptr : points.data()->data();
 }
 
 }  // namespace
 
-NaturalRows::Route NaturalRows::make_route(MPI_Comm comm, const std::vector<int64_t>& rows,
-                                           int64_t total, int block) {
-  Route route;
-  route.block = block;
-  const auto owned = static_cast<PetscInt>(rows.size());
-  const auto slab = base::slab(total, base::rank(comm), base::size(comm));
-  const auto mine = static_cast<PetscInt>(slab.rows());
-  check(VecCreateMPI(comm, block * owned, PETSC_DETERMINE, route.owned.out()));
-  check(VecCreateMPI(comm, block * mine, PETSC_DETERMINE, route.natural.out()));
+NaturalRows::Route::Route(MPI_Comm comm, std::span<const int64_t> rows, int64_t total, int block)
+    : natural_size(block * base::slab(total, base::rank(comm), base::size(comm)).rows()) {
+  const auto owned_rows = static_cast<PetscInt>(rows.size());
+  check(VecCreateMPIWithArray(comm, 1, block * owned_rows, PETSC_DETERMINE, nullptr, owned.out()));
+  check(VecCreateMPIWithArray(comm, 1, static_cast<PetscInt>(natural_size), PETSC_DETERMINE,
+                              nullptr, natural.out()));
   PetscInt first = 0;
-  check(VecGetOwnershipRange(route.owned, &first, nullptr));
+  check(VecGetOwnershipRange(owned, &first, nullptr));
   const std::vector<PetscInt> targets(rows.begin(), rows.end());
   base::IndexSetHandle from, to;
-  check(ISCreateStride(comm, block * owned, first, 1, from.out()));
-  check(ISCreateBlock(comm, block, owned, targets.data(), PETSC_COPY_VALUES, to.out()));
-  check(VecScatterCreate(route.owned, from, route.natural, to, route.scatter.out()));
-  return route;
+  check(ISCreateStride(comm, block * owned_rows, first, 1, from.out()));
+  check(ISCreateBlock(comm, block, owned_rows, targets.data(), PETSC_COPY_VALUES, to.out()));
+  check(VecScatterCreate(owned, from, natural, to, scatter.out()));
+}
+
+void NaturalRows::Route::carry(const double* owned_values, const double* natural_values,
+                               ScatterMode mode) const {
+  const bool forward = mode == SCATTER_FORWARD;
+  check(VecPlaceArray(owned, owned_values));
+  check(VecPlaceArray(natural, natural_values));
+  const Vec from = forward ? owned : natural, to = forward ? natural : owned;
+  check(VecScatterBegin(scatter, from, to, INSERT_VALUES, mode));
+  check(VecScatterEnd(scatter, from, to, INSERT_VALUES, mode));
+  check(VecResetArray(owned));
+  check(VecResetArray(natural));
+}
+
+std::vector<double> NaturalRows::Route::bring(const std::vector<double>& values) const {
+  std::vector<double> rows(natural_size);
+  carry(values.data(), rows.data(), SCATTER_FORWARD);
+  return rows;
 }
 
 NaturalRows::NaturalRows(MPI_Comm comm, const Part& part)
-    : part_(part),
-      points_(make_route(comm, {part.point_row.begin(), part.point_row.begin() + part.owned_points},
-                         part.total_points, 3)),
-      springs_(make_route(comm, part.spring_row, part.total_springs, 1)),
-      prisms_(make_route(comm, part.prism_row, part.total_prisms, 1)) {}
+    : comm_(comm),
+      part_(part),
+      points_(comm, std::span(part.point_row).first(part.owned_points), part.total_points, 3) {}
 
-std::vector<double> NaturalRows::bring(const Route& route, const double* values) {
-  PetscInt owned = 0, mine = 0;
-  check(VecGetLocalSize(route.owned, &owned));
-  check(VecGetLocalSize(route.natural, &mine));
-  PetscScalar* target = nullptr;
-  check(VecGetArrayWrite(route.owned, &target));
-  std::copy(values, values + owned, target);
-  check(VecRestoreArrayWrite(route.owned, &target));
-  check(VecScatterBegin(route.scatter, route.owned, route.natural, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(route.scatter, route.owned, route.natural, INSERT_VALUES, SCATTER_FORWARD));
-  const PetscScalar* source = nullptr;
-  check(VecGetArrayRead(route.natural, &source));
-  std::vector<double> natural(source, source + mine);
-  check(VecRestoreArrayRead(route.natural, &source));
-  return natural;
-}
-
-model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
-  const auto position = objective.positions().local();
+void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Springs& springs = part_.model.springs;
-  const model::Prisms& prisms = part_.model.prisms;
-  std::vector<double> elongation(part_.owned_springs), force(part_.owned_springs);
+  const Route route(comm_, part_.spring_row, part_.total_springs, 1);
+  std::vector<double> values(part_.owned_springs);
   for (int64_t e = 0; e < part_.owned_springs; ++e) {
     const auto& [p, q] = springs.points[e];
-    elongation[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
-    force[e] = tension(springs, e, elongation[e]);
+    values[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
   }
+  rows.elongation = route.bring(values);
+  for (int64_t e = 0; e < part_.owned_springs; ++e) values[e] = tension(springs, e, values[e]);
+  rows.tension = route.bring(values);
+}
+
+void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
+                             model::StepRows& rows) const {
+  const auto position = objective.positions().local();
+  const model::Prisms& prisms = part_.model.prisms;
+  const Route route(comm_, part_.prism_row, part_.total_prisms, 1);
   std::vector<double> ratio(part_.owned_prisms);
   for (int64_t e = 0; e < part_.owned_prisms; ++e) {
     std::array<Vec3, 6> corners;
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
-  const std::vector<Vec3> residual = objective.residual_force();
+  rows.volume_ratio = route.bring(ratio);
+  if (with_pressure) rows.pressure = route.bring(owned_pressures(objective));
+}
+
+model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
+  const auto position = objective.positions().local();
   model::StepRows rows;
   rows.position = natural(position);
-  rows.residual_force = natural(residual);
-  rows.volume_ratio = bring(prisms_, ratio.data());
-  if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective).data());
-  rows.elongation = bring(springs_, elongation.data());
-  rows.tension = bring(springs_, force.data());
+  rows.residual_force = natural(objective.residual_force());
+  add_prisms(objective, with_pressure, rows);
+  add_springs(position, rows);
   return rows;
 }
 
 std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
-  return as_points(bring(points_, values.empty() ? nullptr : values.data()->data()));
+  std::vector<Vec3> rows(points_.natural_size / 3);
+  points_.carry(numbers(values), numbers(rows), SCATTER_FORWARD);
+  return rows;
 }
 
 std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
-  const Route& route = points_;
-  PetscScalar* source = nullptr;
-  check(VecGetArrayWrite(route.natural, &source));
-  for (size_t i = 0; i < slab.size(); ++i) Eigen::Map<Vec3>(source + 3 * i) = slab[i];
-  check(VecRestoreArrayWrite(route.natural, &source));
-  check(VecScatterBegin(route.scatter, route.natural, route.owned, INSERT_VALUES, SCATTER_REVERSE));
-  check(VecScatterEnd(route.scatter, route.natural, route.owned, INSERT_VALUES, SCATTER_REVERSE));
-  const PetscScalar* values = nullptr;
-  check(VecGetArrayRead(route.owned, &values));
   std::vector<Vec3> rows(part_.owned_points);
-  for (size_t i = 0; i < rows.size(); ++i) rows[i] = Eigen::Map<const Vec3>(values + 3 * i);
-  check(VecRestoreArrayRead(route.owned, &values));
+  points_.carry(numbers(rows), numbers(slab), SCATTER_REVERSE);
   return rows;
 }
 

@@ -1,7 +1,8 @@
 #include "repose/solve/part.h"
 
 #include <algorithm>
-#include <limits>
+#include <numeric>
+#include <optional>
 #include <utility>
 
 #include "repose/base/agreement.h"
@@ -98,38 +99,30 @@ bool touches(const Plan& plan, const std::array<int64_t, n>& element, int rank) 
   });
 }
 
-/// Sorts rows of elements into blocks by where their first met point is, within a block as before:
-/// a loop then works on points that fit into the cache together.
-template <size_t n>
-void sort_into_blocks(const Plan& plan, const std::vector<std::array<int64_t, n>>& elements,
-                      std::vector<int64_t>& rows) {
-  constexpr int64_t points_in_block = 1024;
-  std::vector<std::vector<int64_t>> blocks(plan.place.size() / points_in_block + 1);
-  for (const int64_t row : rows) {
-    int64_t first = plan.place[elements[row][0]];
-    for (const int64_t point : elements[row]) first = std::min(first, plan.place[point]);
-    blocks[first / points_in_block].push_back(row);
-  }
-  rows.clear();
-  for (const auto& block : blocks) rows.insert(rows.end(), block.begin(), block.end());
-}
-
 /// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
+/// Both in blocks by where their first met point is, within a block as before: a loop then works on
+/// points that fit into the cache together.
 template <size_t n>
 std::vector<int64_t> element_rows(const Plan& plan,
                                   const std::vector<std::array<int64_t, n>>& elements, int rank,
                                   int64_t& owned) {
-  std::vector<int64_t> rows, others;
-  for (size_t e = 0; e < elements.size(); ++e) {
-    if (plan.owner[elements[e][0]] == rank)
-      rows.push_back(static_cast<int64_t>(e));
-    else if (touches(plan, elements[e], rank))
-      others.push_back(static_cast<int64_t>(e));
-  }
-  sort_into_blocks(plan, elements, rows);
-  sort_into_blocks(plan, elements, others);
-  owned = static_cast<int64_t>(rows.size());
-  rows.insert(rows.end(), others.begin(), others.end());
+  constexpr int64_t points_in_block = 1024;
+  const int64_t blocks = static_cast<int64_t>(plan.place.size()) / points_in_block + 1;
+  const auto block_of = [&](const std::array<int64_t, n>& element) {
+    const bool mine = plan.owner[element[0]] == rank;
+    if (!mine && !touches(plan, element, rank)) return 2 * blocks;
+    int64_t first = plan.place[element[0]];
+    for (const int64_t point : element) first = std::min(first, plan.place[point]);
+    return (mine ? 0 : blocks) + first / points_in_block;
+  };
+  std::vector<int64_t> begin(2 * blocks + 2, 0);
+  for (const auto& element : elements) ++begin[block_of(element) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  owned = begin[blocks];
+  std::vector<int64_t> rows(begin[2 * blocks]);
+  for (size_t e = 0; e < elements.size(); ++e)
+    if (const int64_t block = block_of(elements[e]); block < 2 * blocks)
+      rows[begin[block]++] = static_cast<int64_t>(e);
   return rows;
 }
 
@@ -170,11 +163,13 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
                         pick(model.springs.stiffness, rows),
                         pick(model.springs.exponent, rows),
                         pick(model.springs.reference, rows)};
-  part.spring_row.assign(rows.begin(), rows.begin() + part.owned_springs);
+  rows.resize(part.owned_springs);
+  part.spring_row = std::move(rows);
   rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms);
   part.model.prisms = {pick_elements(model.prisms.points, rows, local),
                        pick(model.prisms.rest_volume, rows)};
-  part.prism_row.assign(rows.begin(), rows.begin() + part.owned_prisms);
+  rows.resize(part.owned_prisms);
+  part.prism_row = std::move(rows);
   part.point_row = local.take();
   pick_points(plan, part);
   part.model.gravity = model.gravity;
@@ -189,7 +184,7 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   return part;
 }
 
-/// Packs or unpacks a part: `archive` decides which.
+/// Sends or receives a part: `archive` decides which.
 template <class Archive>
 void pass(Archive& archive, Part& part) {
   model::Model& m = part.model;
@@ -204,46 +199,41 @@ void pass(Archive& archive, Part& part) {
           part.total_prisms, part.total_unknowns);
 }
 
-Part share_out(MPI_Comm comm, Plan& plan, const ColumnGraph& graph,
-               const std::vector<int>& column_owner) {
-  const int ranks = base::size(comm);
-  plan.owner = pick(column_owner, graph.column_of_point);
+Plan make_plan(const Model& model, const ColumnGraph& graph, const std::vector<int>& column_owner,
+               int ranks) {
+  Plan plan{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {}, {}, {}};
   plan_motion(plan);
   number_points(plan, graph, ranks);
-  LocalNumbers local(static_cast<int64_t>(plan.owner.size()));
-  for (int r = 1; r < ranks; ++r) {
-    Part part = make_part(plan, local, r);
-    Packer packer;
-    pass(packer, part);
-    send(comm, r, packer.bytes());
-  }
-  return make_part(plan, local, 0);
+  return plan;
 }
 
 }  // namespace
 
 Part distribute(MPI_Comm comm, const Model& model) {
+  const int rank = base::rank(comm), ranks = base::size(comm);
   ColumnGraph graph;
   base::on_first_rank(comm, [&] { graph = column_graph(model); });
   const std::vector<int> column_owner = partition(comm, graph);
+  std::optional<Plan> plan;  // on rank 0
+  std::optional<LocalNumbers> local;
+  base::on_first_rank(comm, [&] {
+    plan.emplace(make_plan(model, std::exchange(graph, {}), column_owner, ranks));
+    local.emplace(static_cast<int64_t>(plan->owner.size()));
+  });
   Part part;
-  base::together(comm, [&] {
-    if (base::rank(comm) == 0) {
-      Plan plan{model, {}, {}, {}, {}, {}, {}, {}, {}};
-      try {
-        part = share_out(comm, plan, graph, column_owner);
-      } catch (...) {
-        for (int r = 1; r < base::size(comm); ++r) send(comm, r, {});
-        throw;
-      }
-    } else {
-      const std::vector<char> bytes = receive(comm, 0);
-      if (bytes.empty()) return;
-      Unpacker unpacker(bytes);
-      pass(unpacker, part);
+  for (int r = ranks - 1; r >= 0; --r) {
+    base::on_first_rank(comm, [&] { part = make_part(*plan, *local, r); });
+    if (r == 0) break;
+    if (rank == 0) {
+      Sender to(comm, r);
+      pass(to, part);
+      part = {};
+    } else if (rank == r) {
+      Receiver from(comm, 0);
+      pass(from, part);
       part.model.bones.resize(part.model.bone_transform.size());  // as many, without their names
     }
-  });
+  }
   return part;
 }
 

@@ -15,20 +15,41 @@ namespace {
 
 using base::check;
 
-std::vector<std::array<int64_t, 2>> column_pairs(const model::Model& model,
-                                                 const std::vector<int64_t>& column) {
-  std::vector<std::array<int64_t, 2>> pairs;
-  const auto link = [&](int64_t p, int64_t q) {
+/// Calls link(c, d) for every two columns that an element joins, both ways, as often as elements
+/// join them.
+template <class Link>
+void for_each_link(const model::Model& model, const std::vector<int64_t>& column, Link&& link) {
+  const auto join = [&](int64_t p, int64_t q) {
     if (column[p] == column[q]) return;
-    pairs.push_back({column[p], column[q]});
-    pairs.push_back({column[q], column[p]});
+    link(column[p], column[q]);
+    link(column[q], column[p]);
   };
-  for (const auto& [p, q] : model.springs.points) link(p, q);
+  for (const auto& [p, q] : model.springs.points) join(p, q);
   for (const auto& corners : model.prisms.points)
-    for (int c = 1; c < 6; ++c) link(corners[0], corners[c]);
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  return pairs;
+    for (int c = 1; c < 6; ++c) join(corners[0], corners[c]);
+}
+
+/// Fills in the graph's edges, each once, by columns: of a fine model there are many times more
+/// links than edges.
+void add_edges(const model::Model& model, ColumnGraph& graph) {
+  std::vector<int64_t>&begin = graph.row_begin, &neighbour = graph.neighbour;
+  for_each_link(model, graph.column_of_point, [&](int64_t c, int64_t) { ++begin[c + 1]; });
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<int64_t> end(begin.begin(), begin.end() - 1);
+  neighbour.resize(begin.back());
+  for_each_link(model, graph.column_of_point,
+                [&](int64_t c, int64_t d) { neighbour[end[c]++] = d; });
+  auto kept = neighbour.begin();
+  for (size_t c = 0; c < end.size(); ++c) {
+    const auto first = neighbour.begin() + begin[c], last = neighbour.begin() + end[c];
+    std::sort(first, last);
+    begin[c] = kept - neighbour.begin();
+    for (auto next = first; next != last; ++next)
+      if (next == first || *next != kept[-1]) *kept++ = *next;
+  }
+  begin.back() = kept - neighbour.begin();
+  neighbour.erase(kept, neighbour.end());
+  neighbour.shrink_to_fit();
 }
 
 /// A copy in PETSc's own memory, which PETSc frees.
@@ -106,6 +127,7 @@ std::vector<int64_t> memory_order(const ColumnGraph& graph) {
 ColumnGraph column_graph(const model::Model& model) {
   ColumnGraph graph;
   std::unordered_map<int64_t, int64_t> number;
+  graph.column_of_point.reserve(model.points.column.size());
   for (int64_t name : model.points.column)
     graph.column_of_point.push_back(
         number.emplace(name, static_cast<int64_t>(number.size())).first->second);
@@ -114,11 +136,7 @@ ColumnGraph column_graph(const model::Model& model) {
     if (model.points.set[p] == model::PointSet::soft_tissue)
       ++graph.weight[graph.column_of_point[p]];
   graph.row_begin.assign(number.size() + 1, 0);
-  for (const auto& [from, to] : column_pairs(model, graph.column_of_point)) {
-    ++graph.row_begin[from + 1];
-    graph.neighbour.push_back(to);
-  }
-  std::partial_sum(graph.row_begin.begin(), graph.row_begin.end(), graph.row_begin.begin());
+  add_edges(model, graph);
   return graph;
 }
 

@@ -210,17 +210,11 @@ void collect(MPI_Comm comm, const Part& part, Model& whole) {
   std::vector<double> rest = part.model.springs.rest_length;
   rest.resize(row.size());
   if (base::rank(comm) > 0) {
-    Packer packer;
-    packer(row, rest);
-    send(comm, 0, packer.bytes());
+    Sender(comm, 0)(row, rest);
     return;
   }
   for (int sender = 0; sender < base::size(comm); ++sender) {
-    if (sender > 0) {
-      const std::vector<char> bytes = receive(comm, sender);
-      Unpacker unpacker(bytes);
-      unpacker(row, rest);
-    }
+    if (sender > 0) Receiver(comm, sender)(row, rest);
     for (size_t j = 0; j < row.size(); ++j) whole.springs.rest_length[row[j]] = rest[j];
   }
 }

@@ -23,17 +23,23 @@ class NaturalRows {
   void take(const std::vector<Vec3>& slab, const Positions& positions, Vec displacement) const;
 
  private:
-  struct Route {  // from owned rows to natural slabs, `block` numbers a row
-    int block = 1;
-    base::VecHandle owned, natural;
+  /// From owned rows to natural slabs, `block` numbers a row.
+  struct Route {
+    Route(MPI_Comm comm, std::span<const int64_t> rows, int64_t total, int block);
+    /// Scatters from one of the arrays to the other.
+    void carry(const double* owned_values, const double* natural_values, ScatterMode mode) const;
+    std::vector<double> bring(const std::vector<double>& values) const;
+
+    int64_t natural_size;            // numbers in this rank's slab
+    base::VecHandle owned, natural;  // layouts, without memory of their own
     base::ScatterHandle scatter;
   };
-  static Route make_route(MPI_Comm comm, const std::vector<int64_t>& rows, int64_t total,
-                          int block);
-  static std::vector<double> bring(const Route& route, const double* values);
+  void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
+  void add_prisms(Objective& objective, bool with_pressure, model::StepRows& rows) const;
 
+  MPI_Comm comm_;
   const Part& part_;
-  Route points_, springs_, prisms_;
+  Route points_;  // those of springs and prisms, many more, are made for each step
 };
 
 }  // namespace repose::solve

@@ -1,0 +1,152 @@
+/// What every stage of a large model's way costs, in time and memory: a synthetic head is built,
+/// written, read, shared out, evaluated, searched by 20 iterations of L-BFGS, and its step written.
+/// Nothing makes a matrix. Prints a line a stage: its name, seconds, bytes on the heap at its end,
+/// and most bytes in use during it, both of all ranks; large.py makes a table of it.
+///
+///     benchmark_large SKIN_VERTICES FILE
+///     mpirun -n 2 benchmark_large SKIN_VERTICES FILE
+#include <petsctao.h>
+
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include "repose/base/agreement.h"
+#include "repose/base/petsc.h"
+#include "repose/base/usage.h"
+#include "repose/model/build.h"
+#include "repose/results/model_file.h"
+#include "repose/results/result_file.h"
+#include "repose/solve/natural_rows.h"
+#include "repose/solve/objective.h"
+#include "repose/surface/phantom.h"
+
+namespace {
+
+using namespace repose;
+using base::check;
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
+
+/// Most bytes that were resident since the last restart() (Linux).
+double peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word)
+    if (word == "VmHWM:") break;
+  double kibibytes = 0;
+  status >> kibibytes;
+  return 1024 * kibibytes;
+}
+
+class Clock {
+ public:
+  Clock() { restart(); }
+  void end(const char* stage, int64_t goes = 1) {
+    double seconds = (base::cpu_seconds() - begin_) / static_cast<double>(goes);
+    double bytes[2] = {base::heap_bytes(), peak_bytes()};
+    MPI_Allreduce(MPI_IN_PLACE, &seconds, 1, MPI_DOUBLE, MPI_MAX, comm);
+    MPI_Allreduce(MPI_IN_PLACE, bytes, 2, MPI_DOUBLE, MPI_SUM, comm);
+    if (base::rank(comm) == 0)
+      std::printf("%s %.9f %.0f %.0f\n", stage, seconds, bytes[0], bytes[1]);
+    std::fflush(stdout);
+    restart();
+  }
+
+ private:
+  void restart() {
+    std::ofstream("/proc/self/clear_refs") << 5;  // the peak starts anew
+    begin_ = base::cpu_seconds();
+  }
+  double begin_ = 0;
+};
+
+/// The jaw goes forward by 6 mm.
+scene::Scene jaw_advance() {
+  scene::Scene scene;
+  scene.bones = {{"skull", {}}, {"mandible", {}}};
+  scene.tissue.layers = 4;
+  scene.moves = {scene::RigidMotion(), scene::RigidMotion::translation({0, -6, 0})};
+  return scene;
+}
+
+/// Writes the model of a head with so many skin vertices, on rank 0.
+void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
+  surface::Surface skin;
+  std::vector<surface::Surface> bones;
+  if (base::rank(comm) == 0) {
+    skin = surface::make_phantom_skin(skin_vertices);
+    bones = {surface::make_phantom_skull(bone_edge), surface::make_phantom_mandible(bone_edge)};
+  }
+  clock.end("surfaces");
+  model::Model model;
+  if (base::rank(comm) == 0) model = model::build_model(jaw_advance(), skin, bones).model;
+  clock.end("build");
+  results::ResultFile file(comm, name, model);
+  file.commit();
+  clock.end("write");
+}
+
+PetscErrorCode evaluate(Tao, Vec x, PetscReal* value, Vec gradient, void* objective) {
+  *value = static_cast<solve::Objective*>(objective)->evaluate(x, gradient);
+  return 0;
+}
+
+/// As many iterations of L-BFGS as a search makes before its memory has settled.
+void search(solve::Objective& objective, Vec displacement) {
+  base::Handle<Tao, TaoDestroy> tao;
+  check(TaoCreate(comm, tao.out()));
+  check(TaoSetType(tao, TAOLMVM));
+  check(TaoSetObjectiveAndGradient(tao, nullptr, evaluate, &objective));
+  check(TaoSetMaximumIterations(tao, 20));
+  check(TaoSetSolution(tao, displacement));
+  check(TaoSolve(tao));
+}
+
+void measure(int64_t skin_vertices, const std::string& name) {
+  Clock clock;
+  make_model(skin_vertices, name, clock);
+  model::Model model;
+  if (base::rank(comm) == 0) model = results::read_model(name + ".h5");
+  clock.end("read");
+  const model::Counts counts = model::count(model);
+  if (base::rank(comm) == 0)
+    std::printf("points %ld\nsprings %ld\n", static_cast<long>(counts.points),
+                static_cast<long>(counts.springs));
+  const solve::Part part = solve::distribute(comm, model);
+  solve::Positions positions(comm, part);
+  const solve::NaturalRows natural(comm, part);
+  clock.end("distribute");
+  const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty, 0.5};
+  solve::Objective objective(positions, weights);
+  const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
+  positions.set_load(0.1);
+  clock.end("objective");
+  const int64_t goes = 1 + 20000000 / std::max<int64_t>(part.total_springs, 1);
+  objective.evaluate(at, gradient);
+  for (int64_t go = 0; go < goes; ++go) objective.evaluate(at, gradient);
+  clock.end("evaluation", goes + 1);
+  search(objective, at);
+  clock.end("search");
+  results::ResultFile file(comm, name, model);
+  model::StepNumbers numbers;
+  numbers.functional = "energy";
+  numbers.volume = "penalty";
+  file.append(numbers, natural.rows(objective));
+  file.commit();
+  clock.end("result");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: benchmark_large SKIN_VERTICES FILE\n");
+    return 1;
+  }
+  const base::Session session(1, argv, nullptr);
+  measure(std::stoll(argv[1]), argv[2]);
+  return 0;
+}
