@@ -287,7 +287,8 @@ class Writer {
       numbers.discretisation_error = *discretisation_error_;
     file_.append(numbers, rows);
     last_numbers_ = numbers;
-    last_rows_ = rows;
+    last_rows_.position = rows.position;
+    last_rows_.pressure = rows.pressure;
     int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
     MPI_Bcast(&due, 1, MPI_INT, 0, comm);
     if (!due || !numbers.converged) return;
@@ -297,6 +298,7 @@ class Writer {
     last_ = MPI_Wtime();
   }
   void commit() { file_.commit(); }
+  bool makes_checkpoints() const { return interval_ > 0; }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
     const std::vector<Vec3> forces =
@@ -310,9 +312,18 @@ class Writer {
   std::optional<double> discretisation_error_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
-  model::StepRows last_rows_;
+  model::StepRows last_rows_;  // what reactions need of them
   double interval_, last_ = MPI_Wtime();
 };
+
+/// Finds the rest position of the job's model, which rank 0 lets go of where only the search needs
+/// it: of a large model it is a fifth of the memory.
+solve::Summary search(Job& job, const solve::Settings& settings, const solve::Start& start,
+                      base::Stages& stages, Writer& writer) {
+  if (writer.makes_checkpoints() || !job.held.empty())
+    return solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
+  return solve::find_repose(comm, std::move(job.model), settings, start, stages, std::ref(writer));
+}
 
 /// Path of the result without ending; never that of the input.
 std::string result_name(const base::Options& options, const std::filesystem::path& input) {
@@ -458,8 +469,7 @@ base::Exit run(const base::Options& options) {
   if (start.guess) stages.end("coarser models");
   Writer writer(name, job.model, coarser.discretisation_error,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
-  const solve::Summary summary =
-      solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
+  const solve::Summary summary = search(job, settings, start, stages, writer);
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));

@@ -52,6 +52,11 @@ class SpringSets {
 void add_springs(const SkinMesh& mesh, int64_t layers, Model& model) {
   SpringSets sets(model);
   const auto columns = static_cast<int64_t>(mesh.points.size());
+  const auto edges = static_cast<int64_t>(mesh.edges.size());
+  const int64_t rows = layers * edges + (layers - 1) * (columns + 2 * edges);
+  model.springs.points.reserve(rows);
+  model.springs.set.reserve(rows);
+  model.springs.rest_length.reserve(rows);
   for (int64_t a = 0; a < layers; ++a) {
     sets.open("layer", a);
     for (const auto& [c, d] : mesh.edges) sets.add(c * layers + a, d * layers + a);
@@ -67,13 +72,15 @@ void add_springs(const SkinMesh& mesh, int64_t layers, Model& model) {
       sets.add(d * layers + a, c * layers + a + 1);
     }
   }
-  const size_t rows = model.springs.points.size();
   model.springs.stiffness.assign(rows, 0);
   model.springs.exponent.assign(rows, 0);
   model.springs.reference.assign(rows, 1);
 }
 
 void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {
+  const size_t rows = (layers - 1) * mesh.triangles.size();
+  model.prisms.points.reserve(rows);
+  model.prisms.rest_volume.reserve(rows);
   for (int64_t a = 0; a + 1 < layers; ++a)
     for (const Triangle& t : mesh.triangles) {
       const int64_t i = t[0] * layers + a, j = t[2] * layers + a, k = t[1] * layers + a;

@@ -35,70 +35,81 @@ const double* numbers(std::span<const Vec3> points) {
 
 }  // namespace
 
-NaturalRows::Route::Route(MPI_Comm comm, std::span<const int64_t> rows, int64_t total, int block)
-    : natural_size(block * base::slab(total, base::rank(comm), base::size(comm)).rows()) {
-  const auto owned_rows = static_cast<PetscInt>(rows.size());
-  check(VecCreateMPIWithArray(comm, 1, block * owned_rows, PETSC_DETERMINE, nullptr, owned.out()));
-  check(VecCreateMPIWithArray(comm, 1, static_cast<PetscInt>(natural_size), PETSC_DETERMINE,
-                              nullptr, natural.out()));
+void NaturalRows::carry_at_once(const Rows& rows, const double* owned_values,
+                                const double* natural_values, ScatterMode mode) const {
+  const auto count = static_cast<PetscInt>(rows.row.size());
+  const auto slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
+  const auto mine = static_cast<PetscInt>(slab.rows());
+  base::VecHandle owned, natural;
+  check(VecCreateMPIWithArray(comm_, 1, rows.block * count, PETSC_DETERMINE, owned_values,
+                              owned.out()));
+  check(VecCreateMPIWithArray(comm_, 1, rows.block * mine, PETSC_DETERMINE, natural_values,
+                              natural.out()));
   PetscInt first = 0;
   check(VecGetOwnershipRange(owned, &first, nullptr));
-  const std::vector<PetscInt> targets(rows.begin(), rows.end());
+  const std::vector<PetscInt> targets(rows.row.begin(), rows.row.end());
   base::IndexSetHandle from, to;
-  check(ISCreateStride(comm, block * owned_rows, first, 1, from.out()));
-  check(ISCreateBlock(comm, block, owned_rows, targets.data(), PETSC_COPY_VALUES, to.out()));
+  check(ISCreateStride(comm_, rows.block * count, first, 1, from.out()));
+  check(ISCreateBlock(comm_, rows.block, count, targets.data(), PETSC_COPY_VALUES, to.out()));
+  base::ScatterHandle scatter;
   check(VecScatterCreate(owned, from, natural, to, scatter.out()));
-}
-
-void NaturalRows::Route::carry(const double* owned_values, const double* natural_values,
-                               ScatterMode mode) const {
   const bool forward = mode == SCATTER_FORWARD;
-  check(VecPlaceArray(owned, owned_values));
-  check(VecPlaceArray(natural, natural_values));
-  const Vec from = forward ? owned : natural, to = forward ? natural : owned;
-  check(VecScatterBegin(scatter, from, to, INSERT_VALUES, mode));
-  check(VecScatterEnd(scatter, from, to, INSERT_VALUES, mode));
-  check(VecResetArray(owned));
-  check(VecResetArray(natural));
+  const Vec source = forward ? owned : natural, target = forward ? natural : owned;
+  check(VecScatterBegin(scatter, source, target, INSERT_VALUES, mode));
+  check(VecScatterEnd(scatter, source, target, INSERT_VALUES, mode));
 }
 
-std::vector<double> NaturalRows::Route::bring(const std::vector<double>& values) const {
-  std::vector<double> rows(natural_size);
-  carry(values.data(), rows.data(), SCATTER_FORWARD);
-  return rows;
+void NaturalRows::carry(const Rows& rows, const double* owned, const double* natural,
+                        ScatterMode mode) const {
+  constexpr int64_t most = 1 << 20;
+  const auto size = static_cast<int64_t>(rows.row.size());
+  int64_t longest = 0;
+  MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
+  for (int64_t begin = 0; begin < longest; begin += most) {
+    const int64_t first = std::min(begin, size), count = std::min(most, size - first);
+    carry_at_once({rows.row.subspan(first, count), rows.total, rows.block},
+                  owned + first * rows.block, natural, mode);
+  }
 }
 
 NaturalRows::NaturalRows(MPI_Comm comm, const Part& part)
     : comm_(comm),
       part_(part),
-      points_(comm, std::span(part.point_row).first(part.owned_points), part.total_points, 3) {}
+      points_{std::span(part.point_row).first(part.owned_points), part.total_points, 3},
+      springs_{part.spring_row, part.total_springs, 1},
+      prisms_{part.prism_row, part.total_prisms, 1} {}
+
+std::vector<double> NaturalRows::bring(const Rows& rows, const std::vector<double>& owned) const {
+  const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
+  std::vector<double> natural(slab.rows());
+  carry(rows, owned.data(), natural.data(), SCATTER_FORWARD);
+  return natural;
+}
 
 void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Springs& springs = part_.model.springs;
-  const Route route(comm_, part_.spring_row, part_.total_springs, 1);
   std::vector<double> values(part_.owned_springs);
   for (int64_t e = 0; e < part_.owned_springs; ++e) {
     const auto& [p, q] = springs.points[e];
     values[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
   }
-  rows.elongation = route.bring(values);
+  rows.elongation = bring(springs_, values);
   for (int64_t e = 0; e < part_.owned_springs; ++e) values[e] = tension(springs, e, values[e]);
-  rows.tension = route.bring(values);
+  rows.tension = bring(springs_, values);
 }
 
 void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
                              model::StepRows& rows) const {
   const auto position = objective.positions().local();
   const model::Prisms& prisms = part_.model.prisms;
-  const Route route(comm_, part_.prism_row, part_.total_prisms, 1);
   std::vector<double> ratio(part_.owned_prisms);
   for (int64_t e = 0; e < part_.owned_prisms; ++e) {
     std::array<Vec3, 6> corners;
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
-  rows.volume_ratio = route.bring(ratio);
-  if (with_pressure) rows.pressure = route.bring(owned_pressures(objective));
+  rows.volume_ratio = bring(prisms_, ratio);
+  if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective));
 }
 
 model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
@@ -112,14 +123,15 @@ model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) cons
 }
 
 std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
-  std::vector<Vec3> rows(points_.natural_size / 3);
-  points_.carry(numbers(values), numbers(rows), SCATTER_FORWARD);
+  const base::Slab slab = base::slab(points_.total, base::rank(comm_), base::size(comm_));
+  std::vector<Vec3> rows(slab.rows());
+  carry(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
   return rows;
 }
 
 std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
   std::vector<Vec3> rows(part_.owned_points);
-  points_.carry(numbers(rows), numbers(slab), SCATTER_REVERSE);
+  carry(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
   return rows;
 }
 

@@ -131,12 +131,10 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
   numbers.inverted_prisms = totals.inverted;
 }
 
-Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
-                    const Start& start, base::Stages& stages, const Receiver& receive) {
-  if (const std::optional<Summary> summary =
-          find_in_region(comm, model, settings, start, stages, receive))
-    return *summary;
-  const Part part = distribute(comm, model);
+namespace {
+
+Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
+                      base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   Positions positions(comm, part);
@@ -179,6 +177,24 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   summary.assemblies = searcher.assemblies();
   stages.end("solve");
   return summary;
+}
+
+}  // namespace
+
+Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
+                    const Start& start, base::Stages& stages, const Receiver& receive) {
+  if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
+    return *summary;
+  return find_in_whole(comm, distribute(comm, model), settings, start, stages, receive);
+}
+
+Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
+                    const Start& start, base::Stages& stages, const Receiver& receive) {
+  if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
+    return *summary;
+  const Part part = distribute(comm, model);
+  model = {};
+  return find_in_whole(comm, part, settings, start, stages, receive);
 }
 
 }  // namespace repose::solve

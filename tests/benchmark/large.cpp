@@ -94,15 +94,18 @@ PetscErrorCode evaluate(Tao, Vec x, PetscReal* value, Vec gradient, void* object
   return 0;
 }
 
-/// As many iterations of L-BFGS as a search makes before its memory has settled.
-void search(solve::Objective& objective, Vec displacement) {
-  base::Handle<Tao, TaoDestroy> tao;
+using TaoHandle = base::Handle<Tao, TaoDestroy>;
+
+/// Some iterations of L-BFGS; what it holds is there as long as the handle.
+TaoHandle search(solve::Objective& objective, Vec displacement) {
+  TaoHandle tao;
   check(TaoCreate(comm, tao.out()));
   check(TaoSetType(tao, TAOLMVM));
   check(TaoSetObjectiveAndGradient(tao, nullptr, evaluate, &objective));
   check(TaoSetMaximumIterations(tao, 20));
   check(TaoSetSolution(tao, displacement));
   check(TaoSolve(tao));
+  return tao;
 }
 
 void measure(int64_t skin_vertices, const std::string& name) {
@@ -115,7 +118,10 @@ void measure(int64_t skin_vertices, const std::string& name) {
   if (base::rank(comm) == 0)
     std::printf("points %ld\nsprings %ld\n", static_cast<long>(counts.points),
                 static_cast<long>(counts.springs));
+  results::ResultFile file(comm, name, model);
+  clock.end("open");
   const solve::Part part = solve::distribute(comm, model);
+  model = {};
   solve::Positions positions(comm, part);
   const solve::NaturalRows natural(comm, part);
   clock.end("distribute");
@@ -128,9 +134,8 @@ void measure(int64_t skin_vertices, const std::string& name) {
   objective.evaluate(at, gradient);
   for (int64_t go = 0; go < goes; ++go) objective.evaluate(at, gradient);
   clock.end("evaluation", goes + 1);
-  search(objective, at);
+  const TaoHandle tao = search(objective, at);
   clock.end("search");
-  results::ResultFile file(comm, name, model);
   model::StepNumbers numbers;
   numbers.functional = "energy";
   numbers.volume = "penalty";

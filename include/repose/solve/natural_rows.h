@@ -23,23 +23,23 @@ class NaturalRows {
   void take(const std::vector<Vec3>& slab, const Positions& positions, Vec displacement) const;
 
  private:
-  /// From owned rows to natural slabs, `block` numbers a row.
-  struct Route {
-    Route(MPI_Comm comm, std::span<const int64_t> rows, int64_t total, int block);
-    /// Scatters from one of the arrays to the other.
-    void carry(const double* owned_values, const double* natural_values, ScatterMode mode) const;
-    std::vector<double> bring(const std::vector<double>& values) const;
-
-    int64_t natural_size;            // numbers in this rank's slab
-    base::VecHandle owned, natural;  // layouts, without memory of their own
-    base::ScatterHandle scatter;
+  struct Rows {
+    std::span<const int64_t> row;  // natural rows of what this rank owns
+    int64_t total;
+    int block;  // numbers a row
   };
+  /// Copies from the owned values to this rank's slab, or the other way. Some rows at a time: a
+  /// scatter takes several times the memory of what it carries.
+  void carry(const Rows& rows, const double* owned, const double* natural, ScatterMode mode) const;
+  void carry_at_once(const Rows& rows, const double* owned, const double* natural,
+                     ScatterMode mode) const;
+  std::vector<double> bring(const Rows& rows, const std::vector<double>& owned) const;
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_prisms(Objective& objective, bool with_pressure, model::StepRows& rows) const;
 
   MPI_Comm comm_;
   const Part& part_;
-  Route points_;  // those of springs and prisms, many more, are made for each step
+  Rows points_, springs_, prisms_;
 };
 
 }  // namespace repose::solve

@@ -69,5 +69,8 @@ struct Start {
 /// the search is left to find_in_region (solve/active_search.h) where that takes it. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive);
+/// The same for a model that nobody needs any more: its memory is free once it is shared out.
+Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
+                    const Start& start, base::Stages& stages, const Receiver& receive);
 
 }  // namespace repose::solve
