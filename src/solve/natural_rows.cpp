@@ -61,20 +61,20 @@ void NaturalRows::carry_at_once(const Rows& rows, const double* owned_values,
 
 void NaturalRows::carry(const Rows& rows, const double* owned, const double* natural,
                         ScatterMode mode) const {
-  constexpr int64_t most = 1 << 20;
   const auto size = static_cast<int64_t>(rows.row.size());
   int64_t longest = 0;
   MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
-  for (int64_t begin = 0; begin < longest; begin += most) {
-    const int64_t first = std::min(begin, size), count = std::min(most, size - first);
+  for (int64_t begin = 0; begin < longest; begin += at_once_) {
+    const int64_t first = std::min(begin, size), count = std::min(at_once_, size - first);
     carry_at_once({rows.row.subspan(first, count), rows.total, rows.block},
                   owned + first * rows.block, natural, mode);
   }
 }
 
-NaturalRows::NaturalRows(MPI_Comm comm, const Part& part)
+NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
     : comm_(comm),
       part_(part),
+      at_once_(at_once),
       points_{std::span(part.point_row).first(part.owned_points), part.total_points, 3},
       springs_{part.spring_row, part.total_springs, 1},
       prisms_{part.prism_row, part.total_prisms, 1} {}

@@ -10,7 +10,8 @@ namespace repose::solve {
 /// collective.
 class NaturalRows {
  public:
-  NaturalRows(MPI_Comm comm, const Part& part);
+  /// Carries so many rows at once: a scatter takes several times the memory of what it carries.
+  NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
 
   /// The arrays of a step at the objective's last update.
   model::StepRows rows(Objective& objective, bool with_pressure = false) const;
@@ -28,8 +29,7 @@ class NaturalRows {
     int64_t total;
     int block;  // numbers a row
   };
-  /// Copies from the owned values to this rank's slab, or the other way. Some rows at a time: a
-  /// scatter takes several times the memory of what it carries.
+  /// Copies from the owned values to this rank's slab, or the other way.
   void carry(const Rows& rows, const double* owned, const double* natural, ScatterMode mode) const;
   void carry_at_once(const Rows& rows, const double* owned, const double* natural,
                      ScatterMode mode) const;
@@ -39,6 +39,7 @@ class NaturalRows {
 
   MPI_Comm comm_;
   const Part& part_;
+  int64_t at_once_;
   Rows points_, springs_, prisms_;
 };
 

@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""What each stage of a large model's way costs, in time and memory: two tables.
+
+    tests/benchmark/large.py [-bin build/bin] [-sizes 477,2500,25000,250000,750000] [-ranks 1]
+                             [-output docs/growth.md] [-mark large]
+
+Synthetic heads of the given numbers of skin vertices, four layers, penalty volume term, the jaw 6 mm
+forward: benchmark_large builds, writes, reads and shares out the model of each, evaluates it,
+makes 20 iterations of L-BFGS and writes a step. The table of memory goes below the mark "MARK memory".
+Needs: cmake --preset release -DREPOSE_BENCHMARKS=ON
+"""
+
+import argparse
+import pathlib
+import subprocess
+import tempfile
+
+from page import PROJECT, print_table
+
+STAGES = ("build", "write", "read", "distribute", "objective", "search", "result")
+TIME = ("| points | springs | " + ", µs/point | ".join(STAGES) + ", µs/point | evaluation, ns/spring |\n"
+        + "|--:" * (3 + len(STAGES)) + "|")
+MEMORY = ("| points | " + ", B/spring | ".join(STAGES) + ", B/spring | most on rank 0, B/spring |\n"
+          + "|--:" * (2 + len(STAGES)) + "|")
+
+
+def measure(program, size, ranks):
+    """Of one size the numbers of each line that the program prints, by its first word."""
+    launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run([*launcher, program, size, "model"], cwd=folder, check=True,
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    return {line.split()[0]: [float(number) for number in line.split()[1:]]
+            for line in done.stdout.splitlines()}
+
+
+def row_of_time(found):
+    points, springs = found["counts"]
+    stages = " | ".join(f"{1e6 * found[stage][0] / points:.2f}" for stage in STAGES)
+    evaluation = 1e9 * found["evaluation"][0] / springs
+    return f"| {points:.0f} | {springs:.0f} | {stages} | {evaluation:.1f} |"
+
+
+def row_of_memory(found):
+    points, springs = found["counts"]
+    stages = " | ".join(f"{found[stage][1] / springs:.0f}" for stage in STAGES)
+    first = max(found[stage][2] for stage in STAGES) / springs
+    return f"| {points:.0f} | {stages} | {first:.0f} |"
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="large.py", description=__doc__, add_help=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-help", action="help")
+    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
+    parser.add_argument("-sizes", default="477,2500,25000,250000,750000")
+    parser.add_argument("-ranks", type=int, default=1)
+    parser.add_argument("-output", type=pathlib.Path)
+    parser.add_argument("-mark", default="large")
+    return parser.parse_args()
+
+
+def main():
+    chosen = arguments()
+    program = chosen.bin.resolve() / "benchmark_large"
+    found = [measure(program, size, chosen.ranks) for size in chosen.sizes.split(",")]
+    print_table(TIME, map(row_of_time, found), chosen.output, chosen.mark)
+    print_table(MEMORY, map(row_of_memory, found), chosen.output, f"{chosen.mark} memory")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "../../layered_patch.h"
+#include "repose/base/deal_out.h"
+#include "repose/solve/natural_rows.h"
+#include "repose/solve/partition.h"
+#include "rest.h"
+
+namespace repose {
+namespace {
+
+using test::layered_patch;
+
+/// On rank 0 a patch of 20 columns, whose springs are out of order.
+model::Model patch() {
+  model::Model m = layered_patch({.columns_x = 5, .columns_y = 4});
+  std::swap(m.springs.points.front(), m.springs.points.back());
+  std::swap(m.springs.rest_length.front(), m.springs.rest_length.back());
+  std::swap(m.springs.reference.front(), m.springs.reference.back());
+  return m;
+}
+
+TEST(Sharing, ColumnsAreNeighboursWhereAnElementJoinsThem) {
+  const model::Model m = patch();
+  std::set<std::array<int64_t, 2>> joined;
+  const auto join = [&](const auto& points) {
+    for (const int64_t p : points)
+      for (const int64_t q : points)
+        if (p / 3 != q / 3) joined.insert({p / 3, q / 3});
+  };
+  for (const auto& points : m.springs.points) join(points);
+  for (const auto& points : m.prisms.points) join(points);
+  const solve::ColumnGraph graph = solve::column_graph(m);
+  std::vector<std::array<int64_t, 2>> found;
+  for (int64_t c = 0; c < graph.columns(); ++c)
+    for (int64_t k = graph.row_begin[c]; k < graph.row_begin[c + 1]; ++k)
+      found.push_back({c, graph.neighbour[k]});
+  EXPECT_EQ(found, std::vector(joined.begin(), joined.end()));
+  EXPECT_EQ(graph.neighbour.size(), joined.size());
+}
+
+TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
+  const model::Model m = patch();
+  std::vector<Vec3> moved = m.points.position;
+  for (size_t i = 0; i < moved.size(); ++i) moved[i].z() += 1e-3 * static_cast<double>(i);
+  const solve::Part part = solve::distribute(MPI_COMM_WORLD, m);
+  solve::Positions positions(MPI_COMM_WORLD, part);
+  solve::Objective objective(positions, {});
+  const base::VecHandle displacement = positions.make_vector();
+  for (const int64_t at_once : {7, 1000000}) {
+    const solve::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
+    natural.take(base::deal_out(MPI_COMM_WORLD, moved), positions, displacement);
+    positions.update(displacement);
+    const model::StepRows rows = natural.rows(objective);
+    const std::vector<Vec3> position = testing::gather(rows.position);
+    const std::vector<double> elongation = testing::gather(rows.elongation);
+    for (size_t i = 0; i < position.size(); ++i)
+      EXPECT_EQ(position[i],
+                m.points.set[i] == model::PointSet::soft_tissue ? moved[i] : m.points.position[i])
+          << i;
+    for (size_t j = 0; j < elongation.size(); ++j) {
+      const auto [p, q] = m.springs.points[j];
+      EXPECT_NEAR(elongation[j], (position[q] - position[p]).norm() - m.springs.rest_length[j],
+                  1e-14)
+          << j;
+    }
+  }
+}
+
+TEST(Sharing, AModelGivenAwayIsSolvedAndLetGoOf) {
+  model::Model m = patch();
+  for (size_t i = 0; i < m.points.target.size(); ++i)
+    if (m.points.set[i] == model::PointSet::bone) m.points.target[i].x() += 0.1;
+  solve::Settings settings;
+  settings.path.accuracy = 1e-6;
+  const testing::Rest kept = testing::find_rest(m, settings);
+  base::Stages stages(MPI_COMM_WORLD);
+  std::vector<Vec3> position;
+  solve::find_repose(MPI_COMM_WORLD, std::move(m), settings, {}, stages,
+                     [&](const model::StepNumbers&, const model::StepRows& slabs) {
+                       position = testing::gather(slabs.position);
+                     });
+  EXPECT_EQ(position, kept.rows.position);
+  EXPECT_TRUE(m.springs.points.empty());
+}
+
+}  // namespace
+}  // namespace repose
