@@ -207,10 +207,23 @@ Plan make_plan(const Model& model, const ColumnGraph& graph, const std::vector<i
   return plan;
 }
 
+/// Rank 0 parts with `part`, which a rank takes over; the others do nothing.
+void hand_over(MPI_Comm comm, int to, Part& part) {
+  if (base::rank(comm) == 0) {
+    Sender sender(comm, to);
+    pass(sender, part);
+    part = {};
+  } else if (base::rank(comm) == to) {
+    Receiver receiver(comm, 0);
+    pass(receiver, part);
+    part.model.bones.resize(part.model.bone_transform.size());  // as many, without their names
+  }
+}
+
 }  // namespace
 
 Part distribute(MPI_Comm comm, const Model& model) {
-  const int rank = base::rank(comm), ranks = base::size(comm);
+  const int ranks = base::size(comm);
   ColumnGraph graph;
   base::on_first_rank(comm, [&] { graph = column_graph(model); });
   const std::vector<int> column_owner = partition(comm, graph);
@@ -224,15 +237,7 @@ Part distribute(MPI_Comm comm, const Model& model) {
   for (int r = ranks - 1; r >= 0; --r) {
     base::on_first_rank(comm, [&] { part = make_part(*plan, *local, r); });
     if (r == 0) break;
-    if (rank == 0) {
-      Sender to(comm, r);
-      pass(to, part);
-      part = {};
-    } else if (rank == r) {
-      Receiver from(comm, 0);
-      pass(from, part);
-      part.model.bones.resize(part.model.bone_transform.size());  // as many, without their names
-    }
+    base::together(comm, [&] { hand_over(comm, r, part); });
   }
   return part;
 }
