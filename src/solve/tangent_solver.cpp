@@ -19,7 +19,7 @@ void choose_factors(PC pc) {
 }
 
 double price_of_renewal() {
-  PetscReal price = 20;  // a new multigrid costs about as much as 20 iterations with it
+  PetscReal price = 10;  // a new multigrid costs about as much as 10 iterations with it
   check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
   return price;
 }
@@ -46,6 +46,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
   choose_preconditioner();
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
+  check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
 }
 
 void TangentSolver::choose_preconditioner() {

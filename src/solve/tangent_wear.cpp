@@ -31,7 +31,7 @@ void Wear::take(KSP krylov) {
   const PetscReal* norm = nullptr;
   PetscInt norms = 0;
   check(KSPGetResidualHistory(krylov, &norm, &norms));
-  if (norms < 2 || !(norm[norms - 1] > 0)) return;
+  if (norms < 2 || !(norm[norms - 1] > 0) || cut) return;
   const double folds = std::max(0.0, std::log(norm[0] / norm[norms - 1]));
   if (folds == 0 && !failed) return;
   const auto iterations = static_cast<double>(norms - 1);
