@@ -53,8 +53,8 @@ def test_fewer_unknowns(run):
 def test_same_on_any_number_of_ranks(solved):
     options = [CHIN, *SOLVE, "-accuracy", "0.01", "-active_region", "on"]
     one, three = last(solved(*options)), last(solved(*options, ranks=3))
-    assert apart(one, three) < 1e-6
-    assert one["objective"] == pytest.approx(three["objective"], rel=1e-9)
+    assert apart(one, three) <= one["displacement_error"] + three["displacement_error"]
+    assert one["objective"] == pytest.approx(three["objective"], rel=1e-6)
     assert ((one["point/displacement"] == 0) == (three["point/displacement"] == 0)).all()
 
 

@@ -14,8 +14,9 @@ forces:
 
 
 def check_same(one, many):
-    """Models equal in every byte but for rest lengths, which a solve over the ranks balances: they,
-    and the steps, equal to rounding."""
+    """Models equal in every byte but for rest lengths, which a solve over the ranks balances; rest
+    positions as near as both are to the one rest position (1e-9 mm), so that the objective, which is
+    stationary there, is equal to rounding."""
     model, other = model_of(one), model_of(many)
     assert model.keys() == other.keys()
     different = [name for name in model if model[name].tobytes() != other[name].tobytes()]
@@ -24,9 +25,10 @@ def check_same(one, many):
     assert len(steps(one)) == len(steps(many))
     rounding = 1e-12 * abs(last(one)["objective"])
     for here, there in zip(steps(one), steps(many)):
-        assert apart(here, there) < 1e-6
-        for name in ("objective", "f_e", "f_v", "penalty", "potential"):
-            assert here[name] == pytest.approx(there[name], rel=1e-12, abs=rounding)
+        assert apart(here, there) < 1e-8
+        assert here["objective"] == pytest.approx(there["objective"], rel=1e-12)
+        for name in ("f_e", "f_v", "penalty", "potential"):
+            assert here[name] == pytest.approx(there[name], rel=1e-10, abs=rounding)
         for name in ("load", "volume", "lambda", "bulk_modulus", "inverted_prisms", "converged"):
             assert here[name] == there[name]
         for name, scale in (("spring/tension", "spring/tension"), ("spring/elongation",) * 2,
@@ -38,12 +40,12 @@ def check_same(one, many):
 
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_same_face_on_any_number_of_ranks(solved, ranks):
-    options = ["paper_jaw_advance.yaml", "-accuracy", "1e-6"]
+    options = ["paper_jaw_advance.yaml", "-accuracy", "1e-9"]
     check_same(solved(*options), solved(*options, ranks=ranks))
 
 
 def test_same_face_of_a_turned_jaw(solved):
-    options = ["paper_jaw_opening.yaml", "-accuracy", "1e-6"]
+    options = ["paper_jaw_opening.yaml", "-accuracy", "1e-9"]
     check_same(solved(*options), solved(*options, ranks=3))
 
 
@@ -54,6 +56,6 @@ def test_same_face_with_weight_turgor_and_forces(solved, tmp_path, volume):
     text = text.replace("  layers: 4", "  layers: 4\n  turgor: 0.03\n  mass: [.1, .1, .1, .1]", 1)
     scene = tmp_path / "loaded.yaml"
     scene.write_text(text + LOADED)
-    options = [scene, "-accuracy", "1e-6", "-volume", volume, "-lambda", "0.9"]
+    options = [scene, "-accuracy", "1e-9", "-volume", volume, "-lambda", "0.9"]
     check_same(solved(*options), solved(*options, ranks=3))
     assert last(solved(*options))["potential"] != 0
