@@ -97,7 +97,7 @@ double Contest::distance(Vec displacement) const {
 Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
   Referee referee(problem_.function(), goal, rules);
   Entry entry;
-  const int64_t assembled = problem_.assemblies(), factored = logged("MatCholFctrNum"),
+  const int64_t assembled = problem_.assemblies(), renewed = logged("PCRenew"),
                 acted = logged("MatMult"), applied = logged("PCApply");
   try {
     search(referee, displacement);
@@ -108,7 +108,7 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
   entry.seconds = referee.seconds();
   entry.evaluations = referee.evaluations();
   entry.assemblies = problem_.assemblies() - assembled;
-  entry.factorisations = logged("MatCholFctrNum") - factored;
+  entry.renewals = logged("PCRenew") - renewed;
   entry.actions = logged("MatMult") - acted;
   entry.applications = logged("PCApply") - applied;
   positions_.set_load(1);

@@ -24,6 +24,13 @@ double price_of_renewal() {
   return price;
 }
 
+/// Renewals in PETSc's log (-log_view).
+PetscLogEvent renewal_event() {
+  static PetscLogEvent event = -1;
+  if (event < 0) check(PetscLogEventRegister("PCRenew", PC_CLASSID, &event));
+  return event;
+}
+
 bool is_columns(PC pc) {
   PetscBool same = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), columns_type, &same));
@@ -60,6 +67,8 @@ void TangentSolver::choose_preconditioner() {
     return;
   }
   check(PCSetType(pc, columns_type));
+  check(PCSetApplicationContext(pc, this));
+  check(PCShellSetApply(pc, apply_columns));
 }
 
 Mat TangentSolver::preconditioner_matrix() {
@@ -109,10 +118,14 @@ bool TangentSolver::hopeless() const {
 
 void TangentSolver::renew_preconditioner() {
   const PC pc = preconditioner();
-  if (is_columns(pc))
+  check(PetscLogEventBegin(renewal_event(), pc, nullptr, nullptr, nullptr));
+  if (is_columns(pc)) {
     renew_columns();
-  else
+  } else {
     hessian_.renew();
+    check(PCSetUp(pc));
+  }
+  check(PetscLogEventEnd(renewal_event(), pc, nullptr, nullptr, nullptr));
   wear_.renew();
   made_at_ = hessian_.assemblies();
   ++renewals_;
@@ -133,8 +146,6 @@ void TangentSolver::renew_columns() {
     columns_->refill(blocks);
   } else {
     columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
-    check(PCSetApplicationContext(preconditioner(), this));
-    check(PCShellSetApply(preconditioner(), apply_columns));
   }
 }
 

@@ -315,7 +315,7 @@ def row(contest, method, entry):
         count += f" ({entry['evaluations'] - entry['values']} with gradient)"
     hessians = "–"
     if entry["assemblies"]:
-        hessians = ", ".join(str(entry[what]) for what in ("assemblies", "factorisations", "actions",
+        hessians = ", ".join(str(entry[what]) for what in ("assemblies", "renewals", "actions",
                                                            "applications"))
         if entry.get("coarse_assemblies"):
             hessians += f" and {entry['coarse_assemblies']} coarse"
@@ -326,17 +326,16 @@ def row(contest, method, entry):
 def table(contest):
     cost, unit = contest.costs, contest.costs["evaluation"]
     text = (f"## {contest.title}\n\n{contest.unknowns} unknowns. In evaluations of Repose's kernel, "
-            f"one assembly of the convex Hessian takes {cost['assembly'] / unit:.0f}, one\nfactorisation "
-            f"{cost['factorisation'] / unit:.0f}, one action with the factors' {cost['action'] / unit:.1f}")
+            f"one new preconditioner takes {cost['renewal'] / unit:.0f}, one\naction of the Hessian with one "
+            f"application of it {cost['action'] / unit:.1f}")
     if "numpy" in cost:
         text += f", one evaluation in NumPy {cost['numpy'] / unit:.0f}"
     own = contest.entries["default", 0]
-    spent = (own["factorisations"] * (cost["assembly"] + cost["factorisation"])
-             + own["actions"] * cost["action"])
+    spent = own["renewals"] * cost["renewal"] + own["actions"] * cost["action"]
     text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its linear systems "
              f"{'on this model ' * bool(own['coarse_evaluations'])}are about "
              f"{100 * spent / own['seconds']:.0f} %.\n\n"
-             "| method | evaluations | Hessians, factorisations, actions, applications | time | distance |\n"
+             "| method | evaluations | Hessians, preconditioners, actions, applications | time | distance |\n"
              "|---|--:|--:|--:|---|\n")
     for (method, _), entry in contest.entries.items():
         text += row(contest, method, entry)
@@ -381,7 +380,7 @@ def conclusion(contests):
     over = {what: [c.entries["polak_ribiere", 0][what] / c.entries["default", 0][what]
                    for c in contests.values() if ("polak_ribiere", 0) in c.entries]
             for what in ("evaluations", "seconds")}
-    factor = [c.costs["factorisation"] / c.costs["evaluation"] for c in contests.values()]
+    action = [c.costs["action"] / c.costs["evaluation"] for c in contests.values()]
     others = [entry for c in contests.values() for (method, _), entry in c.entries.items()
               if not method.startswith("default")]
     astray = sum(entry["end"] == "own_minimum" for entry in others)
@@ -389,8 +388,9 @@ def conclusion(contests):
         return ""
     return f"""
 The goals are counted with the first row of each table, evaluations on the smaller, coarser model left
-out. The paper's algorithm takes {spread(over['evaluations'])} times the evaluations of the default, and {spread(over['seconds'])} times its time: one factorisation takes as long
-as {spread(factor)} evaluations, so that few evaluations are not little time. {astray} of the other {len(others)} races, which
+out. The paper's algorithm takes {spread(over['evaluations'])} times the evaluations of the default, and {spread(over['seconds'])} times its time: an action of the Hessian
+with an application of the preconditioner takes as long as {spread(action)} evaluations, and there are many in each of
+Newton's steps, predictions and estimates. {astray} of the other {len(others)} races, which
 start with the bones in their places, came to another minimum than the load path's.
 """
 
@@ -414,8 +414,8 @@ model file, and is stopped at the first state it evaluates that is within {accur
 of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default and
 L-BFGS from the stiffness take load steps (and, where the skin is large enough, solve a coarser model
 first): their cost is in their figures. An evaluation is one of the value, or of the value with its gradient, which in Repose's kernel
-cost the same. Counted apart are the states at which a Hessian is taken, the factorisations of a
-convex one, the actions of the exact one and the applications of the factors; their time is in the times. Times are CPU times over that
+cost the same. Counted apart are the states at which a Hessian is taken, the
+preconditioners made, the actions of the Hessian and the applications of preconditioners; their time is in the times. Times are CPU times over that
 of the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up
 (reading, sharing out, index arrays) is in nobody's.
 

@@ -61,7 +61,7 @@ def measure(command, folder, method):
         unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
         work = next(line for line in done.stdout.splitlines() if "of the Hessian" in line)
         return (total | {"steps": len(steps) - 1, "hessians": int(work.split("gradient,")[1].split()[0]),
-                         "made": logged["PCSetUp"][0], "applied": logged["PCApply"][0],
+                         "made": logged["PCRenew"][0], "applied": logged["PCApply"][0],
                          "seconds": seconds, "memory": peak * 2**20 / unknowns, "unknowns": unknowns,
                          "converged": done.returncode == 0}, steps[-1]["point/position"][()])
 

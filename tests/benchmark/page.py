@@ -16,7 +16,7 @@ def events(log):
     found = {}
     for line in log.read_text(errors="replace").splitlines():
         words = line.split()
-        if len(words) > 10 and words[0] in ("PCSetUp", "PCApply"):
+        if len(words) > 10 and words[0] in ("PCRenew", "PCApply"):
             found[words[0]] = int(words[1]), float(words[3])
     return found
 

@@ -21,7 +21,7 @@ struct Entry {
   End end = End::limit;
   int64_t evaluations = 0;
   int64_t assemblies = 0;      ///< of the Hessian
-  int64_t factorisations = 0;  ///< Cholesky's, if PETSc's log is on (PetscLogDefaultBegin)
+  int64_t renewals = 0;  ///< of the preconditioner, if PETSc's log is on (PetscLogDefaultBegin)
   int64_t actions = 0;         ///< of the Hessian on a vector, likewise
   int64_t applications = 0;    ///< of preconditioners on a vector, likewise
   double seconds = 0;          ///< CPU
