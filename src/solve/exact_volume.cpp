@@ -32,7 +32,9 @@ ExactVolume::ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& 
       settled_target_(objective.prisms().target_volume),
       before_(objective.positions().make_vector()),
       gradient_(objective.positions().make_vector()),
-      correction_(objective.positions().make_vector()) {}
+      correction_(objective.positions().make_vector()) {
+  solver.give_way();
+}
 
 void ExactVolume::set_multipliers(const std::vector<double>& pressure, double weight) {
   mechanics::PrismLoop& prisms = objective_.prisms();

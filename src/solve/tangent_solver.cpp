@@ -18,8 +18,11 @@ void choose_factors(PC pc) {
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-double price_of_renewal() {
-  PetscReal price = 10;  // a new multigrid costs about as much as 10 iterations with it
+/// In iterations: what a new preconditioner costs as much as.
+constexpr double price_of_columns = 10, price_of_factors = 20;
+
+double price_of_renewal(double usual) {
+  PetscReal price = usual;
   check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
   return price;
 }
@@ -45,7 +48,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
       unknowns_(3 * positions.part().total_unknowns),
       work_(positions.make_vector()),
       measured_(positions.make_vector()),
-      wear_(price_of_renewal()) {
+      wear_(price_of_renewal(price_of_factors)) {
   check(KSPCreate(positions.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
@@ -53,6 +56,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
   choose_preconditioner();
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
+  if (is_columns(preconditioner())) wear_ = Wear(price_of_renewal(price_of_columns));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
 }
 
@@ -113,7 +117,8 @@ void TangentSolver::renew(Vec displacement) {
 }
 
 bool TangentSolver::hopeless() const {
-  return columns_ && wear_.new_rate() > slowest && unknowns_ <= factors_limit;
+  const bool slow = given_way_ || (columns_ && wear_.new_rate() > slowest);
+  return slow && !factors_ && unknowns_ <= factors_limit;
 }
 
 void TangentSolver::renew_preconditioner() {
@@ -137,6 +142,7 @@ void TangentSolver::renew_columns() {
     columns_.reset();
     check(PCCreate(positions_.comm(), factors_.out()));
     choose_factors(factors_);
+    wear_ = Wear(price_of_renewal(price_of_factors));
   }
   if (factors_) {
     hessian_.renew();

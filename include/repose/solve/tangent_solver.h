@@ -44,7 +44,8 @@ class TangentSolver {
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.
   double newton_distance(Vec displacement, Vec gradient);
 
-  /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none yet.
+  /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
+  /// yet.
   double glance(Vec gradient);
 
   /// H⁻¹ ∇Φ of the last newton_distance.
@@ -57,7 +58,9 @@ class TangentSolver {
   /// Makes the preconditioner anew, at the state of the Hessian's last assembly.
   void renew_preconditioner();
   bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
-  int64_t renewals() const { return renewals_; }           ///< of the preconditioner
+  /// Multigrid gives way to factors at the next renewal: tissue will be nearly incompressible.
+  void give_way() { given_way_ = true; }
+  int64_t renewals() const { return renewals_; }  ///< of the preconditioner
 
  private:
   static constexpr double slowest = 15;  // multigrid's iterations per e-fold before it is given up
@@ -73,6 +76,7 @@ class TangentSolver {
   int64_t unknowns_;  // scalar, of all ranks
   std::unique_ptr<ColumnMultigrid> columns_;
   PcHandle factors_;  // in the place of columns_
+  bool given_way_ = false;
   KspHandle krylov_;
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
   double distance_ = 0;              // its length, …
