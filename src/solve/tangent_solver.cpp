@@ -116,6 +116,8 @@ void TangentSolver::renew(Vec displacement) {
   renew_preconditioner();
 }
 
+void TangentSolver::give_way() { given_way_ = is_columns(preconditioner()); }
+
 bool TangentSolver::hopeless() const {
   const bool slow = given_way_ || (columns_ && wear_.new_rate() > slowest);
   return slow && !factors_ && unknowns_ <= factors_limit;

@@ -20,11 +20,11 @@ struct Entry {
   std::string method;
   End end = End::limit;
   int64_t evaluations = 0;
-  int64_t assemblies = 0;      ///< of the Hessian
-  int64_t renewals = 0;  ///< of the preconditioner, if PETSc's log is on (PetscLogDefaultBegin)
-  int64_t actions = 0;         ///< of the Hessian on a vector, likewise
-  int64_t applications = 0;    ///< of preconditioners on a vector, likewise
-  double seconds = 0;          ///< CPU
+  int64_t assemblies = 0;    ///< of the Hessian
+  int64_t renewals = 0;      ///< of the preconditioner, if PETSc's log is on (PetscLogDefaultBegin)
+  int64_t actions = 0;       ///< of the Hessian on a vector, likewise
+  int64_t applications = 0;  ///< of preconditioners on a vector, likewise
+  double seconds = 0;        ///< CPU
   double distance = 0;  ///< mm from the reference: closest state, own minimum or where it stopped
   double excess = 0;    ///< at its own minimum, (Φ − Φ_reference) / |Φ_reference|
   bool arrived() const { return end == End::reached || end == End::own_minimum; }

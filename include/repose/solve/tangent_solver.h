@@ -59,7 +59,7 @@ class TangentSolver {
   void renew_preconditioner();
   bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
   /// Multigrid gives way to factors at the next renewal: tissue will be nearly incompressible.
-  void give_way() { given_way_ = true; }
+  void give_way();
   int64_t renewals() const { return renewals_; }  ///< of the preconditioner
 
  private:
