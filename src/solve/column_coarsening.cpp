@@ -78,7 +78,7 @@ std::vector<Place> number_points(const ColumnLevel& fine, const std::vector<int3
 }
 
 /// How strongly a block draws two points together.
-float pull(const float* block) { return -(block[0] + block[4] + block[8]); }
+float pull(const Eigen::Matrix3f& block) { return -block.trace(); }
 
 }  // namespace
 
@@ -197,8 +197,7 @@ void Coarsening::transpose(int32_t own) {
   share_begin_.assign(own + 1, 0);
   const auto for_each_share = [&](auto&& visit) {
     for (int32_t i = 0; i < fine_own_; ++i)
-      for (int m = 0; m < most; ++m)
-        if (weights_[i].weight[m] != 0) visit(weights_[i].point[m], i, weights_[i].weight[m]);
+      weights_[i].visit([&](int32_t point, float weight) { visit(point, i, weight); });
   };
   for_each_share([&](int32_t point, int32_t, float) { ++share_begin_[point + 1]; });
   for (int32_t a = 0; a < own; ++a) share_begin_[a + 1] += share_begin_[a];
@@ -209,30 +208,20 @@ void Coarsening::transpose(int32_t own) {
   });
 }
 
-/// Calls visit(coarse column, weight, place of a fine block) for what adds up to a coarse row.
-template <class Visit>
-void Coarsening::for_each_product(const ColumnLevel& fine, int32_t row, Visit&& visit) const {
-  const BlockPattern& pattern = fine.pattern();
-  for (int64_t s = share_begin_[row]; s < share_begin_[row + 1]; ++s) {
-    const auto [i, weight] = share_[s];
-    for (int64_t k = pattern.begin[i]; k < pattern.begin[i + 1]; ++k) {
-      const Weights& other = weights_[pattern.column[k]];
-      for (int m = 0; m < most && other.weight[m] != 0; ++m)
-        visit(other.point[m], weight * other.weight[m], k);
-    }
-  }
-}
-
 BlockPattern Coarsening::find_pattern(const ColumnLevel& fine, int32_t own, int32_t ghosts) const {
   BlockPattern pattern;
   std::vector<int32_t> seen_in(own + ghosts, none), row;
   for (int32_t a = 0; a < own; ++a) {
     row.clear();
-    for_each_product(fine, a, [&](int32_t b, float, int64_t) {
-      if (seen_in[b] == a) return;
-      seen_in[b] = a;
-      row.push_back(b);
-    });
+    for (int64_t s = share_begin_[a]; s < share_begin_[a + 1]; ++s) {
+      const int32_t i = share_[s].fine;
+      for (int64_t k = fine.pattern().begin[i]; k < fine.pattern().begin[i + 1]; ++k)
+        weights_[fine.pattern().column[k]].visit([&](int32_t b, float) {
+          if (seen_in[b] == a) return;
+          seen_in[b] = a;
+          row.push_back(b);
+        });
+    }
     std::sort(row.begin(), row.end());
     pattern.column.insert(pattern.column.end(), row.begin(), row.end());
     pattern.begin.push_back(static_cast<int64_t>(pattern.column.size()));
@@ -241,18 +230,31 @@ BlockPattern Coarsening::find_pattern(const ColumnLevel& fine, int32_t own, int3
 }
 
 void Coarsening::refill(const ColumnLevel& fine) {
-  const BlockPattern& pattern = coarse_->pattern();
-  coarse_->clear();
-  std::vector<float*> place(coarse_->own() + coarse_->ghosts());
-  for (int32_t a = 0; a < coarse_->own(); ++a) {
-    for (int64_t k = pattern.begin[a]; k < pattern.begin[a + 1]; ++k)
-      place[pattern.column[k]] = coarse_->block(k);
-    for_each_product(fine, a, [&](int32_t b, float weight, int64_t k) {
-      const float* block = fine.block(k);
-      float* sum = place[b];
-      for (int n = 0; n < 9; ++n) sum[n] += weight * block[n];
+  UpperSums sums(*coarse_);
+  std::vector<int32_t> at(coarse_->own() + coarse_->ghosts(), none), point;
+  std::vector<Eigen::Matrix3f> row;  // of A P
+  for (int32_t i = 0; i < fine_own_; ++i) {
+    row.clear();
+    point.clear();
+    for (int64_t k = fine.pattern().begin[i]; k < fine.pattern().begin[i + 1]; ++k) {
+      const Eigen::Matrix3f block = fine.block(k);
+      weights_[fine.pattern().column[k]].visit([&](int32_t b, float weight) {
+        if (at[b] == none) {
+          at[b] = static_cast<int32_t>(point.size());
+          point.push_back(b);
+          row.push_back(weight * block);
+        } else {
+          row[at[b]] += weight * block;
+        }
+      });
+    }
+    weights_[i].visit([&](int32_t a, float weight) {
+      for (size_t k = 0; k < point.size(); ++k)
+        if (point[k] >= a) sums.add(a, point[k], weight * row[k]);
     });
+    for (const int32_t b : point) at[b] = none;
   }
+  coarse_->fill(sums);
 }
 
 void Coarsening::restrict_to(std::span<const Lanes> fine, std::span<Lanes> coarse) const {

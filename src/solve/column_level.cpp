@@ -2,7 +2,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cstring>
+
+#include "column_sweeps.h"
 
 namespace repose::solve {
 
@@ -10,17 +11,12 @@ using base::check;
 
 namespace {
 
-using Mat3f = Eigen::Matrix3f;
-
-/// Four numbers from anywhere, the last of which belongs to what follows and is not used.
-Lanes load(const float* numbers) {
-  Lanes lanes;
-  std::memcpy(&lanes, numbers, sizeof lanes);
-  return lanes;
-}
-
-Lanes times(const float* block, Lanes x) {
-  return load(block) * x[0] + load(block + 3) * x[1] + load(block + 6) * x[2];
+const Sweeps& sweeps_for(mechanics::Kernels kernels) {
+#ifdef __x86_64__
+  if (kernels == mechanics::Kernels::avx512) return avx512_sweeps;
+  if (kernels == mechanics::Kernels::avx2) return avx2_sweeps;
+#endif
+  return plain_sweeps;
 }
 
 }  // namespace
@@ -31,11 +27,12 @@ FloatsType::FloatsType(int count) {
 }
 
 ColumnLevel::ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
-                         BlockPattern pattern)
-    : place_(std::move(place)),
+                         BlockPattern pattern, mechanics::Kernels kernels)
+    : sweeps_(&sweeps_for(kernels)),
+      place_(std::move(place)),
       ghost_(std::move(ghost)),
       pattern_(std::move(pattern)),
-      value_(9 * pattern_.column.size() + 1),
+      block_(pattern_.column.size() + 1),
       damping_(place_.size()),
       inverse_(9 * place_.size() + 1) {
   find_columns();
@@ -60,6 +57,7 @@ void ColumnLevel::find_columns() {
       const auto first = std::lower_bound(begin, end, chain_[c]);
       left_.push_back(static_cast<int32_t>(first - begin));
       within_.push_back(static_cast<int32_t>(std::lower_bound(first, end, chain_[c + 1]) - first));
+      diagonal_.push_back(static_cast<int32_t>(std::lower_bound(first, end, i) - begin));
     }
 }
 
@@ -91,35 +89,26 @@ void ColumnLevel::share(const void* own_entries, void* ghost_entries, MPI_Dataty
   check(PetscSFBcastEnd(forest_, unit, own_entries, ghost_entries, MPI_REPLACE));
 }
 
-void ColumnLevel::clear() { std::fill(value_.begin(), value_.end(), 0.0f); }
-
-void ColumnLevel::add(int32_t row, int32_t column, const Mat3& block) {
-  const auto begin = pattern_.column.begin() + pattern_.begin[row];
-  const auto at =
-      std::lower_bound(begin, pattern_.column.begin() + pattern_.begin[row + 1], column);
-  float* entry = this->block(at - pattern_.column.begin());
-  for (int k = 0; k < 9; ++k) entry[k] += static_cast<float>(block.data()[k]);
-}
-
-void ColumnLevel::mirror() {
+void ColumnLevel::fill(const UpperSums& sums) {
   std::vector<int64_t> next(pattern_.begin.begin(), pattern_.begin.end() - 1);
-  for (int32_t row = 0; row < own(); ++row)
-    for (int64_t k = pattern_.begin[row]; k < pattern_.begin[row + 1]; ++k) {
-      const int32_t column = pattern_.column[k];
-      if (column <= row || column >= own()) continue;
-      Eigen::Map<Mat3f>(block(next[column]++)) = Eigen::Map<const Mat3f>(block(k)).transpose();
+  for (int32_t i = 0; i < own(); ++i) {
+    int64_t k = diagonal(i);
+    for (const Eigen::Matrix3f& sum : sums.row(i)) {
+      block_[k] = PackedBlock::of(sum);
+      const int32_t j = pattern_.column[k];
+      if (j > i && j < own()) block_[next[j]++] = block_[k].transposed();
+      ++k;
     }
+  }
 }
 
 void ColumnLevel::damp() {
-  constexpr float lift = 1e-4f;  // of the mean diagonal: above what single precision rounds off
+  constexpr float lift = 1e-4f;  // of the mean diagonal: above what packing rounds off
   for (int32_t i = 0; i < own(); ++i) {
-    float stiffness = 0, beyond = 0;
-    for (int64_t k = pattern_.begin[i]; k < pattern_.begin[i + 1]; ++k) {
-      const Eigen::Map<const Mat3f> entries(block(k));
-      if (pattern_.column[k] == i) stiffness = entries.trace() / 3;
-      if (pattern_.column[k] >= own()) beyond += entries.norm();
-    }
+    const float stiffness = block(diagonal(i)).trace() / 3;
+    float beyond = 0;
+    for (int64_t k = diagonal(i); k < pattern_.begin[i + 1]; ++k)
+      if (pattern_.column[k] >= own()) beyond += block(k).norm();
     damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
   }
 }
@@ -129,67 +118,55 @@ void ColumnLevel::factor() {
   for (size_t c = 0; c + 1 < chain_.size(); ++c) {
     Mat3 above = Mat3::Zero();  // inverse of what elimination left of the point above
     for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
-      const bool first = i == chain_[c];
-      const int64_t own_column = pattern_.begin[i] + left_[i];
-      Mat3 pivot = Eigen::Map<const Mat3f>(block(own_column + !first)).cast<double>();
-      if (!first) {
-        const Mat3 link = Eigen::Map<const Mat3f>(block(own_column)).cast<double>();
+      Mat3 pivot = block(diagonal(i)).cast<double>();
+      if (i > chain_[c]) {
+        const Mat3 link = block(diagonal(i) - 1).cast<double>();
         pivot -= link * above * link.transpose();
       }
       pivot += damping_[i] * Mat3::Identity();
       above = pivot.inverse();
       above = (0.5 * (above + above.transpose())).eval();
-      Eigen::Map<Mat3f>(inverse_.data() + 9 * i) = above.cast<float>();
+      Eigen::Map<Eigen::Matrix3f>(inverse_.data() + 9 * i) = above.cast<float>();
     }
   }
 }
 
-void ColumnLevel::solve_column(int32_t begin, int32_t end, std::span<Lanes> x) const {
-  for (int32_t i = begin; i < end; ++i) {
-    if (i > begin) x[i] -= times(block(pattern_.begin[i] + left_[i]), x[i - 1]);
-    x[i] = times(inverse_.data() + 9 * i, x[i]);
-  }
-  for (int32_t i = end - 2; i >= begin; --i) {
-    const int64_t below = pattern_.begin[i] + left_[i] + within_[i] - 1;
-    x[i] -= times(inverse_.data() + 9 * i, times(block(below), x[i + 1]));
-  }
+SweptLevel ColumnLevel::swept() const {
+  return {own(),
+          static_cast<int64_t>(chain_.size()) - 1,
+          chain_.data(),
+          pattern_.begin.data(),
+          pattern_.column.data(),
+          left_.data(),
+          within_.data(),
+          block_.data(),
+          damping_.data(),
+          inverse_.data()};
 }
 
 void ColumnLevel::forward(std::span<const Lanes> b, std::span<Lanes> x) const {
-  for (size_t c = 0; c + 1 < chain_.size(); ++c) {
-    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
-      Lanes sum = b[i];
-      const int64_t end = pattern_.begin[i] + left_[i];
-      for (int64_t k = pattern_.begin[i]; k < end; ++k)
-        sum -= times(block(k), x[pattern_.column[k]]);
-      x[i] = sum;
-    }
-    solve_column(chain_[c], chain_[c + 1], x);
-  }
+  sweeps_->forward(swept(), b.data(), x.data());
 }
 
 void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const {
-  for (int32_t i = 0; i < own(); ++i) {
-    Lanes sum = damping_[i] * x[i];
-    for (int64_t k = pattern_.begin[i] + left_[i] + within_[i]; k < pattern_.begin[i + 1]; ++k)
-      sum -= times(block(k), x[pattern_.column[k]]);
-    r[i] = sum;
-  }
+  sweeps_->residual_of_forward(swept(), x.data(), r.data());
 }
 
 void ColumnLevel::backward(std::span<const Lanes> b, std::span<Lanes> x) const {
-  for (size_t c = chain_.size() - 1; c-- > 0;) {
-    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
-      Lanes sum = b[i] + damping_[i] * x[i];
-      const int64_t column = pattern_.begin[i] + left_[i];
-      for (int64_t k = pattern_.begin[i]; k < column; ++k)
-        sum -= times(block(k), x[pattern_.column[k]]);
-      for (int64_t k = column + within_[i]; k < pattern_.begin[i + 1]; ++k)
-        sum -= times(block(k), x[pattern_.column[k]]);
-      x[i] = sum;
-    }
-    solve_column(chain_[c], chain_[c + 1], x);
-  }
+  sweeps_->backward(swept(), b.data(), x.data());
+}
+
+UpperSums::UpperSums(const ColumnLevel& level) : level_(level), begin_(level.own() + 1, 0) {
+  for (int32_t i = 0; i < level.own(); ++i)
+    begin_[i + 1] = begin_[i] + level.pattern().begin[i + 1] - level.diagonal(i);
+  sum_.assign(begin_.back(), Eigen::Matrix3f::Zero());
+}
+
+void UpperSums::add(int32_t row, int32_t column, const Eigen::Matrix3f& block) {
+  const auto first = level_.pattern().column.begin() + level_.diagonal(row),
+             end = level_.pattern().column.begin() + level_.pattern().begin[row + 1];
+  const auto at = row == column ? first : std::lower_bound(first, end, column);
+  sum_[begin_[row] + (at - first)] += block;
 }
 
 }  // namespace repose::solve

@@ -133,7 +133,7 @@ class ColumnMultigrid::Coarsest {
     for (int32_t i = 0; i < level_.own(); ++i)
       for (int64_t k = level_.pattern().begin[i]; k < level_.pattern().begin[i + 1]; ++k)
         matrix.block<3, 3>(3 * level_.global(i), 3 * level_.global(level_.pattern().column[k])) =
-            Eigen::Map<const Eigen::Matrix3f>(level_.block(k)).cast<double>();
+            level_.block(k).cast<double>();
     MPI_Allreduce(MPI_IN_PLACE, matrix.data(), static_cast<int>(n * n), MPI_DOUBLE, MPI_SUM, comm_);
     const double largest = n > 0 ? matrix.diagonal().maxCoeff() : 0.0;
     matrix.diagonal().array() += lift * (largest > 0 ? largest : 1.0);
@@ -197,17 +197,18 @@ void ColumnMultigrid::make_fine(const Part& part, const BlockSource& blocks) {
 }
 
 void ColumnMultigrid::fill_fine(const BlockSource& blocks) {
-  fine_->clear();
   const int32_t own = fine_->own();
+  const double unit = 1 / scale_;
+  UpperSums sums(*fine_);
   blocks([&](int32_t p, int32_t q, const Mat3& block) {
     const int32_t i = number_[p], j = number_[q];
     if (i < 0 || j < 0 || std::min(i, j) >= own) return;
     if (i <= j)
-      fine_->add(i, j, block / scale_);
+      sums.add(i, j, (unit * block).cast<float>());
     else
-      fine_->add(j, i, block.transpose() / scale_);
+      sums.add(j, i, (unit * block.transpose()).cast<float>());
   });
-  fine_->mirror();
+  fine_->fill(sums);
 }
 
 void ColumnMultigrid::factor() {

@@ -33,6 +33,12 @@ class Coarsening {
   struct Weights {
     std::array<int32_t, most> point;  // numbers of the coarse level; unused ones have weight 0
     std::array<float, most> weight;
+    /// Calls visit(point, weight) for those that are used.
+    template <class Visit>
+    void visit(Visit&& visit) const {
+      for (int m = 0; m < most; ++m)
+        if (weight[m] != 0) visit(point[m], weight[m]);
+    }
   };
   struct Share {
     int32_t fine;
@@ -49,8 +55,6 @@ class Coarsening {
   std::vector<int64_t> find_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own);
   void transpose(int32_t own);
   BlockPattern find_pattern(const ColumnLevel& fine, int32_t own, int32_t ghosts) const;
-  template <class Visit>
-  void for_each_product(const ColumnLevel& fine, int32_t coarse_row, Visit&& visit) const;
 
   int32_t fine_own_;
   std::vector<Vec3> centre_;          // [coarse own] mm

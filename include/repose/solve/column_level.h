@@ -7,9 +7,15 @@
 
 #include "repose/base/geometry.h"
 #include "repose/base/petsc.h"
+#include "repose/mechanics/runs.h"
+#include "repose/solve/packed_block.h"
 
-/// Matrices of layered tissue in single precision, for preconditioners (column_multigrid.h).
+/// Matrices of layered tissue for preconditioners (column_multigrid.h).
 namespace repose::solve {
+
+struct SweptLevel;
+struct Sweeps;
+class UpperSums;
 
 /// The numbers of a point, and one of padding.
 using Lanes = float __attribute__((vector_size(16)));
@@ -49,7 +55,7 @@ class ColumnLevel {
   /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
   /// pattern couples points of a column to their neighbours in it only. Collective.
   ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
-              BlockPattern pattern);
+              BlockPattern pattern, mechanics::Kernels kernels = mechanics::best_kernels());
 
   int32_t own() const { return static_cast<int32_t>(place_.size()); }
   int32_t ghosts() const { return static_cast<int32_t>(ghost_.size()); }
@@ -63,14 +69,12 @@ class ColumnLevel {
   /// First points of this rank's columns, and own().
   const std::vector<int32_t>& columns() const { return chain_; }
 
-  /// The entries of the block at this place of the pattern, column by column.
-  float* block(int64_t place) { return value_.data() + 9 * place; }
-  const float* block(int64_t place) const { return value_.data() + 9 * place; }
-  void clear();
-  /// Adds to the block of an own row and a column, which is in the pattern.
-  void add(int32_t row, int32_t column, const Mat3& block);
-  /// Takes what is right of the diagonal over to what is left of it. Not collective.
-  void mirror();
+  /// The block at this place of the pattern.
+  Eigen::Matrix3f block(int64_t place) const { return block_[place].unpacked(); }
+  /// The place of the diagonal block of an own row, which those right of it follow.
+  int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
+  /// Takes all blocks anew; those left of the diagonal are mirror images. Not collective.
+  void fill(const UpperSums& sums);
   /// Factors the columns' own blocks, after the entries have changed. Not collective.
   void factor();
 
@@ -90,21 +94,40 @@ class ColumnLevel {
  private:
   using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
   void damp();
+  SweptLevel swept() const;
   void find_columns();
   void connect(MPI_Comm comm);
-  void solve_column(int32_t begin, int32_t end, std::span<Lanes> x) const;
 
+  const Sweeps* sweeps_;
   std::vector<Place> place_;
   std::vector<int64_t> ghost_;
   int64_t first_ = 0, total_ = 0;
   BlockPattern pattern_;
   std::vector<int32_t> chain_;          // [columns + 1] first points
   std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
-  std::vector<float> value_;            // [9 blocks + 1]
+  std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
+  std::vector<PackedBlock> block_;      // [blocks + 1]
   std::vector<float> damping_;          // [own] added to the columns' blocks
   std::vector<float> inverse_;          // [9 own + 1] of what elimination down columns leaves
   StarForest forest_;
   FloatsType lanes_{4};
+};
+
+/// Sums of a level's blocks on the diagonal and right of it, from which it is filled.
+class UpperSums {
+ public:
+  explicit UpperSums(const ColumnLevel& level);
+  /// To the block of an own row and a column not left of it, which is in the pattern.
+  void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
+  /// Of a row's blocks, from the diagonal on.
+  std::span<const Eigen::Matrix3f> row(int32_t i) const {
+    return std::span(sum_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
+  }
+
+ private:
+  const ColumnLevel& level_;
+  std::vector<int64_t> begin_;  // [own + 1] in blocks
+  std::vector<Eigen::Matrix3f> sum_;
 };
 
 }  // namespace repose::solve
