@@ -11,15 +11,11 @@ out by hand; and, up to -whole vertices, with -active_region off. CPU seconds of
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
-import argparse
-import pathlib
-import subprocess
-import tempfile
-
-import h5py
 import numpy as np
 
-from page import PROJECT, children, print_table
+from measure import run, synthetic
+from page import option_parser, print_table
+from tissue import last, model_of
 
 SCENE = """skin: SKIN
 bones:
@@ -75,29 +71,18 @@ def crop(folder, active):
 def solve(program, folder, skin, *options):
     """One solve: what it says, CPU s, and the positions at rest."""
     (folder / "scene.yaml").write_text(SCENE.replace("SKIN", skin))
-    before = children().ru_utime
-    done = subprocess.run([program, "scene.yaml", "-output", "result", *options], cwd=folder,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    seconds = children().ru_utime - before
-    if done.returncode == 1:
-        raise SystemExit(done.stderr)
-    stages = {line.split()[2]: float(line.split()[-6]) for line in done.stdout.splitlines()
-              if "MiB so far" in line}
-    memory = max(float(line.split()[-4]) for line in done.stdout.splitlines() if "so far" in line)
-    work = next(line for line in done.stdout.splitlines() if "of the Hessian" in line)
-    unknowns = next(line for line in done.stdout.splitlines() if "  unknowns" in line)
-    with h5py.File(folder / "result.h5") as h5:
-        last = h5["step"][max(h5["step"])]
-        column, soft = h5["model/point/column"][()], h5["model/point/set"][()] == 0
-        move = last["point/displacement"][()]
-        found = {"unknowns": int(unknowns.split()[1]), "memory": memory, "points": len(column),
-                 "hessians": int(work.split("gradient,")[1].split()[0]), "seconds": seconds,
-                 "search": stages["solve"], "before": sum(stages.values()) - stages["solve"] -
-                 stages["write"], "error": last.attrs["displacement_error"],
-                 "converged": done.returncode == 0, "position": last["point/position"][()]}
+    solved = run([program, "scene.yaml", "-output", "result", *options], folder)
+    stages = {name: seconds for name, (seconds, _) in solved.stages.items()}
+    model, rest = model_of(folder / "result.h5"), last(folder / "result.h5")
+    column = model["point/column"]
+    moved = (model["point/set"] == 0) & (rest["point/displacement"] != 0).any(axis=1)
     active = np.zeros(column.max() + 1, bool)
-    active[column[soft & (move != 0).any(axis=1)]] = True
-    return found | {"active": active}
+    active[column[moved]] = True
+    return {"unknowns": int(solved.said["unknowns"].split()[0]), "memory": solved.memory,
+            "points": len(column), "hessians": solved.evaluations[1], "seconds": solved.seconds,
+            "search": stages["solve"], "before": sum(stages.values()) - stages["solve"] -
+            stages["write"], "error": rest["displacement_error"], "converged": solved.status == 0,
+            "position": rest["point/position"], "active": active}
 
 
 def row(size, way, found, cropped, distance):
@@ -109,10 +94,7 @@ def row(size, way, found, cropped, distance):
 
 
 def rows_of(size, with_whole, tools):
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        subprocess.run([tools / "repose-phantom", "-skin_vertices", str(size), "-bone_edge", "2",
-                        "-output", "head"], cwd=folder, check=True, capture_output=True)
+    with synthetic(tools, size, SCENE) as folder:
         program = tools / "repose-solve"
         region = solve(program, folder, "head_skin.ply", "-active_region", "on")
         crop(folder, region["active"])
@@ -126,22 +108,10 @@ def rows_of(size, with_whole, tools):
         yield row(size, "cropped", cropped, cropped, "")
 
 
-def arguments():
-    parser = argparse.ArgumentParser(prog="active_region.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-sizes", default="2000,8000")
-    parser.add_argument("-whole", type=int, default=8000)
-    parser.add_argument("-output", type=pathlib.Path)
-    return parser.parse_args()
-
-
 def main():
-    chosen = arguments()
-    sizes, tools = map(int, chosen.sizes.split(",")), chosen.bin.resolve()
-    print_table(HEAD, (line for size in sizes for line in rows_of(size, size <= chosen.whole, tools)),
-                chosen.output)
+    chosen = option_parser(__doc__, sizes="2000,8000", whole=8000).parse_args()
+    print_table(HEAD, (line for size in map(int, chosen.sizes.split(","))
+                       for line in rows_of(size, size <= chosen.whole, chosen.bin)), chosen.output)
 
 
 main()

@@ -9,15 +9,12 @@ Scenes of the shipped head, as they are and changed, solved with -active_region 
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
-import argparse
 import pathlib
-import subprocess
 import tempfile
 
-import h5py
-import numpy as np
-
-from page import PROJECT, print_table
+from measure import run
+from page import PROJECT, option_parser, print_table
+from tissue import apart, steps
 
 CHIN = "head_genioplasty"
 TURGOR = [("layers: 4", "layers: 4\n  turgor: 0.05\n  mass: [.1, .1, .1, .1]")]
@@ -40,17 +37,11 @@ HEAD = ("| case | accuracy, mm | active columns | rounds | error said, mm | true
 
 
 def solve(program, folder, name, *options):
-    """The loads, positions and errors of a solve's steps, and its row about the region."""
-    done = subprocess.run([program, "scene.yaml", "-nested", "off", "-output", name, *options],
-                          cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise SystemExit(done.stderr + done.stdout)
-    region = [line.split() for line in done.stdout.splitlines() if "active region" in line]
-    with h5py.File(folder / f"{name}.h5") as h5:
-        steps = {h5["step"][k].attrs["load"]: (h5["step"][k]["point/position"][()],
-                                               h5["step"][k].attrs["displacement_error"])
-                 for k in sorted(h5["step"])}
-    return steps, region[0] if region else None
+    """The steps of a solve by their loads, and the words of its row about the region."""
+    solved = run([program, "scene.yaml", "-nested", "off", "-output", name, *options], folder,
+                 ends=[0])
+    found = {step["load"]: step for step in steps(folder / f"{name}.h5")}
+    return found, solved.said.get("active region", "").split()
 
 
 def rows_of(case, accuracies, program):
@@ -68,27 +59,17 @@ def rows_of(case, accuracies, program):
         for accuracy in accuracies:
             found, region = solve(program, folder, "found", "-active_region", "on", "-accuracy",
                                   accuracy, *options)
-            true = {load: np.linalg.norm(x - exact[load][0], axis=1).max()
-                    for load, (x, _) in found.items() if load in exact and load > 0}
-            least = min(found[load][1] / true[load] for load in true)
-            yield (f"| {what} | {accuracy} | {region[2]} of {region[4]} | {region[7]} | "
-                   f"{found[1][1]:.2g} | {true[1]:.2g} | {found[1][1] / true[1]:.1f} | {least:.1f} |")
-
-
-def arguments():
-    parser = argparse.ArgumentParser(prog="active_region_error.py", description=__doc__,
-                                     add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-accuracies", default="0.3,0.1,0.02")
-    parser.add_argument("-output", type=pathlib.Path)
-    return parser.parse_args()
+            true = {load: apart(step, exact[load]) for load, step in found.items()
+                    if load in exact and load > 0}
+            error = {load: found[load]["displacement_error"] for load in true}
+            least = min(error[load] / true[load] for load in true)
+            yield (f"| {what} | {accuracy} | {region[0]} of {region[2]} | {region[5]} | "
+                   f"{error[1]:.2g} | {true[1]:.2g} | {error[1] / true[1]:.1f} | {least:.1f} |")
 
 
 def main():
-    chosen = arguments()
-    program, accuracies = chosen.bin.resolve() / "repose-solve", chosen.accuracies.split(",")
+    chosen = option_parser(__doc__, accuracies="0.3,0.1,0.02").parse_args()
+    program, accuracies = chosen.bin / "repose-solve", chosen.accuracies.split(",")
     print_table(HEAD, (line for case in CASES for line in rows_of(case, accuracies, program)),
                 chosen.output, "estimates")
 

@@ -10,12 +10,10 @@ NumPy of the model file. Times are the least CPU time of the rounds.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy python3-scipy liblbfgs-dev
 """
 
-import argparse
 import json
 import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -31,8 +29,7 @@ try:
 except ImportError:
     scipy = None
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(PROJECT / "tests/program"))
+from page import PROJECT, option_parser, write
 from tissue import Tissue, last, model_of
 
 REFERENCE = "1e-9"  # mm
@@ -441,20 +438,13 @@ of the default, the least of {chosen.rounds} rounds, or of fewer where they take
 
 
 def arguments():
-    parser = argparse.ArgumentParser(prog="contest.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    for name, default in SETTINGS.items():
-        parser.add_argument(f"-{name}", type=type(default), default=default)
-    parser.add_argument("-output", type=pathlib.Path, default=PROJECT / "docs/contest.md")
+    parser = option_parser(__doc__, PROJECT / "docs/contest.md", **SETTINGS)
     chosen = parser.parse_args()
     for given, known in ((chosen.cases, CASES), (chosen.methods, METHODS)):
         for word in set(given.split(",")) - set(known):
             parser.error(f"{word}: choose from {', '.join(known)}")
     if not chosen.methods.startswith("default"):
         parser.error("-methods: begin with default, in whose times all are counted")
-    chosen.bin = chosen.bin.resolve()
     return chosen
 
 
@@ -465,9 +455,7 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             contests[case] = Contest(case, pathlib.Path(folder), chosen)
             contests[case].run_all()
-    part = chosen.output.with_suffix(".part")
-    part.write_text(page(contests, chosen, where))
-    part.rename(chosen.output)
+    write(chosen.output, page(contests, chosen, where))
     print(f"wrote {chosen.output}")
 
 

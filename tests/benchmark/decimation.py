@@ -16,6 +16,9 @@ import sys
 import tempfile
 import time
 
+from measure import run
+from page import write
+
 DISTANCES = ["0.1", "0.25", "0.5", "1", "2"]
 CPU_LIMIT = 60  # seconds of one way at one distance
 VTK = """
@@ -41,16 +44,6 @@ def limit_cpu():
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT))
 
 
-def cpu_of(command):
-    """CPU seconds of a command, and the distance that it says it proved."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL, text=True, preexec_fn=limit_cpu)
-    proven = re.search(r"bound proven +(\S+)", done.stdout)
-    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    return seconds, proven.group(1) if proven else ""
-
-
 class Race:
     def __init__(self, mesh, programs, folder):
         self.mesh, self.programs, self.folder = mesh, programs, folder
@@ -63,17 +56,17 @@ class Race:
 
     def enter(self, distance, name, command, file):
         """Runs one way and adds its row; the number of triangles it left."""
-        try:
-            seconds, proven = cpu_of(command)
-        except subprocess.CalledProcessError as error:
-            why = f"status {error.returncode}"
-            if -error.returncode in (signal.SIGXCPU, signal.SIGKILL):
+        done = run(command, ends=None, preexec_fn=limit_cpu)
+        if done.status != 0:
+            why = f"status {done.status}"
+            if -done.status in (signal.SIGXCPU, signal.SIGKILL):
                 why = f"stopped after {CPU_LIMIT} s"
             self.rows.append(f"| {distance} | {name} | {why} | | | | | | |\n")
             return 0
+        proven = re.search(r"bound proven +(\S+)|$", done.text)[1] or ""
         triangles, reached, _, cgal, back, defects = self.measured(file)
         self.rows.append(f"| {distance} | {name} | {triangles} | {float(reached):.4f} | "
-                         f"{proven} | {float(cgal):.4f} | {float(back):.3g} | {seconds:.1f} | {defects} |\n")
+                         f"{proven} | {float(cgal):.4f} | {float(back):.3g} | {done.seconds:.1f} | {defects} |\n")
         print(self.rows[-1], end="", flush=True)
         return int(triangles)
 
@@ -107,7 +100,7 @@ def main():
         for distance in sys.argv[4:] or DISTANCES:
             race.run(distance)
     note = "" if has_vtk() else "\nVTK was not there to compare with.\n"
-    page.write_text(HEAD + "".join(race.rows) + note)
+    write(page, HEAD + "".join(race.rows) + note)
     print(f"{page} written after {time.time() - start:.0f} s")
 
 

@@ -12,7 +12,6 @@ reports is compared with its true distance from the rest position. -few leaves a
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy python3-matplotlib
 """
 
-import argparse
 import csv
 import dataclasses
 import itertools
@@ -21,7 +20,6 @@ import pathlib
 import resource
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -35,8 +33,8 @@ try:
 except ImportError:
     matplotlib = None
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(PROJECT / "tests/program"))
+import measure
+from page import PROJECT, option_parser, write
 from tissue import apart, last, steps
 
 KNOWN = 1e-9  # mm: how well rest positions are known
@@ -116,8 +114,7 @@ def random_scene(seed, folder, phantom):
                         springs=f"{{{stiffness}, law: {law}, reference: {reference}}}",
                         shift=", ".join(f"{s:.3f}" for s in shift), angle=random.uniform(-1, 4),
                         gravity="gravity: [0, 0, -9.80665]\n" if loaded else "")
-    subprocess.run([phantom, "-skin_vertices", str(size), "-output", f"head{size}"], cwd=folder,
-                   check=True, capture_output=True)
+    measure.run([phantom, "-skin_vertices", size, "-output", f"head{size}"], folder, ends=[0])
     file = folder / f"seed{seed}.yaml"
     file.write_text(text)
     return file
@@ -380,19 +377,12 @@ one core of a machine with {os.cpu_count()} cores.
 
 
 def arguments():
-    parser = argparse.ArgumentParser(prog="estimate.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-seeds", type=int, default=8)
+    parser = option_parser(__doc__, PROJECT / "docs/estimate.md", seeds=8)
     parser.add_argument("-few", action="store_true")
     parser.add_argument("-rows", type=pathlib.Path)
-    parser.add_argument("-output", type=pathlib.Path, default=PROJECT / "docs/estimate.md")
     parser.add_argument("-picture", type=pathlib.Path,
                         default=PROJECT / "docs/images/estimate.png")
-    chosen = parser.parse_args()
-    chosen.bin = chosen.bin.resolve()
-    return chosen
+    return parser.parse_args()
 
 
 def cpu_seconds():
@@ -419,9 +409,7 @@ def main():
         draw(runs, chosen.picture)
     else:
         print("no picture: apt-get install --no-install-recommends python3-matplotlib")
-    part = chosen.output.with_suffix(".part")
-    part.write_text(page(runs, weak, study, cpu_seconds(), chosen.picture))
-    part.rename(chosen.output)
+    write(chosen.output, page(runs, weak, study, cpu_seconds(), chosen.picture))
     print(verdict(runs) + f"wrote {chosen.output}")
 
 

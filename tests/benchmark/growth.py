@@ -12,15 +12,11 @@ rest position. Preconditioners made and applied are PETSc's counts, those on coa
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
-import argparse
-import pathlib
-import subprocess
-import tempfile
-
 import h5py
 import numpy as np
 
-from page import PROJECT, children, events, print_table
+from measure import events, run, synthetic
+from page import option_parser, print_table
 
 SCENE = """skin: head_skin.ply
 bones:
@@ -43,42 +39,32 @@ HEAD = ("| skin vertices | layers | unknowns | method | load steps | iterations 
 OPTIONS = {"stiffness": ["-tao_type", "lmvm", "-tao_lmvm_initial", "stiffness"]}
 
 
-def measure(command, folder, method):
-    """One solve: its attributes summed over steps, CPU s, and the positions at rest."""
-    before = children().ru_utime
-    options = OPTIONS.get(method, ["-tao_type", method])
-    done = subprocess.run([*command, "scene.yaml", *options, "-output", method, "-log_view", ":log"],
-                          cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    seconds = children().ru_utime - before
-    if done.returncode == 1:
-        raise SystemExit(done.stderr)
-    peak = max(float(line.split()[-4]) for line in done.stdout.splitlines() if "MiB so far" in line)
+def measure(command, folder, method, ranks):
+    """One solve: its attributes summed over steps, what it took, and the positions at rest."""
+    ways = OPTIONS.get(method, ["-tao_type", method])
+    solved = run([*command, "scene.yaml", *ways, "-output", method, "-log_view", ":log"], folder,
+                 ranks)
     logged = events(folder / "log")
     with h5py.File(folder / f"{method}.h5") as h5:
         steps = [h5["step"][k] for k in sorted(h5["step"])]
         total = {key: sum(int(step.attrs[key]) for step in steps)
                  for key in ("iterations", "evaluations")}
         unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
-        work = next(line for line in done.stdout.splitlines() if "of the Hessian" in line)
-        return (total | {"steps": len(steps) - 1, "hessians": int(work.split("gradient,")[1].split()[0]),
+        return (total | {"steps": len(steps) - 1, "hessians": solved.evaluations[1],
                          "made": logged["PCRenew"][0], "applied": logged["PCApply"][0],
-                         "seconds": seconds, "memory": peak * 2**20 / unknowns, "unknowns": unknowns,
-                         "converged": done.returncode == 0}, steps[-1]["point/position"][()])
+                         "seconds": solved.seconds, "memory": solved.memory * 2**20 / unknowns,
+                         "unknowns": unknowns, "converged": solved.status == 0},
+                steps[-1]["point/position"][()])
 
 
 def rows_of(size, layers, chosen):
-    tools, ranks = chosen.bin.resolve(), chosen.ranks
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        subprocess.run([tools / "repose-phantom", "-skin_vertices", size, "-bone_edge", "2",
-                        "-output", "head"], cwd=folder, check=True, capture_output=True)
-        (folder / "scene.yaml").write_text(SCENE.replace("layers: 4", f"layers: {layers}")
-                                           .replace("turgor: 0", f"turgor: {chosen.turgor}"))
+    scene = SCENE.replace("layers: 4", f"layers: {layers}").replace("turgor: 0",
+                                                                    f"turgor: {chosen.turgor}")
+    with synthetic(chosen.bin, size, scene) as folder:
         first = None
-        command = [*(["mpirun", "-n", str(ranks)] if ranks > 1 else []), tools / "repose-solve",
-                   "-nested", chosen.nested]
+        command = [chosen.bin / "repose-solve", "-nested", chosen.nested]
         for method in chosen.methods.split(","):
-            found, position = measure(command, folder, method)
+            found, position = measure(command, folder, method, chosen.ranks)
             first = position if first is None else first
             apart = np.linalg.norm(position - first, axis=1).max()
             said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
@@ -88,24 +74,10 @@ def rows_of(size, layers, chosen):
                    f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
 
 
-def arguments():
-    parser = argparse.ArgumentParser(prog="growth.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-sizes", default="500,2500,12500")
-    parser.add_argument("-methods", default="ntr,lmvm,stiffness")
-    parser.add_argument("-layers", default="4", help="one number, or one for each size")
-    parser.add_argument("-turgor", type=float, default=0)
-    parser.add_argument("-nested", default="auto")
-    parser.add_argument("-ranks", type=int, default=1)
-    parser.add_argument("-output", type=pathlib.Path)
-    parser.add_argument("-mark", default="measured")
-    return parser.parse_args()
-
-
 def main():
-    chosen = arguments()
+    chosen = option_parser(__doc__, sizes="500,2500,12500", methods="ntr,lmvm,stiffness",
+                           layers="4", turgor=0.0, nested="auto", ranks=1,
+                           mark="measured").parse_args()
     sizes = chosen.sizes.split(",")
     layers = chosen.layers.split(",")
     layers = layers * (len(sizes) if len(layers) == 1 else 1)

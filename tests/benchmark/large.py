@@ -10,12 +10,10 @@ makes 20 iterations of L-BFGS and writes a step. The table of memory goes below 
 Needs: cmake --preset release -DREPOSE_BENCHMARKS=ON
 """
 
-import argparse
-import pathlib
-import subprocess
 import tempfile
 
-from page import PROJECT, print_table
+from measure import run
+from page import option_parser, print_table
 
 STAGES = ("build", "write", "read", "distribute", "objective", "search", "result")
 TIME = ("| points | springs | " + ", µs/point | ".join(STAGES) + ", µs/point | evaluation, ns/spring |\n"
@@ -26,12 +24,10 @@ MEMORY = ("| points | " + ", B/spring | ".join(STAGES) + ", B/spring | most on r
 
 def measure(program, size, ranks):
     """Of one size the numbers of each line that the program prints, by its first word."""
-    launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run([*launcher, program, size, "model"], cwd=folder, check=True,
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        text = run([program, size, "model"], folder, ranks, ends=[0]).text
     return {line.split()[0]: [float(number) for number in line.split()[1:]]
-            for line in done.stdout.splitlines()}
+            for line in text.splitlines()}
 
 
 def row_of_time(found):
@@ -48,21 +44,10 @@ def row_of_memory(found):
     return f"| {points:.0f} | {stages} | {first:.0f} |"
 
 
-def arguments():
-    parser = argparse.ArgumentParser(prog="large.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-sizes", default="477,2500,25000,250000,750000")
-    parser.add_argument("-ranks", type=int, default=1)
-    parser.add_argument("-output", type=pathlib.Path)
-    parser.add_argument("-mark", default="large")
-    return parser.parse_args()
-
-
 def main():
-    chosen = arguments()
-    program = chosen.bin.resolve() / "benchmark_large"
+    chosen = option_parser(__doc__, sizes="477,2500,25000,250000,750000", ranks=1,
+                           mark="large").parse_args()
+    program = chosen.bin / "benchmark_large"
     found = [measure(program, size, chosen.ranks) for size in chosen.sizes.split(",")]
     print_table(TIME, map(row_of_time, found), chosen.output, chosen.mark)
     print_table(MEMORY, map(row_of_memory, found), chosen.output, f"{chosen.mark} memory")

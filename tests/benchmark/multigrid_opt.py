@@ -7,18 +7,17 @@
                                      [-output docs/growth.md] [-mark multigrid] [SCENE.yaml …]
 
 The scenes given (coarsened by 2), and those of growth.py for synthetic heads of the given numbers of
-skin vertices, each with its coarsening of the edges; run by benchmark_multigrid_opt.
+skin vertices, each with its coarsening of the edges; run by benchmark_multigrid_opt, with -smoothing
+evaluations before and after each correction.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
-import argparse
 import json
 import pathlib
-import subprocess
-import tempfile
 
 from growth import SCENE
-from page import PROJECT, print_table
+from measure import run, synthetic
+from page import option_parser, print_table
 
 NAMES = {"default": "default", "lbfgs": "L-BFGS", "cycles": "MG/OPT", "injected": "MG/OPT, injected",
          "default_end": "default, to its own estimate",
@@ -32,15 +31,10 @@ HEAD = ("| scene | unknowns, coarse | method | evaluations | coarse ones, in fin
 
 def race(chosen, scene, coarsening):
     """What the start took, and the entries of the methods."""
-    program = chosen.bin.resolve() / "benchmark_multigrid_opt"
-    options = ["-coarsening", coarsening, "-methods", chosen.methods, "-smoothing",
-               chosen.smoothing, "-accuracy", chosen.accuracy, "-limit", chosen.limit, "-seconds",
-               chosen.seconds]
-    done = subprocess.run([program, scene, *map(str, options)], text=True, capture_output=True,
-                          stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
-        raise SystemExit(done.stderr)
-    return map(json.loads, done.stdout.splitlines())
+    done = run([chosen.bin / "benchmark_multigrid_opt", scene, "-coarsening", coarsening, "-methods",
+                chosen.methods, "-smoothing", chosen.smoothing, "-accuracy", chosen.accuracy,
+                "-limit", chosen.limit, "-seconds", chosen.seconds], ends=[0])
+    return map(json.loads, done.text.splitlines())
 
 
 def ending(entry):
@@ -72,34 +66,17 @@ def all_rows(chosen):
         yield from rows_of(chosen, scene.stem, scene, 2)
     sizes = chosen.sizes.split(",") if chosen.sizes else []
     for size, coarsening in zip(sizes, chosen.coarsening.split(",")):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            subprocess.run([chosen.bin.resolve() / "repose-phantom", "-skin_vertices", size,
-                            "-bone_edge", "2", "-output", "head"], cwd=folder, check=True,
-                           capture_output=True)
-            (folder / "scene.yaml").write_text(SCENE)
+        with synthetic(chosen.bin, size, SCENE) as folder:
             yield from rows_of(chosen, f"{size} skin vertices", folder / "scene.yaml", coarsening)
 
 
-def arguments():
-    parser = argparse.ArgumentParser(prog="multigrid_opt.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-sizes", default="500,2500,12500")
-    parser.add_argument("-coarsening", default="2,2,3", help="of the edges, for each size")
-    parser.add_argument("-methods", default=",".join(NAMES))
-    parser.add_argument("-smoothing", type=int, default=10,
-                        help="evaluations before and after each correction")
-    parser.add_argument("-accuracy", type=float, default=0.01)
-    parser.add_argument("-limit", type=int, default=2000)
-    parser.add_argument("-seconds", type=float, default=60.0)
-    parser.add_argument("-output", type=pathlib.Path)
-    parser.add_argument("-mark", default="multigrid")
+def main():
+    parser = option_parser(__doc__, sizes="500,2500,12500", coarsening="2,2,3",
+                           methods=",".join(NAMES), smoothing=10, accuracy=0.01, limit=2000,
+                           seconds=60.0, mark="multigrid")
     parser.add_argument("scenes", nargs="*", type=pathlib.Path, metavar="SCENE")
-    return parser.parse_args()
-
-
-if __name__ == "__main__":
-    chosen = arguments()
+    chosen = parser.parse_args()
     print_table(HEAD, all_rows(chosen), chosen.output, chosen.mark)
+
+
+main()

@@ -9,17 +9,16 @@ skin is from that of the first, over the vertices of the scene's skin.
 Needs: apt-get install --no-install-recommends python3-h5py python3-scipy
 """
 
-import argparse
 import pathlib
 import re
-import subprocess
 import tempfile
 
-import h5py
 import numpy as np
 from scipy.spatial import cKDTree
 
-from page import PROJECT, children, print_table
+from measure import run
+from page import option_parser, print_table
+from tissue import last, model_of
 
 WAYS = [["-nested", "off", "-accuracy", "0.01"], ["-accuracy", "0.01"], ["-adapt", "-accuracy", "3"],
         ["-profile", "preview"]]
@@ -30,14 +29,12 @@ HEAD = ("| scene | points | options | coarse models, points | evaluations | Hess
 
 def skin_of(file):
     """Skin vertices, triangles of them, and displacements at rest; points of the model."""
-    with h5py.File(file) as h5:
-        initial = h5["model/point/position"][()]
-        skin = np.flatnonzero(h5["model/point/layer"][()] == 0)
-        step = h5["step"][max(h5["step"])]
-        moved = step["point/position"][()] - initial
-        error = step.attrs["displacement_error"] + step.attrs.get("discretisation_error", 0.0)
-        triangles = np.searchsorted(skin, h5["model/skin/points"][()])
-    return initial[skin], triangles, moved[skin], error, len(initial)
+    model, step = model_of(file), last(file)
+    initial, skin = model["point/position"], np.flatnonzero(model["point/layer"] == 0)
+    error = step["displacement_error"] + step.get("discretisation_error", 0.0)
+    triangles = np.searchsorted(skin, model["skin/points"])
+    return (initial[skin], triangles, (step["point/position"] - initial)[skin], error,
+            len(initial))
 
 
 def carried(places, triangles, moved, points):
@@ -58,24 +55,13 @@ def carried(places, triangles, moved, points):
     return (weight[row, best][:, :, None] * moved[triangles[near[row, best]]]).sum(1)
 
 
-def solve(program, scene, options, file):
-    """What a solve says and the CPU seconds it takes."""
-    before = children().ru_utime
-    done = subprocess.run([program, scene, *options, "-output", file.with_suffix("")],
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    if done.returncode == 1:
-        raise SystemExit(done.stderr)
-    return done.stdout, children().ru_utime - before
-
-
-def work(said, own_points):
+def work(solved, own_points):
     """Evaluations and Hessians of all levels, an evaluation on fewer points counting as many times
     less; points of the coarse models."""
     levels = [tuple(map(int, level)) for level in re.findall(
-        r"coarse model +(\d+) points.*: (\d+) evaluations, (\d+) of the", said)]
-    last = re.search(r"evaluations +(\d+) of value and gradient, (\d+) of the Hessian", said)
-    points = levels[-1][0] if "solved model" in said else own_points
-    levels.append((points, int(last[1]), int(last[2])))
+        r"coarse model +(\d+) points.*: (\d+) evaluations, (\d+) of the", solved.text)]
+    points = levels[-1][0] if "solved model" in solved.text else own_points
+    levels.append((points, *solved.evaluations))
     totals = [sum(level[0] * level[k] for level in levels) / own_points for k in (1, 2)]
     return totals, [level[0] for level in levels[:-1]]
 
@@ -86,31 +72,23 @@ def rows_of(program, scene):
         first = first_seconds = None
         for k, options in enumerate(WAYS):
             file = folder / f"{k}.h5"
-            said, seconds = solve(program, scene, options, file)
+            solved = run([program, scene, *options, "-output", file.with_suffix("")])
             places, triangles, moved, error, points = skin_of(file)
             if first is None:
-                first, first_seconds, own_points = (places, moved), seconds, points
+                first, first_seconds, own_points = (places, moved), solved.seconds, points
             off = np.linalg.norm(carried(places, triangles, moved, first[0]) - first[1], axis=1)
-            (evaluations, hessians), coarse = work(said, own_points)
+            (evaluations, hessians), coarse = work(solved, own_points)
             yield (f"| {scene.stem} | {own_points} | `{' '.join(options)}` | "
                    f"{', '.join(map(str, coarse)) or '–'} | {evaluations:.0f} | {hessians:.1f} | "
-                   f"{seconds / first_seconds:.2f} | {error:.2g} | "
+                   f"{solved.seconds / first_seconds:.2f} | {error:.2g} | "
                    f"{off.max():.2g}, {np.percentile(off, 95):.2g} |")
 
 
-def arguments():
-    parser = argparse.ArgumentParser(prog="nested.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
-    parser.add_argument("-bin", type=pathlib.Path, default=PROJECT / "build/bin")
-    parser.add_argument("-output", type=pathlib.Path)
-    parser.add_argument("scenes", nargs="+", type=pathlib.Path, metavar="SCENE")
-    return parser.parse_args()
-
-
 def main():
-    chosen = arguments()
-    program = chosen.bin.resolve() / "repose-solve"
+    parser = option_parser(__doc__)
+    parser.add_argument("scenes", nargs="+", type=pathlib.Path, metavar="SCENE")
+    chosen = parser.parse_args()
+    program = chosen.bin / "repose-solve"
     print_table(HEAD, (row for scene in chosen.scenes for row in rows_of(program, scene)),
                 chosen.output)
 

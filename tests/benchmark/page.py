@@ -1,24 +1,32 @@
-"""What the benchmarks' scripts share: the tables in their pages."""
+"""What the benchmarks' scripts share: their options, and the tables in their pages."""
 
+import argparse
 import pathlib
-import resource
+import sys
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(PROJECT / "tests/program"))  # where results are read: tissue
 
 
-def children():
-    """What the programs that have been run used."""
-    return resource.getrusage(resource.RUSAGE_CHILDREN)
+def option_parser(about, output=None, **settings):
+    """A parser of the options -help, -bin, -output and those of `settings`, whose types are those of
+    their defaults. `about` is the script's docstring."""
+    parser = argparse.ArgumentParser(description=about, add_help=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-help", action="help")
+    parser.add_argument("-bin", type=lambda name: pathlib.Path(name).resolve(),
+                        default=PROJECT / "build/bin")
+    parser.add_argument("-output", type=pathlib.Path, default=output)
+    for name, default in settings.items():
+        parser.add_argument(f"-{name}", type=type(default), default=default)
+    return parser
 
 
-def events(log):
-    """Count and seconds of PETSc's events of preconditioners, from a -log_view."""
-    found = {}
-    for line in log.read_text(errors="replace").splitlines():
-        words = line.split()
-        if len(words) > 10 and words[0] in ("PCRenew", "PCApply"):
-            found[words[0]] = int(words[1]), float(words[3])
-    return found
+def write(file, text):
+    """Writes a page at once, so that it is never there in part."""
+    part = file.with_suffix(".part")
+    part.write_text(text)
+    part.rename(file)
 
 
 def print_table(head, rows, page=None, mark="measured"):
@@ -34,6 +42,4 @@ def print_table(head, rows, page=None, mark="measured"):
     begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->\n"
     before, mark_there, rest = page.read_text().partition(begin)
     _, end_there, after = rest.partition(end)
-    part = page.with_suffix(".part")
-    part.write_text(before + mark_there + "\n" + text + ("\n" + end_there + after) * bool(end_there))
-    part.rename(page)
+    write(page, before + mark_there + "\n" + text + ("\n" + end_there + after) * bool(end_there))
