@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "repose/base/error.h"
 #include "repose/base/petsc_versions.h"
 
 namespace repose::solve {
@@ -30,6 +31,18 @@ bool uses_hessian(Tao tao) {
   check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(tao), &newton, TAONLS, TAONTR,
                                   TAONTL, TAOBNLS, TAOBNTR, TAOBNTL, ""));
   return newton;
+}
+
+/// PETSc's GLTR (3.18) writes behind its workspace where it meets negative curvature.
+void refuse_lanczos(KSP krylov) {
+  PetscBool lanczos = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPGLTR, &lanczos));
+  const char* prefix = nullptr;
+  check(KSPGetOptionsPrefix(krylov, &prefix));
+  if (lanczos)
+    base::refuse(
+        "-{}ksp_type gltr: this method of PETSc's overwrites memory; take stcg, nash or cg",
+        prefix ? prefix : "");
 }
 
 std::string reason_text(TaoConvergedReason reason) {
@@ -144,6 +157,7 @@ void Minimiser::make_tao() {
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   base::check_options(KSPSetFromOptions(inner));
+  refuse_lanczos(inner);
   const char* prefix = nullptr;
   check(KSPGetOptionsPrefix(inner, &prefix));
   PetscBool given = PETSC_FALSE;

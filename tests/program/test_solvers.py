@@ -92,6 +92,13 @@ def test_exact_volume_keeps_a_chosen_preconditioner_until_it_is_worn_out(run, sm
     assert 0 < made < hessians / 2
 
 
+@pytest.mark.parametrize("method, prefix", [("ntr", "tao_ntr_"), ("bntr", "tao_bnk_")])
+def test_a_method_that_overwrites_memory_is_refused(run, method, prefix):
+    scene = PROJECT / "meshes" / ADVANCE
+    result = run("repose-solve", scene, "-tao_type", method, f"-{prefix}ksp_type", "gltr")
+    assert result.returncode == 1 and f"-{prefix}ksp_type gltr" in result.stderr, result
+
+
 def test_lmvm_from_the_stiffness_minimises_forces(solved):
     forces = "-functional", "force", "-volume", "none", "-accuracy", ACCURACY
     default, other = (last(solved(ADVANCE, *forces, *more)) for more in ((), STIFFNESS))
