@@ -100,22 +100,27 @@ Mat Tangent::exact() {
 }
 
 void Tangent::visit_convex(const BlockVisitor& visit) const {
+  std::vector<Mat3> diagonal(at_.size(), Mat3::Zero());  // summed first: most blocks are there
   for (const mechanics::SpringLoop& loop : objective_.loops().springs)
     mechanics::for_each_spring_block(loop, at_, objective_.weights().elastic, Curvature::convex,
                                      [&](int64_t e, const Mat3& block) {
                                        const auto [p, q] = loop.points[e];
-                                       visit(p, p, block);
-                                       visit(q, q, block);
+                                       diagonal[p] += block;
+                                       diagonal[q] += block;
                                        visit(p, q, -block);
                                      });
   const mechanics::PrismLoop& prisms = objective_.loops().prisms;
   mechanics::for_each_prism_block(prisms, at_, objective_.weights(), Curvature::convex,
                                   [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                     const auto& corners = prisms.points[e];
-                                    for (int i = 0; i < 6; ++i)
-                                      for (int j = i; j < 6; ++j)
+                                    for (int i = 0; i < 6; ++i) {
+                                      diagonal[corners[i]] += blocks[i][i];
+                                      for (int j = i + 1; j < 6; ++j)
                                         visit(corners[i], corners[j], blocks[i][j]);
+                                    }
                                   });
+  for (size_t p = 0; p < diagonal.size(); ++p)
+    visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
 }
 
 }  // namespace repose::solve

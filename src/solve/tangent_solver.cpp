@@ -119,7 +119,7 @@ void TangentSolver::renew(Vec displacement) {
 void TangentSolver::give_way() { given_way_ = is_columns(preconditioner()); }
 
 bool TangentSolver::hopeless() const {
-  const bool slow = given_way_ || (columns_ && wear_.new_rate() > slowest);
+  const bool slow = given_way_ || (columns_ && wear_.hopeless());
   return slow && !factors_ && unknowns_ <= factors_limit;
 }
 

@@ -63,7 +63,6 @@ class TangentSolver {
   int64_t renewals() const { return renewals_; }  ///< of the preconditioner
 
  private:
-  static constexpr double slowest = 15;  // multigrid's iterations per e-fold before it is given up
 
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);

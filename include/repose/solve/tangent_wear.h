@@ -16,14 +16,22 @@ class Wear {
 
   /// Whether a new one is worth its price.
   bool out() const { return spent_ > price_; }
-  /// Iterations per e-fold of the residual when it was new, at least 1.
-  double new_rate() const { return std::max(1.0, new_iterations_ / std::max(1.0, folds_)); }
+  /// Whether a new one was too slow, as long as there is proof enough: a solve near a state where
+  /// the stiffness is singular is slow with any preconditioner.
+  bool hopeless() const {
+    constexpr double slowest = 15;  // iterations per e-fold
+    constexpr double proof = 300;   // iterations
+    return new_iterations_ > proof && new_rate() > slowest;
+  }
   void renew();  ///< a new one is made at the state
   void move();   ///< the state changes
   /// Takes in a solve just ended, whose residual history was recorded. The same on all ranks.
   void take(KSP krylov);
 
  private:
+  /// Iterations per e-fold of the residual when it was new, at least 1.
+  double new_rate() const { return std::max(1.0, new_iterations_ / std::max(1.0, folds_)); }
+
   double price_;
   bool new_ = true;                        // at the state it was made at
   double spent_ = 0;                       // iterations beyond those of a new one
