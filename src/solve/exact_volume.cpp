@@ -28,12 +28,21 @@ ExactVolume::ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& 
       solver_(solver),
       minimiser_(minimiser),
       first_weight_(objective.weights().volume_weight),
-      settled_weight_(first_weight_),
-      settled_target_(objective.prisms().target_volume),
+      start_weight_(first_weight_),
+      start_target_(objective.prisms().target_volume),
       before_(objective.positions().make_vector()),
       gradient_(objective.positions().make_vector()),
       correction_(objective.positions().make_vector()) {
   solver.give_way();
+}
+
+std::vector<double> ExactVolume::multipliers() const {
+  const mechanics::PrismLoop& prisms = objective_.prisms();
+  const double weight = objective_.weights().volume_weight;
+  std::vector<double> pressure;
+  for (int64_t e = 0; e < prisms.size(); ++e)
+    pressure.push_back(weight * (prisms.target_volume[e] / prisms.rest_volume[e] - 1));
+  return pressure;
 }
 
 void ExactVolume::set_multipliers(const std::vector<double>& pressure, double weight) {
@@ -85,7 +94,8 @@ Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
     check(VecAXPY(before_, -1, displacement));
     if (round > 0) outcome.displacement_error += largest_block(before_);
     if (outcome.stopped) outcome.converged = false;
-    const bool at_rest = outcome.converged && outcome.displacement_error <= accuracy;
+    // Only the next round tells how far a state is from that with the volume kept.
+    const bool at_rest = round > 0 && outcome.converged && outcome.displacement_error <= accuracy;
     if (!outcome.converged || (at_rest && error <= allowed)) break;
     double weight = objective_.weights().volume_weight;
     if (error > slow * before) weight *= growth;
@@ -102,17 +112,24 @@ Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
 }
 
 Outcome ExactVolume::run(Vec displacement, double accuracy) {
-  // What a search that failed made of the multipliers is no start for the next one.
-  objective_.prisms().target_volume = settled_target_;
-  objective_.set_volume_weight(settled_weight_);
-  tangent_.forget();
+  constexpr double softened = 1e4;  // of the first κ
+  start_target_ = objective_.prisms().target_volume;
+  start_weight_ = objective_.weights().volume_weight;
+  const double weight = std::min(start_weight_, softened * first_weight_);
+  set_multipliers(multipliers(), weight);
+  if (weight < start_weight_) solver_.renew(displacement);
   const double allowed = objective_.positions().load() < 1 ? on_the_way : tolerance;
   Outcome outcome = search(displacement, accuracy, allowed);
   if (!outcome.converged) return outcome;
   balance(displacement, outcome);
-  settled_target_ = objective_.prisms().target_volume;
-  settled_weight_ = objective_.weights().volume_weight;
   return outcome;
+}
+
+void ExactVolume::go_back(Vec displacement) {
+  objective_.prisms().target_volume = start_target_;
+  objective_.set_volume_weight(start_weight_);
+  tangent_.forget();
+  solver_.renew(displacement);  // that of another κ is of no use to the next prediction
 }
 
 }  // namespace repose::solve

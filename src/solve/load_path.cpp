@@ -107,6 +107,7 @@ void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
   } else {
     objective_.positions().set_load(before);
     objective_.positions().update(displacement);
+    search_.go_back(displacement);
   }
 }
 
@@ -130,6 +131,7 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     const bool last_chance = halvings == most_halvings;
     if (!tried.outcome.stopped && !last_chance && !follows(tried, coarser ? &*coarser : nullptr)) {
       positions.set_load(before);
+      search_.go_back(displacement);
       step /= 2;
       ++halvings;
       ++result_.halvings;

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
-from tissue import Tissue, last, model_of, prism_volumes
+from tissue import Tissue, apart, last, model_of, prism_volumes, steps
 
 SHIPPED = (PROJECT / "meshes/head_instrument.yaml").read_text()
 SHAPE = "sphere: {center: [63, -98, -10], radius: 20}"
@@ -71,6 +71,17 @@ def test_the_force_is_the_slope_of_the_objective(run, folder, volume, layers):
         expected += np.einsum("m,mca,mc->a", step["prism/pressure"], gradient,
                               held[model["prism/points"]])
     assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
+
+
+def test_exact_volume_does_not_crawl_and_says_roughly_how_far_every_step_is(run, folder):
+    press(run, folder, "-volume", "exact", "-output", "near")
+    press(run, folder, "-volume", "exact", "-output", "rough", accuracy=1e-2)
+    near = {step["load"]: step for step in steps(folder / "near.h5")}
+    assert sum(int(step["evaluations"]) for step in near.values()) < 2500
+    common = [step for step in steps(folder / "rough.h5") if step["load"] in near]
+    assert len(common) > 3
+    for step in common:
+        assert apart(step, near[step["load"]]) <= 10 * step["displacement_error"], step["load"]
 
 
 def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):

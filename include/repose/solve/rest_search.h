@@ -34,6 +34,9 @@ class RestSearch {
   virtual ~RestSearch() = default;
   /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
+  /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
+  /// `displacement`, from which the way goes on. Collective.
+  virtual void go_back(Vec /*displacement*/) {}
 };
 
 }  // namespace repose::solve
