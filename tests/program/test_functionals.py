@@ -116,6 +116,12 @@ def test_exact_volume_keeps_every_prism(exact):
     assert step["volume_error_max"] <= VOLUME_TOLERANCE and step["volume"] == b"exact"
 
 
+def test_exact_volume_ends_where_a_path_of_smaller_steps_does(solved, exact):
+    """A step that was refused leaves nothing behind that leads the next ones astray."""
+    slowly = last(solved(ADVANCE, "-volume", "exact", "-load_steps", 12))
+    assert apart(last(exact), slowly) <= last(exact)["displacement_error"] + 0.01
+
+
 def test_pressures_balance_the_springs(exact):
     step, model = last(exact), model_of(exact)
     force = step["point/residual_force"].copy()
