@@ -15,7 +15,8 @@ namespace {
 
 constexpr double safety = 2;     // the estimate is this many Newton steps long
 constexpr double linear = 1e-6;  // mm, below which a Newton step need not be confirmed
-constexpr double most_contraction = 0.99;
+// A step by which the next is not shorter than this is no measure: the search goes on.
+constexpr double trusted_contraction = 0.7, most_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
@@ -130,7 +131,6 @@ Minimiser::Minimiser(Function& function, TangentSolver& solver, const Certificat
       watch_(watch),
       gradient_(function.positions().make_vector()),
       saved_(function.positions().make_vector()),
-      step_(function.positions().make_vector()),
       trial_(function.positions().make_vector()),
       certified_gradient_(function.positions().make_vector()) {
   make_tao();
@@ -182,19 +182,16 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
   const double step = certificate_.solver.newton_distance(displacement, gradient);
   const double estimate = safety * step;
   const bool curved = estimate > linear && estimate <= accuracy_;
-  return curved ? std::max(estimate, step / (1 - contraction(displacement, step))) : estimate;
+  return curved ? std::max(estimate, step / (1 - contraction(displacement))) : estimate;
 }
 
-double Minimiser::contraction(Vec displacement, double step) {
+double Minimiser::contraction(Vec displacement) {
   TangentSolver& solver = certificate_.solver;
   if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
-  check(VecCopy(solver.latest(), step_));
-  check(VecWAXPY(trial_, -1.0, step_, displacement));
+  check(VecWAXPY(trial_, -1.0, solver.latest(), displacement));
   certificate_.function.evaluate(trial_, certified_gradient_);
-  check(VecSet(step_, 0));
-  const bool convex = solver.solve(displacement, certified_gradient_, step_, 0.2);
-  contraction_ =
-      convex ? std::min(largest_block(step_) / step, most_contraction) : most_contraction;
+  const double found = solver.contraction(displacement, trial_, certified_gradient_);
+  contraction_ = found <= trusted_contraction ? found : most_contraction;
   contracted_at_ = solver.hessian().assemblies();
   return contraction_;
 }

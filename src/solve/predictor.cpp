@@ -21,7 +21,10 @@ bool Predictor::predict(Vec displacement, double load, Vec increment) {
   // A weak preconditioner's norm does not see smooth errors: after 1e-2 of it an increment can miss
   // by more than the path trusts, and steps are halved for nothing.
   constexpr double close = 1e-5;
-  return solver_.solve(displacement, force_, increment, close);
+  bool convex = solver_.solve(displacement, force_, increment, close);
+  // Where iterations ran out, the preconditioner is worn out and the next solve renews it.
+  if (convex && !solver_.finished()) convex = solver_.solve(displacement, force_, increment, close);
+  return convex && solver_.finished();
 }
 
 }  // namespace repose::solve

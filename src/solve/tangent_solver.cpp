@@ -1,5 +1,8 @@
 #include "repose/solve/tangent_solver.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "repose/base/error.h"
 #include "repose/base/petsc_versions.h"
 
@@ -46,6 +49,7 @@ TangentSolver::TangentSolver(Positions& positions, Hessian& hessian)
     : positions_(positions),
       hessian_(hessian),
       unknowns_(3 * positions.part().total_unknowns),
+      next_(positions.make_vector()),
       work_(positions.make_vector()),
       measured_(positions.make_vector()),
       wear_(price_of_renewal(price_of_factors)) {
@@ -178,6 +182,7 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
   check(KSPGetConvergedReason(krylov_, &reason));
   if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF)
     throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
+  finished_ = reason > 0;
   return reason != KSP_DIVERGED_INDEFINITE_MAT && reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 
@@ -199,6 +204,22 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
   measured_at_ = hessian_.assemblies();
   check(VecCopy(gradient, measured_));
   return distance_;
+}
+
+double TangentSolver::contraction(Vec displacement, Vec trial, Vec gradient) {
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  constexpr double close = 0.2, most_left = 0.5;
+  PetscReal slope = 0, left = 0, next_slope = 0;
+  check(VecDot(measured_, work_, &slope));
+  check(VecDot(gradient, work_, &left));
+  if (std::abs(left) > most_left * slope) return endless;
+  check(VecSet(next_, 0));
+  const bool convex = solve(trial, gradient, next_, close);
+  hessian_.assemble(displacement);
+  measured_at_ = hessian_.assemblies();  // what is known there is not lost
+  if (!convex) return endless;
+  check(VecDot(gradient, next_, &next_slope));
+  return std::max(largest_block(next_) / distance_, std::sqrt(next_slope / slope));
 }
 
 }  // namespace repose::solve

@@ -46,11 +46,11 @@ class Minimiser : public RestSearch {
   /// Whether the search that ended after so many iterations is to be begun again where it ended.
   bool worth_going_on(int64_t iterations);
   double strict_estimate(Vec displacement, Vec gradient);
-  /// How much shorter than the latest Newton step, of length `step`, the next would be with the
-  /// same Hessian: θ < ½ where Newton's method converges, and the rest is |δ| / (1 − θ) away at
-  /// most (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1). Where it is larger, the
-  /// quadratic model is not to be trusted yet.
-  double contraction(Vec displacement, double step);
+  /// Of the latest Newton step δ, from `displacement`, and the next: θ (TangentSolver), of which
+  /// the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004, Newton
+  /// Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic model
+  /// misleads.
+  double contraction(Vec displacement);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
@@ -79,7 +79,7 @@ class Minimiser : public RestSearch {
   bool stopped_ = false;                // the watcher did not want to go on
   double contraction_ = 0;              // of the latest Newton step, …
   int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian
-  base::VecHandle gradient_, saved_, step_, trial_, certified_gradient_;
+  base::VecHandle gradient_, saved_, trial_, certified_gradient_;
   std::exception_ptr thrown_;
 };
 

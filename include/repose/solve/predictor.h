@@ -10,7 +10,7 @@ class Predictor {
   Predictor(Objective& objective, TangentSolver& solver);
 
   /// The increment from `displacement` at the positions' load to `load`. Returns false where the
-  /// Hessian is indefinite. Collective.
+  /// Hessian is indefinite or the linear solver comes to no end. Collective.
   bool predict(Vec displacement, double load, Vec increment);
 
  private:

@@ -36,9 +36,10 @@ class TangentSolver {
   void lend_preconditioner(KSP other);
 
   /// Solves H δ = rhs at `displacement` (prepared there), to a relative natural residual. Returns
-  /// whether the Hessian showed no negative curvature on the way; where it did, δ is the iterate
-  /// reached.
+  /// whether the Hessian showed no negative curvature on the way; where it did, or iterations ran
+  /// out, δ is the iterate reached.
   bool solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance);
+  bool finished() const { return finished_; }  ///< the latest solve, to what was asked of it
 
   /// The Newton step −H⁻¹ ∇Φ at `displacement`, its largest block in mm: how far the rest position
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.
@@ -47,6 +48,12 @@ class TangentSolver {
   /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
   /// yet.
   double glance(Vec gradient);
+
+  /// How much shorter than the latest newton_distance, at `displacement`, the Newton step from its
+  /// end `trial` is, where the gradient is given: by the largest block or by the energy norm
+  /// √(∇Φᵀ H⁻¹ ∇Φ), whichever falls less. Infinite where the model that the step is of misleads: H
+  /// is not positive definite at its end, or the slope along it is not even halved there.
+  double contraction(Vec displacement, Vec trial, Vec gradient);
 
   /// H⁻¹ ∇Φ of the last newton_distance.
   Vec latest() const { return work_; }
@@ -63,7 +70,6 @@ class TangentSolver {
   int64_t renewals() const { return renewals_; }  ///< of the preconditioner
 
  private:
-
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
   void choose_preconditioner();
@@ -77,9 +83,11 @@ class TangentSolver {
   PcHandle factors_;  // in the place of columns_
   bool given_way_ = false;
   KspHandle krylov_;
+  base::VecHandle next_;             // the Newton step at a trial
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
   double distance_ = 0;              // its length, …
   int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
+  bool finished_ = false;
   Wear wear_;
   int64_t renewals_ = 0;
   int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal

@@ -5,6 +5,7 @@
 #include "moved_block.h"
 #include "repose/base/agreement.h"
 #include "repose/base/scoped_option.h"
+#include "repose/solve/predictor.h"
 #include "repose/solve/tangent.h"
 
 namespace repose {
@@ -19,14 +20,22 @@ model::Model slab_on_bone() {
   });
 }
 
+/// That bone goes aside with the load.
+model::Model slab_on_moving_bone() {
+  model::Model slab = slab_on_bone();
+  for (Vec3& target : slab.points.target) target += Vec3(0, 1, 0);
+  return slab;
+}
+
 struct Solved : testing::MovedBlock {
   solve::Objective objective;
   solve::Tangent tangent{objective};
   solve::TangentSolver solver{positions, tangent};
   base::VecHandle rhs = vector(5, 1.0), answer = positions.make_vector();
 
-  explicit Solved(mechanics::VolumeTerm term = mechanics::VolumeTerm::penalty)
-      : MovedBlock(slab_on_bone()), objective(positions, {1, term, 0.4}) {}
+  explicit Solved(mechanics::VolumeTerm term = mechanics::VolumeTerm::penalty,
+                  model::Model model = slab_on_bone())
+      : MovedBlock(std::move(model)), objective(positions, {1, term, 0.4}) {}
   /// Drawn out along x, the more the farther: springs a thousand times stiffer than others.
   base::VecHandle drawn_out() const {
     std::vector<Vec3> values = part.model.points.position;
@@ -78,6 +87,24 @@ TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
   EXPECT_EQ(s.solver.renewals(), 1);
   s.solve(after, 1e-6);
   EXPECT_EQ(s.solver.renewals(), 2);
+}
+
+TEST(Predictor, RenewsThePreconditionerWhereIterationsRunOut) {
+  const base::ScopedOption most("-ksp_max_it", "90");
+  Solved s(mechanics::VolumeTerm::none, slab_on_moving_bone());
+  solve::Predictor predictor(s.objective, s.solver);
+  s.positions.set_load(0);
+  s.solve(s.positions.make_vector(), 1e-6);
+  EXPECT_TRUE(predictor.predict(s.drawn_out(), 1, s.answer));
+  EXPECT_EQ(s.solver.renewals(), 2);
+}
+
+TEST(Predictor, PredictsNothingWhereIterationsRunOut) {
+  const base::ScopedOption most("-ksp_max_it", "2");
+  Solved s(mechanics::VolumeTerm::none, slab_on_moving_bone());
+  solve::Predictor predictor(s.objective, s.solver);
+  s.positions.set_load(0);
+  EXPECT_FALSE(predictor.predict(s.drawn_out(), 1, s.answer));
 }
 
 TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
