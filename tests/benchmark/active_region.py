@@ -2,7 +2,7 @@
 """What searching only the tissue that feels a move costs: a table.
 
     tests/benchmark/active_region.py [-bin build/bin] [-sizes 2000,8000] [-whole 8000]
-                                     [-output docs/active_region.md]
+                                     [-output docs/active_region.md] [-mark measured]
 
 Synthetic heads of the given numbers of skin vertices, 4 layers, springs by moduli with s_ref = r_0,
 penalty volume term, the chin cut off and moved 8 mm forward, solved to 0.1 mm: with -active_region
@@ -109,9 +109,10 @@ def rows_of(size, with_whole, tools):
 
 
 def main():
-    chosen = option_parser(__doc__, sizes="2000,8000", whole=8000).parse_args()
+    chosen = option_parser(__doc__, sizes="2000,8000", whole=8000, mark="measured").parse_args()
     print_table(HEAD, (line for size in map(int, chosen.sizes.split(","))
-                       for line in rows_of(size, size <= chosen.whole, chosen.bin)), chosen.output)
+                       for line in rows_of(size, size <= chosen.whole, chosen.bin)), chosen.output,
+                chosen.mark)
 
 
 main()
