@@ -22,6 +22,7 @@ struct PackedBlock {
     const int16_t(&e)[9] = entry;
     return {{e[0], e[3], e[6], e[1], e[4], e[7], e[2], e[5], e[8]}, upper_bits};
   }
+  /// What is nearest to a block; 0 where its largest entry is no normal number.
   static PackedBlock of(const Eigen::Matrix3f& exact) {
     constexpr float most = 32767;
     const float largest = exact.cwiseAbs().maxCoeff();

@@ -123,6 +123,17 @@ TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
   EXPECT_TRUE(by_factors_after(4e5));
 }
 
+TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
+  const base::ScopedOption few("-ksp_max_it", "200");
+  Solved s;
+  s.objective.set_volume_weight(4e5);
+  solve::TangentSolver solver(s.positions, s.tangent);
+  solver.solve(s.positions.make_vector(), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.finished());
+  solver.solve(s.vector(1, 1e-12), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.by_factors());
+}
+
 INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));
 
 }  // namespace
