@@ -384,7 +384,7 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
     return {};
   }
   const auto columns = static_cast<int64_t>(job.anatomy->skin.points.size());
-  constexpr double short_way = 2 * solve::LoadPath::automatic_stride;  // mm: two steps or fewer
+  constexpr double short_way = 2 * solve::LoadPath::short_stride;  // mm: two steps or fewer
   const double travel = model::PrescribedMotion(job.model).largest_travel(job.model);
   if (!wish.insisted && !wish.preview && travel <= short_way) return {};
   if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);

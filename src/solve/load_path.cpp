@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace repose::solve {
 
@@ -10,9 +11,12 @@ using base::check;
 
 namespace {
 
-constexpr int most_halvings = 5;  // of a step that fails or strays
-constexpr int fold_halvings = 1;  // of a step that folds tissue: a second fold is the path's own
-constexpr double trusted_miss = 0.5;  // of the predicted increment, beyond which a step is halved
+constexpr double unknown = std::numeric_limits<double>::infinity();
+
+constexpr int most_halvings = 5;  // of a short step that fails or strays
+// Of the predicted increment, beyond which a step is halved:
+constexpr double trusted_miss = 0.5;
+constexpr double trusted_defect = 0.25;
 
 class Stopwatch {
  public:
@@ -35,10 +39,16 @@ LoadPath::LoadPath(Objective& objective, Predictor& predictor, RestSearch& searc
       trial_(objective.positions().make_vector()),
       increment_(objective.positions().make_vector()) {}
 
-double LoadPath::first_step() const {
+double LoadPath::step_of(double stride) const {
   if (settings_.load_steps > 0) return 1.0 / settings_.load_steps;
   const double travel = objective_.positions().largest_travel();
-  return 1.0 / std::max(1.0, std::ceil(travel / automatic_stride));
+  return 1.0 / std::max(1.0, std::ceil(travel / stride));
+}
+
+double LoadPath::longest_step() const {
+  // The energy with the paper's volume term is hardly convex: long searches wander.
+  const bool tame = objective_.weights().volume != mechanics::VolumeTerm::paper;
+  return step_of(tame ? std::max(short_stride, settings_.longest_stride) : short_stride);
 }
 
 int64_t LoadPath::inverted(Vec displacement) {
@@ -48,12 +58,14 @@ int64_t LoadPath::inverted(Vec displacement) {
 
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   Positions& positions = objective_.positions();
+  const double before = positions.load(), step = load - before;
   const int64_t folded_before = inverted(displacement);
   const bool predicted = predictor_.predict(displacement, load, increment_);
+  Attempt attempt;
+  if (!predicted && is_long(step)) return attempt;
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
-  Attempt attempt;
   attempt.outcome = search_.run(trial_, settings_.accuracy);
   result_.iterations += attempt.outcome.iterations;
   attempt.folded = inverted(trial_) > folded_before;
@@ -62,11 +74,28 @@ LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   check(VecAXPY(increment_, 1.0, displacement));
   check(VecAXPY(increment_, -1.0, trial_));
   attempt.miss = largest_block(increment_);
+  const bool sound = attempt.outcome.converged && !attempt.folded;
+  // A jump cannot hide in a miss that short steps would have let pass.
+  const double hidden = trusted_miss * attempt.expected * std::min(1.0, short_step_ / step);
+  if (is_long(step) && sound && attempt.miss > hidden + settings_.accuracy)
+    attempt.defect = attempt.miss <= attempt.expected ? defect(displacement, before) : unknown;
   return attempt;
 }
 
-bool LoadPath::follows(const Attempt& now, const Attempt* coarser) const {
+double LoadPath::defect(Vec displacement, double before) {
+  base::VecHandle back = objective_.positions().make_vector();
+  if (!predictor_.predict(trial_, before, back)) return unknown;
+  // The misses of both predictions, whose difference is twice what the trapezoidal rule misses.
+  check(VecAXPY(back, 1.0, trial_));
+  check(VecAXPY(back, -1.0, displacement));
+  check(VecAXPY(back, -1.0, increment_));
+  return largest_block(back) / 2;
+}
+
+bool LoadPath::follows(const Attempt& now, bool is_long, const Attempt* coarser) const {
   if (!now.outcome.converged) return false;
+  if (is_long)
+    return !now.folded && now.defect <= trusted_defect * now.expected + settings_.accuracy;
   // Halving shrinks what a smooth path misses by four. What it does not shrink, a jump of the rest
   // position itself or a fold, is the path's own.
   const bool near = settings_.hasty || now.miss <= trusted_miss * now.expected + settings_.accuracy;
@@ -118,28 +147,35 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   settle(displacement, on_step);
   if (guess && result_.last.converged && !result_.last.stopped && result_.load < 1)
     leap(displacement, guess, on_step);
-  const double full_step = first_step();
-  double step = full_step;
+  short_step_ = step_of(short_stride);
+  double longest = longest_step();
+  double step = longest;
   int halvings = 0;
   std::optional<Attempt> coarser;
   while (result_.last.converged && !result_.last.stopped && result_.load < 1) {
     const Stopwatch watch;
     const double before = result_.load;
     double target = before + step;
-    if (target > 1 - 1e-3 * full_step) target = 1;
+    if (target > 1 - 1e-3 * short_step_) target = 1;
+    const bool far = is_long(target - before);
     const Attempt tried = attempt(displacement, target);
     const bool last_chance = halvings == most_halvings;
-    if (!tried.outcome.stopped && !last_chance && !follows(tried, coarser ? &*coarser : nullptr)) {
+    if (!tried.outcome.stopped && !last_chance &&
+        !follows(tried, far, coarser ? &*coarser : nullptr)) {
       positions.set_load(before);
       search_.go_back(displacement);
-      step /= 2;
-      ++halvings;
       ++result_.halvings;
-      coarser = tried;
+      if (far) {
+        step = longest = std::max(step / 2, short_step_);
+      } else {
+        step /= 2;
+        ++halvings;
+        coarser = tried;
+      }
       continue;
     }
     accept(tried.outcome, target, displacement);
-    step = std::min(full_step, 2 * step);
+    step = std::min(longest, 2 * step);
     halvings = std::max(0, halvings - 1);
     coarser.reset();
     on_step(result_.last, result_.load, watch.seconds());

@@ -133,6 +133,13 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 
 namespace {
 
+/// Far from rest, multipliers of exact volume cost more than the steps that a long one saves.
+PathSettings path_of(const Settings& settings) {
+  PathSettings path = settings.path;
+  if (settings.exact_volume) path.longest_stride = LoadPath::short_stride;
+  return path;
+}
+
 Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
                       base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
@@ -148,7 +155,7 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
 
   Searcher searcher(positions, settings);
   Objective& objective = searcher.objective();
-  LoadPath path(objective, searcher.predictor(), searcher.search(), settings.path);
+  LoadPath path(objective, searcher.predictor(), searcher.search(), path_of(settings));
   Summary summary;
   int64_t evaluations_before = 0;
   summary.path =

@@ -182,7 +182,7 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
   check(KSPGetConvergedReason(krylov_, &reason));
   if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF)
     throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
-  finished_ = reason > 0;
+  finished_ = reason > 0 && reason != KSP_CONVERGED_ITS;  // preonly asks for no accuracy
   return reason != KSP_DIVERGED_INDEFINITE_MAT && reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 

@@ -10,10 +10,11 @@ namespace repose::solve {
 
 /// How the bones are taken to their places.
 struct PathSettings {
-  double accuracy = 0.1;  ///< mm, of every step
-  int load_steps = 0;     ///< equal steps; 0: as many as the motion needs
-  double start_load = 0;  ///< of a restarted run
-  bool hasty = false;     ///< a step is halved where it fails or folds tissue only
+  double accuracy = 0.1;       ///< mm, of every step
+  int load_steps = 0;          ///< equal steps; 0: as many as the motion needs
+  double longest_stride = 10;  ///< mm of the fastest point in one automatic step, at most
+  double start_load = 0;       ///< of a restarted run
+  bool hasty = false;          ///< a short step is halved where it fails or folds tissue only
 };
 
 /// What a run came to.
@@ -29,7 +30,8 @@ struct PathOutcome {
 
 /// Follows the rest position from the initial state as the bones move: each step starts from a
 /// linear prediction, and one that fails, folds tissue or lands far from its prediction is halved.
-/// All members collective.
+/// A long step must also agree with the prediction back from its end, or it may have passed over a
+/// jump of the rest position. All members collective.
 class LoadPath {
  public:
   using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
@@ -43,8 +45,8 @@ class LoadPath {
   /// good where the search from it comes to rest without folded tissue.
   PathOutcome run(Vec displacement, Vec guess, const OnStep& on_step);
 
-  /// Steps an automatic path begins with: one for each `automatic_stride` mm of the fastest point.
-  static constexpr double automatic_stride = 2.5;
+  /// Automatic steps are long where the fastest point goes farther, mm.
+  static constexpr double short_stride = 2.5;
 
  private:
   struct Attempt {
@@ -52,11 +54,15 @@ class LoadPath {
     bool folded = false;  // more inverted prisms than at the start of the step
     double expected = 0;  // largest predicted displacement, mm
     double miss = 0;      // largest distance of the end from the prediction, mm
+    double defect = 0;    // of a long step: its largest distance from the mean of both predictions
   };
-  double first_step() const;
+  double step_of(double stride) const;
+  double longest_step() const;
+  bool is_long(double step) const { return step > 1.01 * short_step_; }
   int64_t inverted(Vec displacement);
   Attempt attempt(Vec displacement, double load);
-  bool follows(const Attempt& now, const Attempt* coarser) const;
+  double defect(Vec displacement, double before);
+  bool follows(const Attempt& now, bool is_long, const Attempt* coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
   void leap(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
@@ -65,6 +71,7 @@ class LoadPath {
   Predictor& predictor_;
   RestSearch& search_;
   PathSettings settings_;
+  double short_step_ = 1;  // the longest that is not long
   base::VecHandle trial_, increment_;
   PathOutcome result_;
 };
