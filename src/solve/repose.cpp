@@ -133,10 +133,11 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 
 namespace {
 
-/// Far from rest, multipliers of exact volume cost more than the steps that a long one saves.
+/// Far from rest, forces and the multipliers of exact volume cost more than the steps that a long
+/// one saves.
 PathSettings path_of(const Settings& settings) {
   PathSettings path = settings.path;
-  if (settings.exact_volume) path.longest_stride = LoadPath::short_stride;
+  if (settings.force || settings.exact_volume) path.longest_stride = LoadPath::short_stride;
   return path;
 }
 
