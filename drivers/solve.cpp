@@ -18,7 +18,6 @@
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
-#include "repose/model/motion.h"
 #include "repose/results/model_file.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
@@ -384,9 +383,7 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
     return {};
   }
   const auto columns = static_cast<int64_t>(job.anatomy->skin.points.size());
-  constexpr double short_way = 2 * solve::LoadPath::short_stride;  // mm: two steps or fewer
-  const double travel = model::PrescribedMotion(job.model).largest_travel(job.model);
-  if (!wish.insisted && !wish.preview && travel <= short_way) return {};
+  if (!wish.insisted && !wish.preview && !adapt::guides_pay(*job.anatomy, job.model)) return {};
   if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);
   if (wish.preview) return adapt::compared_rungs(*job.anatomy, preview_columns);
   std::vector<adapt::Resolution> rungs = adapt::guiding_rungs(*job.anatomy);

@@ -11,6 +11,7 @@
 #include "repose/base/deal_out.h"
 #include "repose/base/error.h"
 #include "repose/base/scoped_option.h"
+#include "repose/model/motion.h"
 #include "repose/solve/gather.h"
 #include "repose/surface/remesh.h"
 
@@ -167,6 +168,14 @@ std::vector<Resolution> rungs_by(double coarsening, double fewest, const model::
 
 std::vector<Resolution> guiding_rungs(const model::Anatomy& anatomy) {
   return rungs_by(3, 300, anatomy);
+}
+
+bool guides_pay(const model::Anatomy& anatomy, const Model& fine) {
+  constexpr size_t fine_columns = 10000;
+  const double short_way = anatomy.skin.points.size() < fine_columns
+                               ? solve::PathSettings{}.longest_stride
+                               : 2 * solve::LoadPath::short_stride;  // mm
+  return model::PrescribedMotion(fine).largest_travel(fine) > short_way;
 }
 
 std::vector<Resolution> compared_rungs(const model::Anatomy& anatomy, int64_t most_columns) {

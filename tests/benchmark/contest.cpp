@@ -196,6 +196,7 @@ class Runner {
   adapt::Ladder climb_coarser_models() {
     if (!options_.has("scene")) return {};
     const model::Anatomy anatomy = model::load_anatomy(scene::read_scene(options_.text("scene")));
+    if (!adapt::guides_pay(anatomy, task_.model)) return {};
     adapt::Climb wanted{adapt::guiding_rungs(anatomy), {}, {}};
     wanted.settings.weights = task_.weights;
     wanted.settings.volume = task_.volume;

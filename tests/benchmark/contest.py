@@ -34,7 +34,7 @@ from tissue import Tissue, last, model_of
 
 REFERENCE = "1e-9"  # mm
 FORWARD, OPENING = "meshes/paper_jaw_advance.yaml", "meshes/paper_jaw_opening.yaml"
-LARGE = 4300  # skin vertices: enough for one coarser model
+LARGE = 4300  # skin vertices
 # name: title, scene (none: a synthetic head of LARGE), options of repose-solve
 CASES = {
     "forward": ("The paper-sized head as shipped: jaw 6 mm forward, penalty volume term", FORWARD, []),

@@ -52,6 +52,10 @@ struct Climb {
 /// where the scene lets layers be any number (layers_are_free).
 std::vector<Resolution> guiding_rungs(const model::Anatomy& anatomy);
 
+/// Whether these pay before a model is solved: not where one long load step is cheaper, or, on
+/// meshes so fine that tissue buckles, two short ones. On rank 0.
+bool guides_pay(const model::Anatomy& anatomy, const model::Model& fine);
+
 /// Resolutions that are compared to see how fine is fine enough: likewise, with edges twice as long
 /// from rung to rung and about `most_columns` at most.
 std::vector<Resolution> compared_rungs(const model::Anatomy& anatomy, int64_t most_columns);
