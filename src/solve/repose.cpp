@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -47,6 +48,7 @@ class Watcher {
   Watcher(MPI_Comm comm, const Settings& settings)
       : progress_(comm),
         interrupt_(comm, settings.time_limit, settings.heeds_signals),
+        accuracy_(settings.path.accuracy),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
     const std::string to_go = std::isfinite(i.millimetres_to_go) && i.millimetres_to_go > 0
@@ -56,11 +58,26 @@ class Watcher {
     progress_.show(fmt::format("load {:.3f}  iteration {}  objective {:.6g} N mm  largest force "
                                "{:.3g} N  {}",
                                i.load, i.number, i.objective, i.largest_force, to_go),
-                   i.load);
+                   done(i));
     return !interrupt_.wanted();
   }
 
  private:
+  /// Share of the way: the loads reached, and of the next one the orders of magnitude that its
+  /// search has taken off the distance.
+  double done(const Iteration& i) {
+    if (i.load != load_ || i.number == 0) {
+      if (i.load > load_) reached_ = load_;  // else a step was refused
+      load_ = i.load;
+      farthest_ = nearest_ = i.millimetres_to_go;
+    }
+    if (!std::isfinite(farthest_)) farthest_ = i.millimetres_to_go;
+    nearest_ = std::min(nearest_, i.millimetres_to_go);
+    const bool known = std::isfinite(farthest_) && farthest_ > accuracy_ && nearest_ > 0;
+    const double searched =
+        known ? std::log(farthest_ / nearest_) / std::log(farthest_ / accuracy_) : 0;
+    return reached_ + (load_ - reached_) * std::clamp(searched, 0.0, 0.99);
+  }
   void print(const Iteration& i, const std::string& to_go) {
     progress_.clear();
     const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
@@ -72,6 +89,8 @@ class Watcher {
   using Clock = std::chrono::steady_clock;
   base::Progress progress_;
   base::Interrupt interrupt_;
+  double accuracy_, load_ = 0, reached_ = 0;
+  double farthest_ = 0, nearest_ = 0;  // mm, in this search
   bool prints_;
   Clock::time_point begin_ = Clock::now();
 };

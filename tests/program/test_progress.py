@@ -47,6 +47,13 @@ def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ran
     assert text.endswith("\r\x1b[K"), "the line is cleared at the end"
 
 
+def test_a_search_of_one_load_step_tells_the_time_left(environment, tmp_path):
+    text = seen([programs() / "repose-solve", PROJECT / "meshes/head_jaw_advance.yaml", "-tao_type",
+                 "lmvm", "-accuracy", "1e-6"], tmp_path, environment)
+    assert "load 1.000" in text and "load 0.5" not in text
+    assert " s left" in text
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_log_stays_quiet(run, ranks):
     result = run("repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml", ranks=ranks)
