@@ -93,7 +93,7 @@ def draw_choices(axes, rows):
                   transform=axes.get_yaxis_transform())
     axes.set_yticks(place, names, fontsize=6.5)
     axes.set_xlabel("skin from the reference, mm (right: time)")
-    axes.legend(fontsize=7, loc="lower right", bbox_to_anchor=(0.92, 0))
+    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
     axes.invert_yaxis()
 
 

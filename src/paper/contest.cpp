@@ -23,6 +23,7 @@ int64_t logged(const char* name) {
   PetscLogEvent event = -1;
   PetscEventPerfInfo info{};
   check(PetscLogEventGetId(name, &event));
+  if (event < 0) return 0;  // not registered yet
   check(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
   return info.count;
 }

@@ -46,9 +46,13 @@ double LoadPath::step_of(double stride) const {
 }
 
 double LoadPath::longest_step() const {
-  // The energy with the paper's volume term is hardly convex: long searches wander.
-  const bool tame = objective_.weights().volume != mechanics::VolumeTerm::paper;
-  return step_of(tame ? std::max(short_stride, settings_.longest_stride) : short_stride);
+  // The energy with the paper's volume term is hardly convex: long searches wander. Meshes so fine
+  // that tissue buckles seldom allow long steps.
+  constexpr int64_t fine = 100000;  // scalar unknowns
+  const bool wanders = objective_.weights().volume == mechanics::VolumeTerm::paper;
+  const bool buckles = 3 * objective_.positions().part().total_unknowns > fine;
+  const bool brief = wanders || buckles || settings_.longest_stride < short_stride;
+  return brief ? short_step_ : step_of(settings_.longest_stride);
 }
 
 int64_t LoadPath::inverted(Vec displacement) {
