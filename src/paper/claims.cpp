@@ -120,7 +120,7 @@ std::string memory(const Findings& findings) {
     most = std::max(most, each);
   }
   return claim("Memory grows linearly.", most <= 1.5 * least,
-               fmt::format("Bytes a spring, Newton's matrices included: {}. From 2 thousand to a "
+               fmt::format("Bytes a spring, Newton's method included: {}. From 2 thousand to a "
                            "million points:\n[scaling](scaling.md).",
                            text));
 }

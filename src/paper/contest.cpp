@@ -174,6 +174,8 @@ Entry Contest::race(const std::string& method, const Search& search) {
   Entry entry = race_to(reference_, rules_, search, end);
   entry.method = method;
   if (entry.end == Entry::End::reached || !find_own_minimum(end)) return entry;
+  if (distance(end) <= rules_.accuracy)
+    return entry;  // of the same minimum, which it did not reach
   Entry own = race_to(end, rules_, search, again);
   if (own.end != Entry::End::reached) return entry;
   own.method = method;

@@ -35,7 +35,7 @@ std::string size_table(const Findings& findings) {
       "is "
       "what is held on\nthe heap: by the model, besides to evaluate energy and gradient, and "
       "besides "
-      "for Newton's\nmatrices (not their factors).\n\n"
+      "for Newton's\nmethod with its preconditioner.\n\n"
       "| layers | points | springs | prisms | model, MB | + descent, MB | + Newton, MB |\n"
       "|--:|--:|--:|--:|--:|--:|--:|\n";
   for (const Size& s : findings.sizes)

@@ -3,6 +3,7 @@
 #include "repose/base/usage.h"
 #include "repose/model/build.h"
 #include "repose/solve/tangent.h"
+#include "repose/solve/tangent_solver.h"
 
 namespace repose::paper {
 
@@ -23,7 +24,9 @@ void measure_solver(const model::Model& model, Size& size) {
   for (int k = 0; k < evaluations; ++k) objective.evaluate(at, gradient);
   size.evaluation = (cpu_seconds() - begin) / evaluations;
   bytes = heap_bytes();
-  const solve::Tangent tangent(objective);
+  solve::Tangent tangent(objective);
+  solve::TangentSolver solver(positions, tangent);
+  solver.renew(at);
   size.newton_bytes = heap_bytes() - bytes;
 }
 

@@ -10,7 +10,7 @@ struct Size {
   model::Counts counts;
   double model_bytes = 0;    ///< of the model
   double descent_bytes = 0;  ///< besides, to evaluate energy and gradient
-  double newton_bytes = 0;   ///< besides, for Newton's matrices
+  double newton_bytes = 0;   ///< besides, for Newton's method with its preconditioner
   double build = 0;          ///< s, surfaces to model
   double ready = 0;          ///< s, model to the first evaluation
   double evaluation = 0;     ///< s, of energy and gradient
