@@ -29,6 +29,8 @@ void check_options(PetscErrorCode code) {
 Session::Session(int argc, char** argv, const char* help) {
   setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0);
   setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
+  // With more, models are shared out over ranks in another way in every run (Scotch 7).
+  setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
   check(PetscInitialize(&argc, &argv, nullptr, help));
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
 }

@@ -49,9 +49,9 @@ def work(path, key="evaluations"):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, solved, scene, ranks):
     check(scene, *STIFFNESS, ranks=ranks)
-    few = solved(scene, "-accuracy", ACCURACY, *STIFFNESS, ranks=ranks)
+    few = solved(scene, "-accuracy", 0.01, *STIFFNESS, ranks=ranks)
+    assert 3 * work(few) < work(solved(scene, "-accuracy", 0.01, "-tao_type", "lmvm"))
     many = solved(scene, "-accuracy", ACCURACY, "-tao_type", "lmvm")
-    assert 3 * work(few) < work(many)
     exact = solved(scene, "-accuracy", ACCURACY, *STIFFNESS, *FACTORS, ranks=ranks)
     assert 8 * work(exact) < work(many)
     assert work(exact) < 1.5 * work(solved(scene, "-accuracy", ACCURACY))
