@@ -101,6 +101,7 @@ struct Minimiser::Callbacks {
       PetscInt iteration = 0;
       PetscReal value = 0, length = 0;
       check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, &length, nullptr));
+      self.cut_ = self.newton_ && iteration > 0 && self.step_was_cut();
       iteration += self.iterations_;
       Vec x = nullptr, g = nullptr;
       check(TaoGetSolution(tao, &x));
@@ -174,6 +175,15 @@ void Minimiser::set_forcing() {
   check(KSPSetTolerances(inner, forcing, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
+bool Minimiser::step_was_cut() const {
+  KSP inner = nullptr;
+  KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
+  check(TaoGetKSP(tao_, &inner));
+  check(KSPGetConvergedReason(inner, &reason));
+  return reason != KSP_CONVERGED_RTOL && reason != KSP_CONVERGED_ATOL &&
+         reason != KSP_CONVERGED_ITS && reason != KSP_DIVERGED_ITS;
+}
+
 double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
   if (&certificate_.function != &function_) {
     certificate_.function.evaluate(displacement, certified_gradient_);
@@ -203,13 +213,14 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   }
   if (accuracy_ == 0) return false;
   // A look costs the solution of a linear system, so it is taken only where the force that went
-  // with a distance at the last look says that it is worth it; a Newton method's steps go further.
+  // with a distance at the last look says that it is worth it; a Newton method's steps go further,
+  // but one cut off by the trust region or negative curvature hardly comes to a convex place.
   const double hopeful = newton_ ? 20 : 2;
   constexpr int64_t seldom = 20;  // evaluations: a look costs other methods as much as many of them
   const bool far = largest_force > hopeful * softest_ * accuracy_;
   const bool quick = newton_ || initial_;
   const bool soon = !quick && function_.evaluations() - looked_at_ < seldom;
-  if (softest_ > 0 && (far || soon)) {
+  if (softest_ > 0 && (far || soon || cut_)) {
     error_ = largest_force / softest_;
     return false;
   }

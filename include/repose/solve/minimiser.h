@@ -51,6 +51,7 @@ class Minimiser : public RestSearch {
   /// Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic model
   /// misleads.
   double contraction(Vec displacement);
+  bool step_was_cut() const;
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
@@ -68,6 +69,7 @@ class Minimiser : public RestSearch {
   bool slowed_ = false;                    // the initial Hessian is to be renewed
   int64_t iterations_ = 0;                 // of the run under way, before TAO's present ones
   bool automatic_forcing_ = true;
+  bool cut_ = false;                    // the latest Newton step was
   double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate
   double accuracy_ = 0;                 // mm, of the run under way
   double error_ = 0;                    // mm, latest strict estimate
