@@ -4,7 +4,8 @@
     drivers/weights.py [SCENE] [-bin build/bin] [-output docs/weights.md]
 
 Solves SCENE (default: meshes/paper_jaw_advance.yaml) once a weight: λ of the paper's term from 1e-9
-to 1 − 1e-9, the bulk modulus κ of the penalty from 1e-6 to 1e3 N/mm². Times are ratios to κ = 1.
+to 1 − 1e-9, the bulk modulus κ of the penalty from 1e-6 to 1e3 N/mm². Times are ratios to κ = 1;
+a search is stopped after 40 s.
 Needs: apt-get install --no-install-recommends python3-h5py
 """
 
@@ -20,6 +21,7 @@ import h5py
 PROJECT = pathlib.Path(__file__).resolve().parents[1]
 LAMBDAS = ("1e-9", "1e-6", "1e-3", "0.5", "0.999", "0.999999", "0.999999999")
 MODULI = ("1e-6", "1e-4", "1e-2", "1", "1e2", "1e3")
+PATIENCE = 40  # s
 HEAD = ("| {} | ended | load | condition number | smallest eigenvalue, N/mm | iterations | "
         "evaluations | time | largest volume error | inverted | estimate, mm |")
 
@@ -28,7 +30,8 @@ def solve(program, scene, options):
     """Exit status and steps (attributes) of one run; no steps where the input was refused."""
     with tempfile.TemporaryDirectory() as folder:
         name = os.path.join(folder, "result")
-        done = subprocess.run([program, scene, *options, "-stability", "-output", name],
+        done = subprocess.run([program, scene, *options, "-stability", "-output", name,
+                               "-time_limit", str(PATIENCE)],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True)
         if done.returncode not in (0, 2):
             print(done.stderr, file=sys.stderr, end="")

@@ -46,12 +46,10 @@ double LoadPath::step_of(double stride) const {
 }
 
 double LoadPath::longest_step() const {
-  // The energy with the paper's volume term is hardly convex: long searches wander. Meshes so fine
-  // that tissue buckles seldom allow long steps.
+  // Meshes so fine that tissue buckles seldom allow long steps.
   constexpr int64_t fine = 100000;  // scalar unknowns
-  const bool wanders = objective_.weights().volume == mechanics::VolumeTerm::paper;
   const bool buckles = 3 * objective_.positions().part().total_unknowns > fine;
-  const bool brief = wanders || buckles || settings_.longest_stride < short_stride;
+  const bool brief = buckles || settings_.longest_stride < short_stride;
   return brief ? short_step_ : step_of(settings_.longest_stride);
 }
 

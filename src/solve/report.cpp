@@ -13,7 +13,10 @@ std::string row(const std::string& name, const std::string& value) {
 }
 
 std::string work_rows(const Summary& s) {
-  return row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
+  const std::string softer =
+      s.softer > 0 ? row("softer volume terms", fmt::format("first: {} evaluations", s.softer))
+                   : "";
+  return softer + row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
          row("iterations", fmt::format("{}", s.path.iterations)) +
          row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
                                         s.evaluations, s.assemblies));

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <utility>
 
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
@@ -17,6 +18,7 @@
 #include "repose/solve/natural_rows.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
+#include "repose/solve/stiffening.h"
 
 namespace repose::solve {
 
@@ -119,6 +121,9 @@ class Searcher {
   Objective& objective() { return problem_.objective(); }
   TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
   Predictor& predictor() { return predictor_; }
+  Stiffening stiffening() {
+    return {problem_.objective(), problem_.tangent(), predictor_, search()};
+  }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   int64_t evaluations() { return problem_.function().evaluations(); }
   int64_t assemblies() const { return problem_.assemblies(); }
@@ -153,11 +158,28 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 namespace {
 
 /// Far from rest, forces and the multipliers of exact volume cost more than the steps that a long
-/// one saves.
+/// one saves, and with the paper's volume term, hardly convex, a search wanders.
 PathSettings path_of(const Settings& settings) {
   PathSettings path = settings.path;
-  if (settings.force || settings.exact_volume) path.longest_stride = LoadPath::short_stride;
+  const bool wanders = settings.weights.volume == mechanics::VolumeTerm::paper;
+  if (settings.force || settings.exact_volume || wanders)
+    path.longest_stride = LoadPath::short_stride;
   return path;
+}
+
+/// A guess of the rest position at load 1, or null where none is wanted or found.
+base::VecHandle stiffened(Searcher& searcher, const Settings& settings, Vec displacement) {
+  const bool automatic = settings.path.load_steps == 0 && settings.path.start_load == 0;
+  base::VecHandle guess;
+  const Positions& positions = searcher.objective().positions();
+  if (settings.force || settings.exact_volume || !automatic || positions.largest_travel() == 0)
+    return guess;
+  Stiffening stiffening = searcher.stiffening();
+  if (!stiffening.pays()) return guess;
+  guess = positions.make_vector();
+  check(VecCopy(displacement, guess));
+  if (!stiffening.run(guess, settings.path)) guess = {};
+  return guess;
 }
 
 Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
@@ -175,8 +197,12 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
 
   Searcher searcher(positions, settings);
   Objective& objective = searcher.objective();
-  LoadPath path(objective, searcher.predictor(), searcher.search(), path_of(settings));
   Summary summary;
+  const double begin = MPI_Wtime();
+  if (!guess) guess = stiffened(searcher, settings, displacement);
+  double seconds_before = MPI_Wtime() - begin;
+  summary.softer = searcher.evaluations();
+  LoadPath path(objective, searcher.predictor(), searcher.search(), path_of(settings));
   int64_t evaluations_before = 0;
   summary.path =
       path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
@@ -194,7 +220,7 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
           summary.last.smallest_eigenvalue = spectrum.smallest;
           summary.last.largest_eigenvalue = spectrum.largest;
         }
-        summary.last.seconds = seconds;
+        summary.last.seconds = seconds + std::exchange(seconds_before, 0);
         summary.last.evaluations = searcher.evaluations() - evaluations_before;
         evaluations_before = searcher.evaluations();
         receive(summary.last, natural.rows(objective, settings.exact_volume));

@@ -35,6 +35,14 @@ def test_a_tame_move_takes_one_step(solved):
     assert 1.5 * evaluations[0] < evaluations[1]
 
 
+def test_a_stiff_volume_term_is_reached_from_softer_ones(solved):
+    stiff = "paper_jaw_opening.yaml", "-accuracy", 1e-6, "-bulk_modulus", 1e3
+    led, followed = solved(*stiff), solved(*stiff, "-load_steps", 4)
+    same_face(led, followed, 2e-6)
+    evaluations = [sum(step["evaluations"] for step in steps(file)) for file in (led, followed)]
+    assert 2 * evaluations[0] < evaluations[1]
+
+
 def test_a_long_step_does_not_pass_over_a_jump(solved):
     """Its end is near its prediction, but the prediction back from there does not lead to its
     start; where the user asks for so few steps, they are taken."""

@@ -1,0 +1,75 @@
+#include "repose/solve/stiffening.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace repose::solve {
+
+namespace {
+
+constexpr double soft = 10;       // κ of the tissue's effective modulus
+constexpr double stiff = 2;       // of the soft κ; below, the load path alone is cheaper
+constexpr double stiffest = 1e3;  // of the soft κ; above, the way along κ is as long
+constexpr double growth = 10;     // of κ at once, at most
+constexpr double loosest = 0.1;   // mm, accuracy of what only leads on
+
+/// How many times stiffer than soft the volume term is, 0 where there is none.
+double stiffness(const Objective& objective) {
+  const mechanics::Weights& weights = objective.weights();
+  if (weights.volume == mechanics::VolumeTerm::none || weights.elastic == 0) return 0;
+  std::array<double, 3> sums{};  // Σ k0 r_0², Σ v_0, prisms
+  for (const mechanics::SpringLoop& loop : objective.loops().springs)
+    for (int64_t e = 0; e < loop.counted; ++e)
+      sums[0] += loop.stiffness[e] * loop.rest_length[e] * loop.rest_length[e];
+  const mechanics::PrismLoop& prisms = objective.loops().prisms;
+  for (int64_t e = 0; e < prisms.counted; ++e) sums[1] += prisms.rest_volume[e];
+  sums[2] = static_cast<double>(prisms.counted);
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), 3, MPI_DOUBLE, MPI_SUM, objective.positions().comm());
+  if (!(sums[0] > 0 && sums[1] > 0)) return 0;
+  const double modulus = weights.elastic * sums[0] / sums[1];
+  const bool paper = weights.volume == mechanics::VolumeTerm::paper;  // ½ κ / v_0 is its weight
+  const double bulk = paper ? 2 * weights.volume_weight * sums[1] / sums[2] : weights.volume_weight;
+  return bulk / (soft * modulus);
+}
+
+}  // namespace
+
+Stiffening::Stiffening(Objective& objective, Tangent& tangent, Predictor& predictor,
+                       RestSearch& search)
+    : objective_(objective), tangent_(tangent), predictor_(predictor), search_(search) {
+  const double times = stiffness(objective), weight = objective.weights().volume_weight;
+  if (!(times > stiff && times <= stiffest)) return;
+  const double stages = std::ceil(std::log(times) / std::log(growth));
+  for (double k = 0; k < stages; ++k) weight_.push_back(weight * std::pow(times, k / stages - 1));
+  weight_.push_back(weight);
+}
+
+void Stiffening::set_weight(double weight) {
+  objective_.set_volume_weight(weight);
+  tangent_.forget();
+}
+
+bool Stiffening::stiffen(Vec displacement, double accuracy) {
+  for (size_t k = 1; k + 1 < weight_.size(); ++k) {
+    set_weight(weight_[k]);
+    const Outcome outcome = search_.run(displacement, accuracy);
+    if (outcome.stopped) return true;
+    if (!outcome.converged) return false;
+  }
+  return true;
+}
+
+bool Stiffening::run(Vec displacement, PathSettings settings) {
+  settings.accuracy = std::max(settings.accuracy, loosest);
+  set_weight(weight_.front());
+  LoadPath path(objective_, predictor_, search_, settings);
+  const PathOutcome outcome =
+      path.run(displacement, nullptr, [](const Outcome&, double, double) {});
+  const bool led = outcome.complete() && stiffen(displacement, settings.accuracy);
+  set_weight(weight_.back());
+  objective_.positions().set_load(0);
+  return led;
+}
+
+}  // namespace repose::solve
