@@ -4,8 +4,8 @@
 
 #include "repose/base/scoped_option.h"
 #include "repose/solve/force_search.h"
-#include "repose/solve/load_path.h"
 #include "repose/solve/polak_ribiere.h"
+#include "repose/solve/stiffening.h"
 
 namespace repose::paper {
 
@@ -120,12 +120,12 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
 Contest::Search Contest::path_search(Vec guess, int load_steps, bool& complete) {
   return [this, guess, load_steps, &complete](solve::Function& watched, Vec displacement) {
     positions_.set_load(0);
-    solve::Predictor predictor(problem_.objective(), problem_.elastic_solver());
     WatchedSearch search(problem_, watched);
-    solve::LoadPath path(problem_.objective(), predictor, search.search(),
-                         {.accuracy = rules_.accuracy, .load_steps = load_steps});
     const auto unheard = [](const solve::Outcome&, double, double) {};
-    complete = path.run(displacement, guess, unheard).complete();
+    complete = solve::follow_bones(problem_, search.search(), false,
+                                   {.accuracy = rules_.accuracy, .load_steps = load_steps},
+                                   displacement, guess, unheard)
+                   .complete();
   };
 }
 

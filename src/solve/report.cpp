@@ -14,8 +14,9 @@ std::string row(const std::string& name, const std::string& value) {
 
 std::string work_rows(const Summary& s) {
   const std::string softer =
-      s.softer > 0 ? row("softer volume terms", fmt::format("first: {} evaluations", s.softer))
-                   : "";
+      s.path.softer > 0
+          ? row("softer volume terms", fmt::format("first: {} evaluations", s.path.softer))
+          : "";
   return softer + row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
          row("iterations", fmt::format("{}", s.path.iterations)) +
          row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
-#include <utility>
 
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
@@ -103,7 +102,6 @@ class Searcher {
  public:
   Searcher(Positions& positions, const Settings& settings)
       : problem_(positions, settings.weights, settings.force),
-        predictor_(problem_.objective(), problem_.elastic_solver()),
         watcher_(positions.comm(), settings),
         minimiser_(problem_.function(), problem_.solver(), problem_.certificate(),
                    std::ref(watcher_)) {
@@ -120,17 +118,13 @@ class Searcher {
   }
   Objective& objective() { return problem_.objective(); }
   TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
-  Predictor& predictor() { return predictor_; }
-  Stiffening stiffening() {
-    return {problem_.objective(), problem_.tangent(), predictor_, search()};
-  }
+  Problem& problem() { return problem_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   int64_t evaluations() { return problem_.function().evaluations(); }
   int64_t assemblies() const { return problem_.assemblies(); }
 
  private:
   Problem problem_;
-  Predictor predictor_;
   Watcher watcher_;
   Minimiser minimiser_;
   std::optional<ForceSearch> force_search_;
@@ -157,31 +151,6 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 
 namespace {
 
-/// Far from rest, forces and the multipliers of exact volume cost more than the steps that a long
-/// one saves, and with the paper's volume term, hardly convex, a search wanders.
-PathSettings path_of(const Settings& settings) {
-  PathSettings path = settings.path;
-  const bool wanders = settings.weights.volume == mechanics::VolumeTerm::paper;
-  if (settings.force || settings.exact_volume || wanders)
-    path.longest_stride = LoadPath::short_stride;
-  return path;
-}
-
-/// A guess of the rest position at load 1, or null where none is wanted or found.
-base::VecHandle stiffened(Searcher& searcher, const Settings& settings, Vec displacement) {
-  const bool automatic = settings.path.load_steps == 0 && settings.path.start_load == 0;
-  base::VecHandle guess;
-  const Positions& positions = searcher.objective().positions();
-  if (settings.force || settings.exact_volume || !automatic || positions.largest_travel() == 0)
-    return guess;
-  Stiffening stiffening = searcher.stiffening();
-  if (!stiffening.pays()) return guess;
-  guess = positions.make_vector();
-  check(VecCopy(displacement, guess));
-  if (!stiffening.run(guess, settings.path)) guess = {};
-  return guess;
-}
-
 Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
                       base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
@@ -198,33 +167,29 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
   Searcher searcher(positions, settings);
   Objective& objective = searcher.objective();
   Summary summary;
-  const double begin = MPI_Wtime();
-  if (!guess) guess = stiffened(searcher, settings, displacement);
-  double seconds_before = MPI_Wtime() - begin;
-  summary.softer = searcher.evaluations();
-  LoadPath path(objective, searcher.predictor(), searcher.search(), path_of(settings));
   int64_t evaluations_before = 0;
   summary.path =
-      path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
-        summary.last = numbers_of(objective, settings, outcome, load);
-        summary.last.epsilon = searcher.epsilon();
-        const bool start = load == 0 && settings.initial_equilibrium;
-        const bool end = load == 1 || !outcome.converged;
-        if (settings.stability && (start || end)) {
-          TangentSolver& solver = searcher.elastic_solver();
-          Spectrum spectrum;
-          spectrum.smallest = smallest_eigenvalue(solver, displacement);
-          spectrum.largest = largest_eigenvalue(solver.hessian().exact());
-          if (start) summary.initial_spectrum = spectrum;
-          if (end) summary.final_spectrum = spectrum;
-          summary.last.smallest_eigenvalue = spectrum.smallest;
-          summary.last.largest_eigenvalue = spectrum.largest;
-        }
-        summary.last.seconds = seconds + std::exchange(seconds_before, 0);
-        summary.last.evaluations = searcher.evaluations() - evaluations_before;
-        evaluations_before = searcher.evaluations();
-        receive(summary.last, natural.rows(objective, settings.exact_volume));
-      });
+      follow_bones(searcher.problem(), searcher.search(), settings.exact_volume, settings.path,
+                   displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
+                     summary.last = numbers_of(objective, settings, outcome, load);
+                     summary.last.epsilon = searcher.epsilon();
+                     const bool start = load == 0 && settings.initial_equilibrium;
+                     const bool end = load == 1 || !outcome.converged;
+                     if (settings.stability && (start || end)) {
+                       TangentSolver& solver = searcher.elastic_solver();
+                       Spectrum spectrum;
+                       spectrum.smallest = smallest_eigenvalue(solver, displacement);
+                       spectrum.largest = largest_eigenvalue(solver.hessian().exact());
+                       if (start) summary.initial_spectrum = spectrum;
+                       if (end) summary.final_spectrum = spectrum;
+                       summary.last.smallest_eigenvalue = spectrum.smallest;
+                       summary.last.largest_eigenvalue = spectrum.largest;
+                     }
+                     summary.last.seconds = seconds;
+                     summary.last.evaluations = searcher.evaluations() - evaluations_before;
+                     evaluations_before = searcher.evaluations();
+                     receive(summary.last, natural.rows(objective, settings.exact_volume));
+                   });
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

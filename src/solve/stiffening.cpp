@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace repose::solve {
 
@@ -35,10 +36,12 @@ double stiffness(const Objective& objective) {
 
 }  // namespace
 
-Stiffening::Stiffening(Objective& objective, Tangent& tangent, Predictor& predictor,
-                       RestSearch& search)
-    : objective_(objective), tangent_(tangent), predictor_(predictor), search_(search) {
-  const double times = stiffness(objective), weight = objective.weights().volume_weight;
+Stiffening::Stiffening(Problem& problem, Predictor& predictor, RestSearch& search)
+    : objective_(problem.objective()),
+      tangent_(problem.tangent()),
+      predictor_(predictor),
+      search_(search) {
+  const double times = stiffness(objective_), weight = objective_.weights().volume_weight;
   if (!(times > stiff && times <= stiffest)) return;
   const double stages = std::ceil(std::log(times) / std::log(growth));
   for (double k = 0; k < stages; ++k) weight_.push_back(weight * std::pow(times, k / stages - 1));
@@ -70,6 +73,40 @@ bool Stiffening::run(Vec displacement, PathSettings settings) {
   set_weight(weight_.back());
   objective_.positions().set_load(0);
   return led;
+}
+
+PathOutcome follow_bones(Problem& problem, RestSearch& search, bool exact_volume,
+                         PathSettings settings, Vec displacement, Vec guess,
+                         const LoadPath::OnStep& on_step) {
+  Objective& objective = problem.objective();
+  const Positions& positions = objective.positions();
+  Predictor predictor(objective, problem.elastic_solver());
+  const bool plain = !problem.force() && !exact_volume;
+  const bool automatic = settings.load_steps == 0 && settings.start_load == 0;
+  const double begin = MPI_Wtime();
+  const int64_t evaluations = problem.function().evaluations();
+  base::VecHandle led;
+  if (plain && automatic && !guess && positions.largest_travel() > 0) {
+    Stiffening stiffening(problem, predictor, search);
+    if (stiffening.pays()) {
+      led = positions.make_vector();
+      base::check(VecCopy(displacement, led));
+      if (!stiffening.run(led, settings)) led = {};
+    }
+  }
+  const int64_t softer = problem.function().evaluations() - evaluations;
+  double seconds_before = MPI_Wtime() - begin;
+  // Far from rest, forces and the multipliers of exact volume cost more than the steps that a long
+  // one saves, and with the paper's volume term, hardly convex, a search wanders.
+  if (!plain || objective.weights().volume == mechanics::VolumeTerm::paper)
+    settings.longest_stride = LoadPath::short_stride;
+  LoadPath path(objective, predictor, search, settings);
+  PathOutcome outcome = path.run(displacement, led ? static_cast<Vec>(led) : guess,
+                                 [&](const Outcome& last, double load, double seconds) {
+                                   on_step(last, load, seconds + std::exchange(seconds_before, 0));
+                                 });
+  outcome.softer = softer;
+  return outcome;
 }
 
 }  // namespace repose::solve

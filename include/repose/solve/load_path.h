@@ -25,6 +25,7 @@ struct PathOutcome {
   int64_t halvings = 0;
   int64_t iterations = 0;
   bool leapt = false;  ///< it came from a guess, not along the path
+  int64_t softer = 0;  ///< evaluations with softer volume terms before (stiffening.h)
   bool complete() const { return last.converged && load == 1; }
 };
 

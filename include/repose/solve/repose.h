@@ -46,10 +46,9 @@ struct RegionSummary {
 struct Summary {
   PathOutcome path;
   model::StepNumbers last;
-  int64_t unknowns = 0;     ///< scalar
-  int64_t evaluations = 0;  ///< of objective and gradient
-  int64_t assemblies = 0;   ///< of the Hessian
-  int64_t softer = 0;  ///< evaluations with softer volume terms, where these led (stiffening.h)
+  int64_t unknowns = 0;                      ///< scalar
+  int64_t evaluations = 0;                   ///< of objective and gradient
+  int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
   std::optional<RegionSummary> region;       ///< where not the whole was searched

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "repose/solve/load_path.h"
-#include "repose/solve/tangent.h"
+#include "repose/solve/problem.h"
 
 namespace repose::solve {
 
@@ -13,7 +13,7 @@ namespace repose::solve {
 /// collective.
 class Stiffening {
  public:
-  Stiffening(Objective& objective, Tangent& tangent, Predictor& predictor, RestSearch& search);
+  Stiffening(Problem& problem, Predictor& predictor, RestSearch& search);
 
   /// Whether the objective's κ is stiff, and not so stiff that the way along κ is no shorter.
   bool pays() const { return weight_.size() > 1; }
@@ -33,5 +33,12 @@ class Stiffening {
   RestSearch& search_;
   std::vector<double> weight_;  // of the volume term, softest first, the objective's own last
 };
+
+/// LoadPath::run with what suits the problem: short steps only where long ones cost more, and where
+/// no guess is given, one by stiffening where it pays, whose time is the first step's. The weights
+/// of an exact volume are its search's own. Collective.
+PathOutcome follow_bones(Problem& problem, RestSearch& search, bool exact_volume,
+                         PathSettings settings, Vec displacement, Vec guess,
+                         const LoadPath::OnStep& on_step);
 
 }  // namespace repose::solve

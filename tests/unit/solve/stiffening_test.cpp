@@ -29,7 +29,7 @@ struct Sheared : testing::MovedBlock {
   solve::Problem problem;
   solve::Predictor predictor{problem.objective(), problem.elastic_solver()};
   solve::Minimiser minimiser{problem.function(), problem.solver(), {}};
-  solve::Stiffening stiffening{problem.objective(), problem.tangent(), predictor, minimiser};
+  solve::Stiffening stiffening{problem, predictor, minimiser};
 
   explicit Sheared(const mechanics::Weights& weights)
       : MovedBlock(sheared_block()), problem(positions, weights, false) {}
