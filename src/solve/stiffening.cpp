@@ -11,7 +11,7 @@ namespace {
 
 constexpr double soft = 10;       // κ of the tissue's effective modulus
 constexpr double stiff = 2;       // of the soft κ; below, the load path alone is cheaper
-constexpr double stiffest = 1e3;  // of the soft κ; above, the way along κ is as long
+constexpr double stiffest = 150;  // of the soft κ; above, the way along κ may jump to another rest
 constexpr double growth = 10;     // of κ at once, at most
 constexpr double loosest = 0.1;   // mm, accuracy of what only leads on
 

@@ -15,7 +15,7 @@ class Stiffening {
  public:
   Stiffening(Problem& problem, Predictor& predictor, RestSearch& search);
 
-  /// Whether the objective's κ is stiff, and not so stiff that the way along κ is no shorter.
+  /// Whether the objective's κ is stiff, and not so stiff that the way along κ leads elsewhere.
   bool pays() const { return weight_.size() > 1; }
 
   /// From the rest position at load 0 to a guess of that at load 1, in place; the objective's κ is

@@ -36,7 +36,7 @@ struct Sheared : testing::MovedBlock {
 };
 
 TEST(Stiffening, PaysWhereTheVolumeTermIsStiffButNotTooStiff) {
-  for (const auto& [times, pays] : {std::pair{5.0, false}, {30.0, true}, {5e3, true}, {3e4, false}})
+  for (const auto& [times, pays] : {std::pair{5.0, false}, {30.0, true}, {1e3, true}, {3e3, false}})
     EXPECT_EQ(Sheared({1, VolumeTerm::penalty, bulk_modulus(times)}).stiffening.pays(), pays)
         << times;
   EXPECT_FALSE(Sheared({1, VolumeTerm::none, 0}).stiffening.pays());
