@@ -201,7 +201,7 @@ Job read_job(const std::filesystem::path& input) {
   bring_into_equilibrium(scene, job);
   make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
-    job.wanted.bulk_modulus = 10 * model::effective_modulus(job.model);
+    job.wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, job.model);
   double bulk_modulus = job.wanted.bulk_modulus.value_or(0);
   MPI_Bcast(&bulk_modulus, 1, MPI_DOUBLE, 0, comm);
   job.wanted.bulk_modulus.reset();
@@ -266,7 +266,7 @@ solve::Settings settings_of(const scene::Solve& wanted, bool solid) {
   if (solid) {
     require_energy(wanted);
     settings.volume = "material";
-    settings.weights = {1, mechanics::VolumeTerm::penalty, 1};
+    settings.weights = mechanics::solid_weights;
     return settings;
   }
   settings.exact_volume = form == VolumeForm::exact;

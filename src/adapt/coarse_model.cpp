@@ -89,7 +89,8 @@ model::BuiltModel coarse_model(const model::Anatomy& anatomy, const Model& fine,
   scene.tissue.layers = layers;
   const surface::Surface skin =
       resolution.edge > 0 ? surface::remesh(anatomy.skin, resolution.edge) : anatomy.skin;
-  if (scene.tissue.material) return model::build_model(scene, skin, anatomy.bones);
+  if (scene.tissue.material || scene.tissue.isotropic)
+    return model::build_model(scene, skin, anatomy.bones);
   scene.tissue.springs = {
       {"default", {.stiffness = {}, .modulus = 1.0, .law = {}, .reference = 0.0}}};
   model::BuiltModel built = model::build_model(scene, skin, anatomy.bones);

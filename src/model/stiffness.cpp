@@ -4,6 +4,7 @@
 
 #include "repose/base/error.h"
 #include "repose/model/build.h"
+#include "repose/model/material.h"
 
 namespace repose::model {
 namespace {
@@ -36,6 +37,41 @@ FullRule rule_of(const std::map<std::string, scene::SpringRule>& rules, const st
   for (const std::string& name : {std::string("default"), kind_of(set), set})
     if (const auto found = rules.find(name); found != rules.end()) full.refine(found->second);
   return full;
+}
+
+/// Moduli of the three kinds of spring by which a network of prisms whose gaps are as thick as
+/// `slope` times its edges are long resembles an isotropic solid at small strains, in units of its
+/// shear modulus.
+std::map<std::string, double> isotropic_moduli(double slope) {
+  constexpr double flattest = 0.5, steepest = 1.22;  // where all are positive
+  const double t = std::clamp(slope, flattest, steepest), square = t * t;
+  return {{"layer", 2.5 * (8 - 2 / square)},
+          {"connecting", 5 * (3 - 2 * square)},
+          {"diagonal", 5 * (1 + square) * (1 + square) / square}};
+}
+
+/// Mean thickness of a gap over the mean length of an edge.
+double slope_of(const Model& model) {
+  double sums[2][2] = {};  // length and number, of edges and gaps
+  for (size_t j = 0; j < model.springs.points.size(); ++j) {
+    const std::string kind = kind_of(model.spring_sets[model.springs.set[j]]);
+    if (kind == "diagonal") continue;
+    const auto [p, q] = model.springs.points[j];
+    auto& [length, number] = sums[kind == "connecting"];
+    length += (model.points.position[q] - model.points.position[p]).norm();
+    ++number;
+  }
+  return sums[1][0] / sums[1][1] / (sums[0][0] / sums[0][1]);
+}
+
+std::map<std::string, scene::SpringRule> isotropic_rules(const scene::Elasticity& solid,
+                                                         const Model& model) {
+  std::map<std::string, scene::SpringRule> rules;
+  const double shear = moduli(solid).shear;
+  for (const auto& [kind, modulus] : isotropic_moduli(slope_of(model)))
+    rules[kind] = {
+        .stiffness = {}, .modulus = shear * modulus, .law = scene::Law::linear, .reference = 0.0};
+  return rules;
 }
 
 void refuse_unknown_sets(const std::map<std::string, scene::SpringRule>& rules,
@@ -76,8 +112,9 @@ std::vector<double> spring_volumes(const SkinMesh& mesh, const std::vector<doubl
 
 void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model) {
   refuse_unknown_sets(tissue.springs, model.spring_sets);
+  const auto given = tissue.isotropic ? isotropic_rules(*tissue.isotropic, model) : tissue.springs;
   std::vector<FullRule> rules;
-  for (const std::string& set : model.spring_sets) rules.push_back(rule_of(tissue.springs, set));
+  for (const std::string& set : model.spring_sets) rules.push_back(rule_of(given, set));
   std::vector<double> volumes;
   if (std::any_of(rules.begin(), rules.end(), [](const FullRule& r) { return r.modulus; }))
     volumes = spring_volumes(mesh, model.prisms.rest_volume);
@@ -90,6 +127,14 @@ void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, Model& mod
     springs.exponent[j] = static_cast<int8_t>(rule.law);
     springs.reference[j] = rule.reference > 0 ? rule.reference : r0;
   }
+}
+
+double default_bulk_modulus(const scene::Tissue& tissue, const Model& model) {
+  constexpr double nearly_incompressible = 10;
+  if (!tissue.isotropic) return nearly_incompressible * effective_modulus(model);
+  const auto [young, poisson] = *tissue.isotropic;
+  const double shear = young / (2 * (1 + poisson));
+  return young / (3 * (1 - 2 * poisson)) - 5 * shear / 3;  // springs alone have ν = 1/4, K = 5/3 G
 }
 
 double effective_modulus(const Model& model) {

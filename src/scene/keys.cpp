@@ -153,6 +153,14 @@ std::vector<Key> spring_keys() {
        "number (\"layer 0\" is the skin, \"connecting 0\" joins layers 0 and 1). What a rule "
        "leaves "
        "out comes from the more general one."},
+      {"tissue.springs.isotropic", map, "",
+       "In place of rules: moduli of the sets that resemble an isotropic solid, linear springs, "
+       "and "
+       "the bulk modulus of the volume term that goes with them."},
+      {"tissue.springs.isotropic.young", number, "required", "Its Young's modulus.", "N/mm²",
+       Range::between(1e-9, 1e9)},
+      {"tissue.springs.isotropic.poisson", number, "required", "Its Poisson's ratio.", "",
+       Range::between(0.25, 0.4999)},
       {"tissue.springs.*.stiffness", number, "", "Stiffness k0; excludes modulus.", "N/mm",
        Range::above(0)},
       {"tissue.springs.*.modulus", number, "",

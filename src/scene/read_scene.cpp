@@ -164,6 +164,20 @@ std::map<std::string, SpringRule> read_rules(const Value& value, int layers) {
   return rules;
 }
 
+void read_springs(const Value& value, Tissue& tissue) {
+  const auto named = value.named();
+  const auto solid = std::find_if(named.begin(), named.end(),
+                                  [](const auto& rule) { return rule.first == "isotropic"; });
+  if (solid == named.end()) {
+    tissue.springs = read_rules(value, tissue.layers);
+    return;
+  }
+  if (named.size() > 1)
+    value.refuse("gives isotropic and other rules, which exclude each other; remove one");
+  const Map map(solid->second.as("tissue.springs.isotropic"));
+  tissue.isotropic = {map.at("young").number(), map.at("poisson").number()};
+}
+
 void read_mass(Tissue& tissue, const Map& map) {
   const auto mass = map.find("mass");
   if (mass) tissue.mass = read_one_a_layer(*mass, tissue.layers);
@@ -187,7 +201,7 @@ Tissue read_tissue(const Value& value) {
   if (springs && material)
     material->refuse("and tissue.springs exclude each other; remove one of them");
   if (springs)
-    tissue.springs = read_rules(*springs, tissue.layers);
+    read_springs(*springs, tissue);
   else
     tissue.material = material ? read_material(*material) : default_material();
   set(tissue.turgor, map, "turgor", &Value::number);

@@ -104,8 +104,8 @@ void subtract_solid_gradient(const Model& model, std::vector<Vec3>& force) {
   const auto loops = mechanics::make_loops(model, 0, 0);
   std::vector<Vec3> gradient(force.size(), Vec3::Zero());
   mechanics::add_edge_gradient(loops.edges, model.points.position, 1, gradient);
-  mechanics::add_prism_gradient(loops.prisms, model.points.position,
-                                {1, mechanics::VolumeTerm::penalty, 1}, gradient);
+  mechanics::add_prism_gradient(loops.prisms, model.points.position, mechanics::solid_weights,
+                                gradient);
   for (size_t i = 0; i < force.size(); ++i) force[i] -= gradient[i];
 }
 

@@ -153,6 +153,7 @@ void Minimiser::make_tao() {
   base::check_options(TaoSetFromOptions(tao_));
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_.emplace(tao_, solver_);
+  closes_ = initial_ && function_.positions().part().solid;
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
   KSP inner = nullptr;
@@ -233,11 +234,11 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   }
   if (quick && &certificate_.function == &function_) {
     const double glance = certificate_.solver.glance(gradient);
-    if (glance > (initial_ ? closing : 1) * accuracy_) {
+    if (glance > (closes_ ? closing : 1) * accuracy_) {
       error_ = safety * glance;
       return false;
     }
-    if (glance < negligible * accuracy_ && glance > 0) {
+    if (closes_ && glance < negligible * accuracy_) {
       error_ = safety * glance;
       return true;
     }
@@ -248,7 +249,7 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     softest_ = largest_force / error_;
   else
     softest_ = 2 * std::max(softest_, largest_force / accuracy_);
-  return error_ <= accuracy_ || (initial_ && error_ <= farthest_correction());
+  return error_ <= accuracy_ || (closes_ && error_ <= farthest_correction());
 }
 
 double Minimiser::farthest_correction() const {

@@ -23,7 +23,6 @@ using model::Model;
 namespace {
 
 constexpr double balanced = 1e-12;  // of the largest force before
-constexpr mechanics::Weights solid_weights{1, mechanics::VolumeTerm::penalty, 1};
 
 double length(const Model& model, size_t spring) {
   const auto& [p, q] = model.springs.points[spring];
@@ -110,7 +109,7 @@ class Stiffness {
   Stiffness(MPI_Comm comm, Part part)
       : part_(std::move(part)),
         positions_(comm, part_),
-        objective_(positions_, part_.solid ? solid_weights : mechanics::Weights{}),
+        objective_(positions_, part_.solid ? mechanics::solid_weights : mechanics::Weights{}),
         tangent_(objective_),
         solver_(positions_, tangent_),
         multiplier_(part_.model.points.position.size(), Vec3::Zero()) {}
@@ -157,7 +156,7 @@ class Stiffness {
 /// The forces on the soft-tissue points at the initial position.
 base::VecHandle initial_forces(MPI_Comm comm, const Part& part) {
   Positions positions(comm, part);
-  Objective objective(positions, part.solid ? solid_weights : mechanics::Weights{});
+  Objective objective(positions, part.solid ? mechanics::solid_weights : mechanics::Weights{});
   const base::VecHandle at_rest = positions.make_vector();
   base::VecHandle forces = positions.make_vector();
   positions.update(at_rest);

@@ -89,10 +89,23 @@ class Study {
     plan_.edges = {std::round(15 * edge) / 10, std::round(20 * edge) / 10};
   }
 
+  /// The scene's tissue, or springs that resemble its material.
+  scene::Tissue tissue_of(const Way& way) const {
+    scene::Tissue tissue = plan_.scene.tissue;
+    if (tissue.material && way.volume != "material") {
+      tissue.isotropic = tissue.material->deep;
+      tissue.material.reset();
+    }
+    return tissue;
+  }
+
   /// The scene's own model, or one of the same material at another resolution. On rank 0.
   model::Model build(const Way& way) const {
-    if (way.edge == 0 && way.layers == plan_.scene.tissue.layers) return own_;
-    return adapt::coarse_model(anatomy_, own_, {way.edge, way.layers}).model;
+    const bool own = way.volume == "material" || !plan_.scene.tissue.material;
+    if (own && way.edge == 0 && way.layers == plan_.scene.tissue.layers) return own_;
+    model::Anatomy anatomy = anatomy_;
+    anatomy.scene.tissue = tissue_of(way);
+    return adapt::coarse_model(anatomy, own_, {way.edge, way.layers}).model;
   }
 
   /// The reference: the most layers, the skin as it is, the scene's volume term.
@@ -119,8 +132,8 @@ class Study {
     Discretisation& made = known_[key_of(way)];
     base::on_first_rank(comm, [&] {
       made.model = build(way);
-      made.bulk_modulus =
-          plan_.scene.solve.bulk_modulus.value_or(10 * model::effective_modulus(made.model));
+      made.bulk_modulus = plan_.scene.solve.bulk_modulus.value_or(
+          model::default_bulk_modulus(tissue_of(way), made.model));
     });
     MPI_Bcast(&made.bulk_modulus, 1, MPI_DOUBLE, 0, comm);
     bring_into_equilibrium(made.model);
@@ -146,6 +159,7 @@ class Study {
     settings.path = {.accuracy = way.accuracy, .load_steps = way.load_steps};
     settings.volume = way.volume;
     settings.time_limit = limit;
+    if (way.volume == "material") settings.weights = mechanics::solid_weights;
     if (way.volume == "penalty")
       settings.weights = {1, mechanics::VolumeTerm::penalty, bulk_modulus};
     if (way.volume == "paper") {

@@ -4,8 +4,9 @@
 
 namespace repose::tradeoff {
 
-std::string volume_word(const scene::Solve& solve) {
-  switch (solve.volume.value_or(scene::VolumeForm::penalty)) {
+std::string volume_word(const scene::Scene& scene) {
+  if (scene.tissue.material) return "material";
+  switch (scene.solve.volume.value_or(scene::VolumeForm::penalty)) {
     case scene::VolumeForm::none:
       return "none";
     case scene::VolumeForm::paper:
@@ -19,7 +20,7 @@ Way usual_way(const Plan& plan) {
   return {.study = "solver",
           .method = plan.methods.front(),
           .accuracy = plan.scene.solve.accuracy,
-          .volume = volume_word(plan.scene.solve),
+          .volume = volume_word(plan.scene),
           .load_steps = plan.scene.solve.load_steps,
           .layers = plan.scene.tissue.layers};
 }
@@ -41,8 +42,16 @@ std::vector<Way> ways_of(const Plan& plan) {
       way.accuracy = accuracy;
     });
   vary("load steps", plan.load_steps, [](Way& way, int steps) { way.load_steps = steps; });
-  vary("volume", plan.volumes, [](Way& way, const std::string& form) { way.volume = form; });
+  const bool solid = plan.scene.tissue.material.has_value();
+  if (!solid)
+    vary("volume", plan.volumes, [](Way& way, const std::string& form) { way.volume = form; });
   vary("layers", plan.layers, [](Way& way, int layers) { way.layers = layers; });
+  if (solid)
+    vary("springs", plan.layers, [](Way& way, int layers) {
+      way.layers = layers;
+      way.volume = "penalty";
+      way.method = "ntr";
+    });
   vary("mesh", plan.edges.value_or(std::vector<double>{}),
        [](Way& way, double mm) { way.edge = mm; });
   return ways;

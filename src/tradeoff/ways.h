@@ -8,6 +8,6 @@ Way usual_way(const Plan& plan);
 /// All ways of a plan, those of one model one after another.
 std::vector<Way> ways_of(const Plan& plan);
 /// The word of a volume term.
-std::string volume_word(const scene::Solve& solve);
+std::string volume_word(const scene::Scene& scene);
 
 }  // namespace repose::tradeoff

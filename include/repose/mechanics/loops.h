@@ -74,4 +74,7 @@ struct Weights {
   double volume_weight = 0;
 };
 
+/// Of a solid: its edges, and its prisms with moduli of their own.
+inline constexpr Weights solid_weights{1, VolumeTerm::penalty, 1};
+
 }  // namespace repose::mechanics

@@ -54,4 +54,8 @@ BuiltModel build_model(const scene::Scene& scene);
 /// N/mm²: of springs Σ k0 r_0² / Σ v_0, of a solid the mean of Young's modulus over its volume.
 double effective_modulus(const Model& model);
 
+/// κ (N/mm²) of the volume term where a scene of springs names none: what its isotropic solid lacks
+/// in bulk modulus, else 10 times the effective modulus.
+double default_bulk_modulus(const scene::Tissue& tissue, const Model& model);
+
 }  // namespace repose::model

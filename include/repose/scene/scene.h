@@ -112,7 +112,8 @@ struct Tissue {
   double free_thickness = 12;  ///< mm
   double release = 10;         ///< mm
   std::vector<SphereRegion> unattached;
-  std::optional<Material> material;           ///< unset: springs
+  std::optional<Material> material;     ///< unset: springs
+  std::optional<Elasticity> isotropic;  ///< of springs: moduli by set that resemble such a solid
   std::map<std::string, SpringRule> springs;  ///< "default", "layer", "layer 0", "connecting 1", …
   double turgor = 0;  ///< initial strain of the skin: of its springs, or of the first stratum
   std::vector<double> mass;       ///< [layers] kg, or empty

@@ -66,6 +66,7 @@ class Minimiser : public RestSearch {
   Watch watch_;
   TaoHandle tao_;
   std::optional<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
+  bool closes_ = false;                    // near rest its search gives way to Newton steps
   bool newton_ = true;                     // the TAO method uses the Hessian
   bool slowed_ = false;                    // the initial Hessian is to be renewed
   int64_t iterations_ = 0;                 // of the run under way, before TAO's present ones

@@ -12,10 +12,10 @@ namespace repose::tradeoff {
 
 /// One way to solve the scene.
 struct Way {
-  std::string study;   ///< what is varied: solver, load steps, volume, layers, mesh
+  std::string study;   ///< what is varied: solver, load steps, volume, layers, springs, mesh
   std::string method;  ///< -tao_type
   double accuracy;     ///< mm asked for
-  std::string volume;  ///< none, paper, penalty
+  std::string volume;  ///< none, paper, penalty; material of a solid
   int load_steps = 0;  ///< 0: automatic
   int layers = 0;      ///< point layers
   double edge = 0;     ///< mm, mean edge of the remeshed skin; 0: the skin as it is

@@ -40,14 +40,12 @@ inline Rest find_rest(const model::Model& model, const solve::Settings& settings
   base::Stages stages(MPI_COMM_WORLD);
   Rest rest;
   const auto keep = [&](const model::StepNumbers&, const model::StepRows& slabs) {
-    rest.rows = {gather(slabs.position),
-                 gather(slabs.residual_force),
-                 gather(slabs.volume_ratio),
-                 gather(slabs.pressure),
-                 {},
-                 {},
-                 gather(slabs.elongation),
-                 gather(slabs.tension)};
+    rest.rows.position = gather(slabs.position);
+    rest.rows.residual_force = gather(slabs.residual_force);
+    rest.rows.volume_ratio = gather(slabs.volume_ratio);
+    rest.rows.pressure = gather(slabs.pressure);
+    rest.rows.elongation = gather(slabs.elongation);
+    rest.rows.tension = gather(slabs.tension);
   };
   rest.summary = solve::find_repose(MPI_COMM_WORLD, model, settings, {}, stages, keep);
   return rest;
