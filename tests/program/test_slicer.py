@@ -331,7 +331,7 @@ def long_run(panel, tmp_path):
     process = panel("--skin", MESHES / "head_skin.ply", "--bone1", MESHES / "head_skull.ply", "--bone2",
                     MESHES / "head_mandible.ply", "--transform2",
                     slicer_transform(tmp_path / "open.tfm", turn), "--accuracy", 1e-6, "--layers", 8,
-                    "--processors", 1, "--predictedSkin", tmp_path / "skin.vtp", wait=False)
+                    "--processors", 2, "--predictedSkin", tmp_path / "skin.vtp", wait=False)
     for line in process.stdout:
         if line.startswith("<filter-progress>"):
             break

@@ -225,20 +225,14 @@ class Progress:
         print(f"<filter-progress>{self.told}</filter-progress>", flush=True)
 
 
-def dies_with_us():
-    """A solver is not left behind when Slicer kills this program (Linux: PR_SET_PDEATHSIG)."""
-    import ctypes
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-
-
 def solve(chosen, scene):
-    """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals."""
+    """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals. Where
+    this program is killed, the solver ends at its next line, which nobody reads."""
     line = command(chosen, scene)
     progress = Progress(float(line[line.index("-accuracy") + 1]))
     process = subprocess.Popen(line, cwd=scene.parent, text=True, errors="replace",
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=open(scene.with_name("stderr"), "w", encoding="utf-8"),
-                               preexec_fn=dies_with_us)
+                               stderr=open(scene.with_name("stderr"), "w", encoding="utf-8"))
     printed = []
     try:
         for text in process.stdout:
