@@ -1,5 +1,6 @@
 #include "repose/results/result_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -9,6 +10,7 @@
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
 #include "repose/results/views.h"
+#include "repose/results/vtkhdf.h"
 #include "repose/results/writer.h"
 
 namespace repose::results {
@@ -116,6 +118,7 @@ struct ResultFile::State {
   void write_points(hid_t step, const model::StepRows& rows) const;
   void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
+  void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
   void publish();
 };
 
@@ -201,9 +204,24 @@ bool ResultFile::State::write_bones(hid_t step, double load) const {
   return true;
 }
 
+/// The first block with a cell, for readers that open the file itself.
+void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
+  const auto shown = std::find_if(blocks.begin(), blocks.end(),
+                                  [](const XdmfBlock& block) { return block.cells > 0; });
+  if (shown == blocks.end() || loads.empty()) return;
+  unfinished->reserve(vtkhdf_bytes(*shown, loads.size()));
+  say_where(part(), [&] {
+    base::Hdf5File whole = base::open_hdf5(part(), MPI_COMM_SELF);
+    write_vtkhdf(whole, *shown, loads);
+    whole.close();
+  });
+}
+
 void ResultFile::State::publish() {
+  const std::vector<XdmfBlock> blocks = views(counts, moved);
+  add_vtkhdf(blocks);
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
-  for (const XdmfBlock& block : views(counts, moved)) {
+  for (const XdmfBlock& block : blocks) {
     const std::filesystem::path document = with_ending(name, "_" + block.name + ".xdmf");
     if (block.cells == 0) {
       std::error_code ignored;
