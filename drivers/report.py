@@ -95,6 +95,8 @@ class Result:
                 refuse(f"{file}: holds no skin to show")
             self.steps = [{name: text(value) for name, value in h5["step"][step].attrs.items()}
                           for step in sorted(h5["step"])]
+            self.origin = {name: text(h5.attrs[name]) for name in
+                           ("program", "command", "ranks", "libraries") if name in h5.attrs}
             self.read(h5["model"], h5["step"][sorted(h5["step"])[-1]])
         self.end = self.steps[-1]
         self.movement = np.linalg.norm(self.after - self.before, axis=1)
@@ -495,7 +497,7 @@ def provenance(chosen, result):
     file = pathlib.Path(chosen.name + ".h5")
     written = datetime.datetime.fromtimestamp(file.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
     rows = [("result", file.name), ("written", written),
-            ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
+            *result.origin.items(), ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
             ("functional", result.end["functional"]), ("volume term", result.end["volume"]),
             ("bulk modulus, N/mm²", float(result.end["bulk_modulus"])),
             ("λ", float(result.end["lambda"])), *result.counts.items()]

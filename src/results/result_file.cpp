@@ -7,6 +7,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
 #include "repose/base/hdf5.h"
+#include "repose/base/this_run.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
 #include "repose/results/views.h"
@@ -131,6 +132,8 @@ void ResultFile::State::create(const model::Model& model) {
     base::Hdf5File whole = base::create_hdf5(part());
     unfinished->reserve(model_bytes(model, bones));
     write_model(whole, model, bones);
+    const base::Hdf5Group root(H5Gopen2(whole, "/", H5P_DEFAULT));
+    for (const auto& [name, text] : base::this_run(comm)) write_attribute(root, name.c_str(), text);
     base::create_hdf5_group(whole, "step");
     whole.close();
   });

@@ -249,9 +249,9 @@ def solve(chosen, scene):
         raise
     if status not in (0, 2):
         said = scene.with_name("stderr").read_text(errors="replace")
-        own = [text for text in said.splitlines() if text.startswith("repose-solve")]
+        own = [text for text in said.splitlines() if text.startswith(("error: ", "internal error"))]
         raise Refusal((own or said.splitlines() or [f"repose-solve ended with status {status}"])[0]
-                      .replace(f"{scene.parent}/", ""))
+                      .removeprefix("error: ").replace(f"{scene.parent}/", ""))
     return status, "".join(printed)
 
 
