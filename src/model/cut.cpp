@@ -4,6 +4,8 @@
 #include <map>
 
 #include "cut_sides.h"
+#include "repose/base/error.h"
+#include "repose/model/material.h"
 
 namespace repose::model {
 namespace {
@@ -30,7 +32,7 @@ class Knife {
     measure_sides();
     share_loads();
     part_springs();
-    part_prisms();
+    part_elements();
     part_skin();
     return pairs_;
   }
@@ -105,6 +107,13 @@ class Knife {
     }
   }
 
+  /// Where what joins two points and does not lie in the cut ends after it.
+  std::array<int64_t, 2> on_its_side(int64_t p, int64_t q) const {
+    const int64_t a = column(p), b = column(q);
+    return {doubled(p) && sides_.left_edge(a, b) ? doubles_[p] : p,
+            doubled(q) && sides_.left_edge(b, a) ? doubles_[q] : q};
+  }
+
   void add_spring(size_t row, const std::array<int64_t, 2>& ends, double share,
                   Springs& springs) const {
     const Springs& before = model_.springs;
@@ -119,17 +128,14 @@ class Knife {
   void part_springs() {
     Springs springs;
     for (size_t j = 0; j < model_.springs.points.size(); ++j) {
-      auto [p, q] = model_.springs.points[j];
+      const auto& [p, q] = model_.springs.points[j];
       if (in_cut(p, q)) {
         const double share = left_share(p, q);
         add_spring(j, {p, q}, 1 - share, springs);
         add_spring(j, {double_of(p), double_of(q)}, share, springs);
         continue;
       }
-      const int64_t a = column(p), b = column(q);
-      if (doubled(p) && sides_.left_edge(a, b)) p = doubles_[p];
-      if (doubled(q) && sides_.left_edge(b, a)) q = doubles_[q];
-      add_spring(j, {p, q}, 1, springs);
+      add_spring(j, on_its_side(p, q), 1, springs);
     }
     model_.springs = std::move(springs);
   }
@@ -140,6 +146,37 @@ class Knife {
       for (int64_t& row : prism)
         if (doubled(row) && left(row, before)) row = doubles_[row];
     }
+  }
+
+  /// The edges of a solid follow from its prisms; the tension they carry besides is parted as that
+  /// of springs.
+  void part_elements() {
+    if (!is_solid(model_)) return part_prisms();
+    const Edges before = std::move(model_.edges);
+    assemble_edges("incision", model_);
+    const std::vector<double> own = std::move(model_.edges.weight);
+    part_prisms();
+    assemble_edges("incision", model_);
+    for (size_t j = 0; j < before.points.size(); ++j) {
+      const auto& [p, q] = before.points[j];
+      const double tension = before.weight[j] - own[j];
+      if (tension == 0) continue;
+      if (!in_cut(p, q)) {
+        add_weight(on_its_side(p, q), tension);
+        continue;
+      }
+      const double share = left_share(p, q);
+      add_weight({p, q}, (1 - share) * tension);
+      add_weight({double_of(p), double_of(q)}, share * tension);
+    }
+  }
+  void add_weight(std::array<int64_t, 2> ends, double weight) {
+    if (ends[0] > ends[1]) std::swap(ends[0], ends[1]);
+    const auto& points = model_.edges.points;
+    const auto edge = std::lower_bound(points.begin(), points.end(), ends);
+    if (edge == points.end() || *edge != ends)
+      throw base::InternalError("no prism is beside an edge of the cut");
+    model_.edges.weight[edge - points.begin()] += weight;
   }
 
   void part_skin() {
