@@ -106,11 +106,15 @@ class Result:
         used, corners = np.unique(corners, return_inverse=True)
         self.corners = corners.reshape(-1, 3)
         self.before, self.after = model["point/position"][:][used], step["point/position"][:][used]
-        self.counts = {"points": len(model["point/set"]), "springs": len(model["spring/points"]),
-                       "prisms": len(model["prism/points"]), "skin triangles": len(self.corners),
-                       "layers": int(model["point/layer"][:].max()) + 1}
+        self.counts = {f"{kind}s": len(model[f"{kind}/points"]) for kind in ("spring", "prism")
+                       if kind in model}
+        self.counts |= {"points": len(model["point/set"]), "skin triangles": len(self.corners),
+                        "layers": int(model["point/layer"][:].max()) + 1}
         self.volume, self.ratio = model["prism/rest_volume"][:], step["prism/volume_ratio"][:]
-        self.tension = step["spring/tension"][:]
+        self.strain = {label: float(np.abs(step[name][:]).max(initial=0)) for label, name in (
+            ("largest tension of a spring, N", "spring/tension"),
+            ("largest von Mises stress, N/mm²", "prism/von_mises"),
+            ("largest stretch", "prism/principal_stretch")) if name in step}
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0
@@ -461,8 +465,7 @@ def tissue(result):
             ("prisms: largest change of volume, %", float(100 * abs(ratio - 1).max(initial=0))),
             ("prisms: 95 % change by less than, %",
              float(100 * np.percentile(abs(ratio - 1), 95)) if len(ratio) else 0.0),
-            ("prisms inside out", int(result.end["inverted_prisms"])),
-            ("largest tension of a spring, N", float(result.tension.max(initial=0)))]
+            ("prisms inside out", int(result.end["inverted_prisms"])), *result.strain.items()]
     return table(("", ""), rows)
 
 

@@ -224,7 +224,7 @@ def test_round_trip_is_the_scene_that_a_person_would_write(panel, head, run, tmp
         "skin: skin_vtkMRMLModelNodeLPS.ply\nbones:\n"
         "  - {name: skull, file: bone1_vtkMRMLModelNodeLPS.ply}\n"
         "  - {name: jaw, file: bone2_vtkMRMLModelNodeLPS.ply}\n"
-        "tissue: {layers: 4, springs: {default: {modulus: 0.05, law: quartic, reference: 1.0}}}\n"
+        "tissue: {layers: 4, material: {preset: face}}\n"
         "moves: [{bone: jaw, translate: [1, -4, 0.5]}]\n")
     assert run("repose-solve", "same.yaml", "-accuracy", 0.01).returncode == 0
     step, model = last(tmp_path / "same.h5"), model_of(tmp_path / "same.h5")
@@ -273,9 +273,10 @@ def test_models_and_curves_in_ras_give_the_same_face(panel, head, tmp_path, bina
     cut = [[47, -80, 8], [49, -75, -8], [46.5, -70, -24]]
     for space in ("LPS", "RAS"):
         curve = slicer_curve(tmp_path / f"cut_{space}.mrk.json", cut, space)
-        result = panel(*head(space, binary=binary), "--incision", curve, "--incisionLayers", 2,
-                       "--tissue", "taut", "--predictedSkin", tmp_path / f"{space}.vtp")
+        result = panel(*head(space, binary=binary), "--lips", curve, "--predictedSkin",
+                       tmp_path / f"{space}.vtp")
         assert (result.returncode, result.stderr) == (0, "")
+        assert "accuracy reached" in result.stdout and "doubled in 4 layers" in result.stdout
     lps, ras = (read_vtp(tmp_path / f"{space}.vtp") for space in ("LPS", "RAS"))
     assert np.abs(lps["Points"] - ras["Points"]).max() < 1e-3
     assert len(lps["Points"]) > len(triangles_of(MESHES / "paper_skin.ply")[0])
@@ -302,7 +303,7 @@ WRONG = {"no skin": ([], "no skin is chosen"),
          "no value": (["--skin"], "--skin: a value is missing"),
          "not a number": (["--accuracy", "fine"], "--accuracy fine: give a number from 1e-6 to 10"),
          "out of range": (["--layers", "1"], "--layers 1: give a whole number from 2 to 64"),
-         "unknown tissue": (["--tissue", "steel"], "take one of plain, taut"),
+         "unknown tissue": (["--tissue", "steel"], "take one of face, skin_on_fat"),
          "missing file": (["--skin", "none.ply", "--bone1", MESHES / "paper_skull.ply"],
                           "none.ply: no such file"),
          "no bone": (["--skin", MESHES / "paper_skin.ply"], "no bone is chosen"),
@@ -370,6 +371,14 @@ def test_a_killed_panel_leaves_no_solver_behind(long_run):
     process, solver = long_run
     os.kill(process.pid, signal.SIGKILL)
     assert wait_for_end(solver)
+
+
+@pytest.mark.parametrize("tissue", [e.text for e in xml.etree.ElementTree.parse(
+    PANEL.with_suffix(".xml")).getroot().find(".//*[name='tissue']").findall("element")])
+def test_every_tissue_of_the_panel_is_one_of_the_scenes(panel, head, tmp_path, tissue):
+    result = panel(*head(), "--tissue", tissue, "--accuracy", 1, "--predictedSkin",
+                   tmp_path / "skin.vtp")
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 def test_several_processors(panel, head, tmp_path):

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from conftest import PROJECT
 from tissue import model_of, steps, write_model
 
 OPENING = "paper_jaw_opening.yaml"
@@ -60,8 +61,26 @@ def test_nothing_is_stored_twice(opening):
 
 def test_pressures_are_shown_where_the_volume_is_exact(solved):
     with h5py.File(solved("paper_jaw_advance.yaml", "-volume", "exact", "-accuracy", 1)) as h5:
-        stored = [h5["step"][name]["prism/pressure"][:] for name in sorted(h5["step"])]
-        assert np.array_equal(h5["VTKHDF/CellData/pressure"][:], np.concatenate(stored))
+        shows(h5, "pressure")
+
+
+def shows(h5, name):
+    stored = [h5["step"][step]["prism"][name][:] for step in sorted(h5["step"])]
+    assert np.array_equal(h5["VTKHDF/CellData"][name][:], np.concatenate(stored))
+
+
+def test_stress_and_stretch_of_a_solid_are_shown(run, tmp_path):
+    head = "\n".join(f"  - {{name: {bone}, file: {PROJECT}/meshes/paper_{bone}.ply}}"
+                     for bone in ("skull", "mandible"))
+    (tmp_path / "solid.yaml").write_text(
+        f"skin: {PROJECT}/meshes/paper_skin.ply\nbones:\n{head}\n"
+        "tissue: {layers: 3, material: {preset: face}}\n"
+        "moves: [{bone: mandible, translate: [0, -3, 0]}]\n")
+    assert run("repose-solve", "solid.yaml", "-output", "solid").returncode == 0
+    with h5py.File(tmp_path / "solid.h5") as h5:
+        shows(h5, "von_mises")
+        shows(h5, "principal_stretch")
+        assert h5["VTKHDF/CellData/principal_stretch"].shape[1] == 3
 
 
 def test_a_model_without_prisms_shows_its_springs(solved, run, tmp_path):

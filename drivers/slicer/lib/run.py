@@ -16,8 +16,10 @@ import xml.etree.ElementTree
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1]
 BONES = 4
-SPRINGS = {"default": {"modulus": 0.05, "law": "quartic", "reference": 1.0}}  # N/mm², mm
-TISSUE = {"plain": {"springs": SPRINGS}, "taut": {"springs": SPRINGS, "turgor": 0.1}}
+TISSUE = {**{preset: {"material": {"preset": preset}}
+             for preset in ("face", "skin_on_fat", "incompressible")},
+          "springs": {"springs": {"default": {"modulus": 0.05, "law": "quartic", "reference": 1.0}},
+                      "turgor": 0.1}}
 MOVING = 0.1  # mm: skin that moves less does not count for the mean
 PATIENCE = 10  # s that a cancelled solver has to end by itself
 ITERATION = re.compile(r"load (\S+)  iteration .* evaluations  (?:(\S+) mm to go)?")
