@@ -4,7 +4,6 @@
 #include <map>
 
 #include "cut_sides.h"
-#include "repose/base/error.h"
 #include "repose/model/material.h"
 
 namespace repose::model {
@@ -32,7 +31,10 @@ class Knife {
     measure_sides();
     share_loads();
     part_springs();
-    part_elements();
+    const std::vector<double> beyond = weights_beyond_material();
+    const Edges before = model_.edges;
+    part_prisms();
+    part_edges(before, beyond);
     part_skin();
     return pairs_;
   }
@@ -107,13 +109,6 @@ class Knife {
     }
   }
 
-  /// Where what joins two points and does not lie in the cut ends after it.
-  std::array<int64_t, 2> on_its_side(int64_t p, int64_t q) const {
-    const int64_t a = column(p), b = column(q);
-    return {doubled(p) && sides_.left_edge(a, b) ? doubles_[p] : p,
-            doubled(q) && sides_.left_edge(b, a) ? doubles_[q] : q};
-  }
-
   void add_spring(size_t row, const std::array<int64_t, 2>& ends, double share,
                   Springs& springs) const {
     const Springs& before = model_.springs;
@@ -124,20 +119,60 @@ class Knife {
     springs.exponent.push_back(before.exponent[row]);
     springs.reference.push_back(before.reference[row]);
   }
+  /// The ends of a spring or edge that lies beside the cut, on its side.
+  void go_to_side(int64_t& p, int64_t& q) const {
+    const int64_t a = column(p), b = column(q);
+    if (doubled(p) && sides_.left_edge(a, b)) p = doubles_[p];
+    if (doubled(q) && sides_.left_edge(b, a)) q = doubles_[q];
+  }
   /// A spring in the cut is followed by its left half, so that they stay sorted by set.
   void part_springs() {
     Springs springs;
     for (size_t j = 0; j < model_.springs.points.size(); ++j) {
-      const auto& [p, q] = model_.springs.points[j];
+      auto [p, q] = model_.springs.points[j];
       if (in_cut(p, q)) {
         const double share = left_share(p, q);
         add_spring(j, {p, q}, 1 - share, springs);
         add_spring(j, {double_of(p), double_of(q)}, share, springs);
         continue;
       }
-      add_spring(j, on_its_side(p, q), 1, springs);
+      go_to_side(p, q);
+      add_spring(j, {p, q}, 1, springs);
     }
     model_.springs = std::move(springs);
+  }
+
+  /// Of a solid's edges the weights that skin tension and an initial equilibrium gave them.
+  std::vector<double> weights_beyond_material() {
+    std::vector<double> beyond = model_.edges.weight;
+    if (!is_solid(model_)) return beyond;
+    assemble_edges("", model_);
+    for (size_t j = 0; j < beyond.size(); ++j) beyond[j] -= model_.edges.weight[j];
+    return beyond;
+  }
+
+  void add_to_edge(int64_t p, int64_t q, double weight) {
+    Edges& edges = model_.edges;
+    const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
+    const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
+    edges.weight[edge - edges.points.begin()] += weight;
+  }
+
+  /// The edges of the parted prisms, with what else they carried.
+  void part_edges(const Edges& before, const std::vector<double>& beyond) {
+    if (!is_solid(model_)) return;
+    assemble_edges("", model_);
+    for (size_t j = 0; j < before.points.size(); ++j) {
+      auto [p, q] = before.points[j];
+      if (in_cut(p, q)) {
+        const double share = left_share(p, q);
+        add_to_edge(p, q, (1 - share) * beyond[j]);
+        add_to_edge(double_of(p), double_of(q), share * beyond[j]);
+        continue;
+      }
+      go_to_side(p, q);
+      add_to_edge(p, q, beyond[j]);
+    }
   }
 
   void part_prisms() {
@@ -146,37 +181,6 @@ class Knife {
       for (int64_t& row : prism)
         if (doubled(row) && left(row, before)) row = doubles_[row];
     }
-  }
-
-  /// The edges of a solid follow from its prisms; the tension they carry besides is parted as that
-  /// of springs.
-  void part_elements() {
-    if (!is_solid(model_)) return part_prisms();
-    const Edges before = std::move(model_.edges);
-    assemble_edges("incision", model_);
-    const std::vector<double> own = std::move(model_.edges.weight);
-    part_prisms();
-    assemble_edges("incision", model_);
-    for (size_t j = 0; j < before.points.size(); ++j) {
-      const auto& [p, q] = before.points[j];
-      const double tension = before.weight[j] - own[j];
-      if (tension == 0) continue;
-      if (!in_cut(p, q)) {
-        add_weight(on_its_side(p, q), tension);
-        continue;
-      }
-      const double share = left_share(p, q);
-      add_weight({p, q}, (1 - share) * tension);
-      add_weight({double_of(p), double_of(q)}, share * tension);
-    }
-  }
-  void add_weight(std::array<int64_t, 2> ends, double weight) {
-    if (ends[0] > ends[1]) std::swap(ends[0], ends[1]);
-    const auto& points = model_.edges.points;
-    const auto edge = std::lower_bound(points.begin(), points.end(), ends);
-    if (edge == points.end() || *edge != ends)
-      throw base::InternalError("no prism is beside an edge of the cut");
-    model_.edges.weight[edge - points.begin()] += weight;
   }
 
   void part_skin() {
