@@ -111,7 +111,7 @@ class Result:
         self.counts |= {"points": len(model["point/set"]), "skin triangles": len(self.corners),
                         "layers": int(model["point/layer"][:].max()) + 1}
         self.volume, self.ratio = model["prism/rest_volume"][:], step["prism/volume_ratio"][:]
-        self.strain = {label: float(np.abs(step[name][:]).max(initial=0)) for label, name in (
+        self.strain = {label: f"{np.abs(step[name][:]).max(initial=0):.3g}" for label, name in (
             ("largest tension of a spring, N", "spring/tension"),
             ("largest von Mises stress, N/mm²", "prism/von_mises"),
             ("largest stretch", "prism/principal_stretch")) if name in step}
@@ -502,8 +502,9 @@ def provenance(chosen, result):
     rows = [("result", file.name), ("written", written),
             *result.origin.items(), ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
             ("functional", result.end["functional"]), ("volume term", result.end["volume"]),
-            ("bulk modulus, N/mm²", float(result.end["bulk_modulus"])),
-            ("λ", float(result.end["lambda"])), *result.counts.items()]
+            ("bulk modulus, N/mm²", f"{result.end['bulk_modulus']:.4g}"),
+            ("λ", f"{result.end['lambda']:g}"),
+            *((name, str(count)) for name, count in result.counts.items())]
     page = table(("", ""), rows)
     if chosen.scene:
         page += f"<h3>{html.escape(os.path.basename(chosen.scene))}</h3>" \
