@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""One HTML page of a result, to be read without a network: the plan, how landmarks and the profile move,
-how far the numbers can be trusted, pictures, and the head to turn and look at.
+"""One HTML page of a result, to be read without a network: the plan, how landmarks and the profile
+move, how far the numbers can be trusted, pictures, and the head to turn and look at.
 
     drivers/report.py NAME [-output report.html] [-scene scene.yaml] [-landmarks points.mrk.json]
 
 NAME is the result (NAME.h5, the ending may be left out). -scene shows the scene file and takes its
-landmarks; -landmarks takes others: 3D Slicer's .mrk.json, or JSON {"name": [x, y, z], …}. Both are in mm;
-axes +x patient left, +y posterior, +z up. Needs: apt-get install python3-numpy python3-h5py, and
-python3-matplotlib for the pictures.
+landmarks; -landmarks takes others: 3D Slicer's .mrk.json, or JSON {"name": [x, y, z], …}. Both are
+in mm; axes +x patient left, +y posterior, +z up. Needs: apt-get install python3-numpy python3-h5py,
+and python3-matplotlib for the pictures.
 """
 
 import argparse
@@ -31,7 +31,7 @@ NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
 STILL = 0.005  # mm: what moves less is said not to move
 LARGE_VOLUME, LARGE_ERROR = 0.2, 0.5  # relative, mm: beyond, the page warns
 MAGMA = ("fcf3dc", "fed395", "f1605d", "832681", "4a1079")  # light to dark
-SKIN, IVORY = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80)
+SKIN = (0.87, 0.68, 0.58)
 MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip",
            "sublabiale", "pogonion", "menton")
 NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_soft", "n'"),
@@ -81,7 +81,7 @@ def read_text(file):
 
 
 class Result:
-    """What the page needs of a result file: model, last step, the steps' numbers; before and after."""
+    """What the page needs of a result file: model, the steps' numbers, before and after."""
 
     def __init__(self, file):
         try:
@@ -188,8 +188,8 @@ def on_skin(result, point):
 
 
 def place_landmarks(result, landmarks):
-    """[{name, on, before, after}] of those on the skin or on a bone, a bone's go with the bone; and the
-    names of the others."""
+    """[{name, on, before, after}] of those on the skin or on a bone, a bone's go with the bone; and
+    the names of the others."""
     placed, lost = [], []
     for name, point in landmarks.items():
         before, after, distance = on_skin(result, point)
@@ -199,7 +199,8 @@ def place_landmarks(result, landmarks):
             if away < distance:
                 turn, shift = bone["motion"]
                 distance = away
-                best = {"name": name, "on": bone["name"], "before": point, "after": turn @ point + shift}
+                best = {"name": name, "on": bone["name"], "before": point,
+                        "after": turn @ point + shift}
         if distance <= NEAR:
             placed.append(best)
         else:
@@ -222,8 +223,8 @@ def known_places(placed):
 
 
 def middle_plane(result, known):
-    """Point and normal of the plane of symmetry: through the landmarks of the midline, upright; the middle of
-    the skin where there are none."""
+    """Point and normal of the plane of symmetry: through the landmarks of the midline, upright; the
+    middle of the skin where there are none."""
     points = np.array([known[name][0] for name in MIDLINE if name in known])
     if len(points) == 0:
         return (result.before.min(0) + result.before.max(0)) / 2, np.array([1.0, 0, 0])
@@ -283,11 +284,14 @@ def measures(known):
     """[(name, unit, before, after)] of what the landmarks allow."""
     columella = "columella" if "columella" in known else "pronasale"
     wanted = [
-        (f"nasolabial angle ({columella}–subnasale–upper lip)", "°", (columella, "subnasale", "upper lip"),
+        (f"nasolabial angle ({columella}–subnasale–upper lip)", "°",
+         (columella, "subnasale", "upper lip"),
          lambda p: angle(p, columella, "subnasale", "upper lip")),
-        ("mentolabial angle (lower lip–sublabiale–pogonion)", "°", ("lower lip", "sublabiale", "pogonion"),
+        ("mentolabial angle (lower lip–sublabiale–pogonion)", "°",
+         ("lower lip", "sublabiale", "pogonion"),
          lambda p: angle(p, "lower lip", "sublabiale", "pogonion")),
-        ("facial convexity (glabella–subnasale–pogonion)", "°", ("glabella", "subnasale", "pogonion"),
+        ("facial convexity (glabella–subnasale–pogonion)", "°",
+         ("glabella", "subnasale", "pogonion"),
          lambda p: angle(p, "glabella", "subnasale", "pogonion")),
         ("upper lip in front of the E-line", "mm", ("upper lip", "pronasale", "pogonion"),
          lambda p: from_line(p, "upper lip")),
@@ -318,7 +322,8 @@ def profile_picture(result, known, plane, before):
     scale = 520 / (high[1] - low[1])
     x, y = (lambda p: 20 + scale * (high[0] - p[1])), (lambda p: 20 + scale * (high[1] - p[2]))
     width = 40 + scale * (high[0] - low[0])
-    parts = [f'<svg viewBox="0 0 {width + 130:.0f} 560" role="img" aria-label="profile before and after">']
+    parts = [f'<svg viewBox="0 0 {width + 130:.0f} 560" role="img" '
+             'aria-label="profile before and after">']
     for name, lines in (("before", before), ("after", after)):
         path = "".join(f"M{x(p):.1f} {y(p):.1f}L{x(q):.1f} {y(q):.1f}" for p, q in lines
                        if max(p[1], q[1]) <= high[0])
@@ -337,7 +342,7 @@ def profile_picture(result, known, plane, before):
 
 
 def shaded(points, corners, eye, right, base):
-    """The triangles as an eye sees them [f, 3, 2], the nearest last, and their colours in its light."""
+    """The triangles as an eye sees them [f, 3, 2], the nearest last, and their colours."""
     faces = points[corners]
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -349,7 +354,7 @@ def shaded(points, corners, eye, right, base):
 
 
 def pictures(result):
-    """Before, after and movement from the front and from the side, as a PNG; why not, where it cannot be."""
+    """Before, after and movement from front and side, as a PNG; why not, where it cannot be."""
     try:
         import matplotlib
         matplotlib.use("Agg")
@@ -448,10 +453,11 @@ def landmark_table(placed, lost):
     rows, rest = [], ", ".join(name.replace("_", " ") for name in lost)
     for mark in placed:
         move = mark["after"] - mark["before"]
-        rows.append((mark["name"].replace("_", " "), mark["on"], *map(float, (-move[1], move[0], move[2])),
-                     float(np.linalg.norm(move))))
-    return table(("landmark", "on", "forward, mm", "to the left, mm", "up, mm", "in all, mm"), rows) + (
-        f"<p>Farther than {NEAR:g} mm from skin and bones: {html.escape(rest)}.</p>" if rest else "")
+        parts = map(float, (-move[1], move[0], move[2], np.linalg.norm(move)))
+        rows.append((mark["name"].replace("_", " "), mark["on"], *parts))
+    head = ("landmark", "on", "forward, mm", "to the left, mm", "up, mm", "in all, mm")
+    lost_ones = f"<p>Farther than {NEAR:g} mm from skin and bones: {html.escape(rest)}.</p>"
+    return table(head, rows) + (lost_ones if rest else "")
 
 
 def tissue(result):
@@ -461,7 +467,8 @@ def tissue(result):
              float(np.median(result.movement[result.movement > 0.1]))
              if (result.movement > 0.1).any() else 0.0),
             ("change of the tissue's volume, mm³", float(change.sum())),
-            ("… of its volume, %", float(100 * change.sum() / result.volume.sum()) if len(ratio) else 0.0),
+            ("… of its volume, %",
+             float(100 * change.sum() / result.volume.sum()) if len(ratio) else 0.0),
             ("prisms: largest change of volume, %", float(100 * abs(ratio - 1).max(initial=0))),
             ("prisms: 95 % change by less than, %",
              float(100 * np.percentile(abs(ratio - 1), 95)) if len(ratio) else 0.0),
@@ -477,21 +484,23 @@ def accuracy(result):
     left = f"{model:.2g} mm (estimate)" if model is not None else \
         "not estimated; repose-solve -profile preview or -adapt estimates it"
     return f"<p>What the model's resolution leaves out: {left}.</p>" + table(
-        ("load", "converged", "to the rest position, mm", "iterations", "evaluations", "s", ""), rows)
+        ("load", "converged", "to the rest position, mm", "iterations", "evaluations", "s", ""),
+        rows)
 
 
 def warnings(result):
     end, said = result.end, []
     if not end["converged"] or end["load"] < 1:
-        said.append(f"The run did not reach its accuracy: {end['reason']}. It ended at load {end['load']:.3g}, "
-                    "where 1 is the plan.")
+        said.append(f"The run did not reach its accuracy: {end['reason']}. It ended at load "
+                    f"{end['load']:.3g}, where 1 is the plan.")
     if end["inverted_prisms"]:
-        said.append(f"{int(end['inverted_prisms'])} prisms are inside out: the tissue is folded there.")
+        said.append(f"{int(end['inverted_prisms'])} prisms are inside out: the tissue is folded "
+                    "there.")
     if end["displacement_error"] > LARGE_ERROR:
         said.append("The rest position is not known to half a millimetre.")
     if end["volume_error_max"] > LARGE_VOLUME:
-        said.append(f"A prism changes its volume by {100 * end['volume_error_max']:.0f} %: the tissue is "
-                    "strained a lot there.")
+        said.append(f"A prism changes its volume by {100 * end['volume_error_max']:.0f} %: the "
+                    "tissue is strained a lot there.")
     for line in said:
         yield f'<p class="warning">{html.escape(line)}</p>'
 
@@ -513,24 +522,29 @@ def provenance(chosen, result):
 
 
 VIEW = """<canvas id="view"></canvas><p id="no-view" hidden>This browser has no WebGL 2.</p>
-<p class="controls"><button data-around="0">front</button> <button data-around="0.6">three-quarter</button>
-<button data-around="-1.5708">side</button>
+<p class="controls"><button data-around="0">front</button>
+<button data-around="0.6">three-quarter</button> <button data-around="-1.5708">side</button>
 <label>before <input type="range" id="share" min="0" max="1" step="0.01" value="1"> after</label>
 <label>skin <input type="range" id="opacity" min="0" max="1" step="0.05" value="1"></label>
 <label><input type="checkbox" id="coloured" checked> movement</label>
 <label><input type="checkbox" id="bones" checked> bones</label></p>
 <p>Drag to turn, Shift and drag to shift, wheel to zoom. Dark is far: up to %.2f mm.</p>"""
 
-STYLE = """body{font:16px/1.45 sans-serif;color:#222;max-width:60rem;margin:2rem auto;padding:0 1rem}
+STYLE = """
+body{font:16px/1.45 sans-serif;color:#222;max-width:60rem;margin:2rem auto;padding:0 1rem}
 h1{font-size:1.6rem}h2{font-size:1.25rem;border-bottom:1px solid #ccc;margin-top:2.2rem}
-table{border-collapse:collapse;margin:.8rem 0}td,th{padding:.2rem .7rem;text-align:left;vertical-align:top;
-border-bottom:1px solid #e4e4e4}td{overflow-wrap:anywhere}.number{text-align:right;white-space:nowrap;
-font-variant-numeric:tabular-nums}img,svg{max-width:100%}svg{max-height:36rem}pre{background:#f5f5f5;padding:.8rem;overflow:auto}
-.verdict{font-size:1.15rem}.warning{background:#fff1dc;border-left:4px solid #c60;padding:.4rem .8rem}
-path{fill:none;stroke-width:2.5}path.before{stroke:#1f6fb4}path.after{stroke:#c0392b}text{font-size:15px}
+table{border-collapse:collapse;margin:.8rem 0}
+td,th{padding:.2rem .7rem;text-align:left;vertical-align:top;border-bottom:1px solid #e4e4e4}
+td{overflow-wrap:anywhere}
+.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+img,svg{max-width:100%}svg{max-height:36rem}text{font-size:15px}
+pre{background:#f5f5f5;padding:.8rem;overflow:auto}
+.verdict{font-size:1.15rem}
+.warning{background:#fff1dc;border-left:4px solid #c60;padding:.4rem .8rem}
+path{fill:none;stroke-width:2.5}path.before{stroke:#1f6fb4}path.after{stroke:#c0392b}
 circle.before{fill:#1f6fb4}circle.after{fill:#c0392b}b.before{color:#1f6fb4}b.after{color:#c0392b}
-canvas{width:100%;height:34rem;border:1px solid #ccc;touch-action:none}.controls>*{margin-right:.8rem}
-@media print{canvas,.controls{display:none}}"""
+canvas{width:100%;height:34rem;border:1px solid #ccc;touch-action:none}
+.controls>*{margin-right:.8rem}@media print{canvas,.controls{display:none}}"""
 
 
 def page(chosen, result, placed, lost):
@@ -541,8 +555,9 @@ def page(chosen, result, placed, lost):
     rows = [(name, unit, one, two, two - one) for name, unit, one, two in measures(known)]
     error = float(result.end["displacement_error"])
     near = f"to {error:.2g} mm" if math.isfinite(error) else "to an unknown distance"
-    verdict = ("The rest position is reached " if result.end["converged"] and result.end["load"] == 1
-               else "NOT CONVERGED: the face shown is near its rest position ") + near
+    there = result.end["converged"] and result.end["load"] == 1
+    verdict = ("The rest position is reached " if there else
+               "NOT CONVERGED: the face shown is near its rest position ") + near
     title = html.escape(os.path.basename(chosen.name).replace("_", " "))
     sections = [
         ("Plan", plan(result)),

@@ -1,12 +1,12 @@
-// The interactive view of report.py: turn (drag), shift (right drag or Shift), zoom (wheel). WebGL 2, nothing else.
+// The interactive view of report.py: drag to turn, Shift and drag to shift, wheel to zoom. WebGL 2.
 "use strict";
 (() => {
-  const canvas = document.getElementById("view"), data = JSON.parse(document.getElementById("meshes").textContent);
-  const gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
   const control = id => document.getElementById(id);
+  const canvas = control("view"), data = JSON.parse(control("meshes").textContent);
+  const gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
   if (!gl) { control("no-view").hidden = false; canvas.hidden = true; return; }
 
-  const numbers = (text, Kind) => new Kind(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
+  const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const vertexSource = `#version 300 es
     in vec3 p0, p1, n0, n1;
     uniform mat4 camera; uniform mat3 turn; uniform float share, largest;
@@ -32,7 +32,8 @@
       pixel = vec4(base * (0.3 + 0.75 * light), 1) * opacity;
     }`;
   const program = gl.createProgram();
-  for (const [kind, source] of [[gl.VERTEX_SHADER, vertexSource], [gl.FRAGMENT_SHADER, fragmentSource]]) {
+  const sources = [[gl.VERTEX_SHADER, vertexSource], [gl.FRAGMENT_SHADER, fragmentSource]];
+  for (const [kind, source] of sources) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
@@ -41,24 +42,22 @@
   gl.linkProgram(program);
   gl.useProgram(program);
   const uniform = name => gl.getUniformLocation(program, name);
-
   // Normals of the vertices, weighted by area.
   function normals(points, corners) {
     const sum = new Float32Array(points.length);
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [0, 1, 2].map(k => 3 * corners[t + k]);
-      const u = [0, 1, 2].map(k => points[b + k] - points[a + k]), v = [0, 1, 2].map(k => points[c + k] - points[a + k]);
+      const [u, v] = [b, c].map(end => [0, 1, 2].map(k => points[end + k] - points[a + k]));
       const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
       for (const corner of [a, b, c]) for (let k = 0; k < 3; ++k) sum[corner + k] += n[k];
     }
     return sum;
   }
-
   function mesh(stored) {
-    const before = numbers(stored.before, Float32Array), after = numbers(stored.after, Float32Array);
-    const corners = numbers(stored.triangles, Uint32Array), array = gl.createVertexArray();
+    const [p0, p1] = [stored.before, stored.after].map(text => new Float32Array(bytes(text)));
+    const corners = new Uint32Array(bytes(stored.triangles)), array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    const attributes = {p0: before, p1: after, n0: normals(before, corners), n1: normals(after, corners)};
+    const attributes = {p0, p1, n0: normals(p0, corners), n1: normals(p1, corners)};
     for (const [name, values] of Object.entries(attributes)) {
       const place = gl.getAttribLocation(program, name);
       gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -77,7 +76,8 @@
 
   const view = {around: 0.6, up: 0.1, zoom: 1, x: 0, y: 0};
   function rows() {  // right, up and towards the eye, of a head that looks to −y with +z up
-    const [s, c, t, d] = [Math.sin(view.around), Math.cos(view.around), Math.sin(view.up), Math.cos(view.up)];
+    const [s, t] = [Math.sin(view.around), Math.sin(view.up)];
+    const [c, d] = [Math.cos(view.around), Math.cos(view.up)];
     return [[c, s, 0], [s * t, -c * t, d], [s * d, -c * d, t]];
   }
   function draw_mesh(one, colour, largest, opacity) {
@@ -94,16 +94,19 @@
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const [r, u, e] = rows(), size = view.zoom / data.radius, aspect = canvas.height / canvas.width, m = data.middle;
-    const along = axis => -(axis[0] * m[0] + axis[1] * m[1] + axis[2] * m[2]);
-    const sx = size * aspect, sz = -0.25 / data.radius;
-    gl.uniformMatrix4fv(uniform("camera"), false, [0, 1, 2].flatMap(k => [sx * r[k], size * u[k], sz * e[k], 0])
-        .concat([sx * along(r) + view.x, size * along(u) + view.y, sz * along(e), 1]));
+    const [r, u, e] = rows(), [x, y, z] = data.middle;
+    const along = axis => -(axis[0] * x + axis[1] * y + axis[2] * z);
+    const sy = view.zoom / data.radius, sz = -0.25 / data.radius;
+    const sx = sy * canvas.height / canvas.width;
+    const turned = [0, 1, 2].flatMap(k => [sx * r[k], sy * u[k], sz * e[k], 0]);
+    const shift = [sx * along(r) + view.x, sy * along(u) + view.y, sz * along(e), 1];
+    gl.uniformMatrix4fv(uniform("camera"), false, turned.concat(shift));
     gl.uniformMatrix3fv(uniform("turn"), false, [0, 1, 2].flatMap(k => [r[k], u[k], e[k]]));
     gl.uniform1f(uniform("share"), control("share").value);
     const opacity = Number(control("opacity").value);
     gl.disable(gl.BLEND);
-    if (control("bones").checked) for (const bone of bones) draw_mesh(bone, [0.96, 0.92, 0.8], 0, 1);
+    if (control("bones").checked)
+      for (const bone of bones) draw_mesh(bone, [0.96, 0.92, 0.8], 0, 1);
     if (opacity < 1) {  // what is nearest only
       gl.enable(gl.BLEND);
       gl.colorMask(false, false, false, false);
@@ -111,7 +114,8 @@
       gl.colorMask(true, true, true, true);
       gl.depthFunc(gl.EQUAL);
     }
-    if (opacity > 0) draw_mesh(skin, [0.87, 0.68, 0.58], control("coloured").checked ? data.largest : 0, opacity);
+    const largest = control("coloured").checked ? data.largest : 0;
+    if (opacity > 0) draw_mesh(skin, [0.87, 0.68, 0.58], largest, opacity);
     gl.depthFunc(gl.LESS);
   }
 
@@ -138,7 +142,8 @@
       Object.assign(view, {around: Number(button.dataset.around), up: 0, x: 0, y: 0, zoom: 1});
       draw();
     });
-  for (const id of ["share", "opacity", "bones", "coloured"]) control(id).addEventListener("input", draw);
+  for (const id of ["share", "opacity", "bones", "coloured"])
+    control(id).addEventListener("input", draw);
   window.addEventListener("resize", draw);
   draw();
 })();

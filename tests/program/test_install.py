@@ -1,4 +1,4 @@
-"""What cmake --install puts where, and that it works from there: programs, scripts, library, batch script."""
+"""What cmake --install puts where, and that it works from there."""
 
 import os
 import shutil
@@ -26,7 +26,7 @@ def prefix(tmp_path_factory, environment):
 
 @pytest.fixture
 def call(prefix, environment, tmp_path):
-    """call(command …) → CompletedProcess, in an empty folder, with the installed programs on the path."""
+    """call(command …) → CompletedProcess, in an empty folder, installed programs on the path."""
 
     def run(*command, **more):
         path = f"{prefix / 'bin'}:{environment['PATH']}"
@@ -50,16 +50,17 @@ def test_everything_is_there(prefix):
 
 
 def test_the_paper_finds_its_heads(call, tmp_path):
-    result = call("repose-paper", "-layers", 2, "-limit", 1, "-seconds", 0.001, "-path_seconds", 0.001)
+    result = call("repose-paper", "-layers", 2, "-limit", 1, "-seconds", 0.001, "-path_seconds",
+                  0.001)
     assert (result.returncode, result.stderr) == (0, "")
     assert (tmp_path / "paper/paper.md").is_file()
 
 
 def test_the_panel_finds_its_program(prefix, call, tmp_path):
     meshes = prefix / "share/repose/meshes"
-    result = call(prefix / "share/repose/slicer/Repose", "--skin", meshes / "paper_skin.ply", "--bone1",
-                  meshes / "paper_skull.ply", "--processors", 1, "--resultFile", tmp_path / "face.h5",
-                  PATH="/usr/bin:/bin")
+    result = call(prefix / "share/repose/slicer/Repose", "--skin", meshes / "paper_skin.ply",
+                  "--bone1", meshes / "paper_skull.ply", "--processors", 1,
+                  "--resultFile", tmp_path / "face.h5", PATH="/usr/bin:/bin")
     assert (result.returncode, result.stderr) == (0, "")
     with h5py.File(tmp_path / "face.h5") as h5:
         assert h5.attrs["command"].decode().startswith(str(prefix / "bin/repose-solve"))

@@ -44,7 +44,7 @@ def triangles_of(file):
 
 
 def slicer_ply(file, points, triangles, space="LPS", binary=False):
-    """A model as vtkPLYWriter writes it for Slicer: float32, with the coordinate system as a comment."""
+    """A model as vtkPLYWriter writes it for Slicer: float32, the coordinate system as a comment."""
     if space == "RAS":
         points = points * (-1, -1, 1)
     layout = "binary_little_endian" if binary else "ascii"
@@ -88,8 +88,8 @@ def slicer_curve(file, points, space="LPS"):
     schema = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/" \
              "Resources/Schema/markups-schema-v1.0.3.json#"
     controls = [{"id": str(i), "label": f"C-{i}", "description": "", "associatedNodeID": "",
-                 "position": list(p), "orientation": [-1, 0, 0, 0, -1, 0, 0, 0, 1], "selected": True,
-                 "locked": False, "visibility": True, "positionStatus": "defined"}
+                 "position": list(p), "orientation": [-1, 0, 0, 0, -1, 0, 0, 0, 1],
+                 "selected": True, "locked": False, "visibility": True, "positionStatus": "defined"}
                 for i, p in enumerate(turned, 1)]
     markup = {"type": "Curve", "coordinateSystem": space, "coordinateUnits": "mm", "locked": False,
               "labelFormat": "%N-%d", "controlPoints": controls, "measurements": [],
@@ -119,8 +119,8 @@ def head(tmp_path):
 
 @pytest.fixture
 def panel(tmp_path, environment):
-    """panel(*arguments) → CompletedProcess, in Slicer's surroundings: with its own libraries and its
-    own Python's home, none of which may reach ours."""
+    """panel(*arguments) → CompletedProcess, in Slicer's surroundings: with its own libraries and
+    its own Python's home, none of which may reach ours."""
     for folder in ("temporary", "libraries", "python"):
         (tmp_path / folder).mkdir()
     needed = subprocess.check_output(["ldd", programs() / "repose-solve"], text=True)
@@ -216,7 +216,7 @@ def test_description_is_printed(panel):
 @pytest.mark.parametrize("ending", [".tfm", ".h5"])
 def test_round_trip_is_the_scene_that_a_person_would_write(panel, head, run, tmp_path, ending):
     names = ["predictedSkin", "movedBone1", "movedBone2", "resultFile", "returnparameterfile"]
-    outputs = {name: tmp_path / f"{name}{'.h5' if name == 'resultFile' else '.vtp'}" for name in names}
+    outputs = {name: tmp_path / name for name in names}
     result = panel(*head(ending=ending), "--boneNames", "skull,jaw", "--accuracy", 0.01,
                    *[word for item in outputs.items() for word in (f"--{item[0]}", item[1])])
     assert (result.returncode, result.stderr) == (0, "")
@@ -239,7 +239,8 @@ def test_round_trip_is_the_scene_that_a_person_would_write(panel, head, run, tmp
     skull, jaw = (read_vtp(outputs[f"movedBone{i}"])["Points"] for i in (1, 2))
     assert np.abs(skull - model["bone_surface/0/points"]).max() == 0
     assert np.abs(jaw - model["bone_surface/1/points"] - (1, -4, 0.5)).max() < 1e-9
-    assert np.abs(last(outputs["resultFile"])["point/position"] - step["point/position"]).max() < 1e-9
+    kept = last(outputs["resultFile"])["point/position"]
+    assert np.abs(kept - step["point/position"]).max() < 1e-9
     numbers = returned(outputs["returnparameterfile"])
     assert "accuracy reached" in numbers["verdict"] and numbers["invertedPrisms"] == "0"
     assert float(numbers["accuracyReached"]) == pytest.approx(step["displacement_error"], rel=1e-5)
@@ -310,8 +311,8 @@ WRONG = {"no skin": ([], "no skin is chosen"),
          "no bone": (["--skin", MESHES / "paper_skin.ply"], "no bone is chosen"),
          "no model": (["--skin", MESHES / "paper_skin.ply", "--transform3", "t.tfm"],
                       "bone 3 has a transform and no model"),
-         "not a mesh": (["--skin", PANEL.with_suffix(".xml"), "--bone1", MESHES / "paper_skull.ply"],
-                        "skin.xml")}
+         "not a mesh": (["--skin", PANEL.with_suffix(".xml"), "--bone1",
+                         MESHES / "paper_skull.ply"], "skin.xml")}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -330,10 +331,11 @@ def long_run(panel, tmp_path):
     """A run of the panel that has begun to search, and its solver's process."""
     turn = np.eye(4)
     turn[1:3, 1:3] = [[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]]
-    process = panel("--skin", MESHES / "head_skin.ply", "--bone1", MESHES / "head_skull.ply", "--bone2",
-                    MESHES / "head_mandible.ply", "--transform2",
-                    slicer_transform(tmp_path / "open.tfm", turn), "--accuracy", 1e-6, "--layers", 8,
-                    "--processors", 2, "--predictedSkin", tmp_path / "skin.vtp", wait=False)
+    process = panel("--skin", MESHES / "head_skin.ply", "--bone1", MESHES / "head_skull.ply",
+                    "--bone2", MESHES / "head_mandible.ply",
+                    "--transform2", slicer_transform(tmp_path / "open.tfm", turn),
+                    "--accuracy", 1e-6, "--layers", 8, "--processors", 2,
+                    "--predictedSkin", tmp_path / "skin.vtp", wait=False)
     for line in process.stdout:
         if line.startswith("<filter-progress>"):
             break

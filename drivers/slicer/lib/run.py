@@ -1,5 +1,5 @@
-"""What the panel Repose of 3D Slicer does: a scene of what it is given, repose-solve, and models of the
-result. Reads the parameters from Repose.xml, so that the panel and this agree. Lengths in mm, LPS."""
+"""What the panel Repose of 3D Slicer does: a scene of what it is given, repose-solve, and models of
+the result. Reads the parameters from Repose.xml, so that panel and program agree. In mm and LPS."""
 
 import base64
 import json
@@ -46,17 +46,17 @@ def parameters():
 def value_of(item, text):
     """A parameter's text as what its tag says."""
     name, kind = item.findtext("name"), item.tag
+    limits = [item.findtext(f"constraints/{end}") for end in ("minimum", "maximum")]
     try:
         if kind in ("integer", "double"):
             number = int(text) if kind == "integer" else float(text)
-            low, high = (float(item.findtext(f"constraints/{end}")) for end in ("minimum", "maximum"))
+            low, high = (float(end) for end in limits)
             if not low <= number <= high:
                 raise ValueError
             return number
     except ValueError:
-        raise Refusal(f"--{name} {text}: give {'a whole' if kind == 'integer' else 'a'} number from "
-                      f"{item.findtext('constraints/minimum')} to "
-                      f"{item.findtext('constraints/maximum')}") from None
+        what = "a whole number" if kind == "integer" else "a number"
+        raise Refusal(f"--{name} {text}: give {what} from {' to '.join(limits)}") from None
     if kind == "string-vector":
         return [part.strip() for part in text.split(",") if part.strip()]
     choices = [element.text for element in item.findall("element")]
@@ -178,15 +178,16 @@ def write_scene(chosen, folder):
 
 
 def solver():
-    """repose-solve: of REPOSE_BUILD, beside this folder when installed, of the build folder here, or on
-    the path."""
+    """repose-solve: of REPOSE_BUILD, beside this folder when installed, of the build folder here,
+    or on the path."""
     top = FOLDER.parents[1]
-    homes = [pathlib.Path(os.environ["REPOSE_BUILD"]) / "bin"] if "REPOSE_BUILD" in os.environ else [
-        top.parent / "bin", top / "build" / "bin"]
+    homes = [top.parent / "bin", top / "build" / "bin"]
+    if "REPOSE_BUILD" in os.environ:
+        homes = [pathlib.Path(os.environ["REPOSE_BUILD"]) / "bin"]
     found = shutil.which("repose-solve", path=os.pathsep.join(map(str, homes)))
     found = found or shutil.which("repose-solve")
     if not found:
-        raise Refusal("repose-solve is not found; set REPOSE_BUILD to the folder Repose is built in")
+        raise Refusal("repose-solve is not found; set REPOSE_BUILD to the folder it is built in")
     return found
 
 
@@ -204,8 +205,8 @@ def command(chosen, scene):
 
 
 class Progress:
-    """The share of the work that is done, from the solver's lines: of the loads reached, and of the next
-    the orders of magnitude its search has taken off the distance. Told as Slicer reads it."""
+    """The share of the work that is done, from the solver's lines: of the loads reached, and of the
+    next the orders of magnitude its search has taken off the distance. Told as Slicer reads it."""
 
     def __init__(self, accuracy):
         self.accuracy, self.load, self.reached, self.farthest, self.told = accuracy, 0, 0, 0, 0
@@ -228,8 +229,8 @@ class Progress:
 
 
 def solve(chosen, scene):
-    """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals. Where
-    this program is killed, the solver ends at its next line, which nobody reads."""
+    """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals.
+    Where this program is killed, the solver ends at its next line, which nobody reads."""
     line = command(chosen, scene)
     progress = Progress(float(line[line.index("-accuracy") + 1]))
     process = subprocess.Popen(line, cwd=scene.parent, text=True, errors="replace",
@@ -277,16 +278,19 @@ def data_array(name, values):
 
 
 def write_vtp(file, points, triangles, arrays):
-    """A surface in LPS, as Slicer knows by the field SPACE; a vector array comes first, then scalars."""
+    """A surface in LPS, as the field SPACE tells Slicer, with arrays at its points."""
     import numpy as np
     ends = 3 * np.arange(1, len(triangles) + 1)
     vectors = next((name for name, values in arrays.items() if values.ndim == 2), None)
     scalars = next((name for name, values in arrays.items() if values.ndim == 1), None)
-    active = (f' Vectors="{vectors}"' if vectors else "") + (f' Scalars="{scalars}"' if scalars else "")
-    text = ('<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" '
-            'header_type="UInt64">\n<PolyData>\n<FieldData>\n' + data_array("SPACE", "LPS")
-            + f'</FieldData>\n<Piece NumberOfPoints="{len(points)}" NumberOfVerts="0" '
-            f'NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{len(triangles)}">\n<PointData{active}>\n'
+    active = f' Vectors="{vectors}"' if vectors else ""
+    active += f' Scalars="{scalars}"' if scalars else ""
+    text = ('<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" '
+            'byte_order="LittleEndian" header_type="UInt64">\n<PolyData>\n<FieldData>\n'
+            + data_array("SPACE", "LPS") + "</FieldData>\n"
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="0" NumberOfLines="0" '
+            f'NumberOfStrips="0" NumberOfPolys="{len(triangles)}">\n'
+            f"<PointData{active}>\n"
             + "".join(data_array(name, values) for name, values in arrays.items())
             + "</PointData>\n<Points>\n" + data_array("Points", points) + "</Points>\n<Polys>\n"
             + data_array("connectivity", triangles.ravel()) + data_array("offsets", ends)
@@ -336,9 +340,9 @@ def verdict(status, told, accuracy):
     if status == 0:
         return f"accuracy reached: {error:.3g} mm of {accuracy:g} mm"
     reason = told["reason"].decode() if isinstance(told["reason"], bytes) else str(told["reason"])
-    near = f"about {error:.3g} mm from rest" if math.isfinite(error) else "at no known distance from rest"
+    near = f"about {error:.3g} mm" if math.isfinite(error) else "at no known distance"
     where = "" if load == 1 else f"; the bones have made {100 * load:.0f} % of their way only"
-    return f"ACCURACY NOT REACHED: the face is {near}{where} ({reason})"
+    return f"ACCURACY NOT REACHED: the face is {near} from rest{where} ({reason})"
 
 
 def work(chosen, folder):
