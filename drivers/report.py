@@ -481,9 +481,9 @@ def accuracy(result):
              int(s["iterations"]), int(s["evaluations"]), float(s["seconds"]), str(s["reason"]))
             for s in result.steps]
     model = result.end.get("discretisation_error")
-    left = f"{model:.2g} mm (estimate)" if model is not None else \
-        "not estimated; repose-solve -profile preview or -adapt estimates it"
-    return f"<p>What the model's resolution leaves out: {left}.</p>" + table(
+    left = f"{model:.2g} mm at most (estimate)" if model is not None else \
+        "not estimated; repose-solve -discretisation estimates it"
+    return f"<p>What mesh and layers leave out: {left}.</p>" + table(
         ("load", "converged", "to the rest position, mm", "iterations", "evaluations", "s", ""),
         rows)
 

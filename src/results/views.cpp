@@ -32,6 +32,8 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
                              {"layer", "/model/point/layer", true, false, short_integer},
                              {"column", "/model/point/column", true, false, long_integer},
                              {"volume_ratio", "step/prism/volume_ratio"}}};
+  if (counts.discretisation)
+    block.arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
   if (counts.stress) {
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});

@@ -384,6 +384,21 @@ def test_every_tissue_of_the_panel_is_one_of_the_scenes(panel, head, tmp_path, t
     assert (result.returncode, result.stderr) == (0, "")
 
 
+def test_uncertainty_is_told_point_by_point(panel, head, tmp_path):
+    result = panel(*head(), "--uncertainty", "--predictedSkin", tmp_path / "skin.vtp",
+                   "--resultFile", tmp_path / "face.h5",
+                   "--returnparameterfile", tmp_path / "numbers")
+    assert (result.returncode, result.stderr) == (0, "")
+    step = last(tmp_path / "face.h5")
+    used = np.unique(model_of(tmp_path / "face.h5")["skin/points"])
+    wanted = step["displacement_error"] + step["point/discretisation_error"][used]
+    told = read_vtp(tmp_path / "skin.vtp")["uncertainty"][:, 0]
+    assert np.abs(told - wanted).max() < 1e-12 and told.max() > 10 * told.min()
+    numbers = returned(tmp_path / "numbers")
+    assert float(numbers["meshError"]) == pytest.approx(step["discretisation_error"], rel=1e-5)
+    assert float(numbers["accuracyReached"]) == pytest.approx(step["displacement_error"], rel=1e-5)
+
+
 def test_several_processors(panel, head, tmp_path):
     arguments = head()[:-1] + [2]
     result = panel(*arguments, "--predictedSkin", tmp_path / "skin.vtp")

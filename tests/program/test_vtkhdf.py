@@ -64,22 +64,24 @@ def test_pressures_are_shown_where_the_volume_is_exact(solved):
         shows(h5, "pressure")
 
 
-def shows(h5, name):
-    stored = [h5["step"][step]["prism"][name][:] for step in sorted(h5["step"])]
-    assert np.array_equal(h5["VTKHDF/CellData"][name][:], np.concatenate(stored))
+def shows(h5, name, place="prism"):
+    stored = [h5["step"][step][place][name][:] for step in sorted(h5["step"])]
+    data = h5["VTKHDF/PointData" if place == "point" else "VTKHDF/CellData"]
+    assert np.array_equal(data[name][:], np.concatenate(stored))
 
 
-def test_stress_and_stretch_of_a_solid_are_shown(run, tmp_path):
+def test_stress_stretch_and_uncertainty_of_a_solid_are_shown(run, tmp_path):
     head = "\n".join(f"  - {{name: {bone}, file: {PROJECT}/meshes/paper_{bone}.ply}}"
                      for bone in ("skull", "mandible"))
     (tmp_path / "solid.yaml").write_text(
         f"skin: {PROJECT}/meshes/paper_skin.ply\nbones:\n{head}\n"
         "tissue: {layers: 3, material: {preset: face}}\n"
         "moves: [{bone: mandible, translate: [0, -3, 0]}]\n")
-    assert run("repose-solve", "solid.yaml", "-output", "solid").returncode == 0
+    assert run("repose-solve", "solid.yaml", "-discretisation", "-output", "solid").returncode == 0
     with h5py.File(tmp_path / "solid.h5") as h5:
         shows(h5, "von_mises")
         shows(h5, "principal_stretch")
+        shows(h5, "discretisation_error", "point")
         assert h5["VTKHDF/CellData/principal_stretch"].shape[1] == 3
 
 

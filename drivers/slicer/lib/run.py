@@ -197,6 +197,8 @@ def command(chosen, scene):
     if chosen["preview"]:
         line += ["-profile", "preview"]
         accuracy = max(accuracy, 1)
+    elif chosen["uncertainty"]:
+        line.append("-discretisation")
     line += ["-accuracy", str(accuracy)]
     if chosen["timeLimit"]:
         line += ["-time_limit", str(chosen["timeLimit"])]
@@ -313,9 +315,12 @@ def hand_back(chosen, result, numbers):
         points, ratio = step["point/position"][:][used], step["prism/volume_ratio"][:]
         movement = np.linalg.norm(displacement, axis=1)
         arrays = {"displacement": displacement, "displacement_magnitude": movement}
-        uncertainty = told["displacement_error"] + told.get("discretisation_error", 0)
-        if math.isfinite(uncertainty):
-            arrays["uncertainty"] = np.full(len(used), uncertainty)
+        error, mesh_error = told["displacement_error"], told.get("discretisation_error")
+        of_mesh = np.full(len(used), mesh_error or 0.0)
+        if "point/discretisation_error" in step:
+            of_mesh = step["point/discretisation_error"][:][used]
+        if math.isfinite(error):
+            arrays["uncertainty"] = error + of_mesh
         if chosen["predictedSkin"]:
             write_vtp(chosen["predictedSkin"], points, triangles.reshape(-1, 3), arrays)
         moved, first = step["bone_surface/points"][:] if "bone_surface" in step else None, 0
@@ -327,7 +332,8 @@ def hand_back(chosen, result, numbers):
                 write_vtp(chosen[f"movedBone{number}"], where, surface["triangles"][:], {})
             first += count
     moving = movement[movement > MOVING]
-    return {"accuracyReached": float(uncertainty) if math.isfinite(uncertainty) else -1,
+    return {"accuracyReached": float(error) if math.isfinite(error) else -1,
+            "meshError": -1 if mesh_error is None else float(mesh_error),
             "largestMovement": float(movement.max(initial=0)),
             "meanMovement": float(moving.mean()) if len(moving) else 0.0,
             "volumeChange": 100 * float(abs(ratio - 1).max(initial=0)),
