@@ -13,6 +13,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/shipped.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/paper/figures.h"
@@ -25,7 +26,8 @@ using base::OptionKind;
 
 std::vector<base::Option> option_table() {
   return {{"output", OptionKind::path, "paper", "Folder of the page and its files."},
-          {"meshes", OptionKind::path, "meshes", "Folder of the shipped heads."},
+          {"meshes", OptionKind::path, "",
+           "Folder of the shipped heads; default: the one that is shipped."},
           {"layers", OptionKind::text, "2,4,6", "Point layers, 2 … 64, one or several."},
           {"accuracy",
            OptionKind::number,
@@ -77,7 +79,10 @@ std::string command_of(const base::Options& options) {
 
 base::Exit run(const base::Options& options) {
   if (base::size(MPI_COMM_WORLD) > 1) base::refuse("repose-paper is serial: run it without mpirun");
-  const std::filesystem::path folder = options.text("output"), meshes = options.text("meshes");
+  const std::filesystem::path folder = options.text("output");
+  const std::filesystem::path meshes = options.has("meshes")
+                                           ? std::filesystem::path(options.text("meshes"))
+                                           : base::shipped_folder("meshes");
   const paper::Plan plan{.scene = scene::read_scene(meshes / "paper_jaw_advance.yaml"),
                          .layers = read_layers(options.text("layers")),
                          .rules = {.accuracy = options.number("accuracy"),

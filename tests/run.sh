@@ -10,7 +10,7 @@ cmake --preset ci
 cmake --build --preset ci
 
 if command -v clang-format-14 >/dev/null; then
-  find drivers include src tests \( -name '*.h' -o -name '*.cpp' \) -print0 |
+  find drivers examples include src tests \( -name '*.h' -o -name '*.cpp' \) -print0 |
     xargs -0 clang-format-14 --dry-run --Werror
 else
   echo "formatting: not checked, the layout is that of clang-format 14 (Debian 12)"

@@ -1,14 +1,17 @@
 #include "repose/results/result_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
 #include "repose/base/hdf5.h"
+#include "repose/base/this_run.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
 #include "repose/results/views.h"
+#include "repose/results/vtkhdf.h"
 #include "repose/results/writer.h"
 
 namespace repose::results {
@@ -116,6 +119,7 @@ struct ResultFile::State {
   void write_points(hid_t step, const model::StepRows& rows) const;
   void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
+  void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
   void publish();
 };
 
@@ -128,6 +132,8 @@ void ResultFile::State::create(const model::Model& model) {
     base::Hdf5File whole = base::create_hdf5(part());
     unfinished->reserve(model_bytes(model, bones));
     write_model(whole, model, bones);
+    const base::Hdf5Group root(H5Gopen2(whole, "/", H5P_DEFAULT));
+    for (const auto& [name, text] : base::this_run(comm)) write_attribute(root, name.c_str(), text);
     base::create_hdf5_group(whole, "step");
     whole.close();
   });
@@ -215,9 +221,24 @@ bool ResultFile::State::write_bones(hid_t step, double load) const {
   return true;
 }
 
+/// The first block with a cell, for readers that open the file itself.
+void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
+  const auto shown = std::find_if(blocks.begin(), blocks.end(),
+                                  [](const XdmfBlock& block) { return block.cells > 0; });
+  if (shown == blocks.end() || loads.empty()) return;
+  unfinished->reserve(vtkhdf_bytes(*shown, loads.size()));
+  say_where(part(), [&] {
+    base::Hdf5File whole = base::open_hdf5(part(), MPI_COMM_SELF);
+    write_vtkhdf(whole, *shown, loads);
+    whole.close();
+  });
+}
+
 void ResultFile::State::publish() {
+  const std::vector<XdmfBlock> blocks = views(counts, moved);
+  add_vtkhdf(blocks);
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
-  for (const XdmfBlock& block : views(counts, moved)) {
+  for (const XdmfBlock& block : blocks) {
     const std::filesystem::path document = with_ending(name, "_" + block.name + ".xdmf");
     if (block.cells == 0) {
       std::error_code ignored;

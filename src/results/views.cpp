@@ -7,6 +7,7 @@ namespace repose::results {
 namespace {
 
 constexpr const char* small_integer = "NumberType=\"Char\" Precision=\"1\"";
+constexpr const char* long_integer = "NumberType=\"Int\" Precision=\"8\"";
 constexpr const char* short_integer = "NumberType=\"Int\" Precision=\"4\"";
 
 std::vector<std::string> moving_points(size_t steps) {
@@ -19,6 +20,7 @@ std::vector<std::string> moving_points(size_t steps) {
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
   XdmfBlock block{.name = "tissue",
                   .topology = "TopologyType=\"Wedge\"",
+                  .vtk_cell = 13,
                   .corners = 6,
                   .connectivity = "/model/prism/points",
                   .points = counts.points,
@@ -28,7 +30,10 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
                              {"residual_force", "step/point/residual_force", true, true},
                              {"set", "/model/point/set", true, false, small_integer},
                              {"layer", "/model/point/layer", true, false, short_integer},
+                             {"column", "/model/point/column", true, false, long_integer},
                              {"volume_ratio", "step/prism/volume_ratio"}}};
+  if (counts.discretisation)
+    block.arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
   if (counts.stress) {
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});
@@ -40,6 +45,7 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
 XdmfBlock springs(const FileCounts& counts, size_t steps) {
   return {.name = "springs",
           .topology = "TopologyType=\"Polyline\" NodesPerElement=\"2\"",
+          .vtk_cell = 3,
           .corners = 2,
           .connectivity = "/model/spring/points",
           .points = counts.points,
@@ -56,6 +62,7 @@ XdmfBlock skin(const FileCounts& counts, size_t steps) {
     arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   return {.name = "skin",
           .topology = "TopologyType=\"Triangle\"",
+          .vtk_cell = 5,
           .corners = 3,
           .connectivity = "/model/skin/points",
           .points = counts.points,
@@ -67,6 +74,7 @@ XdmfBlock skin(const FileCounts& counts, size_t steps) {
 XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
   XdmfBlock block{.name = "bones",
                   .topology = "TopologyType=\"Triangle\"",
+                  .vtk_cell = 5,
                   .corners = 3,
                   .connectivity = "/model/bone_surfaces/triangles",
                   .points = counts.bone_points,

@@ -67,6 +67,11 @@ void write_array(hid_t place, const std::string& name, const std::vector<hsize_t
   write_whole(place, name, shape, H5T_STD_I8LE, H5T_NATIVE_INT8, values);
 }
 
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const uint8_t* values) {
+  write_whole(place, name, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, values);
+}
+
 void write_strings(hid_t place, const std::string& name, const std::vector<std::string>& values) {
   size_t width = 1;
   for (const std::string& value : values) width = std::max(width, value.size());
@@ -95,6 +100,36 @@ void write_attribute(hid_t object, const char* name, const std::string& value) {
 void write_attribute(hid_t object, const char* name, const std::vector<double>& values) {
   write_attribute(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, make_space({values.size()}),
                   values.data());
+}
+
+void write_attribute(hid_t object, const char* name, const std::vector<int64_t>& values) {
+  write_attribute(object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, make_space({values.size()}),
+                  values.data());
+}
+
+void write_virtual(hid_t file, hid_t place, const std::string& name,
+                   const std::vector<std::string>& datasets, const std::vector<hsize_t>& shape) {
+  const base::Hdf5Space whole = make_space(shape);
+  const base::Hdf5Properties creation(H5Pcreate(H5P_DATASET_CREATE));
+  check_hdf5(H5Pset_obj_track_times(creation, false));
+  base::Hdf5Type type;
+  std::vector<hsize_t> start(shape.size(), 0), count = shape;
+  for (const std::string& path : datasets) {
+    const base::Hdf5Dataset source(H5Dopen2(file, path.c_str(), H5P_DEFAULT));
+    const base::Hdf5Space of_source(H5Dget_space(source));
+    type = base::Hdf5Type(H5Dget_type(source));
+    count[0] = shape[0] / datasets.size();
+    check_hdf5(
+        H5Sselect_hyperslab(whole, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr));
+    check_hdf5(H5Pset_virtual(creation, whole, ".", path.c_str(), of_source));
+    start[0] += count[0];
+  }
+  base::Hdf5Dataset(
+      H5Dcreate2(place, name.c_str(), type, whole, H5P_DEFAULT, creation, H5P_DEFAULT));
+}
+
+void link_to(hid_t file, const std::string& path, hid_t place, const std::string& name) {
+  check_hdf5(H5Lcreate_hard(file, path.c_str(), place, name.c_str(), H5P_DEFAULT, H5P_DEFAULT));
 }
 
 namespace {

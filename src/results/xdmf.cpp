@@ -38,17 +38,13 @@ std::string data_item(const std::string& h5, const std::string& path, int64_t ro
                      dimensions, escaped(h5), path);
 }
 
-std::string in_step(const std::string& path, size_t step) {
-  return path.starts_with("step/") ? fmt::format("/step/{:04}/{}", step, path.substr(5)) : path;
-}
-
 std::string attribute(const XdmfBlock& block, const XdmfArray& array, const std::string& h5,
                       size_t step) {
   const int64_t rows = array.at_points ? block.points : block.cells;
   return fmt::format(
       "        <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"{}\">{}</Attribute>\n",
       array.name, array.vector ? "Vector" : "Scalar", array.at_points ? "Node" : "Cell",
-      data_item(h5, in_step(array.path, step), rows, array.vector ? 3 : 1, array.type));
+      data_item(h5, array.in_step(step), rows, array.vector ? 3 : 1, array.type));
 }
 
 std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, double load) {
@@ -64,6 +60,10 @@ std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, dou
 }
 
 }  // namespace
+
+std::string XdmfArray::in_step(size_t step) const {
+  return moves() ? fmt::format("/step/{:04}/{}", step, path.substr(5)) : path;
+}
 
 std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
                           const std::vector<double>& loads) {

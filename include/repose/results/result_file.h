@@ -12,8 +12,8 @@ namespace repose::results {
 /// Writes NAME.h5 in parallel: to NAME.h5.part first, renamed by commit(). Destroyed without
 /// commit(), the .part file is removed: the result is complete or absent. All members are
 /// collective. A folder that is missing or not writable and a full disk are an InputError on all
-/// ranks. The file's bytes do not depend on the number of ranks: datasets are contiguous (chunks
-/// with parallel gzip took twelve times as long for 28 % less space).
+/// ranks. The file's bytes do not depend on the number of ranks, but for what tells of it: datasets
+/// are contiguous (chunks with parallel gzip took twelve times as long for 28 % less space).
 class ResultFile {
  public:
   /// Opens NAME.h5.part (`name` is a path without the ending) and writes /model (`model` is looked

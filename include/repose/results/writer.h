@@ -32,6 +32,8 @@ void write_array(hid_t place, const std::string& name, const std::vector<hsize_t
                  const int32_t* values);
 void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
                  const int8_t* values);
+void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
+                 const uint8_t* values);
 /// Strings of the fixed length of the longest.
 void write_strings(hid_t place, const std::string& name, const std::vector<std::string>& values);
 
@@ -40,6 +42,14 @@ void write_attribute(hid_t object, const char* name, double value);
 void write_attribute(hid_t object, const char* name, int64_t value);
 void write_attribute(hid_t object, const char* name, const std::string& value);
 void write_attribute(hid_t object, const char* name, const std::vector<double>& values);
+void write_attribute(hid_t object, const char* name, const std::vector<int64_t>& values);
+
+/// A dataset that stores nothing: equal datasets of the same file one after the other, in the given
+/// shape, which has as many numbers as they. MPI-IO can make it and not read it.
+void write_virtual(hid_t file, hid_t place, const std::string& name,
+                   const std::vector<std::string>& datasets, const std::vector<hsize_t>& shape);
+/// Another name for what is at `path` of the file.
+void link_to(hid_t file, const std::string& path, hid_t place, const std::string& name);
 
 /// Creates a dataset of `rows` × `columns` doubles (columns 0: one-dimensional) that all ranks will
 /// write. Collective where the file is.

@@ -12,12 +12,17 @@ struct XdmfArray {
   bool at_points = false;  ///< else one a cell
   bool vector = false;     ///< [.,3], else [.]
   const char* type = "NumberType=\"Float\" Precision=\"8\"";
+
+  bool moves() const { return path.starts_with("step/"); }
+  /// Its path in the file, at a step.
+  std::string in_step(size_t step) const;
 };
 
 /// A mesh of one kind of cell that moves from step to step.
 struct XdmfBlock {
   std::string name;           ///< last part of the file's name: tissue, springs, skin, bones
   const char* topology = "";  ///< attributes of the Topology element but the number of cells
+  uint8_t vtk_cell = 0;       ///< the kind of cell as VTK numbers them
   int corners = 0;            ///< points a cell
   std::string connectivity;   ///< path of the i64 [cells, corners] dataset
   int64_t points = 0, cells = 0;

@@ -10,6 +10,7 @@
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
+#include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
 
 namespace repose::model {
@@ -201,6 +202,61 @@ TEST_F(CutAlong, leaves_points_on_bone_joined) {
     EXPECT_EQ(built_.model.points.set[twin], PointSet::soft_tissue);
   const auto inner = static_cast<int64_t>(built_.cuts[0].columns.size()) - 2;
   EXPECT_EQ(static_cast<int64_t>(pairs_.size()), 2 * inner);
+}
+
+class CutSolid : public CutAlong {
+ protected:
+  /// A solid whose edges carry `tension` besides, cut.
+  void make_solid(double tension) {
+    scene::Scene scene = cut_scene(4, {{{{13.7, 22.3, 0}, {30, 29, 0}, {41.9, 25.2, 0}}, 3}});
+    scene.tissue.material = scene::Material{.deep = {0.015, 0.45}, .strata = {}, .regions = {}};
+    built_ = build_model(scene, patches::square(6, 60), {kBone});
+    for (double& weight : built_.model.edges.weight) weight += tension;
+    before_ = built_.model;
+    pairs_ = cut_along(built_.cuts[0], built_.model);
+    whole_ = built_.model;
+    assemble_edges("test", whole_);
+  }
+  Model whole_;  // with the edges that follow from its prisms
+};
+
+TEST_F(CutSolid, has_the_edges_that_follow_from_its_prisms) {
+  make_solid(0);
+  EXPECT_GT(pairs_.size(), 0u);
+  EXPECT_EQ(built_.model.edges.points, whole_.edges.points);
+  EXPECT_EQ(built_.model.edges.weight, whole_.edges.weight);
+  EXPECT_NO_THROW(validate(built_.model, "cut"));
+}
+
+TEST_F(CutSolid, keeps_the_tension_that_its_edges_carry) {
+  make_solid(1);
+  const Model& m = built_.model;
+  const auto forces = [](const Model& model, const std::vector<double>& weight) {
+    std::vector<Vec3> force(model.points.position.size(), Vec3::Zero());
+    for (size_t j = 0; j < weight.size(); ++j) {
+      const auto& [p, q] = model.edges.points[j];
+      const Vec3 pull = weight[j] * (model.points.position[q] - model.points.position[p]);
+      force[p] += pull;
+      force[q] -= pull;
+    }
+    return force;
+  };
+  std::vector<double> tension = m.edges.weight;
+  for (size_t j = 0; j < tension.size(); ++j) {
+    tension[j] -= whole_.edges.weight[j];
+    EXPECT_GT(tension[j], 0);
+  }
+  EXPECT_NEAR(sum(tension), static_cast<double>(before_.edges.weight.size()), 1e-9);
+  const std::vector<Vec3> was =
+      forces(before_, std::vector<double>(before_.edges.weight.size(), 1.0));
+  std::vector<Vec3> is = forces(m, tension);
+  double largest = 0;  // N, with which the sides are pulled apart
+  for (const auto& [row, twin] : pairs_) {
+    largest = std::max(largest, is[twin].norm());
+    is[row] += is[twin];
+  }
+  for (size_t i = 0; i < was.size(); ++i) EXPECT_LT((is[i] - was[i]).norm(), 1e-9);
+  EXPECT_GT(largest, 1);
 }
 
 }  // namespace

@@ -1,0 +1,32 @@
+# cmake --install, find_package(Repose) for programs of one's own, and Debian packages by cpack.
+include(CMakePackageConfigHelpers)
+
+set(rooms base scene volume surface model mechanics solve results adapt paper tradeoff)
+list(TRANSFORM rooms PREPEND repose_ OUTPUT_VARIABLE libraries)
+foreach(room ${rooms})
+  set_target_properties(repose_${room} PROPERTIES EXPORT_NAME ${room})
+endforeach()
+install(TARGETS ${programs} RUNTIME DESTINATION bin)
+install(TARGETS repose_options ${libraries} EXPORT Repose ARCHIVE DESTINATION lib)
+install(DIRECTORY include/repose DESTINATION include)
+
+# Scripts find each other, and the Slicer panel the programs, by where they lie.
+install(DIRECTORY meshes examples DESTINATION share/repose)
+install(DIRECTORY drivers/ DESTINATION share/repose USE_SOURCE_PERMISSIONS
+  FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
+
+set(package lib/cmake/Repose)
+install(EXPORT Repose NAMESPACE Repose:: DESTINATION ${package} FILE ReposeTargets.cmake)
+configure_file(cmake/ReposeConfig.cmake ReposeConfig.cmake COPYONLY)
+write_basic_package_version_file(ReposeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/ReposeConfig.cmake
+  ${PROJECT_BINARY_DIR}/ReposeConfigVersion.cmake DESTINATION ${package})
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "the authors of Repose")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Rest position of facial soft tissue after its bones moved")
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3-numpy, python3-h5py, python3-matplotlib")
+include(CPack)

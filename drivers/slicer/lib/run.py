@@ -1,0 +1,396 @@
+"""What the panel Repose of 3D Slicer does: a scene of what it is given, repose-solve, and models of
+the result. Reads the parameters from Repose.xml, so that panel and program agree. In mm and LPS."""
+
+import base64
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+
+FOLDER = pathlib.Path(__file__).resolve().parents[1]
+BONES = 4
+TISSUE = {**{preset: {"material": {"preset": preset}}
+             for preset in ("face", "skin_on_fat", "incompressible")},
+          "springs": {"springs": {"default": {"modulus": 0.05, "law": "quartic", "reference": 1.0}},
+                      "turgor": 0.1}}
+MOVING = 0.1  # mm: skin that moves less does not count for the mean
+PATIENCE = 10  # s that a cancelled solver has to end by itself
+ITERATION = re.compile(r"load (\S+)  iteration .* evaluations  (?:(\S+) mm to go)?")
+
+
+class Refusal(Exception):
+    """What a person has to change, in one line."""
+
+
+class Cancelled(Exception):
+    """Slicer's Cancel button."""
+
+
+# ----- what Slicer says
+
+
+def parameters():
+    """{name: XML element} of everything in Repose.xml."""
+    root = xml.etree.ElementTree.parse(FOLDER / "Repose.xml").getroot()
+    return {item.findtext("name"): item for group in root.iter("parameters") for item in group
+            if item.find("name") is not None}
+
+
+def value_of(item, text):
+    """A parameter's text as what its tag says."""
+    name, kind = item.findtext("name"), item.tag
+    limits = [item.findtext(f"constraints/{end}") for end in ("minimum", "maximum")]
+    try:
+        if kind in ("integer", "double"):
+            number = int(text) if kind == "integer" else float(text)
+            low, high = (float(end) for end in limits)
+            if not low <= number <= high:
+                raise ValueError
+            return number
+    except ValueError:
+        what = "a whole number" if kind == "integer" else "a number"
+        raise Refusal(f"--{name} {text}: give {what} from {' to '.join(limits)}") from None
+    if kind == "string-vector":
+        return [part.strip() for part in text.split(",") if part.strip()]
+    choices = [element.text for element in item.findall("element")]
+    if choices and text not in choices:
+        raise Refusal(f"--{name} {text}: take one of {', '.join(choices)}")
+    return text == "true" if kind == "boolean" else text
+
+
+def parse(arguments):
+    """The chosen value of every parameter with a flag; None for a file that is not given."""
+    known = {name: item for name, item in parameters().items() if item.find("longflag") is not None}
+    texts = {name: item.findtext("default") for name, item in known.items()}
+    texts["returnparameterfile"] = None
+    rest = list(arguments)
+    while rest:
+        flag, joined, text = rest.pop(0).partition("=")
+        name = flag.removeprefix("--")
+        if not flag.startswith("--") or name not in [*texts, "processinformationaddress"]:
+            raise Refusal(f"{flag}: unknown; the flags are those of Repose.xml")
+        if name in known and known[name].tag == "boolean":
+            texts[name] = "true"
+            continue
+        if not joined and not rest:
+            raise Refusal(f"{flag}: a value is missing")
+        texts[name] = text if joined else rest.pop(0)
+    return {name: value_of(known[name], text) if name in known and text is not None else text
+            for name, text in texts.items()}
+
+
+# ----- the scene
+
+
+def link(source, folder, name):
+    """The file in the scene's folder, by the part it plays; its name there."""
+    source = pathlib.Path(source)
+    if not source.is_file():
+        raise Refusal(f"{source}: no such file")
+    ending = ".mrk.json" if source.name.endswith(".mrk.json") else source.suffix
+    target = folder / (name + ending)
+    if ending == ".ply" and (turned := in_lps(source.read_bytes(), source)):
+        target.write_bytes(turned)
+    else:
+        target.symlink_to(source.resolve())
+    return target.name
+
+
+def in_lps(data, name):
+    """A PLY file whose header says SPACE=RAS, as Slicer writes it, in LPS; nothing for others."""
+    import numpy as np
+    types = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+             "float": "f4", "double": "f8"}
+    head, _, body = data.partition(b"end_header\n")
+    lines = head.decode("ascii", "replace").replace("\r", "").splitlines()
+    if not any("SPACE=RAS" in line for line in lines if line.startswith("comment")):
+        return None
+    elements = [i for i, line in enumerate(lines) if line.startswith("element")]
+    if not elements or not lines[elements[0]].startswith("element vertex"):
+        raise Refusal(f"{name}: in RAS, and its vertices do not come first; save it as LPS")
+    count = int(lines[elements[0]].split()[2])
+    columns = [line.split()[1:] for line in lines[elements[0] + 1:elements[1]]
+               if line.startswith("property")]
+    if "format ascii 1.0" in lines:
+        rows = body.split(b"\n", count)
+        flipped = [b" ".join(negated(row.split(), columns)) for row in rows[:count]]
+        body = b"\n".join(flipped + rows[count:])
+    else:
+        order = "<" if "format binary_little_endian 1.0" in lines else ">"
+        layout = np.dtype([(axis, order + types[kind]) for kind, axis in columns])
+        vertices = np.frombuffer(body, layout, count).copy()
+        for axis in "xy":
+            vertices[axis] *= -1
+        body = vertices.tobytes() + body[vertices.nbytes:]
+    return head.replace(b"SPACE=RAS", b"SPACE=LPS") + b"end_header\n" + body
+
+
+def negated(words, columns):
+    """The words of an ASCII vertex with x and y negated."""
+    return [repr(-float(word)).encode() if axis in "xy" else word
+            for word, (_, axis) in zip(words, columns)]
+
+
+def bone_entries(chosen, folder):
+    """The scene's bones and moves, and the number in the panel of each bone."""
+    bones, moves, numbers = [], [], []
+    for i in range(1, BONES + 1):
+        model, transform = chosen[f"bone{i}"], chosen[f"transform{i}"]
+        if model is None:
+            if transform:
+                raise Refusal(f"bone {i} has a transform and no model; choose one")
+            continue
+        names = chosen["boneNames"]
+        name = names[i - 1] if i <= len(names) else f"bone {i}"
+        bones.append({"name": name, "file": link(model, folder, f"bone{i}")})
+        if transform:
+            moves.append({"bone": name, "transform": link(transform, folder, f"transform{i}")})
+        numbers.append(i)
+    return bones, moves, numbers
+
+
+def write_scene(chosen, folder):
+    """The scene file (JSON is YAML), and the number in the panel of each bone."""
+    if chosen["skin"] is None:
+        raise Refusal("no skin is chosen")
+    bones, moves, numbers = bone_entries(chosen, folder)
+    if not bones:
+        raise Refusal("no bone is chosen")
+    layers = chosen["layers"]
+    cuts = [("lips", layers), ("incision", min(chosen["incisionLayers"], layers))]
+    scene = {"skin": link(chosen["skin"], folder, "skin"), "bones": bones,
+             "tissue": {"layers": layers, **TISSUE[chosen["tissue"]]}, "moves": moves,
+             "incisions": [{"path": link(chosen[cut], folder, cut), "layers": deep}
+                           for cut, deep in cuts if chosen[cut]]}
+    file = folder / "scene.yaml"
+    file.write_text(json.dumps({key: value for key, value in scene.items() if value}, indent=1))
+    return file, numbers
+
+
+# ----- the solver
+
+
+def solver():
+    """repose-solve: of REPOSE_BUILD, beside this folder when installed, of the build folder here,
+    or on the path."""
+    top = FOLDER.parents[1]
+    homes = [top.parent / "bin", top / "build" / "bin"]
+    if "REPOSE_BUILD" in os.environ:
+        homes = [pathlib.Path(os.environ["REPOSE_BUILD"]) / "bin"]
+    found = shutil.which("repose-solve", path=os.pathsep.join(map(str, homes)))
+    found = found or shutil.which("repose-solve")
+    if not found:
+        raise Refusal("repose-solve is not found; set REPOSE_BUILD to the folder it is built in")
+    return found
+
+
+def command(chosen, scene):
+    line = [solver(), str(scene), "-output", str(scene.with_name("result")), "-monitor_mm"]
+    accuracy = chosen["accuracy"]
+    if chosen["preview"]:
+        line += ["-profile", "preview"]
+        accuracy = max(accuracy, 1)
+    elif chosen["uncertainty"]:
+        line.append("-discretisation")
+    line += ["-accuracy", str(accuracy)]
+    if chosen["timeLimit"]:
+        line += ["-time_limit", str(chosen["timeLimit"])]
+    ranks, mpirun = chosen["processors"], shutil.which("mpirun")
+    return [mpirun, "-n", str(ranks), *line] if ranks > 1 and mpirun else line
+
+
+class Progress:
+    """The share of the work that is done, from the solver's lines: of the loads reached, and of the
+    next the orders of magnitude its search has taken off the distance. Told as Slicer reads it."""
+
+    def __init__(self, accuracy):
+        self.accuracy, self.load, self.reached, self.farthest, self.told = accuracy, 0, 0, 0, 0
+
+    def __call__(self, line):
+        if not (match := ITERATION.search(line)):
+            return
+        load, to_go = float(match[1]), float(match[2] or "inf")
+        if load != self.load:
+            self.reached = max(self.reached, self.load) if load > self.load else self.reached
+            self.load, self.farthest = load, 0
+        if math.isfinite(to_go):
+            self.farthest = max(self.farthest, to_go)
+        share = 0
+        if self.farthest > self.accuracy and 0 < to_go < self.farthest:
+            share = math.log(self.farthest / to_go) / math.log(self.farthest / self.accuracy)
+        done = self.reached + max(self.load - self.reached, 0) * min(share, 0.99)
+        self.told = max(self.told, round(0.95 * done, 3))
+        print(f"<filter-progress>{self.told}</filter-progress>", flush=True)
+
+
+def solve(chosen, scene):
+    """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals.
+    Where this program is killed, the solver ends at its next line, which nobody reads."""
+    line = command(chosen, scene)
+    progress = Progress(float(line[line.index("-accuracy") + 1]))
+    process = subprocess.Popen(line, cwd=scene.parent, text=True, errors="replace",
+                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=open(scene.with_name("stderr"), "w", encoding="utf-8"))
+    printed = []
+    try:
+        for text in process.stdout:
+            progress(text)
+            if not ITERATION.search(text):
+                printed.append(text)
+        status = process.wait()
+    except Cancelled:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        raise
+    if status not in (0, 2):
+        said = scene.with_name("stderr").read_text(errors="replace")
+        own = [text for text in said.splitlines() if text.startswith(("error: ", "internal error"))]
+        raise Refusal((own or said.splitlines() or [f"repose-solve ended with status {status}"])[0]
+                      .removeprefix("error: ").replace(f"{scene.parent}/", ""))
+    return status, "".join(printed)
+
+
+# ----- the result
+
+
+def data_array(name, values):
+    """An array of a VTK XML file; strings as VTK writes them."""
+    import numpy as np
+    if isinstance(values, str):
+        codes = " ".join(str(ord(c)) for c in values + "\0")
+        return (f'<Array type="String" Name="{name}" NumberOfTuples="1" format="ascii">{codes}'
+                "</Array>\n")
+    values = np.ascontiguousarray(values)
+    kind = "Int64" if values.dtype.kind == "i" else "Float64"
+    across = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    size = np.array([values.nbytes], "<u8").tobytes()
+    text = base64.b64encode(size + values.astype("<i8" if kind == "Int64" else "<f8").tobytes())
+    return (f'<DataArray type="{kind}" Name="{name}"{across} format="binary">{text.decode()}'
+            "</DataArray>\n")
+
+
+def write_vtp(file, points, triangles, arrays):
+    """A surface in LPS, as the field SPACE tells Slicer, with arrays at its points."""
+    import numpy as np
+    ends = 3 * np.arange(1, len(triangles) + 1)
+    vectors = next((name for name, values in arrays.items() if values.ndim == 2), None)
+    scalars = next((name for name, values in arrays.items() if values.ndim == 1), None)
+    active = f' Vectors="{vectors}"' if vectors else ""
+    active += f' Scalars="{scalars}"' if scalars else ""
+    text = ('<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" '
+            'byte_order="LittleEndian" header_type="UInt64">\n<PolyData>\n<FieldData>\n'
+            + data_array("SPACE", "LPS") + "</FieldData>\n"
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="0" NumberOfLines="0" '
+            f'NumberOfStrips="0" NumberOfPolys="{len(triangles)}">\n'
+            f"<PointData{active}>\n"
+            + "".join(data_array(name, values) for name, values in arrays.items())
+            + "</PointData>\n<Points>\n" + data_array("Points", points) + "</Points>\n<Polys>\n"
+            + data_array("connectivity", triangles.ravel()) + data_array("offsets", ends)
+            + "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n")
+    part = pathlib.Path(f"{file}.part")
+    part.write_text(text)
+    part.replace(file)
+
+
+def hand_back(chosen, result, numbers):
+    """Writes the models that are asked for; the numbers for the panel."""
+    import h5py
+    import numpy as np
+    with h5py.File(result) as h5:
+        step = h5["step"][sorted(h5["step"])[-1]]
+        told = dict(step.attrs)
+        triangles = h5["model/skin/points"][:]
+        used, triangles = np.unique(triangles, return_inverse=True)
+        displacement = step["point/displacement"][:][used]
+        points, ratio = step["point/position"][:][used], step["prism/volume_ratio"][:]
+        movement = np.linalg.norm(displacement, axis=1)
+        arrays = {"displacement": displacement, "displacement_magnitude": movement}
+        error, mesh_error = told["displacement_error"], told.get("discretisation_error")
+        of_mesh = np.full(len(used), mesh_error or 0.0)
+        if "point/discretisation_error" in step:
+            of_mesh = step["point/discretisation_error"][:][used]
+        if math.isfinite(error):
+            arrays["uncertainty"] = error + of_mesh
+        if chosen["predictedSkin"]:
+            write_vtp(chosen["predictedSkin"], points, triangles.reshape(-1, 3), arrays)
+        moved, first = step["bone_surface/points"][:] if "bone_surface" in step else None, 0
+        for b, number in enumerate(numbers):
+            surface = h5[f"model/bone_surface/{b}"]
+            count = len(surface["points"])
+            if chosen[f"movedBone{number}"]:
+                where = surface["points"][:] if moved is None else moved[first:first + count]
+                write_vtp(chosen[f"movedBone{number}"], where, surface["triangles"][:], {})
+            first += count
+    moving = movement[movement > MOVING]
+    return {"accuracyReached": float(error) if math.isfinite(error) else -1,
+            "meshError": -1 if mesh_error is None else float(mesh_error),
+            "largestMovement": float(movement.max(initial=0)),
+            "meanMovement": float(moving.mean()) if len(moving) else 0.0,
+            "volumeChange": 100 * float(abs(ratio - 1).max(initial=0)),
+            "invertedPrisms": int(told["inverted_prisms"])}, told
+
+
+def verdict(status, told, accuracy):
+    """One line for the panel."""
+    load, error = told["load"], told["displacement_error"]
+    if status == 0:
+        return f"accuracy reached: {error:.3g} mm of {accuracy:g} mm"
+    reason = told["reason"].decode() if isinstance(told["reason"], bytes) else str(told["reason"])
+    near = f"about {error:.3g} mm" if math.isfinite(error) else "at no known distance"
+    where = "" if load == 1 else f"; the bones have made {100 * load:.0f} % of their way only"
+    return f"ACCURACY NOT REACHED: the face is {near} from rest{where} ({reason})"
+
+
+def work(chosen, folder):
+    scene, numbers = write_scene(chosen, folder)
+    print("<filter-start><filter-name>Repose</filter-name></filter-start>", flush=True)
+    status, printed = solve(chosen, scene)
+    returned, told = hand_back(chosen, scene.with_name("result.h5"), numbers)
+    returned = {"verdict": verdict(status, told, chosen["accuracy"]), **returned}
+    if chosen["resultFile"]:
+        shutil.copyfile(scene.with_name("result.h5"), chosen["resultFile"])
+    if chosen["returnparameterfile"]:
+        lines = [f"{name} = {value if isinstance(value, str) else format(value, '.6g')}\n"
+                 for name, value in returned.items()]
+        pathlib.Path(chosen["returnparameterfile"]).write_text("".join(lines))
+    print(printed.replace(f"{folder}/", "") + returned["verdict"])
+    print("<filter-progress>1</filter-progress>", flush=True)
+
+
+def cancel(*_):
+    raise Cancelled
+
+
+def main():
+    if "--xml" in sys.argv[1:]:
+        sys.stdout.write((FOLDER / "Repose.xml").read_text(encoding="utf-8"))
+        return 0
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, cancel)
+    try:
+        with tempfile.TemporaryDirectory(prefix="repose_") as folder:
+            work(parse(sys.argv[1:]), pathlib.Path(folder).resolve())
+    except ModuleNotFoundError as missing:
+        print(f"Repose: {missing.name} is missing: apt-get install python3-numpy python3-h5py",
+              file=sys.stderr)
+        return 1
+    except (Refusal, OSError) as reason:
+        print(f"Repose: {reason}", file=sys.stderr)
+        return 1
+    except Cancelled:
+        print("Repose: cancelled", file=sys.stderr)
+        return 128 + signal.SIGTERM
+    return 0
+
+
+sys.exit(main())

@@ -1,0 +1,96 @@
+"""What cmake --install puts where, and that it works from there."""
+
+import os
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from conftest import PROJECT, finish, programs
+from tissue import last, model_of
+
+SCENE = "paper_jaw_advance.yaml"
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory, environment):
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is not installed")
+    folder = tmp_path_factory.mktemp("installed")
+    result = finish(["cmake", "--install", programs().parent, "--prefix", folder], PROJECT,
+                    environment, 120)
+    assert result.returncode == 0, result.stderr
+    return folder
+
+
+@pytest.fixture
+def call(prefix, environment, tmp_path):
+    """call(command …) → CompletedProcess, in an empty folder, installed programs on the path."""
+
+    def run(*command, **more):
+        path = f"{prefix / 'bin'}:{environment['PATH']}"
+        here = {name: value for name, value in environment.items() if name != "REPOSE_BUILD"}
+        return finish([*map(str, command)], tmp_path, {**here, "PATH": path, **more}, 400)
+
+    return run
+
+
+def test_everything_is_there(prefix):
+    sources = {p.stem.replace("_", "-") for p in (PROJECT / "drivers").glob("*.cpp")}
+    assert {p.name for p in (prefix / "bin").iterdir()} == {f"repose-{name}" for name in sources}
+    headers = PROJECT / "include"
+    for header in headers.rglob("*.h"):
+        assert (prefix / "include" / header.relative_to(headers)).is_file()
+    shared = prefix / "share/repose"
+    for name in ("report.py", "report_viewer.js", "render.py", "repose.slurm", "slicer/Repose.xml",
+                 f"meshes/{SCENE}"):
+        assert (shared / name).is_file(), name
+    assert os.access(shared / "slicer/Repose", os.X_OK) and os.access(shared / "report.py", os.X_OK)
+
+
+def test_the_paper_finds_its_heads(call, tmp_path):
+    result = call("repose-paper", "-layers", 2, "-limit", 1, "-seconds", 0.001, "-path_seconds",
+                  0.001)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert (tmp_path / "paper/paper.md").is_file()
+
+
+def test_the_panel_finds_its_program(prefix, call, tmp_path):
+    meshes = prefix / "share/repose/meshes"
+    result = call(prefix / "share/repose/slicer/Repose", "--skin", meshes / "paper_skin.ply",
+                  "--bone1", meshes / "paper_skull.ply", "--processors", 1,
+                  "--resultFile", tmp_path / "face.h5", PATH="/usr/bin:/bin")
+    assert (result.returncode, result.stderr) == (0, "")
+    with h5py.File(tmp_path / "face.h5") as h5:
+        assert h5.attrs["command"].decode().startswith(str(prefix / "bin/repose-solve"))
+
+
+def test_a_program_of_ones_own_builds_against_it(prefix, call, tmp_path):
+    example = prefix / "share/repose/examples/own_energy"
+    result = call("cmake", "-S", example, "-B", "own", f"-DCMAKE_PREFIX_PATH={prefix}")
+    assert result.returncode == 0, result.stderr
+    result = call("cmake", "--build", "own")
+    assert result.returncode == 0, result.stdout + result.stderr
+    scene = prefix / "share/repose/meshes" / SCENE
+    result = call("mpirun", "-n", 2, "own/own_energy", scene, "-pressure", 0.002)
+    assert (result.returncode, result.stderr) == (0, "")
+    model = model_of(tmp_path / "own_energy.h5")
+    a, b, c = (model["point/position"][model["skin/points"][:, k]] for k in range(3))
+    wanted = -0.002 * np.cross(b - a, c - a).sum(0) / 2
+    assert model["point/external_force"].sum(0) == pytest.approx(wanted, rel=1e-12)
+    assert last(tmp_path / "own_energy.h5")["converged"]
+    assert call("repose-check", "own_energy.h5").returncode == 0
+
+
+def test_the_batch_script_takes_an_unfinished_run_up_again(prefix, call, tmp_path):
+    (tmp_path / "srun").write_text('#!/bin/sh\necho "$@" >> calls\nexec "$@" $MORE\n')
+    (tmp_path / "srun").chmod(0o755)
+    script, scene = prefix / "share/repose/repose.slurm", prefix / "share/repose/meshes" / SCENE
+    path = f"{tmp_path}:{prefix / 'bin'}:/usr/bin:/bin"
+    first = call("bash", script, scene, PATH=path, MORE="-time_limit 0")
+    assert first.returncode == 2, first.stderr
+    assert call("bash", script, scene, "missing.yaml", PATH=path, MORE="").returncode == 1
+    calls = (tmp_path / "calls").read_text().splitlines()
+    assert [" -restart " in line for line in calls] == [False, True, False]
+    assert last(tmp_path / "paper_jaw_advance.h5")["load"] == 1
