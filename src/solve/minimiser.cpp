@@ -112,7 +112,7 @@ struct Minimiser::Callbacks {
       const bool done = self.near_enough(x, g, force);
       if (self.watch_ && !done)
         self.stopped_ = !self.watch_({iteration, self.function_.positions().load(), value, force,
-                                      self.error_, self.function_.evaluations()});
+                                      self.error_, self.function_.evaluations(), x});
       check(TaoDefaultConvergenceTest(tao, nullptr));
       const bool over = done || self.stopped_ || self.stalled(iteration, value);
       self.slowed_ = !over && self.initial_ && self.initial_->worn_out(force, length);
