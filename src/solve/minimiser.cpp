@@ -184,12 +184,14 @@ bool Minimiser::step_was_cut() const {
          reason != KSP_CONVERGED_ITS && reason != KSP_DIVERGED_ITS;
 }
 
-double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
+double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
   if (&certificate_.function != &function_) {
     certificate_.function.evaluate(displacement, certified_gradient_);
     gradient = certified_gradient_;
   }
-  const double step = certificate_.solver.newton_distance(displacement, gradient);
+  double step = certificate_.solver.newton_distance(displacement, gradient);
+  if (last || safety * step <= accuracy_)
+    step = certificate_.solver.sure_distance(displacement, gradient);
   const double estimate = safety * step;
   const bool curved = estimate > linear && estimate <= accuracy_;
   return curved ? std::max(estimate, step / (1 - contraction(displacement))) : estimate;
@@ -232,7 +234,7 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     }
   }
   looked_at_ = function_.evaluations();
-  error_ = strict_estimate(displacement, gradient);
+  error_ = strict_estimate(displacement, gradient, false);
   if (std::isfinite(error_))
     softest_ = largest_force / error_;
   else
@@ -271,7 +273,7 @@ int Minimiser::polish(Vec displacement) {
 
 double Minimiser::measure(Vec displacement) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_);
+  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, true);
   return objective;
 }
 
