@@ -30,12 +30,12 @@ void give_room(PC pc) {
   check(
       PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(pc), &factors, PCCHOLESKY, PCLU, ""));
   if (!factors) return;
+  Mat factor = nullptr;
   MatSolverType type = nullptr;
   check(PCFactorSetUpMatSolverType(pc));
-  check(PCFactorGetMatSolverType(pc, &type));
-  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
-  Mat factor = nullptr;
   check(PCFactorGetMatrix(pc, &factor));
+  check(MatFactorGetSolverType(factor, &type));
+  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
   check(MatMumpsSetIcntl(factor, more_memory, percent));
 }
 
