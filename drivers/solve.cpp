@@ -10,16 +10,20 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <limits>
+#include <optional>
 
 #include "repose/adapt/discretisation.h"
 #include "repose/adapt/ladder.h"
 #include "repose/adapt/report.h"
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
+#include "repose/base/interrupt.h"
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
 #include "repose/results/model_file.h"
+#include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
@@ -117,7 +121,7 @@ std::vector<base::Option> run_options() {
       {"time_limit",
        OptionKind::number,
        "",
-       "End the search after this, keep the state it has and say how far it is.",
+       "End all searches after this, keep the state and say how far it is.",
        {0, 1e9},
        "s"},
       {"dry_run", OptionKind::flag, "", "Build and report the model only."},
@@ -300,14 +304,16 @@ struct Coarser {
   std::optional<double> discretisation_error;  // mm, of the model that was chosen, if one was
 };
 
-/// Writes every step to the result, and from time to time the latest to a checkpoint.
+/// Writes every step to the result, and from time to time what was reached to a checkpoint.
 class Writer {
  public:
+  /// `unsettled`: why not even a rest position at load 1 is the end, or empty.
   Writer(const std::filesystem::path& name, const model::Model& model, const Coarser& coarser,
-         double interval)
+         double interval, std::string unsettled)
       : name_(name),
         model_(model),
         coarser_(coarser),
+        unsettled_(std::move(unsettled)),
         file_(comm, name, model),
         interval_(interval) {}
 
@@ -315,17 +321,23 @@ class Writer {
     if (numbers.load == 1 && coarser_.discretisation_error)
       numbers.discretisation_error = *coarser_.discretisation_error;
     if (coarser_.compared) compare(numbers, rows);
+    if (numbers.load == 1 && !unsettled_.empty()) {
+      numbers.converged = false;
+      numbers.reason += "; " + unsettled_;
+    }
     file_.append(numbers, rows);
     last_numbers_ = numbers;
     last_rows_.position = rows.position;
     last_rows_.pressure = rows.pressure;
-    int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
-    MPI_Bcast(&due, 1, MPI_INT, 0, comm);
-    if (!due || !numbers.converged) return;
-    results::ResultFile checkpoint(comm, name_.string() + "_checkpoint", model_);
-    checkpoint.append(numbers, rows);
-    checkpoint.commit();
-    last_ = MPI_Wtime();
+    if (!makes_checkpoints() || !numbers.converged) return;
+    reached_ = {numbers, rows};
+    saved_ = false;
+    if (due()) write_checkpoint(nullptr);
+  }
+  /// At an iteration of a search.
+  void look_in(double load, const solve::Look& look) {
+    const bool news = !saved_ || (look && load == 1);
+    if (reached_ && news && due()) write_checkpoint(load == 1 ? look : nullptr);
   }
   void commit() { file_.commit(); }
   bool compares() const { return coarser_.compared.has_value(); }
@@ -338,6 +350,7 @@ class Writer {
         solve::reactions(comm, model_, held, last_numbers_, last_rows_);
     return forces.empty() ? "" : solve::describe_reactions(held, forces);
   }
+  const std::string& unsettled() const { return unsettled_; }
 
  private:
   void compare(model::StepNumbers& numbers, model::StepRows& rows) {
@@ -355,23 +368,57 @@ class Writer {
     for (size_t i = 0; i < mine.size(); ++i) rows.discretisation_error[i] = mine[i].x();
   }
 
+  struct Step {
+    model::StepNumbers numbers;
+    model::StepRows rows;
+  };
+  bool due() const {
+    int due = MPI_Wtime() - last_ > interval_;
+    MPI_Bcast(&due, 1, MPI_INT, 0, comm);
+    return due != 0;
+  }
+  /// The last rest position reached and, of a search at load 1, the state it is at: with both a
+  /// run can go on from there or, should that lead astray, along the path.
+  void write_checkpoint(const solve::Look& look) {
+    results::ResultFile file(comm, name_.string() + "_checkpoint", model_,
+                             results::Kind::checkpoint);
+    file.append(reached_->numbers, reached_->rows);
+    if (look && reached_->numbers.load < 1)
+      look([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });
+    file.commit();
+    saved_ = true;
+    last_ = MPI_Wtime();
+  }
+
   std::filesystem::path name_;
   const model::Model& model_;
   const Coarser& coarser_;
   std::string comparison_;
+  std::string unsettled_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
-  model::StepRows last_rows_;  // what reactions need of them
+  model::StepRows last_rows_;    // what reactions need of them
+  std::optional<Step> reached_;  // where checkpoints are made: the last rest position, …
+  bool saved_ = false;           // … and whether a checkpoint has it
   double interval_, last_ = MPI_Wtime();
 };
 
 /// Finds the rest position of the job's model, which rank 0 lets go of where only the search needs
 /// it: of a large model it is a fifth of the memory.
-solve::Summary search(Job& job, const solve::Settings& settings, const solve::Start& start,
+solve::Summary search(Job& job, solve::Settings settings, const solve::Start& start,
                       base::Stages& stages, Writer& writer) {
-  if (writer.makes_checkpoints() || writer.compares() || !job.held.empty())
-    return solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
-  return solve::find_repose(comm, std::move(job.model), settings, start, stages, std::ref(writer));
+  if (writer.makes_checkpoints())
+    settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
+  const bool needed = writer.makes_checkpoints() || writer.compares() || !job.held.empty();
+  solve::Summary summary =
+      needed ? solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer))
+             : solve::find_repose(comm, std::move(job.model), settings, start, stages,
+                                  std::ref(writer));
+  if (summary.path.complete() && !writer.unsettled().empty()) {
+    summary.path.last.converged = false;
+    summary.last.reason += "; " + writer.unsettled();
+  }
+  return summary;
 }
 
 /// Path of the result without ending; never that of the input.
@@ -383,12 +430,38 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   return name;
 }
 
-/// The torn model is solved from where the last tear left its tissue.
-void start_torn(const solve::Tearing& tearing, solve::Settings& settings,
+/// Sliding points find their places and springs tear, in rounds of searches.
+struct Rounds {
+  solve::Sliding sliding;
+  solve::Tearing tearing;
+  /// Why the result is not to be trusted as an end, or nothing.
+  std::string unsettled() const {
+    const std::string who =
+        sliding.stopped || tearing.stopped ? "a signal or the time limit: " : "";
+    if (!sliding.settled) return who + "points that slide have not found their places";
+    return tearing.settled ? "" : who + "more may tear";
+  }
+};
+
+/// The search begins with a state that the rounds left.
+void start_from(double load, const std::vector<Vec3>& position, solve::Settings& settings,
                 results::Restart& restart) {
-  restart.position = tearing.position;
-  settings.path.start_load = 1;
-  settings.initial_equilibrium = false;
+  restart = {load, position, false};
+  settings.path.start_load = load;
+  if (load > 0) settings.initial_equilibrium = false;
+}
+
+Rounds go_through_rounds(Job& job, solve::Settings& settings, results::Restart& restart,
+                         base::Stages& stages) {
+  Rounds rounds;
+  rounds.sliding = solve::slide(comm, job.model, job.sliders, settings, restart.position);
+  if (rounds.sliding.rounds > 0) stages.end("slide");
+  if (rounds.sliding.stopped)
+    start_from(rounds.sliding.load, rounds.sliding.position, settings, restart);
+  rounds.tearing = solve::tear(comm, job.model, job.tearing, settings, restart.position);
+  if (rounds.tearing.rounds > 0) stages.end("tear");
+  if (rounds.tearing.torn) start_from(1, rounds.tearing.position, settings, restart);
+  return rounds;
 }
 
 /// Why coarser models cannot be solved first, or nothing.
@@ -469,7 +542,6 @@ Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& s
   if (rungs == 0) return {};
   climb.rungs.resize(rungs);
   if (wish.adapt || wish.preview) climb.enough = settings.path.accuracy;
-  const double begin = MPI_Wtime();
   const model::Anatomy none;
   adapt::Ladder ladder = adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
   Coarser coarser{adapt::describe_ladder(ladder), {}, {}};
@@ -485,56 +557,66 @@ Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& s
     start = {base::deal_out(comm, ladder.position), true};
   }
   if (wish.compare && !ladder.rungs.empty()) coarser.compared = std::move(ladder);
-  settings.time_limit = ladder.stopped ? 0 : settings.time_limit - (MPI_Wtime() - begin);
   return coarser;
 }
 
-base::Exit run(const base::Options& options) {
-  base::Stages stages(comm);
-  const std::filesystem::path input = options.arguments()[0];
-  Job job = read_job(input);
-  override_by(options, job.wanted);
+/// What the options ask of the searches.
+solve::Settings settings_of(const base::Options& options, const Job& job) {
   solve::Settings settings = settings_of(job.wanted, job.solid);
   settings.stability = options.flag("stability");
-  settings.heeds_signals = true;
   settings.monitor = options.flag("monitor_mm");
-  if (options.has("time_limit")) settings.time_limit = options.number("time_limit");
   settings.initial_equilibrium = job.initial_equilibrium;
-  stages.end("build");
-  if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));
-  if (options.flag("dry_run")) {
-    say(solve::describe_stages(stages));
-    return base::Exit::done;
-  }
+  return settings;
+}
 
+/// From a job that is built to its result.
+base::Exit solve_job(const base::Options& options, Job& job, solve::Settings settings,
+                     const std::string& name, base::Stages& stages) {
+  const double unlimited = std::numeric_limits<double>::infinity();
+  base::Interrupt interrupt(
+      comm, options.has("time_limit") ? options.number("time_limit") : unlimited, true);
+  settings.interrupt = &interrupt;
   results::Restart restart;
   if (options.has("restart")) {
     restart = results::read_restart(comm, options.text("restart"), job.model);
     settings.path.start_load = restart.load;
   }
   choose_extent(options, settings);
-  const std::string name = result_name(options, input);
-  const solve::Sliding sliding = solve::slide(comm, job.model, job.sliders, settings);
-  if (sliding.rounds > 0) stages.end("slide");
-  const solve::Tearing tearing =
-      solve::tear(comm, job.model, job.tearing, settings, restart.position);
-  if (tearing.rounds > 0) stages.end("tear");
-  if (tearing.torn) start_torn(tearing, settings, restart);
-  solve::Start start{restart.position};
+  const Rounds rounds = go_through_rounds(job, settings, restart, stages);
+  solve::Start start{restart.position, restart.guess};
   const Coarser coarser = solve_coarser(options, job, settings, start);
-  if (start.guess) stages.end("coarser models");
+  if (start.guess && !restart.guess) stages.end("coarser models");
   Writer writer(name, job.model, coarser,
-                options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
+                options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0,
+                rounds.unsettled());
   const solve::Summary summary = search(job, settings, start, stages, writer);
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
-  say(coarser.told + writer.comparison() + solve::describe_sliding(sliding) +
-      solve::describe_tearing(tearing));
+  say(coarser.told + writer.comparison() + solve::describe_sliding(rounds.sliding) +
+      solve::describe_tearing(rounds.tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
-  const bool settled = sliding.settled && tearing.settled;
-  return summary.path.complete() && settled ? base::Exit::done : base::Exit::not_converged;
+  return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
+}
+
+base::Exit run(const base::Options& options) {
+  base::Stages stages(comm);
+  const std::filesystem::path input = options.arguments()[0];
+  const bool dry = options.flag("dry_run");
+  const std::string name = dry ? "" : result_name(options, input);
+  std::optional<results::NameLock> lock;
+  base::on_first_rank(comm, [&] {
+    if (!dry) lock.emplace(name);
+  });
+  Job job = read_job(input);
+  override_by(options, job.wanted);
+  solve::Settings settings = settings_of(options, job);
+  stages.end("build");
+  if (base::rank(comm) == 0) say(job.building + solve::describe_model(job.model));
+  if (!dry) return solve_job(options, job, std::move(settings), name, stages);
+  say(solve::describe_stages(stages));
+  return base::Exit::done;
 }
 
 }  // namespace

@@ -61,13 +61,11 @@ class Climber {
   }
 
  private:
-  double elapsed() const { return MPI_Wtime() - begin_; }
-
   /// Solves the model of one resolution; returns whether it came to rest.
   bool step_up(const Resolution& resolution) {
     Rung rung;
     rung.resolution = resolution;
-    const double begin = elapsed();
+    const double begin = MPI_Wtime();
     model::BuiltModel built;
     base::on_first_rank(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
     if (wanted_.recording) solve::prestress(comm_, built.model, *wanted_.recording);
@@ -79,7 +77,6 @@ class Climber {
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              position = solve::gather_points(comm_, rows.position);
                            });
-    ladder_.stopped = summary.path.last.stopped;
     if (!summary.path.complete()) {
       ladder_.refusal = fmt::format("a coarse model did not come to rest: {}", summary.last.reason);
       return false;
@@ -89,7 +86,7 @@ class Climber {
     rung.assemblies = summary.assemblies;
     base::on_first_rank(comm_, [&] { take(std::move(built), std::move(position), rung); });
     MPI_Bcast(&rung.discretisation_error, 1, MPI_DOUBLE, 0, comm_);
-    rung.seconds = elapsed() - begin;
+    rung.seconds = MPI_Wtime() - begin;
     ladder_.rungs.push_back(rung);
     ladder_.last_settings = settings;
     const double error = rung.discretisation_error + summary.last.displacement_error;
@@ -101,7 +98,6 @@ class Climber {
     solve::Settings settings = wanted_.settings;
     settings.path.accuracy = wanted_.enough > 0 ? search_share * wanted_.enough
                                                 : std::max(settings.path.accuracy, loosest_guide);
-    settings.time_limit -= elapsed();
     settings.path.hasty = true;
     settings.monitor = settings.stability = false;
     double volume_ratio = 1;  // f_v of a strain grows with the volume of the prisms
@@ -143,7 +139,6 @@ class Climber {
   const model::Anatomy& anatomy_;
   const Model& fine_;
   const Climb& wanted_;
-  const double begin_ = MPI_Wtime();
   Ladder ladder_;
 };
 

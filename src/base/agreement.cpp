@@ -64,6 +64,13 @@ void on_first_rank(MPI_Comm comm, const std::function<void()>& work) {
   agree(comm, rank(comm) == 0 ? run(work) : Told{});
 }
 
+void share(MPI_Comm comm, std::string& text) {
+  int length = static_cast<int>(text.size());
+  MPI_Bcast(&length, 1, MPI_INT, 0, comm);
+  text.resize(length);
+  MPI_Bcast(text.data(), length, MPI_CHAR, 0, comm);
+}
+
 Slab slab(int64_t n, int rank, int size) {
   const int64_t share = n / size, extra = n % size;
   const int64_t begin = rank * share + std::min<int64_t>(rank, extra);

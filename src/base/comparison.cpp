@@ -88,16 +88,18 @@ std::string Comparison::worst() const {
                      worst->stored, worst->recomputed);
 }
 
+std::string Comparison::verdict(const Row& row) {
+  return row.wrong == 0 ? "agrees" : fmt::format("{} of {} DISAGREE", row.wrong, row.entries);
+}
+
 std::string Comparison::line(const Row& row) {
-  const std::string verdict =
-      row.wrong == 0 ? "agrees" : fmt::format("{} of {} DISAGREE", row.wrong, row.entries);
   if (row.kind == Row::said)
     return fmt::format("{:10} {:75} {}\n", row.section, row.name, row.wrong ? "NOT SO" : "holds");
   if (row.kind == Row::range_only)
     return fmt::format("{:10} {:25} {:>17.10g} {:>17} {:>13} {}\n", row.section, row.name,
                        row.stored, "range only", "", row.wrong ? "OUT OF RANGE" : "in range");
   return fmt::format("{:10} {:25} {:>17.10g} {:>17.10g} {:>13.1e} {}\n", row.section, row.name,
-                     row.stored, row.recomputed, row.difference, verdict);
+                     row.stored, row.recomputed, row.difference, verdict(row));
 }
 
 std::string Comparison::table() const {
@@ -105,6 +107,49 @@ std::string Comparison::table() const {
                                  "recomputed", "rel. diff.");
   for (const Row& row : rows_) text += line(row);
   return text;
+}
+
+std::vector<Comparison::Row> Comparison::by_name() const {
+  std::vector<Row> kinds;
+  for (const Row& row : rows_) {
+    if (row.kind != Row::recalculated) continue;
+    const auto same = std::find_if(kinds.begin(), kinds.end(),
+                                   [&](const Row& kind) { return kind.name == row.name; });
+    if (same == kinds.end()) {
+      kinds.push_back(row);
+      continue;
+    }
+    const int64_t entries = same->entries + row.entries, wrong = same->wrong + row.wrong;
+    if (row.difference > same->difference) *same = row;
+    same->entries = entries;
+    same->wrong = wrong;
+  }
+  return kinds;
+}
+
+std::string Comparison::others(Row::Kind kind, const std::string& what) const {
+  int64_t all = 0, wrong = 0;
+  std::string text;
+  for (const Row& row : rows_) {
+    if (row.kind != kind) continue;
+    ++all;
+    wrong += row.wrong;
+    if (row.wrong > 0) text += line(row);
+  }
+  return fmt::format("{:25} {:>10}{}\n", what, all - wrong,
+                     wrong > 0 ? fmt::format(", {} DO NOT", wrong) : "") +
+         text;
+}
+
+std::string Comparison::summary() const {
+  std::string text = fmt::format("{:25} {:>10} {:>17} {:>17} {:>11}  {:10}\n", "quantity",
+                                 "entries", "stored", "recomputed", "rel. diff.", "at worst in");
+  for (const Row& row : by_name())
+    text += fmt::format("{:25} {:>10} {:>17.10g} {:>17.10g} {:>11.1e}  {:10} {}\n", row.name,
+                        row.entries, row.stored, row.recomputed, row.difference, row.section,
+                        verdict(row));
+  return text + others(Row::range_only, "ranges that hold") +
+         others(Row::said, "statements that hold");
 }
 
 }  // namespace repose::base

@@ -1,5 +1,7 @@
 #include "repose/base/petsc.h"
 
+#include <csignal>
+#include <cstdio>
 #include <cstdlib>
 
 namespace repose::base {
@@ -14,6 +16,14 @@ std::string text_of(PetscErrorCode code) {
   return fmt::format("{}{}{} (error {})", text ? text : "unknown error",
                      specific && *specific ? ": " : "", specific ? specific : "",
                      static_cast<int>(code));
+}
+
+/// Who reads no further does not end the work: writing fails, without a signal.
+void ignore_broken_pipes() {
+  sigset_t pipe;
+  sigemptyset(&pipe);
+  sigaddset(&pipe, SIGPIPE);
+  pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
 }
 
 }  // namespace
@@ -31,11 +41,17 @@ Session::Session(int argc, char** argv, const char* help) {
   setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
   // With more, models are shared out over ranks in another way in every run (Scotch 7).
   setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
+  ignore_broken_pipes();
   check(PetscInitialize(&argc, &argv, nullptr, help));
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
+  // PETSc takes these for faults, of which it prints a page.
+  std::signal(SIGTERM, SIG_DFL);
+  std::signal(SIGHUP, SIG_DFL);
 }
 
 Session::~Session() {
+  // PETSc flushes it, and takes a broken pipe or a full disk there for a fault.
+  if (std::fflush(stdout) != 0 && !std::freopen("/dev/null", "w", stdout)) std::fclose(stdout);
   PetscPopErrorHandler();
   PetscFinalize();
 }

@@ -1,5 +1,8 @@
 #include "repose/base/whole_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -8,8 +11,39 @@
 
 namespace repose::base {
 
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+std::filesystem::path begin_part(const std::filesystem::path& file) {
+  for (int64_t number = getpid();; ++number) {
+    const std::filesystem::path part = fmt::format("{}.{}.part", file.string(), number);
+    const int descriptor = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      close(descriptor);
+      return part;
+    }
+    if (errno != EEXIST)
+      refuse("{}: cannot be written: {}; name a folder that exists and has room", file.string(),
+             std::strerror(errno));
+  }
+}
+
+void require_writable(const std::filesystem::path& file) {
+  const std::filesystem::path folder = folder_of(file);
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
+    refuse("{}: cannot be written: there is no folder {}; make it or choose another -output",
+           file.string(), folder.string());
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    refuse("{}: cannot be written: folder {}: {}; choose another -output", file.string(),
+           folder.string(), std::strerror(errno));
+  if (std::filesystem::is_directory(file, error))
+    refuse("{}: is a folder; remove it or choose another -output", file.string());
+}
+
 void write_whole_file(const std::filesystem::path& file, std::string_view bytes) {
-  const std::filesystem::path part = file.string() + ".part";
+  const std::filesystem::path part = begin_part(file);
   std::ofstream out(part, std::ios::binary);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();

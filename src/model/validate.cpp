@@ -98,6 +98,12 @@ void validate_springs(const Springs& s, size_t points, size_t sets, const std::s
   Array(file, "spring/exponent").has_rows(s.exponent.size(), n);
   Array(file, "spring/reference").has_rows(s.reference.size(), n);
   Array(file, "spring/points").all_index(s.points, points);
+  for (size_t j = 0; j < n; ++j)
+    if (s.points[j][0] == s.points[j][1])
+      refuse(
+          "{}: /model/spring/points: row {} is ({}, {}), expected two different points: a spring "
+          "between a point and itself holds nothing; remove it",
+          file, j, s.points[j][0], s.points[j][1]);
   Array(file, "spring/set").all_within(s.set, 0, static_cast<int64_t>(sets) - 1);
   Array(file, "spring/rest_length").is_not_negative(s.rest_length, "mm");
   Array(file, "spring/stiffness").is_not_negative(s.stiffness, "N/mm");

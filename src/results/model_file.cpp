@@ -127,6 +127,11 @@ bool is_hdf5(const std::filesystem::path& file) {
   return false;
 }
 
+bool is_checkpoint(const std::filesystem::path& file) {
+  const Reader in(file);
+  return in.has_attribute("/", "checkpoint") && in.integer("/", "checkpoint") != 0;
+}
+
 int64_t step_count(const std::filesystem::path& file) {
   const Reader in(file);
   if (!in.has("/step")) return 0;

@@ -9,12 +9,24 @@ namespace repose::results {
 
 namespace {
 
-StoredStep last_converged_step(const std::filesystem::path& file, const model::Model& model) {
-  for (int64_t step = step_count(file) - 1; step >= 0; --step) {
-    StoredStep stored = read_step(file, step, model);
-    if (stored.numbers.converged) return stored;
+struct Found {
+  StoredStep step;
+  bool guess = false;
+};
+
+Found find_step(const std::filesystem::path& file, const model::Model& model) {
+  const int64_t count = step_count(file);
+  Found found;
+  for (int64_t step = count - 1; step >= 0 && !found.step.numbers.converged; --step)
+    found.step = read_step(file, step, model);
+  const bool none = !found.step.numbers.converged;
+  if (count > 0 && (none || found.step.numbers.load == 0)) {
+    StoredStep end = read_step(file, count - 1, model);
+    if (end.numbers.load == 1) return {std::move(end), true};
   }
-  base::refuse("{}: no converged step to go on from; start without -restart", file.string());
+  if (none)
+    base::refuse("{}: no converged step to go on from; start without -restart", file.string());
+  return found;
 }
 
 void refuse_another_model(const std::filesystem::path& file, const model::Model& model) {
@@ -32,10 +44,12 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
   std::vector<Vec3> all;
   base::on_first_rank(comm, [&] {
     refuse_another_model(file, model);
-    StoredStep stored = last_converged_step(file, model);
-    restart.load = stored.numbers.load;
-    all = std::move(stored.rows.position);
+    Found found = find_step(file, model);
+    restart.guess = found.guess;
+    restart.load = found.guess ? 0 : found.step.numbers.load;
+    all = std::move(found.step.rows.position);
   });
+  MPI_Bcast(&restart.guess, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&restart.load, 1, MPI_DOUBLE, 0, comm);
   restart.position = base::deal_out(comm, all);
   return restart;

@@ -60,10 +60,7 @@ struct UnpackNumbers {
 model::StepNumbers of_first_rank(MPI_Comm comm, const model::StepNumbers& mine) {
   PackNumbers packed;
   model::for_each_number(mine, packed);
-  int length = static_cast<int>(packed.text.size());
-  MPI_Bcast(&length, 1, MPI_INT, 0, comm);
-  packed.text.resize(length);
-  MPI_Bcast(packed.text.data(), length, MPI_CHAR, 0, comm);
+  base::share(comm, packed.text);
   MPI_Bcast(packed.values.data(), static_cast<int>(packed.values.size()), MPI_DOUBLE, 0, comm);
   model::StepNumbers numbers;
   model::for_each_number(numbers, UnpackNumbers{packed});
@@ -101,17 +98,17 @@ struct ResultFile::State {
   base::Slab slab(int64_t rows) const {
     return base::slab(rows, base::rank(comm), base::size(comm));
   }
-  std::filesystem::path part() const { return with_ending(name, ".h5.part"); }
+  std::string part;  // the file that is written until commit
   /// Work on the open file that all ranks do, and all fail if one does.
   void on_disk(const std::function<void()>& work) const {
-    base::together(comm, [&] { say_where(part(), work); });
+    base::together(comm, [&] { say_where(with_ending(name, ".h5"), work); });
   }
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
     return 80 * counts.points + 16 * counts.springs + 48 * counts.prisms + 24 * counts.bone_points +
            (int64_t{1} << 16);
   }
-  void create(const model::Model& model);
+  void create(const model::Model& model, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
   void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
@@ -123,17 +120,18 @@ struct ResultFile::State {
   void publish();
 };
 
-void ResultFile::State::create(const model::Model& model) {
-  require_writable(with_ending(name, ".h5"));
+void ResultFile::State::create(const model::Model& model, Kind kind) {
   unfinished.emplace(with_ending(name, ".h5"));
+  part = unfinished->part();
   bones = merge_bones(model.bone_surfaces);
   motion.emplace(model);
-  say_where(part(), [&] {
-    base::Hdf5File whole = base::create_hdf5(part());
+  say_where(unfinished->file(), [&] {
+    base::Hdf5File whole = base::create_hdf5(part);
     unfinished->reserve(model_bytes(model, bones));
     write_model(whole, model, bones);
     const base::Hdf5Group root(H5Gopen2(whole, "/", H5P_DEFAULT));
     for (const auto& [name, text] : base::this_run(comm)) write_attribute(root, name.c_str(), text);
+    if (kind == Kind::checkpoint) write_attribute(root, "checkpoint", int64_t{1});
     base::create_hdf5_group(whole, "step");
     whole.close();
   });
@@ -245,7 +243,6 @@ void ResultFile::State::publish() {
       std::filesystem::remove(document, ignored);
       continue;
     }
-    require_writable(document);
     documents.push_back(std::make_unique<UnfinishedFile>(document));
     documents.back()->write(xdmf_document(block, name.filename().string() + ".h5", loads));
   }
@@ -253,16 +250,18 @@ void ResultFile::State::publish() {
   for (auto& document : documents) document->commit();
 }
 
-ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model)
+ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+                       Kind kind)
     : state_(std::make_unique<State>()) {
   State& s = *state_;
   s.comm = comm;
   // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
   s.name = std::filesystem::absolute(name);
-  base::on_first_rank(comm, [&] { s.create(model); });
+  base::on_first_rank(comm, [&] { s.create(model, kind); });
+  base::share(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
   s.initial = base::deal_out(comm, model.points.position);
-  s.on_disk([&] { s.file = base::open_hdf5(s.part(), comm); });
+  s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
 }
 
 ResultFile::~ResultFile() = default;

@@ -8,14 +8,11 @@
 #include <fstream>
 
 #include "repose/base/error.h"
+#include "repose/base/whole_file.h"
 
 namespace repose::results {
 
 namespace {
-
-std::filesystem::path folder_of(const std::filesystem::path& file) {
-  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-}
 
 void make_last(const std::filesystem::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -29,8 +26,10 @@ void make_last(const std::filesystem::path& path) {
 
 }  // namespace
 
-UnfinishedFile::UnfinishedFile(std::filesystem::path file)
-    : file_(std::move(file)), part_(file_.string() + ".part") {}
+UnfinishedFile::UnfinishedFile(std::filesystem::path file) : file_(std::move(file)) {
+  base::require_writable(file_);
+  part_ = base::begin_part(file_);
+}
 
 UnfinishedFile::~UnfinishedFile() {
   std::error_code ignored;
@@ -41,7 +40,7 @@ void UnfinishedFile::write(const std::string& content) const {
   std::ofstream out(part_, std::ios::binary | std::ios::trunc);
   out << content << std::flush;
   if (!out)
-    base::refuse("{}: cannot be written: {}; free space or choose another -output", part_.string(),
+    base::refuse("{}: cannot be written: {}; free space or choose another -output", file_.string(),
                  std::strerror(errno));
 }
 
@@ -53,7 +52,8 @@ void UnfinishedFile::reserve(int64_t bytes) const {
   if (descriptor >= 0) close(descriptor);
   if (reserved) return;
   std::error_code error;
-  const auto left = static_cast<int64_t>(std::filesystem::space(folder_of(file_), error).available);
+  const auto left =
+      static_cast<int64_t>(std::filesystem::space(base::folder_of(file_), error).available);
   if (reason == ENOSPC || reason == EDQUOT || (!error && left < bytes))
     base::refuse(
         "{}: needs {:.2f} MB more, its disk has {:.2f} MB left; free space or choose another "
@@ -69,21 +69,7 @@ void UnfinishedFile::commit() {
   std::filesystem::rename(part_, file_, error);
   if (error) base::refuse("{}: cannot be replaced: {}", file_.string(), error.message());
   committed_ = true;
-  make_last(folder_of(file_));
-}
-
-void require_writable(const std::filesystem::path& file) {
-  const std::filesystem::path folder = folder_of(file);
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error))
-    base::refuse("{}: cannot be written: there is no folder {}; make it or choose another -output",
-                 file.string(), folder.string());
-  if (access(folder.c_str(), W_OK | X_OK) != 0)
-    base::refuse("{}: cannot be written: folder {}: {}; choose another -output", file.string(),
-                 folder.string(), std::strerror(errno));
-  for (const std::string& path : {file.string(), file.string() + ".part"})
-    if (std::filesystem::is_directory(path, error))
-      base::refuse("{}: is a folder; remove it or choose another -output", path);
+  make_last(base::folder_of(file_));
 }
 
 }  // namespace repose::results

@@ -129,7 +129,6 @@ class RegionSearch {
   const model::Model& model_;
   const Settings& settings_;
   const Receiver& receive_;
-  const double begin_ = MPI_Wtime();
 
   Plan plan_;
   std::optional<ActiveRegion> region_;  // on rank 0
@@ -185,8 +184,9 @@ bool RegionSearch::pays() {
 Settings RegionSearch::settings_inside() const {
   Settings settings = settings_;
   settings.extent = Extent::whole;
+  if (settings_.under_way)
+    settings.under_way = [this](double load, const Look&) { settings_.under_way(load, nullptr); };
   settings.path.accuracy *= own_share;
-  settings.time_limit -= MPI_Wtime() - begin_;
   return settings;
 }
 

@@ -115,7 +115,7 @@ struct Minimiser::Callbacks {
       const bool done = self.near_enough(x, g, force);
       if (self.watch_ && !done)
         self.stopped_ = !self.watch_({iteration, self.function_.positions().load(), value, force,
-                                      self.error_, self.function_.evaluations()});
+                                      self.error_, self.function_.evaluations(), x});
       check(TaoDefaultConvergenceTest(tao, nullptr));
       const bool over = done || self.stopped_ || self.stalled(iteration, value);
       self.slowed_ = !over && self.initial_ && self.initial_->worn_out(force, length);
@@ -188,12 +188,14 @@ bool Minimiser::step_was_cut() const {
          reason != KSP_CONVERGED_ITS && reason != KSP_DIVERGED_ITS;
 }
 
-double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
+double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
   if (&certificate_.function != &function_) {
     certificate_.function.evaluate(displacement, certified_gradient_);
     gradient = certified_gradient_;
   }
-  const double step = certificate_.solver.newton_distance(displacement, gradient);
+  double step = certificate_.solver.newton_distance(displacement, gradient);
+  if (last || safety * step <= accuracy_)
+    step = certificate_.solver.sure_distance(displacement, gradient);
   const double estimate = safety * step;
   const bool curved = estimate > linear && estimate <= accuracy_;
   if (!curved) return estimate;
@@ -244,7 +246,7 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     }
   }
   looked_at_ = function_.evaluations();
-  error_ = strict_estimate(displacement, gradient);
+  error_ = strict_estimate(displacement, gradient, false);
   if (std::isfinite(error_))
     softest_ = largest_force / error_;
   else
@@ -290,7 +292,7 @@ int Minimiser::polish(Vec displacement) {
 
 double Minimiser::measure(Vec displacement) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_);
+  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, true);
   return objective;
 }
 

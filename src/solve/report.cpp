@@ -12,6 +12,12 @@ std::string row(const std::string& name, const std::string& value) {
   return fmt::format("  {:<22} {}\n", name, value);
 }
 
+/// How rounds that must settle ended.
+std::string ending(bool settled, bool stopped, const std::string& unsettled) {
+  if (settled) return "settled";
+  return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");
+}
+
 std::string work_rows(const Summary& s) {
   const std::string softer =
       s.path.softer > 0
@@ -100,8 +106,8 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 std::string describe_sliding(const Sliding& sliding) {
   if (sliding.rounds == 0) return "";
   return row("sliding", fmt::format("{} in {} rounds, {:.2g} mm to go",
-                                    sliding.settled ? "settled" : "NOT SETTLED", sliding.rounds,
-                                    sliding.to_go));
+                                    ending(sliding.settled, sliding.stopped, "NOT SETTLED"),
+                                    sliding.rounds, sliding.to_go));
 }
 
 std::string describe_tearing(const Tearing& t) {
@@ -110,8 +116,8 @@ std::string describe_tearing(const Tearing& t) {
       row("tearing",
           fmt::format("{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
                       "{:.4g} N",
-                      t.settled ? "settled" : "NOT SETTLED, MORE MAY TEAR", t.rounds, *t.limit,
-                      t.largest));
+                      ending(t.settled, t.stopped, "NOT SETTLED, MORE MAY TEAR"), t.rounds,
+                      *t.limit, t.largest));
   if (t.springs == 0) return text + row("torn", "nothing");
   return text + row("torn", fmt::format("springs {}, with them prisms {} and triangles of the "
                                         "skin {}; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",

@@ -6,10 +6,10 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 
 #include "repose/base/agreement.h"
-#include "repose/base/interrupt.h"
 #include "repose/base/progress.h"
 #include "repose/solve/active_search.h"
 #include "repose/solve/exact_volume.h"
@@ -48,7 +48,7 @@ class Watcher {
  public:
   Watcher(MPI_Comm comm, const Settings& settings)
       : progress_(comm),
-        interrupt_(comm, settings.time_limit, settings.heeds_signals),
+        interrupt_(settings.interrupt),
         accuracy_(settings.path.accuracy),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
@@ -60,8 +60,10 @@ class Watcher {
                                "{:.3g} N  {}",
                                i.load, i.number, i.objective, i.largest_force, to_go),
                    done(i));
-    return !interrupt_.wanted();
+    if (on_iteration_) on_iteration_(i);
+    return !(interrupt_ && interrupt_->wanted());
   }
+  void on_iteration(std::function<void(const Iteration&)> work) { on_iteration_ = std::move(work); }
 
  private:
   /// Share of the way: the loads reached, and of the next one the orders of magnitude that its
@@ -89,7 +91,8 @@ class Watcher {
 
   using Clock = std::chrono::steady_clock;
   base::Progress progress_;
-  base::Interrupt interrupt_;
+  base::Interrupt* interrupt_;
+  std::function<void(const Iteration&)> on_iteration_;
   double accuracy_, load_ = 0, reached_ = 0;
   double farthest_ = 0, nearest_ = 0;  // mm, in this search
   bool prints_;
@@ -119,6 +122,7 @@ class Searcher {
   Objective& objective() { return problem_.objective(); }
   TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
   Problem& problem() { return problem_; }
+  Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   int64_t evaluations() { return problem_.function().evaluations(); }
   int64_t assemblies() const { return problem_.assemblies(); }
@@ -152,6 +156,25 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 
 namespace {
 
+/// Lets the one who asks for it look at the state of each iteration.
+void show_states(Searcher& searcher, const Settings& settings, const NaturalRows& natural) {
+  searcher.watcher().on_iteration([&](const Iteration& i) {
+    settings.under_way(i.load, [&](const Receiver& receive) {
+      Objective& objective = searcher.objective();
+      const base::VecHandle gradient = objective.positions().make_vector();
+      Outcome outcome;
+      outcome.objective = searcher.problem().function().evaluate(i.displacement, gradient);
+      outcome.gradient_max = largest_block(gradient);
+      outcome.displacement_error = std::numeric_limits<double>::infinity();
+      outcome.iterations = i.number;
+      outcome.reason = "the search is under way";
+      model::StepNumbers numbers = numbers_of(objective, settings, outcome, i.load);
+      numbers.epsilon = searcher.epsilon();
+      receive(numbers, natural.rows(objective, settings.exact_volume));
+    });
+  });
+}
+
 Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
                       base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
@@ -166,6 +189,7 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
   stages.end("distribute");
 
   Searcher searcher(positions, settings);
+  if (settings.under_way) show_states(searcher, settings, natural);
   Objective& objective = searcher.objective();
   Summary summary;
   int64_t evaluations_before = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "repose/base/agreement.h"
 #include "repose/solve/reaction.h"
@@ -15,27 +16,33 @@ constexpr double longest_step = 2;  // mm
 /// Rest positions of a model, one after the other, each from the one before.
 class Rests {
  public:
-  Rests(MPI_Comm comm, const Settings& settings) : comm_(comm), settings_(settings) {}
+  Rests(MPI_Comm comm, const Settings& settings, const std::vector<Vec3>& start)
+      : comm_(comm), settings_(settings) {
+    rows_.position = start;
+  }
 
   void find(const model::Model& model) {
     base::Stages unused(comm_);
     const Start start{rows_.position};
-    find_repose(comm_, model, settings_, start, unused,
-                [&](const model::StepNumbers& numbers, const model::StepRows& rows) {
-                  numbers_ = numbers;
-                  rows_ = rows;
-                });
+    outcome_ = find_repose(comm_, model, settings_, start, unused,
+                           [&](const model::StepNumbers& numbers, const model::StepRows& rows) {
+                             numbers_ = numbers;
+                             rows_ = rows;
+                           })
+                   .path;
     settings_.path.start_load = 1;
   }
   std::vector<Vec3> forces(const model::Model& model,
                            const std::vector<std::vector<int64_t>>& points) const {
     return reactions(comm_, model, points, numbers_, rows_);
   }
-  bool converged() const { return numbers_.load == 1 && numbers_.converged; }
+  const PathOutcome& outcome() const { return outcome_; }
+  const std::vector<Vec3>& position() const { return rows_.position; }
 
  private:
   MPI_Comm comm_;
   Settings settings_;
+  PathOutcome outcome_;
   model::StepNumbers numbers_;
   model::StepRows rows_;
 };
@@ -105,21 +112,26 @@ class Steps {
 }  // namespace
 
 Sliding slide(MPI_Comm comm, model::Model& model, const std::vector<model::Slider>& sliders,
-              const Settings& settings) {
+              const Settings& settings, const std::vector<Vec3>& start) {
   auto wanted = static_cast<int64_t>(sliders.size());
   MPI_Bcast(&wanted, 1, MPI_INT64_T, 0, comm);
   Sliding result;
   if (wanted == 0) return result;
-  Rests rests(comm, settings);
+  Rests rests(comm, settings, start);
   Steps steps(model, sliders);
-  for (result.settled = false; result.rounds < most_rounds && !result.settled; ++result.rounds) {
+  result.to_go = std::numeric_limits<double>::infinity();
+  for (result.settled = false; result.rounds < most_rounds && !result.settled;) {
     rests.find(model);
-    if (!rests.converged()) break;
+    ++result.rounds;
+    result.stopped = rests.outcome().last.stopped;
+    if (result.stopped || !rests.outcome().complete()) break;
     const std::vector<Vec3> forces = rests.forces(model, steps.points());
     if (base::rank(comm) == 0) result.to_go = steps.take(forces);
     MPI_Bcast(&result.to_go, 1, MPI_DOUBLE, 0, comm);
     result.settled = result.to_go <= settings.path.accuracy / 2;
   }
+  result.load = rests.outcome().load;
+  result.position = rests.position();
   return result;
 }
 

@@ -42,7 +42,8 @@ void choose_factors(KSP krylov) {
 
 /// How many eigenvalues are below `shift`: as many as the pivots of H − shift that are negative.
 PetscInt eigenvalues_below(Mat matrix, double shift) {
-  constexpr int parallel_root = 13;  // ICNTL: without ScaLAPACK, which does not know the inertia
+  // ICNTL: without ScaLAPACK, which does not know the inertia, and with room on many ranks.
+  constexpr int parallel_root = 13, more_memory = 14;
   base::MatHandle shifted;
   check(MatDuplicate(matrix, MAT_COPY_VALUES, shifted.out()));
   check(MatShift(shifted, -shift));
@@ -56,6 +57,7 @@ PetscInt eigenvalues_below(Mat matrix, double shift) {
   check(PCFactorSetUpMatSolverType(pc));
   check(PCFactorGetMatrix(pc, &factors));
   check(MatMumpsSetIcntl(factors, parallel_root, 1));
+  check(MatMumpsSetIcntl(factors, more_memory, 100));
   check(KSPSetUp(krylov));
   PetscInt below = 0;
   check(MatGetInertia(factors, &below, nullptr, nullptr));

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
+#include <string_view>
 
 #include "repose/base/error.h"
 #include "repose/base/petsc_versions.h"
@@ -19,6 +21,22 @@ constexpr const char* columns_type = "columns";
 void choose_factors(PC pc) {
   check(PCSetType(pc, PCCHOLESKY));
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+/// MUMPS sets too little memory aside for factors on many ranks.
+void give_room(PC pc) {
+  constexpr int more_memory = 14, percent = 100;  // ICNTL
+  PetscBool factors = PETSC_FALSE;
+  check(
+      PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(pc), &factors, PCCHOLESKY, PCLU, ""));
+  if (!factors) return;
+  Mat factor = nullptr;
+  MatSolverType type = nullptr;
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factor));
+  check(MatFactorGetSolverType(factor, &type));
+  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
+  check(MatMumpsSetIcntl(factor, more_memory, percent));
 }
 
 /// In iterations: what a new preconditioner costs as much as.
@@ -134,6 +152,7 @@ void TangentSolver::renew_preconditioner() {
     renew_columns();
   } else {
     hessian_.renew();
+    give_room(pc);
     check(PCSetUp(pc));
   }
   check(PetscLogEventEnd(renewal_event(), pc, nullptr, nullptr, nullptr));
@@ -153,6 +172,7 @@ void TangentSolver::renew_columns() {
   if (factors_) {
     hessian_.renew();
     check(PCSetOperators(factors_, hessian_.convex(), hessian_.convex()));
+    give_room(factors_);
     check(PCSetUp(factors_));
   } else if (columns_) {
     columns_->refill(blocks);
@@ -199,10 +219,59 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
   if (measured_at_ == hessian_.assemblies()) check(VecEqual(gradient, measured_, &same));
   if (same) return distance_;
   check(VecSet(work_, 0));
-  const bool convex = solve(displacement, gradient, work_, 0.05);
+  const bool convex = solve(displacement, gradient, work_, usual_);
   distance_ = convex ? largest_block(work_) : std::numeric_limits<double>::infinity();
   measured_at_ = hessian_.assemblies();
+  sure_at_ = -1;
   check(VecCopy(gradient, measured_));
+  return distance_;
+}
+
+/// Of a point, mm/N, or more: what a load of random signs moves. Soft points go farthest, and take
+/// most of its energy, so that a rough solution will do. What a preconditioner serves for is alike.
+double TangentSolver::largest_compliance(Vec displacement) {
+  constexpr double rough = 0.3;
+  if (compliance_at_ == renewals_) return compliance_;
+  base::VecHandle load = positions_.make_vector();
+  PetscInt begin = 0, end = 0;
+  PetscScalar* values = nullptr;
+  check(VecGetOwnershipRange(load, &begin, &end));
+  check(VecGetArray(load, &values));
+  for (PetscInt i = begin; i < end; ++i)
+    values[i - begin] = std::mt19937(static_cast<uint32_t>(i))() & 1 ? 1.0 : -1.0;
+  check(VecRestoreArray(load, &values));
+  check(VecSet(next_, 0));
+  const bool known = solve(displacement, load, next_, rough) && finished_;
+  compliance_ = known ? largest_block(next_) : std::numeric_limits<double>::infinity();
+  compliance_at_ = known ? renewals_ : -1;
+  return compliance_;
+}
+
+bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
+  base::VecHandle left = positions_.make_vector();
+  check(MatMult(hessian_.action(), work_, left));
+  check(VecAYPX(left, -1, gradient));
+  check(VecSet(next_, 0));
+  const bool convex = solve(displacement, left, next_, factor);
+  check(VecAXPY(work_, 1, next_));
+  return convex && finished_;
+}
+
+double TangentSolver::sure_distance(Vec displacement, Vec gradient) {
+  // Of the distance; the preconditioner's norm, which is looked at, is the energy's but roughly.
+  constexpr double share = 0.05;
+  constexpr double finest = 1e-12;
+  const double rough = newton_distance(displacement, gradient);
+  if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_) return rough;
+  PetscReal energy = 0;
+  check(VecDot(gradient, work_, &energy));
+  const double wanted = share * rough / std::sqrt(largest_compliance(displacement) * energy);
+  if (wanted < usual_) {
+    const bool sure = wanted > finest && improve(displacement, gradient, wanted / usual_);
+    distance_ =
+        sure ? std::max(rough, largest_block(work_)) : std::numeric_limits<double>::infinity();
+  }
+  sure_at_ = measured_at_;
   return distance_;
 }
 
@@ -216,6 +285,7 @@ double TangentSolver::contraction(Vec displacement, Vec trial, Vec gradient) {
   check(VecSet(next_, 0));
   const bool convex = solve(trial, gradient, next_, close);
   hessian_.assemble(displacement);
+  if (sure_at_ == measured_at_) sure_at_ = hessian_.assemblies();
   measured_at_ = hessian_.assemblies();  // what is known there is not lost
   if (!convex) return endless;
   check(VecDot(gradient, next_, &next_slope));

@@ -82,7 +82,8 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
                                        tension = rows.tension;
                                      });
     ++result.rounds;
-    if (!rest.path.complete()) break;
+    result.stopped = rest.path.last.stopped;
+    if (result.stopped || !rest.path.complete()) break;
     tension = gather(comm, tension.data(), tension.size());
     base::on_first_rank(comm, [&] { more = rupture.take(tension); });
     MPI_Bcast(&more, 1, MPI_C_BOOL, 0, comm);

@@ -154,11 +154,10 @@ class Study {
     solve::prestress(comm, model, {scene.tissue.turgor, field});
   }
 
-  solve::Settings settings_of(const Way& way, double bulk_modulus, double limit) const {
+  solve::Settings settings_of(const Way& way, double bulk_modulus) const {
     solve::Settings settings;
     settings.path = {.accuracy = way.accuracy, .load_steps = way.load_steps};
     settings.volume = way.volume;
-    settings.time_limit = limit;
     if (way.volume == "material") settings.weights = mechanics::solid_weights;
     if (way.volume == "penalty")
       settings.weights = {1, mechanics::VolumeTerm::penalty, bulk_modulus};
@@ -175,8 +174,11 @@ class Study {
     run.measurement.way = way;
     base::Stages stages(comm);
     const double begin = base::cpu_seconds();
+    base::Interrupt end(comm, limit, false);
+    solve::Settings settings = settings_of(way, made.bulk_modulus);
+    settings.interrupt = &end;
     const solve::Summary summary =
-        solve::find_repose(comm, made.model, settings_of(way, made.bulk_modulus, limit), {}, stages,
+        solve::find_repose(comm, made.model, settings, {}, stages,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              run.position = solve::gather_points(comm, rows.position);
                            });

@@ -1,9 +1,13 @@
 """repose-check against a result that numpy made on its own: it must find every number right, and
 each single one wrong after a change in its seventh digit."""
 
+import subprocess
+
 import h5py
 import numpy as np
 import pytest
+
+from conftest import programs
 
 GRAVITY = np.array([0.3, -0.2, -9.80665])
 LOAD, LAMBDA, KAPPA, EPSILON = 0.5, 0.7, 0.05, 1e-3
@@ -261,6 +265,41 @@ def test_finds_a_bone_point_in_the_wrong_place(run, tmp_path):
     refused(result)
     assert "point/position, fixed" in [line for line in result.stdout.splitlines()
                                        if "1 of 81 DISAGREE" in line][0]
+
+
+def test_prints_a_row_for_each_kind_and_all_where_asked(run, tmp_path):
+    file = write_result(tmp_path / "a.h5", "energy", "none")
+    with h5py.File(file, "r+") as h5:
+        for step in range(1, 9):
+            h5.copy("step/0000", f"step/{step:04}")
+            h5[f"step/{step:04}"].attrs["load"] = LOAD + step / 100
+            h5[f"step/{step:04}"].attrs["f_e"] *= 1 + step * 1e-7
+    rows = run("repose-check", file).stdout.splitlines()
+    assert len([row for row in rows if row.startswith("f_e ")]) == 1
+    worst = next(row for row in rows if row.startswith("f_e "))
+    assert "step 0008" in worst and "8 of 9 DISAGREE" in worst
+    every = run("repose-check", file, "-verbose").stdout.splitlines()
+    assert len([row for row in every if " f_e " in row]) == 9 and len(every) > 150 > 30 > len(rows)
+
+
+def test_a_checkpoint_is_no_end(run, tmp_path):
+    file = write_result(tmp_path / "a.h5", "energy", "none")
+    with h5py.File(file, "r+") as h5:
+        h5["step/0000"].attrs["converged"] = 1
+    refused(run("repose-check", file), "not so: converged is 0 where the last load is below 1")
+    with h5py.File(file, "r+") as h5:
+        h5.attrs["checkpoint"] = 1
+    assert run("repose-check", file).returncode == 0
+
+
+def test_a_reader_that_goes_away_is_no_fault(run, environment, tmp_path):
+    file = write_result(tmp_path / "a.h5", "energy", "none")
+    command = [programs() / "repose-check", file, "-verbose"]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
 
 
 def test_refuses_what_is_no_result(run, tmp_path):

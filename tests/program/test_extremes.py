@@ -203,3 +203,43 @@ def test_steps_of_an_extreme_are_one_path(solve, tmp_path):
     path = steps(tmp_path / "out.h5")
     assert all(a["load"] < b["load"] for a, b in zip(path, path[1:]))
     assert all(apart(a, b) < 15 for a, b in zip(path, path[1:]))
+
+
+def chain(points, seed):
+    """Springs without length, linear, from end to end along x: of stiffnesses over twelve orders of
+    magnitude; forces on their joints; and where it comes to rest."""
+    random = np.random.default_rng(seed)
+    count = points - 1
+    stiffness = 10**random.uniform(-6, 6, count)
+    force = np.zeros((points, 3))
+    force[1:-1, 0] = random.uniform(-3, 3, points - 2)
+    position = np.zeros((points, 3))
+    position[:, 0] = np.arange(points)
+    sets = np.zeros(points, "i1")
+    sets[[0, -1]] = 1
+    below = np.concatenate([[0], np.cumsum(force[1:-1, 0])])
+    tension = (count + (below / stiffness).sum()) / (1 / stiffness).sum() - below
+    rest = np.zeros((points, 3))
+    rest[1:, 0] = np.cumsum(tension / stiffness)
+    return {
+        "gravity": np.zeros(3), "point/position": position, "point/set": sets,
+        "point/target": position, "point/layer": np.zeros(points, "i4"),
+        "point/column": np.arange(points), "point/bone": np.full(points, -1, "i4"),
+        "point/mass": np.zeros(points), "point/external_force": force,
+        "spring/points": np.stack([np.arange(count), np.arange(1, points)], 1),
+        "spring/set": np.zeros(count, "i4"), "spring/rest_length": np.zeros(count),
+        "spring/stiffness": stiffness, "spring/exponent": np.zeros(count, "i1"),
+        "spring/reference": np.ones(count), "spring_set": np.array([b"all"])}, rest
+
+
+@pytest.mark.parametrize("points, seed", [(11, 1), (11, 3), (41, 1), (41, 2)])
+@pytest.mark.parametrize("accuracy", [0.1, 1e-3])
+def test_the_estimate_holds_where_stiffnesses_lie_far_apart(run, tmp_path, points, seed, accuracy):
+    model, rest = chain(points, seed)
+    write_model(tmp_path / "chain.h5", model)
+    result = run("repose-solve", "chain.h5", "-volume", "none", "-accuracy", accuracy, "-output",
+                 "out")
+    step = last(tmp_path / "out.h5")
+    assert result.returncode == (0 if step["converged"] else 2)
+    error = np.linalg.norm(step["point/position"] - rest, axis=1).max()
+    assert error <= step["displacement_error"] + 1e-7, (error, step["displacement_error"])

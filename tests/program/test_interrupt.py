@@ -1,5 +1,6 @@
 """A run that is told to end keeps the state it has, says how far that is from rest, and can go on."""
 
+import os
 import re
 import signal
 import subprocess
@@ -13,20 +14,38 @@ from tissue import apart, last, steps
 SCENE = PROJECT / "meshes/head_jaw_opening.yaml"
 
 
-def interrupted(folder, environment, command, sent):
-    """Runs a solve and sends it a signal once it has written a first line for an iteration."""
-    process = subprocess.Popen(
-        [*command, programs() / "repose-solve", SCENE, "-monitor_mm", "-output", "early"], cwd=folder,
+def begin(folder, environment, *arguments, ranks=1):
+    """Starts a solve that prints a line for every iteration."""
+    command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    return subprocess.Popen(
+        [*command, programs() / "repose-solve", *map(str, arguments), "-monitor_mm"], cwd=folder,
         env=environment, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE)
-    lines = []
-    for line in process.stdout:
-        lines.append(line)
-        if "evaluations" in line and "iteration" in line:
-            process.send_signal(sent)
-            break
+
+
+def iterations(process, count):
+    """Reads until so many lines of iterations have come; returns what was read."""
+    lines, seen = [], 0
+    while seen < count:
+        lines.append(process.stdout.readline())
+        assert lines[-1], "the run ended before"
+        seen += "evaluations" in lines[-1] and "iteration" in lines[-1]
+    return "".join(lines)
+
+
+def interrupted(folder, environment, command, sent):
+    """Runs a solve and sends it a signal once it has written a first line for an iteration."""
+    process = begin(folder, environment, SCENE, "-output", "early", ranks=2 if command else 1)
+    text = iterations(process, 1)
+    process.send_signal(sent)
     rest, _ = process.communicate(timeout=60)
-    return process.returncode, "".join(lines) + rest
+    return process.returncode, text + rest
+
+
+def ranks_of(process):
+    """Process ids of what mpirun has started."""
+    children = f"/proc/{process.pid}/task/{process.pid}/children"
+    return [int(pid) for pid in open(children).read().split()]
 
 
 @pytest.mark.parametrize("command, sent", [([], signal.SIGINT), ([], signal.SIGTERM),
@@ -39,6 +58,57 @@ def test_a_signal_ends_the_run_and_keeps_its_state(run, environment, tmp_path, c
     assert step["converged"] == 0 and step["load"] < 1 and b"stopped" in step["reason"]
     assert run("repose-check", "early.h5").returncode == 0
     assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_batch_system_that_ends_the_ranks_is_heard(run, environment, tmp_path):
+    process = begin(tmp_path, environment, SCENE, "-output", "early", ranks=2)
+    iterations(process, 1)
+    assert len(ranks_of(process)) == 2
+    for rank in ranks_of(process):
+        os.kill(rank, signal.SIGTERM)
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode == 2 and "NOT CONVERGED" in text
+    assert run("repose-check", "early.h5").returncode == 0
+
+
+FORCES = "forces:\n  - {at: [47, -80, 8], radius: 8, force: [0, -3, 0]}\ntearing: {limit: 0.5}\n"
+BALL = ("instruments:\n  - {sphere: {center: [63, -98, -10], radius: 20}, push: [-9, 12, 0], "
+        "skin: slide}\n")
+
+
+def in_rounds(folder, rounds):
+    """A scene whose search goes in rounds."""
+    for file in (PROJECT / "meshes").glob("paper_*.ply"):
+        (folder / file.name).symlink_to(file)
+    head = (PROJECT / "meshes/paper_jaw_advance.yaml").read_text().partition("moves:")[0]
+    head = head.replace("{stiffness: 1.0,", "{modulus: 0.05,")
+    (folder / "rounds.yaml").write_text(head + rounds + "solve:\n  volume: {form: penalty}\n")
+    return folder / "rounds.yaml"
+
+
+@pytest.mark.parametrize("rounds, row, lines", [
+    (BALL, "sliding", 1), (BALL, "sliding", 60), (FORCES, "tearing", 1)],
+    ids=["sliding", "sliding later", "tearing"])
+def test_a_signal_ends_all_rounds(run, environment, tmp_path, rounds, row, lines):
+    process = begin(tmp_path, environment, in_rounds(tmp_path, rounds), "-output", "early",
+                    "-accuracy", 1e-9)
+    iterations(process, lines)
+    process.send_signal(signal.SIGTERM)
+    text, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (2, "") and "NOT CONVERGED" in text
+    assert re.search(rf"{row} +NOT SETTLED.*, STOPPED BY A SIGNAL OR THE TIME LIMIT", text)
+    end = last(tmp_path / "early.h5")
+    assert end["converged"] == 0 and re.search(b"stopped before|signal", end["reason"])
+    assert text.count("iteration") - text.count("iterations") < 5
+    assert run("repose-check", "early.h5").returncode == 0
+
+
+def test_a_time_limit_is_that_of_all_rounds(run, tmp_path):
+    scene = in_rounds(tmp_path, BALL)
+    result = run("repose-solve", scene, "-time_limit", 0, "-output", "early")
+    assert result.returncode == 2
+    assert re.search(r"sliding +NOT SETTLED, STOPPED .* in 1 rounds, inf mm to go", result.stdout)
+    assert last(tmp_path / "early.h5")["converged"] == 0
 
 
 def test_a_time_limit_does_the_same_and_the_run_can_go_on(run, solved, tmp_path):

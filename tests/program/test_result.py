@@ -1,13 +1,15 @@
 """Which files a run of repose-solve writes, what is in them, and how a run is taken up again."""
 
 import shutil
+import signal
+import subprocess
 
 import h5py
 import meshio
 import numpy as np
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, programs
 from tissue import apart, last, model_of, steps
 
 SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
@@ -119,6 +121,67 @@ def test_checkpoints_are_results(run, face, tmp_path):
     assert restarted.returncode == 0
     assert apart(last(tmp_path / "rest.h5"), last(face)) <= 2 * ACCURACY
     assert not list(tmp_path.glob("*.part"))
+
+
+def begin(folder, environment, *arguments):
+    """Starts a solve and waits for its first iteration."""
+    process = subprocess.Popen(
+        [programs() / "repose-solve", *map(str, arguments), "-monitor_mm"], cwd=folder,
+        env=environment, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE)
+    wait_for(process, "iteration    0")
+    return process
+
+
+def wait_for(process, words):
+    for line in process.stdout:
+        if words in line:
+            return
+    pytest.fail(f"the run ended before it said '{words}'")
+
+
+LONG = ["-load_steps", 1, "-tao_type", "cg", "-nested", "off", "-accuracy", 1e-9]
+
+
+def test_a_run_killed_in_a_long_step_goes_on_from_its_checkpoint(run, face, environment, tmp_path):
+    process = begin(tmp_path, environment, SCENE, *LONG, "-checkpoint_interval", 1e-9, "-output",
+                    "jaw")
+    wait_for(process, "load 1.0000  iteration   40")
+    process.kill()
+    process.communicate()
+    checkpoint = tmp_path / "jaw_checkpoint.h5"
+    assert [(step["load"], step["converged"]) for step in steps(checkpoint)] == [(0, 1), (1, 0)]
+    assert apart(*steps(checkpoint)) > 1, "the search is not lost"
+    assert run("repose-check", checkpoint).returncode == 0
+    restarted = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", checkpoint, "-output",
+                    "jaw")
+    assert (restarted.returncode, restarted.stderr) == (0, "")
+    assert apart(last(tmp_path / "jaw.h5"), last(face)) <= 2 * ACCURACY
+    assert not list(tmp_path.glob("jaw*.part")) + list(tmp_path.glob("*.lock"))
+
+
+def test_two_runs_of_one_name_do_not_meet(run, environment, tmp_path):
+    first = begin(tmp_path, environment, SCENE, *LONG, "-output", "jaw")
+    first.send_signal(signal.SIGSTOP)
+    for ranks in (1, 2):
+        second = run("repose-solve", PROJECT / "meshes/paper_jaw_opening.yaml", "-output", "jaw",
+                     ranks=ranks)
+        assert second.returncode == 1 and second.stderr.count("\n") == 1, second
+        assert f"jaw.h5: process {first.pid} on " in second.stderr and second.stdout == ""
+    other = run("repose-solve", SCENE, "-accuracy", 1, "-output", "other")
+    assert other.returncode == 0
+    first.terminate()
+    first.send_signal(signal.SIGCONT)
+    assert first.communicate()[1] == "" and first.returncode == 2
+    assert names(tmp_path) == sorted(files_of("jaw") + files_of("other"))
+    assert run("repose-check", "jaw.h5").returncode == 0
+
+
+def test_a_reader_that_goes_away_does_not_end_the_run(environment, tmp_path):
+    process = begin(tmp_path, environment, SCENE, "-accuracy", 1e-6, "-output", "jaw")
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait() == 0 and names(tmp_path) == files_of("jaw")
 
 
 @pytest.mark.parametrize("limit", [["-tao_max_it", 1, "-tao_type", "lmvm"],

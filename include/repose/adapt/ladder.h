@@ -34,7 +34,6 @@ struct Ladder {
   std::vector<Vec3> last_position;  ///< its rest position, mm, on rank 0
   solve::Settings last_settings;    ///< what it was solved with
   bool near_enough = false;         ///< the last one is within Climb::enough
-  bool stopped = false;             ///< by a signal or the time limit
   std::string refusal;              ///< why it ended before its last rung, or empty; on rank 0
 };
 

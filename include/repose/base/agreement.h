@@ -15,6 +15,9 @@ int size(MPI_Comm comm);
 void together(MPI_Comm comm, const std::function<void()>& work);
 void on_first_rank(MPI_Comm comm, const std::function<void()>& work);
 
+/// Gives rank 0's text to all ranks. Collective.
+void share(MPI_Comm comm, std::string& text);
+
 /// The part [begin, end) of n rows that a rank holds in natural order; sizes differ by at most one.
 struct Slab {
   int64_t begin, end;

@@ -31,6 +31,10 @@ class Comparison {
   std::string worst() const;
   /// One line a row: section, name, stored, recomputed, relative difference, verdict.
   std::string table() const;
+  /// One line for each name that was recomputed, of its worst row in any section, with the number
+  /// of entries that it stands for; one line for all ranges and one for all statements, and those
+  /// that do not hold.
+  std::string summary() const;
 
  private:
   struct Row {
@@ -42,6 +46,9 @@ class Comparison {
   static double relative(double stored, double recomputed, double scale);
   void add(Row row);
   static std::string line(const Row& row);
+  static std::string verdict(const Row& row);
+  std::vector<Row> by_name() const;
+  std::string others(Row::Kind kind, const std::string& what) const;
 
   double tolerance_;
   std::string section_;

@@ -5,9 +5,9 @@
 
 namespace repose::base {
 
-/// A person's wish that work should end and keep what it has: SIGINT, SIGTERM or SIGUSR1 to any
-/// rank (mpirun and batch systems pass the last one on to all), or a time limit. A second SIGINT or
-/// SIGTERM ends the program as usual.
+/// A person's wish that a run, all its searches, should end and keep what it has: SIGINT, SIGTERM
+/// or SIGUSR1 to any rank (mpirun and batch systems pass the last one on to all), or a time limit.
+/// A second SIGINT or SIGTERM ends the program as usual.
 class Interrupt {
  public:
   /// `limit` in s of wall-clock time from now; without `signals` the limit alone counts.

@@ -4,8 +4,19 @@
 
 namespace repose::base {
 
-/// Writes `bytes` to FILE.part and renames it to `file`, so that no half-written file is ever seen.
-/// Throws InputError naming the file and the reason. Not collective.
+/// Writes `bytes` to a part file and renames it to `file`, so that no half-written file is ever
+/// seen. Throws InputError naming the file and the reason. Not collective.
 void write_whole_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Makes an empty file beside `file` that no other process writes, FILE.<number>.part, and returns
+/// its path. Throws InputError where it cannot be made. Not collective.
+std::filesystem::path begin_part(const std::filesystem::path& file);
+
+/// The folder that a file is in.
+std::filesystem::path folder_of(const std::filesystem::path& file);
+
+/// Refuses, in one line, a path that cannot become a file: folder missing or not writable, a folder
+/// in its place.
+void require_writable(const std::filesystem::path& file);
 
 }  // namespace repose::base

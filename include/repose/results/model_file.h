@@ -26,6 +26,9 @@ struct StoredStep {
   std::vector<Vec3> bone_points;   ///< mm, of all bone surfaces in turn; empty: none, or not moved
 };
 
+/// Whether a file is a checkpoint of a run that went on.
+bool is_checkpoint(const std::filesystem::path& file);
+
 /// How many steps a file has; 0 for a model. InputError where /step/0000 … are not in sequence.
 int64_t step_count(const std::filesystem::path& file);
 /// Step number `step` (from 0) of a file with `model`; InputError as read_model.

@@ -9,16 +9,20 @@
 
 namespace repose::results {
 
-/// Writes NAME.h5 in parallel: to NAME.h5.part first, renamed by commit(). Destroyed without
-/// commit(), the .part file is removed: the result is complete or absent. All members are
+/// What a file is: where a run ended, or a state on its way, from which it can be gone on.
+enum class Kind { result, checkpoint };
+
+/// Writes NAME.h5 in parallel: to a part file of its own first, renamed by commit(). Destroyed
+/// without commit(), the part is removed: the result is complete or absent. All members are
 /// collective. A folder that is missing or not writable and a full disk are an InputError on all
 /// ranks. The file's bytes do not depend on the number of ranks, but for what tells of it: datasets
 /// are contiguous (chunks with parallel gzip took twelve times as long for 28 % less space).
 class ResultFile {
  public:
-  /// Opens NAME.h5.part (`name` is a path without the ending) and writes /model (`model` is looked
-  /// at on rank 0 only, and copied as far as it is needed later).
-  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model);
+  /// Opens the part of NAME.h5 (`name` is a path without the ending) and writes /model (`model` is
+  /// looked at on rank 0 only, and copied as far as it is needed later).
+  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+             Kind kind = Kind::result);
   ~ResultFile();
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
@@ -29,7 +33,7 @@ class ResultFile {
   void append(const model::StepNumbers& numbers, const model::StepRows& rows);
 
   /// Closes, fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
-  /// NAME_skin.xdmf and NAME_bones.xdmf (each .part, then renamed) for what the model has; one of
+  /// NAME_skin.xdmf and NAME_bones.xdmf (each a part, then renamed) for what the model has; one of
   /// an earlier run that would describe nothing is removed. Nothing may be appended afterwards.
   void commit();
 

@@ -45,7 +45,8 @@ class Minimiser : public RestSearch {
   void search(Vec displacement);
   /// Whether the search that ended after so many iterations is to be begun again where it ended.
   bool worth_going_on(int64_t iterations);
-  double strict_estimate(Vec displacement, Vec gradient);
+  /// `last`: the search is over, so the estimate is told.
+  double strict_estimate(Vec displacement, Vec gradient, bool last);
   /// Of the latest Newton step δ, from `displacement`, and the next: θ (TangentSolver), of which
   /// the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004, Newton
   /// Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic model

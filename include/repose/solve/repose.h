@@ -1,9 +1,9 @@
 #pragma once
 #include <functional>
-#include <limits>
 #include <optional>
 #include <string>
 
+#include "repose/base/interrupt.h"
 #include "repose/base/stages.h"
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
@@ -15,6 +15,12 @@ namespace repose::solve {
 /// or these where that pays.
 enum class Extent { whole, automatic, region };
 
+/// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
+using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
+
+/// Hands the state that a search is at to a receiver, as a step that has not converged. Collective.
+using Look = std::function<void(const Receiver&)>;
+
 /// What is asked of a run.
 struct Settings {
   mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
@@ -22,17 +28,16 @@ struct Settings {
   bool exact_volume = false;    ///< v = v_0, by multipliers
   std::string volume = "none";  ///< name of the volume term, for the result
   double lambda = 1;            ///< paper's weight, for the result
-  double time_limit = std::numeric_limits<double>::infinity();  ///< s, of the search
-  bool heeds_signals = false;        ///< SIGINT, SIGTERM, SIGUSR1 end the search as the limit does
-  bool monitor = false;              ///< print a line for every iteration
-  bool stability = false;            ///< the smallest eigenvalue where the run ends, …
-  bool initial_equilibrium = false;  ///< … and at its start, because the scene asks for one
-  Extent extent = Extent::whole;     ///< what is searched
+  base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
+  bool monitor = false;                  ///< print a line for every iteration
+  bool stability = false;                ///< the smallest eigenvalue where the run ends, …
+  bool initial_equilibrium = false;      ///< … and at its start, because the scene asks for one
+  Extent extent = Extent::whole;         ///< what is searched
+  /// Called at each iteration, on all ranks; with an empty look where a part of the tissue is
+  /// searched.
+  std::function<void(double load, const Look&)> under_way;
   PathSettings path;
 };
-
-/// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
-using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
 
 /// What a search in a part of the tissue left out.
 struct RegionSummary {

@@ -14,6 +14,7 @@ struct Iteration {
   double largest_force = 0;      ///< largest block of ∇Φ
   double millimetres_to_go = 0;  ///< estimated distance to the rest position
   int64_t evaluations = 0;       ///< of value and gradient so far
+  Vec displacement = nullptr;    ///< the state
 };
 
 /// How a search for the rest position at one load ended.

@@ -45,6 +45,12 @@ class TangentSolver {
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.
   double newton_distance(Vec displacement, Vec gradient);
 
+  /// newton_distance that holds wherever stiffnesses lie far apart: conjugate gradients bound the
+  /// error e of the step in the energy norm, in which soft points hardly count; no point is off by
+  /// more than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it.
+  /// Infinite where that is out of reach, or a random load meets negative curvature.
+  double sure_distance(Vec displacement, Vec gradient);
+
   /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
   /// yet.
   double glance(Vec gradient);
@@ -74,7 +80,12 @@ class TangentSolver {
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
   void choose_preconditioner();
   bool hopeless() const;
+  double largest_compliance(Vec displacement);
+  /// Takes the residual of the latest Newton step down by a factor; whether it could be.
+  bool improve(Vec displacement, Vec gradient, double factor);
   void renew_columns();
+
+  static constexpr double usual_ = 0.05;  // to which Newton steps are solved for
 
   Positions& positions_;
   Hessian& hessian_;
@@ -87,6 +98,9 @@ class TangentSolver {
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
   double distance_ = 0;              // its length, …
   int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
+  int64_t sure_at_ = -1;             // and at this many it is sure
+  double compliance_ = 0;            // mm/N, of the softest point, …
+  int64_t compliance_at_ = -1;       // … at this many renewals of the preconditioner
   bool finished_ = false;
   Wear wear_;
   int64_t renewals_ = 0;

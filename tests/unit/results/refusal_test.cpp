@@ -249,6 +249,12 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"SpringBeyondThePoints",
                [](const Spoiler& f) { f.set<int64_t>("/model/spring/points", 5, 12); },
                "/model/spring/points: row 2 is 12, expected 0 to 11"},
+        Defect{"SpringOfOnePoint",
+               [](const Spoiler& f) {
+                 f.set<int64_t>("/model/spring/points", 6, 5);
+                 f.set<int64_t>("/model/spring/points", 7, 5);
+               },
+               "/model/spring/points: row 3 is (5, 5), expected two different points"},
         Defect{"NegativeIndex",
                [](const Spoiler& f) { f.set<int64_t>("/model/prism/points", 6, -1); },
                "/model/prism/points: row 1 is -1, expected 0 to 11"},

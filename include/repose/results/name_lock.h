@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+
+namespace repose::results {
+
+/// The right to write results of one name, NAME.h5 and what goes with it: one run's at a time. It
+/// is an advisory lock (flock) on NAME.lock, so that it ends with its process however that ends:
+/// what a killed run left behind is no obstacle, and its unfinished files (NAME….part) are removed.
+/// Where the file system knows no locks, none is held. For one process; not copied or moved.
+class NameLock {
+ public:
+  /// `name` is a path without ending. InputError at once where another run holds it, naming that
+  /// run, and where the folder is missing or not writable.
+  explicit NameLock(const std::filesystem::path& name);
+  ~NameLock();  ///< removes NAME.lock
+  NameLock(const NameLock&) = delete;
+  NameLock& operator=(const NameLock&) = delete;
+
+ private:
+  bool take();
+  void remove_leftovers() const;
+
+  std::filesystem::path name_, file_;
+  int descriptor_ = -1;
+};
+
+}  // namespace repose::results

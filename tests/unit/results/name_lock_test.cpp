@@ -1,0 +1,45 @@
+#include "repose/results/name_lock.h"
+
+#include <fstream>
+
+#include "files.h"
+
+namespace repose::results {
+namespace {
+
+void make(const std::filesystem::path& file) { std::ofstream(file) << "x"; }
+
+TEST(NameLock, IsOneRunsAtATime) {
+  const Folder folder;
+  {
+    const NameLock first(folder.path("a"));
+    const std::string text = refusal([&] { NameLock(folder.path("a")); });
+    EXPECT_NE(text.find("a.h5: process " + std::to_string(getpid()) + " on "), std::string::npos);
+    EXPECT_NE(text.find("choose another -output"), std::string::npos) << text;
+    EXPECT_EQ(refusal([&] { NameLock(folder.path("b")); }), "accepted");
+    EXPECT_EQ(folder.content(), "a.lock");
+  }
+  EXPECT_EQ(folder.content(), "");
+  EXPECT_EQ(refusal([&] { NameLock(folder.path("a")); }), "accepted");
+}
+
+TEST(NameLock, WhatAKilledRunLeftGoesAndNothingElse) {
+  const Folder folder;
+  for (const std::string left : {"a.lock", "a.h5.77.part", "a_checkpoint.h5.77.part",
+                                 "a_skin.xdmf.78.part", "a_checkpoint_skin.xdmf.9.part"})
+    make(folder.path(left));
+  const std::string others = "a.h5 a.h5.x.part a_2.h5.77.part a_2_skin.xdmf.77.part ba.h5.77.part";
+  std::istringstream names(others);
+  for (std::string name; names >> name;) make(folder.path(name));
+  { const NameLock lock(folder.path("a")); }
+  EXPECT_EQ(folder.content(), others);
+}
+
+TEST(NameLock, AMissingFolderIsRefused) {
+  const Folder folder;
+  const std::string text = refusal([&] { NameLock(folder.path("none/a")); });
+  EXPECT_NE(text.find("none/a.h5: cannot be written: there is no folder"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace repose::results
