@@ -1,5 +1,5 @@
-"""The neo-Hookean solid in numpy and scipy, from the formulas alone: it judges the programs and shares
-nothing with them. Per prism of reference volume V, with F the deformation gradient of the wedge's
+"""The neo-Hookean solid in numpy and scipy, from the formulas alone: it judges the programs and
+shares nothing with them. Per prism of reference volume V, with F the deformation gradient of the wedge's
 shape functions N_i, J its determinant averaged over the prism, mu and kappa in N/mm²:
 
     W = mu/2 (|F|² - 3) - mu (J - 1) + kappa/2 (J - 1)²
@@ -20,7 +20,7 @@ WEIGHT = 1 / 6  # of each of the 3 × 2 Gauss points
 
 
 def slopes_at(r, s, z):
-    """Derivatives of the six shape functions by (r, s, z), [6, 3]; a0 a1 a2 at z = -1, b0 b1 b2 at 1."""
+    """Derivatives of the six shape functions by (r, s, z), [6, 3]; a's at z = -1, b's at 1."""
     area, by_area = np.array([1 - r - s, r, s]), np.array([[-1, -1], [1, 0], [0, 1]])
     low, high = (1 - z) / 2, (1 + z) / 2
     return np.vstack([np.column_stack([by_area * low, -area / 2]),
@@ -88,8 +88,8 @@ def edges_of(laplacians, prisms, mu):
 
 
 def with_material(model, young, poisson):
-    """A model (as tissue.model_of gives it) of springs or none, with the datasets of a solid of these
-    moduli (numbers or one a prism), and without springs."""
+    """A model (as tissue.model_of gives it) of springs or none, with the datasets of a solid of
+    these moduli (numbers or one a prism), and without springs."""
     x, prisms = model["point/position"], model["prism/points"]
     mu, kappa = (np.broadcast_to(value, len(prisms)).astype(float)
                  for value in moduli(np.asarray(young), np.asarray(poisson)))
@@ -187,9 +187,9 @@ def rest_position(solid, fixed_at=None, tolerance=1e-9, loads=4, force=None, fac
     for part in range(loads):
         motion, push = goal / loads, force * (part + 1) / loads
         hessian = solid.hessian(x)
-        slope = (hessian @ motion.ravel() + (solid.value_and_gradient(x)[1] - push).ravel())[unknown]
+        slope = (solid.value_and_gradient(x)[1] - push).ravel() + hessian @ motion.ravel()
         x += motion
-        x[soft] -= factorise(hessian[unknown][:, unknown])(slope).reshape(-1, 3)
+        x[soft] -= factorise(hessian[unknown][:, unknown])(slope[unknown]).reshape(-1, 3)
         enough = tolerance if part == loads - 1 else 0.1
         for iteration in range(100):
             x, length = newton_step(solid, x, unknown, push, factorise)

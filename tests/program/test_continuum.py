@@ -89,7 +89,7 @@ def test_patch(change):
 
 @pytest.mark.parametrize("stretch", [0.6, 0.99, 1.7])
 def test_uniaxial_stretch(stretch):
-    """The sides of the stretched block are free of forces; its ends are pulled as the formula says."""
+    """The stretched block's sides are free of forces; its ends are pulled as the formula says."""
     def lateral_stress(across):
         det = stretch * across**2
         return MU * across - MU * stretch * across + KAPPA * (det - 1) * stretch * across
