@@ -141,6 +141,7 @@ struct Job {
   scene::Solve wanted;                        // on all ranks
   std::optional<model::Anatomy> anatomy;      // of a scene, on rank 0
   std::optional<solve::Recording> recording;  // of an initial equilibrium, on all ranks
+  bool solid = false;                         // the tissue is a solid, on all ranks
   bool initial_equilibrium = false;           // it holds before the bones move, on all ranks
   std::string building;                       // what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;     // points of each instrument, on rank 0
@@ -191,6 +192,8 @@ Job read_job(const std::filesystem::path& input) {
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
+  job.solid = model::is_solid(job.model);
+  MPI_Bcast(&job.solid, 1, MPI_C_BOOL, 0, comm);
   bring_into_equilibrium(scene, job);
   make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
@@ -232,7 +235,17 @@ void override_by(const base::Options& options, scene::Solve& wanted) {
         options.text("load_steps") == "auto" ? 0 : static_cast<int>(options.integer("load_steps"));
 }
 
-solve::Settings settings_of(const scene::Solve& wanted) {
+/// A solid's energy is its material's: nothing of how springs are minimised applies to it.
+void require_energy(const scene::Solve& wanted) {
+  if (wanted.functional == scene::Functional::force)
+    base::refuse("functional force is of tissue.springs, and the tissue is a solid; choose energy");
+  if (wanted.volume)
+    base::refuse(
+        "solve.volume is of tissue.springs, and the tissue is a solid, whose Poisson's ratio says "
+        "how it keeps its volume (tissue.material.poisson); remove it");
+}
+
+solve::Settings settings_of(const scene::Solve& wanted, bool solid) {
   using scene::VolumeForm;
   solve::Settings settings;
   settings.force = wanted.functional == scene::Functional::force;
@@ -246,6 +259,12 @@ solve::Settings settings_of(const scene::Solve& wanted) {
         settings.volume);
   settings.path.accuracy = wanted.accuracy;
   settings.path.load_steps = wanted.load_steps;
+  if (solid) {
+    require_energy(wanted);
+    settings.volume = "material";
+    settings.weights = {1, mechanics::VolumeTerm::penalty, 1};
+    return settings;
+  }
   settings.exact_volume = form == VolumeForm::exact;
   if (form == VolumeForm::penalty || form == VolumeForm::exact)
     settings.weights = {1, mechanics::VolumeTerm::penalty, *wanted.bulk_modulus};
@@ -383,7 +402,8 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
     return {};
   }
   const auto columns = static_cast<int64_t>(job.anatomy->skin.points.size());
-  if (!wish.insisted && !wish.preview && !adapt::guides_pay(*job.anatomy, job.model)) return {};
+  const bool leads = !job.solid && adapt::guides_pay(*job.anatomy, job.model);
+  if (!wish.insisted && !wish.preview && !leads) return {};
   if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);
   if (wish.preview) return adapt::compared_rungs(*job.anatomy, preview_columns);
   std::vector<adapt::Resolution> rungs = adapt::guiding_rungs(*job.anatomy);
@@ -435,7 +455,7 @@ base::Exit run(const base::Options& options) {
   const std::filesystem::path input = options.arguments()[0];
   Job job = read_job(input);
   override_by(options, job.wanted);
-  solve::Settings settings = settings_of(job.wanted);
+  solve::Settings settings = settings_of(job.wanted, job.solid);
   settings.stability = options.flag("stability");
   settings.heeds_signals = true;
   settings.monitor = options.flag("monitor_mm");

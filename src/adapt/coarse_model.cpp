@@ -77,7 +77,7 @@ bool layers_are_free(const scene::Tissue& tissue) {
     return std::any_of(rule.first.begin(), rule.first.end(),
                        [](unsigned char c) { return std::isdigit(c); });
   };
-  return tissue.depths.empty() && tissue.mass.empty() &&
+  return tissue.depths.empty() && tissue.depths_mm.empty() && tissue.mass.empty() &&
          std::none_of(tissue.springs.begin(), tissue.springs.end(), names_a_layer);
 }
 
@@ -87,10 +87,11 @@ model::BuiltModel coarse_model(const model::Anatomy& anatomy, const Model& fine,
   const int layers = resolution.layers > 0 ? resolution.layers : scene.tissue.layers;
   const bool same_layers = layers == scene.tissue.layers;
   scene.tissue.layers = layers;
-  scene.tissue.springs = {
-      {"default", {.stiffness = {}, .modulus = 1.0, .law = {}, .reference = 0.0}}};
   const surface::Surface skin =
       resolution.edge > 0 ? surface::remesh(anatomy.skin, resolution.edge) : anatomy.skin;
+  if (scene.tissue.material) return model::build_model(scene, skin, anatomy.bones);
+  scene.tissue.springs = {
+      {"default", {.stiffness = {}, .modulus = 1.0, .law = {}, .reference = 0.0}}};
   model::BuiltModel built = model::build_model(scene, skin, anatomy.bones);
   give_material(materials(anatomy.skin, fine, same_layers), same_layers, built.model);
   return built;

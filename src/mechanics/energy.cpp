@@ -1,9 +1,11 @@
 #include "repose/mechanics/energy.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "repose/mechanics/hessian.h"
+#include "repose/model/material.h"
 #include "run_kernels.h"
 
 namespace repose::mechanics {
@@ -52,7 +54,12 @@ SpringsInRuns in_runs(const SpringLoop& loop, const Section<SpringRun>& section)
 
 PrismsInRuns in_runs(const PrismLoop& loop, const Section<PrismRun>& section) {
   return {section.in_runs.runs.data(), static_cast<int64_t>(section.in_runs.runs.size()),
-          loop.rest_volume.data() + section.begin, loop.target_volume.data() + section.begin};
+          loop.compliance.data() + section.begin, loop.target_volume.data() + section.begin};
+}
+
+EdgesInRuns in_runs(const EdgeLoop& loop, const Section<SpringRun>& section) {
+  return {section.in_runs.runs.data(), static_cast<int64_t>(section.in_runs.runs.size()),
+          loop.weight.data() + section.begin};
 }
 
 /// The numbers of the vectors, three a vector.
@@ -103,13 +110,27 @@ void spring_action(const SpringLoop& loop, int64_t begin, int64_t end,
   }
 }
 
+double edge_gradient(const EdgeLoop& loop, int64_t begin, int64_t end,
+                     std::span<const Vec3> position, double scale, std::span<Vec3> gradient) {
+  double energy = 0;
+  for (int64_t e = begin; e < end; ++e) {
+    const auto [i, j] = loop.points[e];
+    const Vec3 d = position[j] - position[i];
+    const Vec3 force = scale * loop.weight[e] * d;
+    gradient[i] -= force;
+    gradient[j] += force;
+    energy += 0.5 * loop.weight[e] * d.squaredNorm();
+  }
+  return energy;
+}
+
 /// The prisms e and e + 1 of a range that ends at `end`: two, or the last one twice.
 class TwoPrisms {
  public:
   TwoPrisms(const PrismLoop& loop, int64_t e, int64_t end) : count_(e + 1 < end ? 2 : 1) {
     const int64_t second = e + count_ - 1;
     corner_ = {&loop.points[e], &loop.points[second]};
-    rest_volume = Pair{loop.rest_volume[e], loop.rest_volume[second]};
+    compliance = Pair{loop.compliance[e], loop.compliance[second]};
     target_volume = Pair{loop.target_volume[e], loop.target_volume[second]};
   }
   PrismTriples<Pair> gather(std::span<const Vec3> values) const {
@@ -131,7 +152,7 @@ class TwoPrisms {
   }
   double sum(Pair values) const { return count_ == 2 ? values[0] + values[1] : values[0]; }
 
-  Pair rest_volume, target_volume;
+  Pair compliance, target_volume;
 
  private:
   int count_;
@@ -140,9 +161,9 @@ class TwoPrisms {
 
 /// k of the volume term ½ k (v − v_0)², of one prism or of two.
 template <class S>
-S volume_stiffness(const Weights& weights, const S& rest_volume) {
+S volume_stiffness(const Weights& weights, const S& compliance) {
   if (weights.volume == VolumeTerm::paper) return S{} + 2 * weights.volume_weight;
-  return weights.volume_weight / rest_volume;
+  return weights.volume_weight / compliance;
 }
 
 double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
@@ -152,7 +173,7 @@ double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
   for (int64_t e = begin; e < end; e += 2) {
     const TwoPrisms prisms(loop, e, end);
     const PrismSlope<Pair> v(PrismEdges<Pair>(prisms.gather(position)));
-    const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
+    const Pair stiffness = volume_stiffness(weights, prisms.compliance);
     const Pair change = v.volume - prisms.target_volume, slope = stiffness * change;
     PrismTriples<Pair> force;
     for (int c = 0; c < 6; ++c) force[c] = slope * v.gradient[c];
@@ -171,7 +192,7 @@ void prism_action(const PrismLoop& loop, int64_t begin, int64_t end, std::span<c
     const PrismTriples<Pair> moves = prisms.gather(direction);
     const PrismSlope<Pair> v(edges);
     const PrismTriples<Pair> turned = prism_slope_change(edges, PrismEdges<Pair>(moves));
-    const Pair stiffness = volume_stiffness(weights, prisms.rest_volume);
+    const Pair stiffness = volume_stiffness(weights, prisms.compliance);
     const Pair slope = stiffness * (v.volume - prisms.target_volume);
     Pair change{};
     for (int c = 0; c < 6; ++c) change += v.gradient[c].dot(moves[c]);
@@ -210,9 +231,25 @@ double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> positio
   });
 }
 
-VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume,
+double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, double scale,
+                         std::span<Vec3> gradient, Kernels kernels) {
+  const auto add = [&](const Section<SpringRun>& section) {
+    const int64_t singles = section.singles(kernels);
+    double energy = 0;
+    if (singles > section.begin)
+      energy = run_kernels(kernels)->edge_gradient(in_runs(loop, section), numbers(position), scale,
+                                                   numbers(gradient)) /
+               scale;
+    return energy + edge_gradient(loop, singles, section.end, position, scale, gradient);
+  };
+  const double energy = add(counted(loop));
+  add(others(loop));
+  return energy;
+}
+
+VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
                      double target_volume) {
-  const double stiffness = volume_stiffness(weights, rest_volume), change = volume - target_volume;
+  const double stiffness = volume_stiffness(weights, compliance), change = volume - target_volume;
   return {0.5 * stiffness * change * change, stiffness * change, stiffness};
 }
 
@@ -263,19 +300,35 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
   for (const SpringLoop& loop : loops.springs)
     for (const auto& section : {counted(loop), others(loop)})
       add_spring_action(loop, section, position, weights.elastic, direction, product, kernels);
+  if (loops.edges.size() > 0)
+    add_edge_gradient(loops.edges, direction, weights.elastic, product, kernels);
   if (weights.volume == VolumeTerm::none) return;
   for (const auto& section : {counted(loops.prisms), others(loops.prisms)})
     add_prism_action(loops.prisms, section, position, weights, direction, product, kernels);
 }
 
-PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
-                         double target_volume, const Weights& weights, Curvature curvature) {
+std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,
+                                        std::span<const Vec3> position) {
+  std::vector<double> slopes(loop.size(), 0.0);
+  for (size_t e = 0; e < loop.shear_modulus.size(); ++e) {
+    const auto row = static_cast<int64_t>(e);
+    const Mat3 f = model::deformation_gradient(corners_of(loop, row, initial),
+                                               corners_of(loop, row, position));
+    Eigen::SelfAdjointEigenSolver<Mat3> squares;
+    squares.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
+    slopes[e] = loop.shear_modulus[e] / std::sqrt(squares.eigenvalues()[2]);
+  }
+  return slopes;
+}
+
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double compliance,
+                         double target_volume, const Weights& weights, double most_slope) {
   PrismTriples<double> x;
   for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
   const PrismEdges<double> edges(x);
   const PrismSlope<double> v(edges);
-  const VolumeLaw law = volume_law(weights, v.volume, rest_volume, target_volume);
-  const double turning = curvature == Curvature::exact ? law.slope : 0.0;
+  const VolumeLaw law = volume_law(weights, v.volume, compliance, target_volume);
+  const double turning = std::clamp(law.slope, -most_slope, most_slope);
   const auto skew = prism_volume_hessian(edges);
   PrismBlocks blocks;
   for (int i = 0; i < 6; ++i)
@@ -297,8 +350,14 @@ Totals totals(const Loops& loops, std::span<const Vec3> position) {
         sum.spring_energy += spring_energy<p>(s, loop.stiffness[e], loop.inverse_reference[e]);
       }
     });
+  for (int64_t e = 0; e < loops.edges.counted; ++e) {
+    const auto [i, j] = loops.edges.points[e];
+    sum.solid_energy += 0.5 * loops.edges.weight[e] * (position[j] - position[i]).squaredNorm();
+  }
   for (int64_t e = 0; e < loops.prisms.counted; ++e) {
     const double v = prism_volume(corners_of(loops.prisms, e, position).data());
+    const double beyond = v - loops.prisms.target_volume[e];
+    if (loops.solid()) sum.solid_energy += 0.5 * beyond * beyond / loops.prisms.compliance[e];
     const double v0 = loops.prisms.rest_volume[e], change = v - v0;
     sum.volume_squares += change * change;
     sum.penalty_unit += 0.5 * change * change / v0;

@@ -211,11 +211,11 @@ class SpringBatch {
 template <int runs>
 struct PrismLanes {
   Firsts<runs> top[3];
-  Lanes<runs> rest_volume, target_volume;
+  Lanes<runs> compliance, target_volume;
   Active<runs> active;
 
   PrismLanes(const PrismsInRuns& prisms, const Step<runs, PrismRun>& step)
-      : rest_volume(step.numbers(prisms.rest_volume)),
+      : compliance(step.numbers(prisms.compliance)),
         target_volume(step.numbers(prisms.target_volume)),
         active(step.active()) {
     for (int c = 0; c < 3; ++c)
@@ -241,9 +241,23 @@ struct PrismLanes {
   /// k of the volume term ½ k (v − t)².
   Lanes<runs> stiffness(const Weights& weights) const {
     if (weights.volume == VolumeTerm::paper) return 2 * weights.volume_weight;
-    return weights.volume_weight / rest_volume;
+    return weights.volume_weight / compliance;
   }
 };
+
+/// ½ Σ w |d|² of the runs' edges, lane by lane; their forces go to `gradient`.
+template <int runs>
+Lanes<runs> add_edge_force(const Step<runs, SpringRun>& step, const double* weight,
+                           const double* position, double scale, double* gradient) {
+  Firsts<runs> first, second;
+  for (int k = 0; k < runs; ++k) first[k] = step.run[k].first, second[k] = step.run[k].second;
+  const Rows<runs> d = gather<runs>(position, second) - gather<runs>(position, first);
+  const Rows<runs> force = spread(step.active().only(scale * step.numbers(weight))) * d;
+  scatter<runs>({-force.a, -force.b, -force.c}, first, gradient);
+  scatter<runs>(force, second, gradient);
+  const Rows<runs> energy = force * d;
+  return 0.5 * (energy.a + energy.b + energy.c);
+}
 
 template <int runs>
 Lanes<runs> add_prism_force(const PrismLanes<runs>& prism, const double* position,
@@ -358,6 +372,19 @@ struct LaneKernels {
       });
     });
   }
+  [[gnu::flatten]] static double edge_gradient(const EdgesInRuns& edges, const double* position,
+                                               double scale, double* gradient) {
+    Lanes<widest> energy = 0;
+    double rest = 0;
+    for_each_step<widest>(edges.run, edges.runs, [&]<int n>(const Step<n, SpringRun>& step) {
+      const auto here = add_edge_force<n>(step, edges.weight, position, scale, gradient);
+      if constexpr (n == widest)
+        energy = energy + here;
+      else
+        rest += here.sum();
+    });
+    return energy.sum() + rest;
+  }
   [[gnu::flatten]] static double prism_gradient(const PrismsInRuns& prisms, const double* position,
                                                 const Weights& weights, double* gradient) {
     Lanes<widest> value = 0;
@@ -378,8 +405,8 @@ struct LaneKernels {
       add_prism_action(PrismLanes<n>(prisms, step), position, weights, direction, product);
     });
   }
-  static constexpr RunKernels table = {spring_gradient, spring_action, prism_gradient,
-                                       prism_action};
+  static constexpr RunKernels table = {spring_gradient, spring_action, edge_gradient,
+                                       prism_gradient, prism_action};
 };
 
 }  // namespace

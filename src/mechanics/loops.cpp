@@ -86,6 +86,31 @@ SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owne
   return loop;
 }
 
+EdgeLoop make_edge_loop(const model::Model& part, int64_t owned) {
+  EdgeLoop loop;
+  const model::Edges& edges = part.edges;
+  const Chosen chosen = choose(part, edges.points, owned, [](int64_t) { return true; });
+  const auto points = static_cast<int64_t>(part.points.position.size());
+  const size_t size = chosen.counted.size() + chosen.others.size();
+  loop.points.reserve(size);
+  loop.weight.reserve(size);
+  const auto add = [&](int64_t row) { loop.weight.push_back(edges.weight[row]); };
+  loop.counted = static_cast<int64_t>(chosen.counted.size());
+  loop.counted_runs = append<SpringRun>(edges.points, chosen.counted, points, loop, add);
+  loop.other_runs = append<SpringRun>(edges.points, chosen.others, points, loop, add);
+  return loop;
+}
+
+/// The material of a solid's prisms, in the order of the loop.
+void add_material(const model::Prisms& prisms, PrismLoop& loop) {
+  for (size_t e = 0; e < loop.row.size(); ++e) {
+    const int64_t row = loop.row[e];
+    loop.compliance[e] /= prisms.modulus[row];
+    loop.target_volume[e] = prisms.target_volume[row];
+    loop.shear_modulus.push_back(prisms.shear_modulus[row]);
+  }
+}
+
 PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
   PrismLoop loop;
   const model::Prisms& prisms = part.prisms;
@@ -103,17 +128,21 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
   loop.counted_runs = append<PrismRun>(prisms.points, chosen.counted, points, loop, add);
   loop.other_runs = append<PrismRun>(prisms.points, chosen.others, points, loop, add);
   loop.target_volume = loop.rest_volume;
+  loop.compliance = loop.rest_volume;
+  if (model::is_solid(part)) add_material(prisms, loop);
   return loop;
 }
 
 }  // namespace
 
-Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms) {
+Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
+                 int64_t owned_edges) {
   Loops loops;
   for (int exponent = 0; exponent <= 2; ++exponent) {
     SpringLoop loop = make_spring_loop(part, exponent, owned_springs);
     if (loop.size() > 0) loops.springs.push_back(std::move(loop));
   }
+  loops.edges = make_edge_loop(part, owned_edges);
   loops.prisms = make_prism_loop(part, owned_prisms);
   return loops;
 }

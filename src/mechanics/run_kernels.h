@@ -12,11 +12,18 @@ struct SpringsInRuns {
   const double *stiffness, *rest_length, *inverse_reference;
 };
 
+/// The edges in runs; arrays begin at the first of them.
+struct EdgesInRuns {
+  const SpringRun* run;
+  int64_t runs;
+  const double* weight;
+};
+
 /// The prisms in runs; arrays begin at the first of them.
 struct PrismsInRuns {
   const PrismRun* run;
   int64_t runs;
-  const double *rest_volume, *target_volume;
+  const double *compliance, *target_volume;
 };
 
 /// Kernels as in energy.h; positions, gradients, directions and products are [3 P] numbers.
@@ -25,6 +32,8 @@ struct RunKernels {
                             double* gradient);
   void (*spring_action)(const SpringsInRuns& springs, const double* position, double scale,
                         const double* direction, double* product);
+  double (*edge_gradient)(const EdgesInRuns& edges, const double* position, double scale,
+                          double* gradient);
   double (*prism_gradient)(const PrismsInRuns& prisms, const double* position,
                            const Weights& weights, double* gradient);
   void (*prism_action)(const PrismsInRuns& prisms, const double* position, const Weights& weights,

@@ -10,6 +10,7 @@
 #include "repose/model/layers.h"
 #include "repose/model/load_entry.h"
 #include "repose/model/loads.h"
+#include "repose/model/material.h"
 #include "repose/model/orientation.h"
 #include "repose/model/point_sets.h"
 #include "repose/model/release.h"
@@ -60,7 +61,10 @@ void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
 /// Everything of the model but its geometry and point sets.
 void complete(const scene::Scene& scene, const SkinMesh& mesh,
               const std::vector<surface::Surface>& bones, Model& model) {
-  set_stiffness(scene.tissue, mesh, model);
+  if (scene.tissue.material)
+    set_material(*scene.tissue.material, scene.file.string(), model);
+  else
+    set_stiffness(scene.tissue, mesh, model);
   set_masses(scene.tissue, mesh, model);
   spread_forces(scene, mesh, model);
   model.gravity = scene.gravity.value_or(Vec3::Zero());
@@ -125,7 +129,8 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
   release_near_rim(columns.deep, rim, scene.moves, scene.tissue.release, attachment);
 
-  built.model = make_layers(mesh, columns.deep, depths);
+  built.model = make_layers(mesh, columns.deep, depths, scene.tissue.depths_mm,
+                            scene.tissue.material ? Elements::solid : Elements::springs);
   set_points(rim, attachment, scene.moves, built.model);
   built.held = hold_by_instruments(scene, built.model);
   require_free_cuts(scene, built.cuts, built.model);

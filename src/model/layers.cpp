@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "repose/base/error.h"
 #include "repose/model/prism_geometry.h"
 
@@ -10,18 +12,41 @@ namespace {
 
 constexpr int fewest = 2, most = 64;
 
+/// Fractions of a column's thickness: those of `depths_mm`, but nowhere deeper than even ones, then
+/// even ones to the end.
+std::vector<double> fractions_of(const std::vector<double>& depths_mm, double thickness,
+                                 size_t layers) {
+  std::vector<double> fractions;
+  const auto even = [&](size_t a) {
+    return static_cast<double>(a) / static_cast<double>(layers - 1);
+  };
+  for (size_t a = 0; a < std::min(depths_mm.size(), layers - 1); ++a)
+    fractions.push_back(std::min(depths_mm[a] / thickness, even(a)));
+  const size_t given = fractions.size();
+  const double last = fractions.back();
+  for (size_t a = given; a < layers; ++a)
+    fractions.push_back(last + (1 - last) * static_cast<double>(a - given + 1) /
+                                   static_cast<double>(layers - given));
+  return fractions;
+}
+
 void add_points(const SkinMesh& mesh, const std::vector<Vec3>& deep,
-                const std::vector<double>& depths, Points& points) {
-  const size_t rows = deep.size() * depths.size();
+                const std::vector<double>& even_depths, const std::vector<double>& depths_mm,
+                Points& points) {
+  const size_t rows = deep.size() * even_depths.size();
   points.position.reserve(rows);
   points.layer.reserve(rows);
   points.column.reserve(rows);
-  for (size_t c = 0; c < deep.size(); ++c)
+  for (size_t c = 0; c < deep.size(); ++c) {
+    const double thickness = (deep[c] - mesh.points[c]).norm();
+    const std::vector<double>& depths =
+        depths_mm.empty() ? even_depths : fractions_of(depths_mm, thickness, even_depths.size());
     for (size_t a = 0; a < depths.size(); ++a) {
       points.position.push_back((1 - depths[a]) * mesh.points[c] + depths[a] * deep[c]);
       points.layer.push_back(static_cast<int32_t>(a));
       points.column.push_back(static_cast<int64_t>(c));
     }
+  }
   points.set.assign(rows, PointSet::soft_tissue);
   points.target = points.position;
   points.bone.assign(rows, -1);
@@ -114,11 +139,12 @@ std::vector<double> layer_depths(const scene::Tissue& tissue) {
 }
 
 Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,
-                  const std::vector<double>& depths) {
+                  const std::vector<double>& depths, const std::vector<double>& depths_mm,
+                  Elements elements) {
   Model model;
   const auto layers = static_cast<int64_t>(depths.size());
-  add_points(mesh, deep, depths, model.points);
-  add_springs(mesh, layers, model);
+  add_points(mesh, deep, depths, depths_mm, model.points);
+  if (elements == Elements::springs) add_springs(mesh, layers, model);
   add_prisms(mesh, layers, model);
   for (const Triangle& t : mesh.triangles)
     model.skin.push_back({t[0] * layers, t[1] * layers, t[2] * layers});

@@ -94,6 +94,10 @@ void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, Model& mod
 
 double effective_modulus(const Model& model) {
   double stiffness = 0, volume = 0;
+  for (size_t m = 0; m < model.prisms.modulus.size(); ++m) {
+    const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
+    stiffness += model.prisms.rest_volume[m] * shear * (3 * lame + 2 * shear) / (lame + shear);
+  }
   for (size_t j = 0; j < model.springs.points.size(); ++j) {
     const auto [p, q] = model.springs.points[j];
     stiffness += model.springs.stiffness[j] *

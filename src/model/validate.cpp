@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "repose/base/error.h"
+#include "repose/base/pick.h"
 #include "repose/model/model.h"
 #include "repose/model/prism_geometry.h"
 #include "repose/scene/rigid_motion.h"
@@ -25,6 +26,11 @@ class Array {
       if (!values[i].allFinite())
         refuse("{}: /model/{}: row {} is ({}, {}, {}), expected finite numbers", file_, name_, i,
                values[i][0], values[i][1], values[i][2]);
+  }
+  void is_finite(const std::vector<double>& values) const {
+    for (size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i]))
+        refuse("{}: /model/{}: row {} is {}, expected a finite number", file_, name_, i, values[i]);
   }
   void is_not_negative(const std::vector<double>& values, const char* unit) const {
     for (size_t i = 0; i < values.size(); ++i)
@@ -123,6 +129,25 @@ void refuse_wrong_volume(const Model& m, const std::string& file) {
   }
 }
 
+/// A solid's material and edges, all of them or none.
+void validate_solid(const Model& m, const std::string& file) {
+  const Prisms& p = m.prisms;
+  if (!is_solid(m) && m.edges.points.empty()) return;
+  const size_t n = p.points.size();
+  Array(file, "prism/modulus").has_rows(p.modulus.size(), n);
+  Array(file, "prism/shear_modulus").has_rows(p.shear_modulus.size(), n);
+  Array(file, "prism/target_volume").has_rows(p.target_volume.size(), n);
+  Array(file, "prism/modulus").is_positive(p.modulus, "N/mm²", "κ is Lamé's λ + μ");
+  Array(file, "prism/shear_modulus").is_positive(p.shear_modulus, "N/mm²", "it is Lamé's μ");
+  Array(file, "prism/target_volume").is_finite(p.target_volume);
+  Array(file, "edge/weight").has_rows(m.edges.weight.size(), m.edges.points.size());
+  Array(file, "edge/points").all_index(m.edges.points, m.points.position.size());
+  Array(file, "edge/weight").is_finite(m.edges.weight);
+  if (!m.springs.points.empty())
+    refuse("{}: /model/spring: has {} rows beside /model/edge; a model is of springs or a solid",
+           file, m.springs.points.size());
+}
+
 void validate_prisms(const Model& m, const std::string& file) {
   const Prisms& p = m.prisms;
   Array(file, "prism/rest_volume").has_rows(p.rest_volume.size(), p.points.size());
@@ -154,15 +179,26 @@ void refuse_unattached(const Model& m, const std::string& file) {
   std::vector<bool> held(m.points.position.size(), false);
   for (const auto& ends : m.springs.points)
     for (const int64_t end : ends) held[end] = true;
+  for (const auto& ends : m.edges.points)
+    for (const int64_t end : ends) held[end] = true;
   for (size_t i = 0; i < held.size(); ++i)
     if (!held[i] && m.points.set[i] == PointSet::soft_tissue)
       refuse(
-          "{}: /model/point: row {} is soft tissue and no spring holds it; remove it, join it with "
-          "a spring or make it a boundary point (set 1)",
+          "{}: /model/point: row {} is soft tissue and no spring or edge holds it; remove it, join "
+          "it "
+          "with one or make it a boundary point (set 1)",
           file, i);
 }
 
 }  // namespace
+
+Prisms pick_prisms(const Prisms& p, const std::vector<int64_t>& rows) {
+  const auto of_solid = [&](const std::vector<double>& values) {
+    return values.empty() ? values : base::pick(values, rows);
+  };
+  return {base::pick(p.points, rows), base::pick(p.rest_volume, rows), of_solid(p.shear_modulus),
+          of_solid(p.modulus), of_solid(p.target_volume)};
+}
 
 Counts count(const Model& model) {
   Counts c;
@@ -175,6 +211,7 @@ Counts count(const Model& model) {
   }
   c.springs = static_cast<int64_t>(model.springs.points.size());
   c.prisms = static_cast<int64_t>(model.prisms.points.size());
+  c.edges = static_cast<int64_t>(model.edges.points.size());
   return c;
 }
 
@@ -184,6 +221,7 @@ void validate(const Model& model, const std::string& file) {
   validate_points(model.points, static_cast<int64_t>(model.bones.size()), file);
   validate_springs(model.springs, points, model.spring_sets.size(), file);
   validate_prisms(model, file);
+  validate_solid(model, file);
   Array(file, "skin/points").all_index(model.skin, points);
   validate_bones(model, file);
   refuse_unattached(model, file);

@@ -37,6 +37,7 @@ model::Points read_points(const Reader& in) {
 
 model::Springs read_springs(const Reader& in) {
   model::Springs springs;
+  if (!in.has("/model/spring")) return springs;
   springs.points = in.tuples<2>("/model/spring/points", Shape::any);
   const auto s = static_cast<int64_t>(springs.points.size());
   springs.set = in.integers<int32_t>("/model/spring/set", s);
@@ -53,7 +54,19 @@ model::Prisms read_prisms(const Reader& in) {
   prisms.points = in.tuples<6>("/model/prism/points", Shape::any);
   const auto m = static_cast<int64_t>(prisms.points.size());
   prisms.rest_volume = in.numbers("/model/prism/rest_volume", {m, {}});
+  if (!in.has("/model/edge")) return prisms;
+  prisms.shear_modulus = in.numbers("/model/prism/shear_modulus", {m, {}});
+  prisms.modulus = in.numbers("/model/prism/modulus", {m, {}});
+  prisms.target_volume = in.numbers("/model/prism/target_volume", {m, {}});
   return prisms;
+}
+
+model::Edges read_edges(const Reader& in) {
+  model::Edges edges;
+  if (!in.has("/model/edge")) return edges;
+  edges.points = in.tuples<2>("/model/edge/points", Shape::any);
+  edges.weight = in.numbers("/model/edge/weight", {static_cast<int64_t>(edges.points.size()), {}});
+  return edges;
 }
 
 std::vector<Mat4> read_transforms(const Reader& in, int64_t bones) {
@@ -89,7 +102,8 @@ model::Model read_model(const std::filesystem::path& file) {
   model.points = read_points(in);
   model.springs = read_springs(in);
   model.prisms = read_prisms(in);
-  model.spring_sets = in.names("/model/spring_set");
+  model.edges = read_edges(in);
+  if (in.has("/model/spring_set")) model.spring_sets = in.names("/model/spring_set");
   if (in.has("/model/skin/points")) model.skin = in.tuples<3>("/model/skin/points", Shape::any);
   if (in.has("/model/bone")) model.bones = in.names("/model/bone");
   if (in.has("/model/bone_transform"))
@@ -149,12 +163,18 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   stored.rows.position = in.vectors(group + "/point/position", counts.points);
   stored.displacement = in.vectors(group + "/point/displacement", counts.points);
   stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);
-  stored.rows.elongation = in.numbers(group + "/spring/elongation", {counts.springs, {}});
-  stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});
+  if (in.has(group + "/spring") || counts.springs > 0) {
+    stored.rows.elongation = in.numbers(group + "/spring/elongation", {counts.springs, {}});
+    stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});
+  }
   if (in.has(group + "/prism/volume_ratio") || counts.prisms > 0)
     stored.rows.volume_ratio = in.numbers(group + "/prism/volume_ratio", {counts.prisms, {}});
   if (in.has(group + "/prism/pressure"))
     stored.rows.pressure = in.numbers(group + "/prism/pressure", {counts.prisms, {}});
+  if (in.has(group + "/prism/von_mises")) {
+    stored.rows.von_mises = in.numbers(group + "/prism/von_mises", {counts.prisms, {}});
+    stored.rows.stretch = in.vectors(group + "/prism/principal_stretch", counts.prisms);
+  }
   const std::string bones = group + "/bone_surface/points";
   if (in.has(bones)) stored.bone_points = in.vectors(bones, Shape::any);
   return stored;

@@ -22,6 +22,7 @@ void write_points(hid_t model, const model::Points& points) {
 }
 
 void write_springs(hid_t model, const model::Springs& springs) {
+  if (springs.points.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "spring");
   const hsize_t s = springs.points.size();
   write_array(group, "points", {s, 2}, flat(springs.points));
@@ -37,6 +38,18 @@ void write_prisms(hid_t model, const model::Prisms& prisms) {
   const hsize_t m = prisms.points.size();
   write_array(group, "points", {m, 6}, flat(prisms.points));
   write_array(group, "rest_volume", {m}, prisms.rest_volume.data());
+  if (prisms.modulus.empty()) return;
+  write_array(group, "shear_modulus", {m}, prisms.shear_modulus.data());
+  write_array(group, "modulus", {m}, prisms.modulus.data());
+  write_array(group, "target_volume", {m}, prisms.target_volume.data());
+}
+
+void write_edges(hid_t model, const model::Edges& edges) {
+  if (edges.points.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "edge");
+  const hsize_t e = edges.points.size();
+  write_array(group, "points", {e, 2}, flat(edges.points));
+  write_array(group, "weight", {e}, edges.weight.data());
 }
 
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {
@@ -83,6 +96,7 @@ void write_model(const base::Hdf5File& file, const model::Model& model, const Me
   write_points(group, model.points);
   write_springs(group, model.springs);
   write_prisms(group, model.prisms);
+  write_edges(group, model.edges);
   write_skin(group, model.skin);
   write_strings(group, "spring_set", model.spring_sets);
   write_strings(group, "bone", model.bones);
@@ -95,9 +109,9 @@ int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
   const size_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   const size_t bytes = descriptions + model.points.position.size() * point +
-                       model.springs.points.size() * spring + model.prisms.points.size() * 7 * 8 +
-                       model.skin.size() * 3 * 8 + bones.points.size() * 2 * 3 * 8 +
-                       bones.triangles.size() * (2 * 3 * 8 + 4);
+                       model.springs.points.size() * spring + model.prisms.points.size() * 10 * 8 +
+                       model.edges.points.size() * 3 * 8 + model.skin.size() * 3 * 8 +
+                       bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes);
 }
 

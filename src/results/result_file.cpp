@@ -105,7 +105,7 @@ struct ResultFile::State {
   }
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
-    return 72 * counts.points + 16 * counts.springs + 8 * counts.prisms + 24 * counts.bone_points +
+    return 72 * counts.points + 16 * counts.springs + 48 * counts.prisms + 24 * counts.bone_points +
            (int64_t{1} << 16);
   }
   void create(const model::Model& model);
@@ -137,7 +137,9 @@ void ResultFile::State::create(const model::Model& model) {
             of.prisms,
             static_cast<int64_t>(model.skin.size()),
             static_cast<int64_t>(bones.points.size()),
-            static_cast<int64_t>(bones.triangles.size())};
+            static_cast<int64_t>(bones.triangles.size()),
+            model::is_solid(model),
+            model::is_solid(model)};
 }
 
 void ResultFile::State::require_rows(const model::StepRows& rows) const {
@@ -148,6 +150,7 @@ void ResultFile::State::require_rows(const model::StepRows& rows) const {
       !agrees(rows.residual_force.size(), counts.points) ||
       !agrees(rows.volume_ratio.size(), counts.prisms) ||
       !(rows.pressure.empty() || agrees(rows.pressure.size(), counts.prisms)) ||
+      (counts.stress && !agrees(rows.stretch.size(), counts.prisms)) ||
       !agrees(rows.elongation.size(), counts.springs) ||
       !agrees(rows.tension.size(), counts.springs))
     throw base::InternalError("a step's rows are not this rank's slab");
@@ -179,11 +182,17 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) co
 
 void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) const {
   const base::Hdf5Group prism = create_group(step, "prism");
-  const base::Hdf5Group spring = create_group(step, "spring");
-  const base::Slab prisms = slab(counts.prisms), springs = slab(counts.springs);
+  const base::Slab prisms = slab(counts.prisms);
   write_dataset(prism, "volume_ratio", counts.prisms, 0, prisms, rows.volume_ratio.data());
   if (counts.pressure)
     write_dataset(prism, "pressure", counts.prisms, 0, prisms, rows.pressure.data());
+  if (counts.stress) {
+    write_dataset(prism, "von_mises", counts.prisms, 0, prisms, rows.von_mises.data());
+    write_dataset(prism, "principal_stretch", counts.prisms, 3, prisms, flat(rows.stretch));
+  }
+  if (counts.springs == 0) return;
+  const base::Hdf5Group spring = create_group(step, "spring");
+  const base::Slab springs = slab(counts.springs);
   write_dataset(spring, "elongation", counts.springs, 0, springs, rows.elongation.data());
   write_dataset(spring, "tension", counts.springs, 0, springs, rows.tension.data());
 }
@@ -239,7 +248,7 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   const model::StepNumbers same = of_first_rank(s.comm, numbers);
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
   s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
-  s.counts.pressure = same.volume == "exact";
+  s.counts.pressure = same.volume == "exact" || s.counts.stress;
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

@@ -30,6 +30,10 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
                              {"layer", "/model/point/layer", true, false, short_integer},
                              {"volume_ratio", "step/prism/volume_ratio"}}};
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
+  if (counts.stress) {
+    block.arrays.push_back({"von_mises", "step/prism/von_mises"});
+    block.arrays.push_back({"principal_stretch", "step/prism/principal_stretch", false, true});
+  }
   return block;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "material_presets.h"
 #include "repose/base/error.h"
 
 namespace repose::scene {
@@ -59,38 +60,95 @@ std::vector<Key> surface_keys() {
 }
 
 std::vector<Key> tissue_keys() {
-  return {{"tissue", map, "required", "The soft tissue between skin and bone."},
-          {"tissue.layers", integer, "required", "Point layers, skin and deepest included.", "",
-           Range::between(2, 64)},
-          {"tissue.depths", numbers, "",
-           "Where each layer lies, as fractions of the skin–bone distance: "
-           "one a layer, from 0 to 1, increasing; evenly spaced when not given.",
-           "", Range::between(0, 1)},
-          {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
-           "mm", Range::at_least(0)},
-          {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
-           Range::above(0)},
-          {"tissue.release", number, "10",
-           "Tissue lets go of bone this near to a piece that moves differently; 0 never does.",
-           "mm", Range::at_least(0)},
-          {"tissue.unattached", list, "",
-           "Regions that touch bone but do not hold to it (lips, cheeks)."},
-          {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
-          {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
-          {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
-           Range::above(0)},
-          {"tissue.turgor", number, "0", "Initial strain of the skin's springs.", "",
-           Range::between(0, 1)},
-          {"tissue.mass", numbers, "", "Mass of each layer, one a layer; excludes density.", "kg",
-           Range::at_least(0)},
-          {"tissue.density", number, "", "Density of the tissue; excludes mass.", "kg/mm³",
-           Range::above(0)}};
+  return {
+      {"tissue", map, "required", "The soft tissue between skin and bone."},
+      {"tissue.layers", integer, "required", "Point layers, skin and deepest included.", "",
+       Range::between(2, 64)},
+      {"tissue.depths", numbers, "",
+       "Where each layer lies, as fractions of the skin–bone distance: "
+       "one a layer, from 0 to 1, increasing; evenly spaced when not given.",
+       "", Range::between(0, 1)},
+      {"tissue.depths_mm", numbers, "",
+       "How deep the upper layers lie below the skin, 0 first, at most one a layer, increasing; "
+       "the others are spread evenly below. Excludes depths. Where tissue is too thin for "
+       "them, layers are spread evenly.",
+       "mm", Range::at_least(0)},
+      {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
+       "mm", Range::at_least(0)},
+      {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
+       Range::above(0)},
+      {"tissue.release", number, "10",
+       "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
+       Range::at_least(0)},
+      {"tissue.unattached", list, "",
+       "Regions that touch bone but do not hold to it (lips, cheeks)."},
+      {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
+      {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
+      {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
+       Range::above(0)},
+      {"tissue.turgor", number, "0",
+       "Initial strain of the skin: of its springs, or of a material's first stratum.", "",
+       Range::between(0, 1)},
+      {"tissue.mass", numbers, "", "Mass of each layer, one a layer; excludes density.", "kg",
+       Range::at_least(0)},
+      {"tissue.density", number, "", "Density of the tissue; excludes mass.", "kg/mm³",
+       Range::above(0)}};
+}
+
+/// Young's modulus and Poisson's ratio, below `above`.
+std::vector<Key> elasticity_keys(const std::string& above, const char* standard) {
+  return {{above + ".young", number, standard, "Young's modulus at small strains.", "N/mm²",
+           Range::between(1e-9, 1e9)},
+          {above + ".poisson", number, "", "Poisson's ratio; that of the material when not given.",
+           "", Range::between(-0.9, 0.4999)}};
+}
+
+std::vector<Key> material_keys() {
+  std::vector<Key> rows{
+      {"tissue.material", map, "",
+       "The tissue as a neo-Hookean solid; excludes springs. The default, with the preset face, "
+       "where neither is given."},
+      {"tissue.material.law", choice, "neo_hookean", "The law.", "", {}, {"neo_hookean"}},
+      {"tissue.material.preset",
+       choice,
+       "face",
+       "Moduli from the literature (see below); the other keys change them.",
+       "",
+       {},
+       preset_names()},
+      {"tissue.material.young", number, "", "Young's modulus below all strata.", "N/mm²",
+       Range::between(1e-9, 1e9)},
+      {"tissue.material.poisson", number, "", "Poisson's ratio below all strata.", "",
+       Range::between(-0.9, 0.4999)},
+      {"tissue.material.skin", map, "", "The outermost stratum; the preset's when not given."},
+      {"tissue.material.skin.thickness", number, "required", "Its thickness.", "mm",
+       Range::above(0)},
+      {"tissue.material.strata", list, "",
+       "Strata from the skin down, in place of skin; the deepest is what lies below them."},
+      {"tissue.material.strata[].thickness", number, "required", "Its thickness.", "mm",
+       Range::above(0)},
+      {"tissue.material.regions", list, "",
+       "Places of another material; a later one beats those before it."},
+      {"tissue.material.regions[].sphere", map, "", "A region as a sphere."},
+      {"tissue.material.regions[].sphere.center", vector, "required", "Its center.", "mm"},
+      {"tissue.material.regions[].sphere.radius", number, "required", "Its radius.", "mm",
+       Range::above(0)},
+      {"tissue.material.regions[].mesh", file, "",
+       "A region as the inside of a closed triangle mesh."},
+      {"tissue.material.regions[].volume", volume, "", "A label map; needs label."},
+      {"tissue.material.regions[].label", integer, "", "The label that marks the region.", "",
+       Range::between(1, 100000)}};
+  for (const char* above :
+       {"tissue.material.skin", "tissue.material.strata[]", "tissue.material.regions[]"})
+    for (const Key& key : elasticity_keys(above, "required")) rows.push_back(key);
+  return rows;
 }
 
 std::vector<Key> spring_keys() {
   return {
       {"tissue.springs", map, "",
-       "Rules for the springs, by set: default, layer, connecting, diagonal, or one of them with "
+       "The tissue as the paper's springs; excludes material. Rules by set: default, layer, "
+       "connecting, diagonal, or one of them with "
        "its "
        "number (\"layer 0\" is the skin, \"connecting 0\" joins layers 0 and 1). What a rule "
        "leaves "
@@ -288,9 +346,9 @@ std::vector<Key> incision_keys() {
 const std::vector<Key>& all_keys() {
   static const std::vector<Key> table = [] {
     std::vector<Key> rows;
-    for (const auto& part :
-         {surface_keys(), tissue_keys(), spring_keys(), load_keys(), osteotomy_keys(), move_keys(),
-          collision_keys(), instrument_keys(), incision_keys(), tearing_keys(), solve_keys()})
+    for (const auto& part : {surface_keys(), tissue_keys(), material_keys(), spring_keys(),
+                             load_keys(), osteotomy_keys(), move_keys(), collision_keys(),
+                             instrument_keys(), incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

@@ -4,6 +4,7 @@
 #include "bone_names.h"
 #include "read_incisions.h"
 #include "read_instruments.h"
+#include "read_material.h"
 #include "read_moves.h"
 #include "read_osteotomies.h"
 #include "read_yaml.h"
@@ -102,6 +103,20 @@ std::vector<double> read_depths(const Value& value, int layers) {
   return depths;
 }
 
+std::vector<double> read_depths_mm(const Value& value, int layers) {
+  const std::vector<double> depths = value.numbers();
+  if (depths.empty() || depths.size() > static_cast<std::size_t>(layers))
+    value.refuse("must have 1 to {} numbers, at most one a layer; it has {}", layers,
+                 depths.size());
+  if (depths.front() != 0)
+    value.refuse("must begin with 0 (the skin), it begins with {:g}", depths.front());
+  for (std::size_t a = 1; a < depths.size(); ++a)
+    if (!(depths[a] > depths[a - 1]))
+      value.elements()[a].refuse("must be greater than the one before ({:g}), it is {:g}",
+                                 depths[a - 1], depths[a]);
+  return depths;
+}
+
 std::vector<SphereRegion> read_regions(const Value& value) {
   std::vector<SphereRegion> regions;
   for (const Value& item : value.items()) {
@@ -160,13 +175,21 @@ Tissue read_tissue(const Value& value) {
   const Map map(value);
   Tissue tissue;
   tissue.layers = map.at("layers").integer();
-  if (const auto depths = map.find("depths")) tissue.depths = read_depths(*depths, tissue.layers);
+  const auto depths = map.find("depths"), depths_mm = map.find("depths_mm");
+  if (depths) tissue.depths = read_depths(*depths, tissue.layers);
+  if (depths && depths_mm) depths_mm->refuse("and tissue.depths exclude each other; remove one");
+  if (depths_mm) tissue.depths_mm = read_depths_mm(*depths_mm, tissue.layers);
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);
   if (const auto regions = map.find("unattached")) tissue.unattached = read_regions(*regions);
-  if (const auto springs = map.find("springs"))
+  const auto springs = map.find("springs"), material = map.find("material");
+  if (springs && material)
+    material->refuse("and tissue.springs exclude each other; remove one of them");
+  if (springs)
     tissue.springs = read_rules(*springs, tissue.layers);
+  else
+    tissue.material = material ? read_material(*material) : default_material();
   set(tissue.turgor, map, "turgor", &Value::number);
   read_mass(tissue, map);
   return tissue;

@@ -6,6 +6,7 @@
 #include <queue>
 
 #include "repose/base/pick.h"
+#include "repose/mechanics/energy.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/model/motion.h"
 
@@ -77,7 +78,7 @@ std::vector<char> travelling(const Model& model) {
   return travels;
 }
 
-/// [N] Σ k0 r_0 over the springs at a point, N.
+/// [N] Σ k0 r_0 over the springs at a point, Σ |w| r_0 over the edges, N.
 std::vector<double> force_scales(const Model& model) {
   std::vector<double> scale(model.points.position.size(), 0.0);
   const model::Springs& springs = model.springs;
@@ -88,7 +89,24 @@ std::vector<double> force_scales(const Model& model) {
     scale[p] += force;
     scale[q] += force;
   }
+  for (size_t j = 0; j < model.edges.points.size(); ++j) {
+    const auto [p, q] = model.edges.points[j];
+    const double force = std::abs(model.edges.weight[j]) *
+                         (model.points.position[q] - model.points.position[p]).norm();
+    scale[p] += force;
+    scale[q] += force;
+  }
   return scale;
+}
+
+/// The forces of a solid in its initial state.
+void subtract_solid_gradient(const Model& model, std::vector<Vec3>& force) {
+  const auto loops = mechanics::make_loops(model, 0, 0);
+  std::vector<Vec3> gradient(force.size(), Vec3::Zero());
+  mechanics::add_edge_gradient(loops.edges, model.points.position, 1, gradient);
+  mechanics::add_prism_gradient(loops.prisms, model.points.position,
+                                {1, mechanics::VolumeTerm::penalty, 1}, gradient);
+  for (size_t i = 0; i < force.size(); ++i) force[i] -= gradient[i];
 }
 
 int64_t count(const std::vector<char>& flags) {
@@ -101,6 +119,7 @@ Submodel submodel(const Model& whole, const std::vector<char>& unknown) {
   std::vector<char> marked = unknown;
   const std::vector<int64_t> springs = touching(whole.springs.points, unknown, marked);
   const std::vector<int64_t> prisms = touching(whole.prisms.points, unknown, marked);
+  const std::vector<int64_t> edges = touching(whole.edges.points, unknown, marked);
   Submodel part;
   std::vector<int64_t> number(marked.size(), -1);
   for (size_t i = 0; i < marked.size(); ++i)
@@ -120,8 +139,10 @@ Submodel submodel(const Model& whole, const std::vector<char>& unknown) {
                         pick(s.stiffness, springs),
                         pick(s.exponent, springs),
                         pick(s.reference, springs)};
-  part.model.prisms = {renumbered(pick(whole.prisms.points, prisms), number),
-                       pick(whole.prisms.rest_volume, prisms)};
+  part.model.prisms = model::pick_prisms(whole.prisms, prisms);
+  part.model.prisms.points = renumbered(std::move(part.model.prisms.points), number);
+  part.model.edges = {renumbered(pick(whole.edges.points, edges), number),
+                      pick(whole.edges.weight, edges)};
   part.model.spring_sets = whole.spring_sets;
   carry_motion(whole, part.model);
   return part;
@@ -155,6 +176,7 @@ std::vector<Vec3> initial_forces(const Model& model) {
     force[p] += tension / length * d;
     force[q] -= tension / length * d;
   }
+  if (model::is_solid(model)) subtract_solid_gradient(model, force);
   for (size_t i = 0; i < x.size(); ++i) {
     force[i] += model.points.mass[i] * model.gravity + model.points.external_force[i];
     if (model.points.set[i] != PointSet::soft_tissue) force[i].setZero();

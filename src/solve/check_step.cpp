@@ -32,8 +32,8 @@ void check_ranges(const model::StepNumbers& n, bool gradient_known, base::Compar
     return std::find(words.begin(), words.end(), word) != words.end();
   };
   comparison.statement("functional is energy or force", one_of(n.functional, {"energy", "force"}));
-  comparison.statement("volume is none, paper, penalty or exact",
-                       one_of(n.volume, {"none", "paper", "penalty", "exact"}));
+  comparison.statement("volume is none, paper, penalty, exact or material",
+                       one_of(n.volume, {"none", "paper", "penalty", "exact", "material"}));
 }
 
 void check_numbers(const model::StepNumbers& stored, const RecomputedStep& again,
@@ -78,6 +78,12 @@ void check_step(const model::Model& model, const model::PrescribedMotion& motion
                    flat(again.rows.residual_force), again.force_scale);
   comparison.array("prism/volume_ratio", rows.volume_ratio, again.rows.volume_ratio,
                    again.ratio_scale);
+  if (model::is_solid(model)) {
+    comparison.array("prism/pressure", rows.pressure, again.rows.pressure, again.stress_scale);
+    comparison.array("prism/von_mises", rows.von_mises, again.rows.von_mises, again.stress_scale);
+    comparison.array("prism/principal_stretch", flat(rows.stretch), flat(again.rows.stretch),
+                     again.stretch_scale);
+  }
   comparison.array("spring/elongation", rows.elongation, again.rows.elongation,
                    again.elongation_scale);
   comparison.array("spring/tension", rows.tension, again.rows.tension, again.tension_scale);

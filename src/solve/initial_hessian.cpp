@@ -30,8 +30,9 @@ PetscErrorCode read_options(MPI_Comm comm, Wanted& wanted) {
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-Wanted wanted_by_options(MPI_Comm comm) {
+Wanted wanted_by_options(MPI_Comm comm, bool solid = false) {
   Wanted wanted;
+  if (solid) wanted.initial = 1;
   base::check_options(read_options(comm, wanted));
   return wanted;
 }
@@ -89,6 +90,8 @@ bool InitialHessian::worn_out(double force, double length) {
   return wear_.take(force, length);
 }
 
-bool begins_with_stiffness(MPI_Comm comm) { return wanted_by_options(comm).initial == 1; }
+bool begins_with_stiffness(const Positions& positions) {
+  return wanted_by_options(positions.comm(), positions.part().solid).initial == 1;
+}
 
 }  // namespace repose::solve

@@ -46,6 +46,7 @@ double LoadPath::step_of(double stride) const {
 }
 
 double LoadPath::longest_step() const {
+  if (objective_.positions().part().solid) return short_step_;
   // Meshes so fine that tissue buckles seldom allow long steps.
   constexpr int64_t fine = 100000;  // scalar unknowns
   const bool buckles = 3 * objective_.positions().part().total_unknowns > fine;
@@ -149,7 +150,7 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   settle(displacement, on_step);
   if (guess && result_.last.converged && !result_.last.stopped && result_.load < 1)
     leap(displacement, guess, on_step);
-  short_step_ = step_of(short_stride);
+  short_step_ = step_of(positions.part().solid ? solid_stride : short_stride);
   double longest = longest_step();
   double step = longest;
   int halvings = 0;

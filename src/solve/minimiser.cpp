@@ -15,6 +15,9 @@ namespace {
 
 constexpr double safety = 2;     // the estimate is this many Newton steps long
 constexpr double linear = 1e-6;  // mm, below which a Newton step need not be confirmed
+// Of the accuracy: where a preconditioned gradient this long is worth a Newton step, which also
+// says how far the rest position is; and one so short that it is rest, whatever the preconditioner.
+constexpr double closing = 5, negligible = 1e-6;
 // A step by which the next is not shorter than this is no measure: the search goes on.
 constexpr double trusted_contraction = 0.7, most_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
@@ -139,7 +142,7 @@ Minimiser::Minimiser(Function& function, TangentSolver& solver, const Certificat
 
 void Minimiser::make_tao() {
   check(TaoCreate(function_.positions().comm(), tao_.out()));
-  check(TaoSetType(tao_, TAONTR));
+  check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
   check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner_matrix(),
                       Callbacks::hessian, this));
@@ -148,7 +151,7 @@ void Minimiser::make_tao() {
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
-  if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions().comm()))
+  if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_.emplace(tao_, solver_);
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
@@ -192,7 +195,11 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient) {
   const double step = certificate_.solver.newton_distance(displacement, gradient);
   const double estimate = safety * step;
   const bool curved = estimate > linear && estimate <= accuracy_;
-  return curved ? std::max(estimate, step / (1 - contraction(displacement))) : estimate;
+  if (!curved) return estimate;
+  // A step just taken says as much of the quadratic model as one on trial.
+  const bool contracted = taken_ > 0 && step <= trusted_contraction * taken_;
+  const double left = contracted ? step / taken_ : contraction(displacement);
+  return std::max(estimate, step / (1 - left));
 }
 
 double Minimiser::contraction(Vec displacement) {
@@ -226,9 +233,13 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   }
   if (quick && &certificate_.function == &function_) {
     const double glance = certificate_.solver.glance(gradient);
-    if (glance > accuracy_) {
+    if (glance > (initial_ ? closing : 1) * accuracy_) {
       error_ = safety * glance;
       return false;
+    }
+    if (glance < negligible * accuracy_ && glance > 0) {
+      error_ = safety * glance;
+      return true;
     }
   }
   looked_at_ = function_.evaluations();
@@ -237,7 +248,12 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     softest_ = largest_force / error_;
   else
     softest_ = 2 * std::max(softest_, largest_force / accuracy_);
-  return error_ <= accuracy_;
+  return error_ <= accuracy_ || (initial_ && error_ <= farthest_correction());
+}
+
+double Minimiser::farthest_correction() const {
+  constexpr double finest = 1e-3;  // mm
+  return std::max(finest, 10 * accuracy_);
 }
 
 bool Minimiser::stalled(int64_t iteration, double value) {
@@ -254,11 +270,13 @@ bool Minimiser::stalled(int64_t iteration, double value) {
 int Minimiser::polish(Vec displacement) {
   constexpr int most = 8;
   int corrections = 0;
-  while (corrections < most && error_ > accuracy_ && error_ <= std::max(1e-3, 10 * accuracy_)) {
+  while (corrections < most && error_ > accuracy_ && error_ <= farthest_correction()) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
     check(VecAXPY(displacement, -1.0, certificate_.solver.latest()));
+    taken_ = largest_block(certificate_.solver.latest());
     measure(displacement);
+    taken_ = 0;
     if (error_ > 0.5 * before) {
       check(VecCopy(saved_, displacement));
       measure(displacement);

@@ -5,6 +5,7 @@
 #include "repose/base/agreement.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
+#include "repose/mechanics/stress.h"
 #include "repose/solve/exact_volume.h"
 
 namespace repose::solve {
@@ -112,6 +113,31 @@ void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
   if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective));
 }
 
+void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
+  const model::Prisms& prisms = part_.model.prisms;
+  std::vector<double> pressure(part_.owned_prisms), von_mises(part_.owned_prisms);
+  std::vector<Vec3> stretch(part_.owned_prisms);
+  for (int64_t e = 0; e < part_.owned_prisms; ++e) {
+    std::array<Vec3, 6> before, now;
+    for (int c = 0; c < 6; ++c) {
+      before[c] = part_.model.points.position[prisms.points[e][c]];
+      now[c] = position[prisms.points[e][c]];
+    }
+    const mechanics::PrismState state =
+        mechanics::prism_state({prisms.shear_modulus[e], prisms.modulus[e], prisms.rest_volume[e],
+                                prisms.target_volume[e]},
+                               before, now);
+    pressure[e] = state.pressure;
+    von_mises[e] = state.von_mises;
+    stretch[e] = state.stretch;
+  }
+  rows.pressure = bring(prisms_, pressure);
+  rows.von_mises = bring(prisms_, von_mises);
+  const base::Slab slab = base::slab(prisms_.total, base::rank(comm_), base::size(comm_));
+  rows.stretch.resize(slab.rows());
+  carry({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch), SCATTER_FORWARD);
+}
+
 model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
   const auto position = objective.positions().local();
   model::StepRows rows;
@@ -119,6 +145,7 @@ model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) cons
   rows.residual_force = natural(objective.residual_force());
   add_prisms(objective, with_pressure, rows);
   add_springs(position, rows);
+  if (part_.solid) add_stress(position, rows);
   return rows;
 }
 

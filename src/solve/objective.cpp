@@ -46,8 +46,10 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
     : Function(positions),
       weights_(weights),
       loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
-                                   positions.part().owned_prisms)),
+                                   positions.part().owned_prisms, positions.part().owned_edges)),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
+      initial_energy_(
+          mechanics::totals(loops_, positions.part().model.points.position).solid_energy),
       work_(positions.local().size()) {}
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
@@ -70,6 +72,9 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   for (const mechanics::SpringLoop& loop : loops_.springs)
     value += weights_.elastic *
              mechanics::add_spring_gradient(loop, positions_.local(), weights_.elastic, work_);
+  value += weights_.elastic * mechanics::add_edge_gradient(loops_.edges, positions_.local(),
+                                                           weights_.elastic, work_) -
+           initial_energy_;
   value += mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
@@ -93,6 +98,10 @@ std::vector<Vec3> Objective::residual_force() {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   for (const mechanics::SpringLoop& loop : loops_.springs)
     mechanics::add_spring_gradient(loop, positions_.local(), 1.0, work_);
+  if (loops_.solid()) {
+    mechanics::add_edge_gradient(loops_.edges, positions_.local(), 1.0, work_);
+    mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
+  }
   subtract_loads(1.0, work_);
   std::vector<Vec3> force(part.owned_points, Vec3::Zero());
   for (int64_t i = 0; i < part.owned_points; ++i)
@@ -104,6 +113,7 @@ mechanics::Totals Objective::totals() const {
   mechanics::Totals t = mechanics::totals(loops_, positions_.local());
   MPI_Comm comm = positions_.comm();
   t.spring_energy = sum(comm, t.spring_energy);
+  t.solid_energy = sum(comm, t.solid_energy - initial_energy_);
   t.volume_squares = sum(comm, t.volume_squares);
   t.penalty_unit = sum(comm, t.penalty_unit);
   MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);

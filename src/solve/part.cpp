@@ -127,12 +127,17 @@ std::vector<int64_t> element_rows(const Plan& plan,
 }
 
 template <size_t n>
+void number(std::vector<std::array<int64_t, n>>& elements, LocalNumbers& local) {
+  for (auto& element : elements)
+    for (int64_t& point : element) point = local.of(point);
+}
+
+template <size_t n>
 std::vector<std::array<int64_t, n>> pick_elements(
     const std::vector<std::array<int64_t, n>>& elements, const std::vector<int64_t>& rows,
     LocalNumbers& local) {
   std::vector<std::array<int64_t, n>> picked = pick(elements, rows);
-  for (auto& element : picked)
-    for (int64_t& point : element) point = local.of(point);
+  number(picked, local);
   return picked;
 }
 
@@ -166,12 +171,16 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   rows.resize(part.owned_springs);
   part.spring_row = std::move(rows);
   rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms);
-  part.model.prisms = {pick_elements(model.prisms.points, rows, local),
-                       pick(model.prisms.rest_volume, rows)};
+  part.model.prisms = model::pick_prisms(model.prisms, rows);
+  number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);
   part.prism_row = std::move(rows);
+  rows = element_rows(plan, model.edges.points, rank, part.owned_edges);
+  part.model.edges = {pick_elements(model.edges.points, rows, local),
+                      pick(model.edges.weight, rows)};
   part.point_row = local.take();
   pick_points(plan, part);
+  part.solid = model::is_solid(model);
   part.model.gravity = model.gravity;
   part.model.bones = model.bones;
   part.model.bone_transform = plan.bone_transform;
@@ -192,9 +201,10 @@ void pass(Archive& archive, Part& part) {
           m.points.column, m.points.bone, m.points.mass, m.points.external_force);
   archive(m.springs.points, m.springs.set, m.springs.rest_length, m.springs.stiffness,
           m.springs.exponent, m.springs.reference);
-  archive(m.prisms.points, m.prisms.rest_volume, m.bone_transform);
-  archive(part.owned_points, part.owned_springs, part.owned_prisms, part.point_row, part.spring_row,
-          part.prism_row, part.unknown);
+  archive(m.prisms.points, m.prisms.rest_volume, m.prisms.shear_modulus, m.prisms.modulus,
+          m.prisms.target_volume, m.edges.points, m.edges.weight, m.bone_transform);
+  archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
+          part.point_row, part.spring_row, part.prism_row, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
           part.total_prisms, part.total_unknowns);
 }

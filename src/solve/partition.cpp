@@ -25,6 +25,7 @@ void for_each_link(const model::Model& model, const std::vector<int64_t>& column
     link(column[q], column[p]);
   };
   for (const auto& [p, q] : model.springs.points) join(p, q);
+  for (const auto& [p, q] : model.edges.points) join(p, q);
   for (const auto& corners : model.prisms.points)
     for (int c = 1; c < 6; ++c) join(corners[0], corners[c]);
 }

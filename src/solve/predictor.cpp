@@ -20,7 +20,7 @@ bool Predictor::predict(Vec displacement, double load, Vec increment) {
   check(VecSet(increment, 0));
   // A weak preconditioner's norm does not see smooth errors: after 1e-2 of it an increment can miss
   // by more than the path trusts, and steps are halved for nothing.
-  constexpr double close = 1e-5;
+  const double close = part.solid ? 1e-2 : 1e-5;
   bool convex = solver_.solve(displacement, force_, increment, close);
   // Where iterations ran out, the preconditioner is worn out and the next solve renews it.
   if (convex && !solver_.finished()) convex = solver_.solve(displacement, force_, increment, close);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "repose/mechanics/spring_law.h"
+#include "repose/mechanics/stress.h"
 #include "repose/model/prism_geometry.h"
 
 namespace repose::solve {
@@ -50,6 +51,7 @@ class Recomputation {
     elastic_ = claimed_.volume == "paper" ? claimed_.lambda : 1.0;
     points();
     springs();
+    edges();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
     noise_.assign(x_.size(), 0.0);
@@ -68,7 +70,10 @@ class Recomputation {
   SpringState spring(int64_t j) const;
   void points();
   void springs();
+  void edges();
   void forces();
+  void solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent);
+  void stress(int64_t j, const std::array<Vec3, 6>& corners);
   void prisms();
   void prism(int64_t j);
   void objective();
@@ -141,6 +146,76 @@ void Recomputation::springs() {
   step_.tension_scale = scale_of(tension, rounding * noise);
 }
 
+double edge_energy(const model::Edges& edges, size_t j, const std::vector<Vec3>& x) {
+  const auto [p, q] = edges.points[j];
+  return 0.5 * edges.weight[j] * (x[q] - x[p]).squaredNorm();
+}
+
+// The energies are from the initial state on.
+void Recomputation::edges() {
+  const model::Edges& edges = model_.edges;
+  double uncertain = 0;
+  for (size_t j = 0; j < edges.points.size(); ++j) {
+    if (!any_soft(edges.points[j])) continue;
+    const auto [p, q] = edges.points[j];
+    const Vec3 force = edges.weight[j] * (x_[q] - x_[p]);
+    const double now = edge_energy(edges, j, x_);
+    const double before = edge_energy(edges, j, model_.points.position);
+    step_.f_e.value += now - before;
+    uncertain += rounding * (std::abs(now) + std::abs(before));
+    if (soft(p)) step_.rows.residual_force[p] += force;
+    if (soft(q)) step_.rows.residual_force[q] -= force;
+    for (const int64_t end : {p, q}) at_point_[end] += force.norm();
+  }
+  step_.f_e.scale += uncertain / tolerance;
+  for (size_t j = 0; j < model_.prisms.modulus.size(); ++j) {
+    std::array<Vec3, 6> corners;
+    double extent = 0;
+    for (int c = 0; c < 6; ++c) {
+      corners[c] = x_[model_.prisms.points[j][c]];
+      extent = std::max(extent, (corners[c] - corners[0]).norm());
+    }
+    solid_prism(static_cast<int64_t>(j), corners, extent);
+  }
+  step_.f_e.scale += std::abs(step_.f_e.value);
+}
+
+void Recomputation::solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent) {
+  const model::Prisms& prisms = model_.prisms;
+  stress(j, corners);
+  if (!any_soft(prisms.points[j])) return;
+  const double stiffness = prisms.modulus[j] / prisms.rest_volume[j];
+  const double before = prisms.rest_volume[j] - prisms.target_volume[j];
+  const double now = model::prism_volume(corners.data()) - prisms.target_volume[j];
+  const double uncertain = extent * extent * extent + prisms.rest_volume[j];
+  step_.f_e.value += 0.5 * stiffness * (now * now - before * before);
+  step_.f_e.scale +=
+      rounding / tolerance * stiffness * (now * now + before * before + std::abs(now) * uncertain);
+  const std::array<Vec3, 6> toward = volume_gradient(corners, extent);
+  for (int c = 0; c < 6; ++c) {
+    const int64_t point = prisms.points[j][c];
+    if (soft(point)) step_.rows.residual_force[point] -= stiffness * now * toward[c];
+    at_point_[point] += extent * extent * stiffness * (std::abs(now) + uncertain);
+  }
+}
+
+void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
+  const model::Prisms& prisms = model_.prisms;
+  std::array<Vec3, 6> before;
+  for (int c = 0; c < 6; ++c) before[c] = model_.points.position[prisms.points[j][c]];
+  const mechanics::PrismState state = mechanics::prism_state(
+      {prisms.shear_modulus[j], prisms.modulus[j], prisms.rest_volume[j], prisms.target_volume[j]},
+      before, corners);
+  step_.rows.pressure.push_back(state.pressure);
+  step_.rows.von_mises.push_back(state.von_mises);
+  step_.rows.stretch.push_back(state.stretch);
+  const double stress = prisms.modulus[j] * (1 + std::abs(state.stretch.prod())) +
+                        prisms.shear_modulus[j] * state.stretch.squaredNorm();
+  step_.stress_scale =
+      std::max(step_.stress_scale, std::abs(state.pressure) + state.von_mises + 1e-4 * stress);
+  step_.stretch_scale = std::max(step_.stretch_scale, state.stretch[0]);
+}
+
 void Recomputation::forces() {
   double uncertain_force = 0, uncertain_work = 0, largest = 0;
   for (size_t i = 0; i < x_.size(); ++i) {
@@ -183,6 +258,7 @@ void Recomputation::prism(int64_t j) {
   step_.penalty.scale += scale_of(change * change, square_error) * 0.5 * kappa / v0;
   step_.volume_error_max.value = std::max(step_.volume_error_max.value, std::abs(v / v0 - 1));
   step_.inverted_prisms += v <= 0;
+  if (model::is_solid(model_)) return;
   double slope = 0, curvature = 0;
   if (claimed_.volume == "paper") {
     slope = 2 * (1 - claimed_.lambda) * change;

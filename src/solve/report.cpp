@@ -52,7 +52,9 @@ std::string describe_model(const model::Model& model) {
   const model::Counts c = model::count(model);
   return row("points", fmt::format("{} ({} soft tissue, {} boundary, {} bone, {} held)", c.points,
                                    c.soft, c.boundary, c.bone, c.held)) +
-         row("springs", fmt::format("{}", c.springs)) + row("prisms", fmt::format("{}", c.prisms));
+         (c.edges > 0 ? row("edges", fmt::format("{}", c.edges))
+                      : row("springs", fmt::format("{}", c.springs))) +
+         row("prisms", fmt::format("{}", c.prisms));
 }
 
 std::string describe_build(const model::BuildReport& r) {

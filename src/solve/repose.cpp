@@ -136,9 +136,10 @@ class Searcher {
 void measure(Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
-  if (weights.volume == mechanics::VolumeTerm::penalty)
+  const bool solid = objective.positions().part().solid;
+  if (weights.volume == mechanics::VolumeTerm::penalty && !solid)
     numbers.bulk_modulus = weights.volume_weight;
-  numbers.f_e = totals.spring_energy;
+  numbers.f_e = solid ? totals.solid_energy : totals.spring_energy;
   numbers.potential = objective.potential();
   double force = 0;
   for (const Vec3& f : objective.residual_force()) force += f.norm();

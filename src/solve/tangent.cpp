@@ -109,16 +109,26 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
                                        diagonal[q] += block;
                                        visit(p, q, -block);
                                      });
+  const mechanics::EdgeLoop& edges = objective_.loops().edges;
+  for (int64_t e = 0; e < edges.size(); ++e) {
+    const auto [p, q] = edges.points[e];
+    const Mat3 block = objective_.weights().elastic * edges.weight[e] * Mat3::Identity();
+    diagonal[p] += block;
+    diagonal[q] += block;
+    visit(p, q, -block);
+  }
   const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-  mechanics::for_each_prism_block(prisms, at_, objective_.weights(), Curvature::convex,
-                                  [&](int64_t e, const mechanics::PrismBlocks& blocks) {
-                                    const auto& corners = prisms.points[e];
-                                    for (int i = 0; i < 6; ++i) {
-                                      diagonal[corners[i]] += blocks[i][i];
-                                      for (int j = i + 1; j < 6; ++j)
-                                        visit(corners[i], corners[j], blocks[i][j]);
-                                    }
-                                  });
+  mechanics::for_each_prism_block(
+      prisms, at_, objective_.weights(),
+      mechanics::semidefinite_slopes(prisms, objective_.positions().part().model.points.position,
+                                     at_),
+      [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+        const auto& corners = prisms.points[e];
+        for (int i = 0; i < 6; ++i) {
+          diagonal[corners[i]] += blocks[i][i];
+          for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
+        }
+      });
   for (size_t p = 0; p < diagonal.size(); ++p)
     visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
 }

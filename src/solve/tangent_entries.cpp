@@ -31,6 +31,7 @@ void TangentEntries::make_pattern() {
     link(static_cast<int32_t>(i), static_cast<int32_t>(i));
   for (const auto& loop : objective_.loops().springs)
     for (const auto& [p, q] : loop.points) link(p, q), link(q, p);
+  for (const auto& [p, q] : objective_.loops().edges.points) link(p, q), link(q, p);
   if (objective_.weights().volume != mechanics::VolumeTerm::none)
     for (const auto& corners : objective_.loops().prisms.points)
       for (int32_t p : corners)
@@ -95,12 +96,19 @@ TangentEntries::Slot TangentEntries::find(int32_t row_point, int32_t column_poin
   return before + 9 * rows.begin[k] + 3 * static_cast<int32_t>(place - first);
 }
 
+std::vector<TangentEntries::PairSlots> TangentEntries::find_pairs(
+    const std::vector<std::array<int32_t, 2>>& points) const {
+  std::vector<PairSlots> slots;
+  slots.reserve(points.size());
+  for (const auto& [p, q] : points)
+    slots.push_back({find(p, p), find(p, q), find(q, p), find(q, q)});
+  return slots;
+}
+
 void TangentEntries::find_slots() {
-  for (const auto& loop : objective_.loops().springs) {
-    auto& slots = spring_slots_.emplace_back();
-    for (const auto& [p, q] : loop.points)
-      slots.push_back({find(p, p), find(p, q), find(q, p), find(q, q)});
-  }
+  for (const auto& loop : objective_.loops().springs)
+    spring_slots_.push_back(find_pairs(loop.points));
+  edge_slots_ = find_pairs(objective_.loops().edges.points);
   if (objective_.weights().volume == mechanics::VolumeTerm::none) return;
   for (const auto& corners : objective_.loops().prisms.points) {
     auto& slots = prism_slots_.emplace_back();
@@ -123,8 +131,13 @@ void TangentEntries::add(double* const values[2], Slot slot, int32_t row_point,
 
 void TangentEntries::add_spring(double* const values[2], size_t loop, int64_t spring,
                                 const Mat3& block) const {
-  const auto [p, q] = objective_.loops().springs[loop].points[spring];
-  const auto& slots = spring_slots_[loop][spring];
+  add_pair(values, objective_.loops().springs[loop].points[spring], spring_slots_[loop][spring],
+           block);
+}
+
+void TangentEntries::add_pair(double* const values[2], const std::array<int32_t, 2>& points,
+                              const PairSlots& slots, const Mat3& block) const {
+  const auto [p, q] = points;
   add(values, slots[0], p, block);
   add(values, slots[1], p, -block);
   add(values, slots[2], q, -block);
@@ -153,8 +166,15 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at, Curvature curvat
       mechanics::for_each_spring_block(
           objective_.loops().springs[l], at, objective_.weights().elastic, curvature,
           [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
+    const mechanics::EdgeLoop& edges = objective_.loops().edges;
+    const double scale = objective_.weights().elastic;
+    for (size_t e = 0; e < edge_slots_.size(); ++e)
+      add_pair(values, edges.points[e], edge_slots_[e], scale * edges.weight[e] * Mat3::Identity());
     const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-    mechanics::for_each_prism_block(prisms, at, objective_.weights(), curvature,
+    std::vector<double> most_slope;
+    if (curvature == Curvature::convex)
+      most_slope = mechanics::semidefinite_slopes(prisms, part_.model.points.position, at);
+    mechanics::for_each_prism_block(prisms, at, objective_.weights(), most_slope,
                                     [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                       for (int i = 0; i < 6; ++i)
                                         for (int j = 0; j < 6; ++j)

@@ -13,6 +13,12 @@ namespace repose::mechanics {
 double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> position, double scale,
                            std::span<Vec3> gradient, Kernels kernels = best_kernels());
 
+/// Adds scale · ∂/∂x of ½ Σ w |x_i − x_j|², a solid's edges, to `gradient`; returns the sum over
+/// the counted ones (N·mm, unscaled). As the function is quadratic, this is also its Hessian's
+/// action on `position`.
+double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, double scale,
+                         std::span<Vec3> gradient, Kernels kernels = best_kernels());
+
 /// Adds the volume term's gradient; returns its value over the counted prisms (N·mm or mm⁶ ·
 /// weight).
 double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
@@ -23,7 +29,7 @@ double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
 struct VolumeLaw {
   double value, slope, curvature;
 };
-VolumeLaw volume_law(const Weights& weights, double volume, double rest_volume,
+VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
                      double target_volume);
 
 /// Σ scale · (∂²Φ/∂x²) d of all terms, added to `product`: the action of the exact Hessian.
@@ -33,7 +39,8 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
 
 /// What a state of the tissue amounts to, over the counted elements (to be summed over ranks).
 struct Totals {
-  double spring_energy = 0;     ///< f_e, N·mm
+  double spring_energy = 0;     ///< f_e of springs, N·mm
+  double solid_energy = 0;      ///< edges' and prisms' of a solid, to a constant, N·mm
   double volume_squares = 0;    ///< f_v, mm⁶
   double penalty_unit = 0;      ///< Σ ½ (v−v_0)²/v_0, mm³ (times κ: N·mm)
   double volume_error_max = 0;  ///< max |v/v_0 − 1|

@@ -1,5 +1,6 @@
 #pragma once
 #include <cmath>
+#include <limits>
 
 #include "repose/mechanics/energy.h"
 #include "repose/mechanics/prism_volume.h"
@@ -9,7 +10,8 @@
 namespace repose::mechanics {
 
 /// Which Hessian: the exact one, or a positive semidefinite one that leaves out what can be
-/// negative (the transverse stiffness T/r of a compressed spring, the curvature of v itself).
+/// negative (the transverse stiffness T/r of a compressed spring, the curvature of v itself; of a
+/// solid as much of that as its edges do not outweigh).
 enum class Curvature { exact, convex };
 
 /// ∂²E/∂q∂q of a spring with d = q − p: T′ u uᵀ + (T/r)(1 − u uᵀ), N/mm. The blocks of its two
@@ -91,20 +93,30 @@ void for_each_spring_third(const SpringLoop& loop, std::span<const Vec3> positio
   });
 }
 
-/// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v.
+/// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `most_slope`.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
-PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double rest_volume,
-                         double target_volume, const Weights& weights, Curvature curvature);
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double compliance,
+                         double target_volume, const Weights& weights, double most_slope);
 
-/// Calls visit(prism number, blocks) for each prism of the loop.
+/// [M] What |φ′| of each prism may be for the blocks to be semidefinite with the rest of the
+/// Hessian: nothing where there are springs. A solid's ½ μ |F|² + φ′ J has the curvatures μ ± φ′ σ,
+/// σ the singular values of F (Smith, de Goes & Kim 2018, "Stable Neo-Hookean Flesh Simulation"),
+/// so that it is μ / σ_max, with F in the middle of the prism, between `initial` and `position`.
+std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,
+                                        std::span<const Vec3> position);
+
+/// Calls visit(prism number, blocks) for each prism of the loop. `most_slope` [M], or empty for no
+/// limit.
 template <class Visit>
 void for_each_prism_block(const PrismLoop& loop, std::span<const Vec3> position,
-                          const Weights& weights, Curvature curvature, Visit&& visit) {
+                          const Weights& weights, std::span<const double> most_slope,
+                          Visit&& visit) {
   if (weights.volume == VolumeTerm::none) return;
   for (int64_t e = 0; e < loop.size(); ++e) {
     std::array<Vec3, 6> corners;
     for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
-    visit(e, prism_blocks(corners, loop.rest_volume[e], loop.target_volume[e], weights, curvature));
+    const double most = most_slope.empty() ? std::numeric_limits<double>::max() : most_slope[e];
+    visit(e, prism_blocks(corners, loop.compliance[e], loop.target_volume[e], weights, most));
   }
 }
 

@@ -23,10 +23,23 @@ struct SpringLoop {
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
+/// Edges of a solid: pairs of points with a weight of either sign. An edge is a run of springs too.
+struct EdgeLoop {
+  std::vector<std::array<int32_t, 2>> points;  ///< [E]
+  std::vector<double> weight;                  ///< [E] N/mm
+  int64_t counted = 0;                         ///< as in SpringLoop
+  Runs<SpringRun> counted_runs = {}, other_runs = {};
+  int64_t size() const { return static_cast<int64_t>(points.size()); }
+};
+
 /// Prisms with at least one soft-tissue point.
 struct PrismLoop {
   std::vector<std::array<int32_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
   std::vector<double> rest_volume;             ///< [M] v_0, mm³
+  /// [M] mm³, by which the weight of a penalty is divided: v_0, and for a solid v_0 / κ with κ in
+  /// N/mm², so that its weight is 1.
+  std::vector<double> compliance;
+  std::vector<double> shear_modulus;  ///< [M] μ of a solid, N/mm²; else empty
   std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
   std::vector<int64_t> row;           ///< [M] the prism's row in the part
   int64_t counted = 0;                ///< as in SpringLoop
@@ -37,18 +50,21 @@ struct PrismLoop {
 /// All that a rank evaluates.
 struct Loops {
   std::vector<SpringLoop> springs;  ///< one a law that occurs, by exponent
+  EdgeLoop edges;                   ///< of a solid
   PrismLoop prisms;
+  bool solid() const { return !prisms.shear_modulus.empty(); }
 };
 
-/// The loops over the springs and prisms of `part` with a soft-tissue point. Of its rows the first
-/// `owned_springs` and `owned_prisms` are counted here. What lies in runs comes first, by blocks of
-/// points that fit into the cache together.
-Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms);
+/// The loops over the springs, prisms and edges of `part` with a soft-tissue point. Of its rows the
+/// first `owned_…` are counted here. What lies in runs comes first, by blocks of points that fit
+/// into the cache together.
+Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
+                 int64_t owned_edges = 0);
 
 /// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:
 ///     paper    weight (t − v)²             (MODEL.md Eq. 10, weight = 1 − λ)
-///     penalty  weight ½ (v − t)² / v_0     (weight = κ)
-/// t = v_0 but where multipliers move it (exact volume).
+///     penalty  weight ½ (v − t)² / v_0     (weight = κ; 1 of a solid, whose prisms have their own)
+/// t = v_0 but in a solid, and where multipliers move it (exact volume).
 enum class VolumeTerm { none, paper, penalty };
 
 /// Which parts of an objective are on: Φ = elastic (f_e + W) + volume term.

@@ -18,7 +18,7 @@ struct BuildReport {
   int64_t released = 0;   ///< of those, let go near a piece that moves differently
   int64_t shortened = 0;  ///< columns made shorter so that neighbours do not cross
   double thickness_min = 0, thickness_median = 0, thickness_max = 0;  ///< mm
-  double effective_modulus = 0;      ///< Σ k0 r_0² / Σ v_0 over springs and prisms, N/mm²
+  double effective_modulus = 0;      ///< N/mm², as the function below
   std::vector<std::string> remarks;  ///< lines for a person, each complete
 };
 
@@ -51,7 +51,7 @@ BuiltModel build_model(const Anatomy& anatomy);
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
 
-/// Σ k0 r_0² / Σ v_0 over springs and prisms of a model, N/mm².
+/// N/mm²: of springs Σ k0 r_0² / Σ v_0, of a solid the mean of Young's modulus over its volume.
 double effective_modulus(const Model& model);
 
 }  // namespace repose::model

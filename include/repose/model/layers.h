@@ -17,8 +17,11 @@ std::vector<double> layer_depths(const scene::Tissue& tissue);
 /// layer; springs by set ("layer 0" … , "connecting 0" …, "diagonal 0" …), in a set by edge or
 /// column; prisms by gap, ordered so that their volume is positive inwards. Everything is soft
 /// tissue, without mass, force, stiffness or bone; rest lengths and volumes are the initial ones.
-/// `deep` [V] are the deepest points, mm.
+/// `deep` [V] are the deepest points, mm. `depths_mm`, if any, are how deep the upper layers lie
+/// (scene::Tissue), in place of `depths`. A solid has no springs.
+enum class Elements { springs, solid };
 Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,
-                  const std::vector<double>& depths);
+                  const std::vector<double>& depths, const std::vector<double>& depths_mm = {},
+                  Elements elements = Elements::springs);
 
 }  // namespace repose::model

@@ -34,9 +34,20 @@ struct Springs {
   std::vector<double> reference;               ///< [S] s_ref, mm, > 0
 };
 
+/// Prisms, and of a solid its material: of tissue of springs the last three are empty.
 struct Prisms {
   std::vector<std::array<int64_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
   std::vector<double> rest_volume;             ///< [M] mm³, at Points::position
+  std::vector<double> shear_modulus;           ///< [M] μ, N/mm², > 0
+  std::vector<double> modulus;                 ///< [M] κ = λ + μ (Lamé), N/mm², > 0
+  std::vector<double> target_volume;           ///< [M] t, mm³
+};
+
+/// The part of a solid's energy that is quadratic in the positions: ½ Σ w |x_i − x_j|²
+/// (docs/model.md "The continuum").
+struct Edges {
+  std::vector<std::array<int64_t, 2>> points;  ///< [E]
+  std::vector<double> weight;                  ///< [E] w, N/mm, of either sign
 };
 
 struct Model {
@@ -44,6 +55,7 @@ struct Model {
   Points points;
   Springs springs;
   Prisms prisms;
+  Edges edges;                 ///< of a solid
   std::vector<Triangle> skin;  ///< [K] for drawing, may be empty
   std::vector<std::string> spring_sets;
   std::vector<std::string> bones;
@@ -51,9 +63,16 @@ struct Model {
   std::vector<Mat4> bone_transform;             ///< [bones] or empty: recovered from targets
 };
 
+/// Whether the tissue is a neo-Hookean solid, not springs.
+inline bool is_solid(const Model& model) { return !model.prisms.modulus.empty(); }
+
+/// Some rows of the prisms, with all that belongs to them.
+Prisms pick_prisms(const Prisms& prisms, const std::vector<int64_t>& rows);
+
 /// The numbers a person asks for first.
 struct Counts {
   int64_t points = 0, soft = 0, boundary = 0, bone = 0, held = 0, springs = 0, prisms = 0;
+  int64_t edges = 0;
 };
 Counts count(const Model& model);
 

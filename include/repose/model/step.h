@@ -72,7 +72,10 @@ struct StepRows {
   std::vector<Vec3> position;        ///< mm
   std::vector<Vec3> residual_force;  ///< N
   std::vector<double> volume_ratio;
-  std::vector<double> pressure;    ///< N/mm², compression positive; empty but with volume "exact"
+  /// N/mm², compression positive; with volume "exact" and of a solid, else empty.
+  std::vector<double> pressure;
+  std::vector<Vec3> stretch;       ///< principal stretches of a solid, largest first; else empty
+  std::vector<double> von_mises;   ///< N/mm², of a solid; else empty
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
 };

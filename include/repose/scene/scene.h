@@ -68,17 +68,55 @@ struct SphereRegion {
   double radius;  ///< mm
 };
 
+/// A place that a label of a volume marks.
+struct LabelRegion {
+  std::filesystem::path volume;  ///< absolute
+  int label;
+};
+
+/// The inside of a closed triangle mesh.
+struct MeshRegion {
+  std::filesystem::path file;  ///< absolute
+};
+
+/// An isotropic elastic solid at small strains.
+struct Elasticity {
+  double young;    ///< N/mm², > 0
+  double poisson;  ///< −1 < ν < 0.5
+};
+
+/// A stratum of the tissue; those of a material lie one below the other, the first at the skin.
+struct Stratum {
+  double thickness;  ///< mm
+  Elasticity elasticity;
+};
+
+struct MaterialRegion {
+  std::variant<SphereRegion, MeshRegion, LabelRegion> where;
+  Elasticity elasticity;
+};
+
+/// Tissue as a neo-Hookean solid (docs/model.md "The continuum").
+struct Material {
+  Elasticity deep;                      ///< below all strata
+  std::vector<Stratum> strata;          ///< from the skin down
+  std::vector<MaterialRegion> regions;  ///< beat the strata, and each the ones before it
+};
+
 struct Tissue {
   int layers = 4;              ///< 2 … 64
   std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
+  /// mm below the skin of the upper layers, the skin's 0 first, increasing; empty: by `depths`.
+  std::vector<double> depths_mm;
   double attach_within = 30;   ///< mm
   double free_thickness = 12;  ///< mm
   double release = 10;         ///< mm
   std::vector<SphereRegion> unattached;
+  std::optional<Material> material;           ///< unset: springs
   std::map<std::string, SpringRule> springs;  ///< "default", "layer", "layer 0", "connecting 1", …
-  double turgor = 0;                          ///< initial strain of the skin springs
-  std::vector<double> mass;                   ///< [layers] kg, or empty
-  std::optional<double> density;              ///< kg/mm³, excludes mass
+  double turgor = 0;  ///< initial strain of the skin: of its springs, or of the first stratum
+  std::vector<double> mass;       ///< [layers] kg, or empty
+  std::optional<double> density;  ///< kg/mm³, excludes mass
 };
 
 enum class Functional { energy, force };

@@ -27,7 +27,8 @@ Submodel submodel_at(const model::Model& whole, const std::vector<char>& unknown
                      const std::vector<Vec3>& position);
 
 /// The force (N) on each soft-tissue point in the initial state, by springs, weight and external
-/// force, [N]; zero at others. Prisms do not press: they have their rest volume there.
+/// force, [N]; zero at others. Prisms beside springs do not press: they
+/// have their rest volume there.
 std::vector<Vec3> initial_forces(const model::Model& model);
 
 /// How far each column of tissue is from what sets tissue in motion: columns with a soft-tissue
@@ -38,7 +39,7 @@ std::vector<Vec3> initial_forces(const model::Model& model);
 class ActiveRegion {
  public:
   /// `force` as initial_forces gives it; at rest is what is below 1e-9 of Σ k0 r_0 of the springs
-  /// at a point. O(model + columns log columns).
+  /// at a point, of a solid Σ |w| r_0 of its edges. O(model + columns log columns).
   ActiveRegion(const model::Model& model, const std::vector<Vec3>& force);
 
   /// [N] soft-tissue points of the columns whose distance d is nearest ≤ d < farthest.

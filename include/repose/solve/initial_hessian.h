@@ -49,8 +49,9 @@ class InitialHessian {
   int64_t renewals_ = 0;  // of the preconditioner, when last looked at
 };
 
-/// Whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial stiffness`) or
-/// with the diagonal that TAO estimates (`diagonal`, the default). Throws InputError. Collective.
-bool begins_with_stiffness(MPI_Comm comm);
+/// Whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial stiffness`, the
+/// default of a solid) or with the diagonal that TAO estimates (`diagonal`, that of springs).
+/// Throws InputError. Collective.
+bool begins_with_stiffness(const Positions& positions);
 
 }  // namespace repose::solve

@@ -48,6 +48,8 @@ class LoadPath {
 
   /// Automatic steps are long where the fastest point goes farther, mm.
   static constexpr double short_stride = 2.5;
+  /// Of a solid, whose searches end at one rest position from as far, mm.
+  static constexpr double solid_stride = 20;
 
  private:
   struct Attempt {

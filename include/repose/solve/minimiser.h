@@ -53,6 +53,7 @@ class Minimiser : public RestSearch {
   double contraction(Vec displacement);
   bool step_was_cut() const;
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
+  double farthest_correction() const;  ///< mm, of a Newton step that ends a search
   bool stalled(int64_t iteration, double value);
   double measure(Vec displacement);
   int polish(Vec displacement);
@@ -79,6 +80,7 @@ class Minimiser : public RestSearch {
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long
   bool stopped_ = false;                // the watcher did not want to go on
+  double taken_ = 0;                    // mm, the Newton step that led here, or 0
   double contraction_ = 0;              // of the latest Newton step, …
   int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian
   base::VecHandle gradient_, saved_, trial_, certified_gradient_;

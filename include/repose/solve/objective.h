@@ -14,10 +14,12 @@ class Objective : public Function {
   /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
   void hessian_action(std::span<const Vec3> direction, Vec product);
 
-  /// F_i of Eq. 6 without volume term, [owned points], zero outside soft tissue (N).
+  /// F_i of Eq. 6, of springs without volume term, of a solid whole; [owned points], zero outside
+  /// soft tissue (N).
   std::vector<Vec3> residual_force();
-  mechanics::Totals totals() const;  ///< summed over ranks, at the last update
-  double potential() const;          ///< W, N·mm
+  /// Summed over ranks, at the last update; the solid's energy is 0 initially.
+  mechanics::Totals totals() const;
+  double potential() const;  ///< W, N·mm
 
   const mechanics::Weights& weights() const { return weights_; }
   void set_volume_weight(double weight) { weights_.volume_weight = weight; }
@@ -32,6 +34,7 @@ class Objective : public Function {
   mechanics::Loops loops_;
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
+  double initial_energy_;         // N·mm, this rank's share of a solid's
   std::vector<Vec3> work_;        // [local points]
 };
 

@@ -10,12 +10,13 @@
 namespace repose::solve {
 
 /// What one rank works on. `model` is a model in local numbers: the points of its own columns come
-/// first, column after column, then ghosts; springs and prisms whose first point it owns come
-/// first (they count in energies and are written here), then those that merely touch a soft-tissue
-/// point it owns. Bones that do not move rigidly appear as held points.
+/// first, column after column, then ghosts; springs, edges and prisms whose first point it owns
+/// come first (they count in energies and are written here), then those that merely touch a
+/// soft-tissue point it owns. Bones that do not move rigidly appear as held points.
 struct Part {
   model::Model model;
-  int64_t owned_points = 0, owned_springs = 0, owned_prisms = 0;
+  bool solid = false;  ///< the whole model is one, whatever is here
+  int64_t owned_points = 0, owned_springs = 0, owned_prisms = 0, owned_edges = 0;
   std::vector<int64_t> point_row;   ///< [local points] row in the whole model
   std::vector<int64_t> spring_row;  ///< [owned_springs]
   std::vector<int64_t> prism_row;   ///< [owned_prisms]

@@ -19,6 +19,8 @@ struct RecomputedStep {
   double position_scale = 0, displacement_scale = 0, elongation_scale = 0;  ///< mm
   double tension_scale = 0, force_scale = 0;                                ///< N
   double ratio_scale = 0;
+  double stress_scale = 0;  ///< N/mm²
+  double stretch_scale = 0;
   Recomputed f_e, potential, f_f, f_v, penalty, objective, gradient_max, volume_error_max;
   int64_t inverted_prisms = 0;  ///< v ≤ 0, of those with a soft-tissue point
   bool gradient_known = true;   ///< false for volume "exact" without its pressures

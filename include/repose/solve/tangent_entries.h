@@ -30,22 +30,27 @@ class TangentEntries {
   // Where a block goes: index of its first entry among the values of the diagonal part, or, beyond
   // their end, of the off-diagonal part; −1 for a block that is not in this rank's rows.
   using Slot = int32_t;
+  using PairSlots = std::array<Slot, 4>;  // ii ij ji jj
 
   void make_pattern();
   void make_pattern_matrix();
   void find_slots();
+  std::vector<PairSlots> find_pairs(const std::vector<std::array<int32_t, 2>>& points) const;
   bool owns(int32_t point) const;
   Slot find(int32_t row_point, int32_t column_point) const;
   void add(double* const values[2], Slot slot, int32_t row_point, const Mat3& block) const;
+  void add_pair(double* const values[2], const std::array<int32_t, 2>& points,
+                const PairSlots& slots, const Mat3& block) const;
   void add_spring(double* const values[2], size_t loop, int64_t spring, const Mat3& block) const;
   template <class Work>
   void refill(Mat matrix, Work&& add_blocks) const;
 
   const Objective& objective_;
   const Part& part_;
-  BlockRows rows_[2];                                           // diagonal part, off-diagonal part
-  base::MatHandle pattern_;                                     // zeros
-  std::vector<std::vector<std::array<Slot, 4>>> spring_slots_;  // [loop][spring] ii ij ji jj
+  BlockRows rows_[2];                                 // diagonal part, off-diagonal part
+  base::MatHandle pattern_;                           // zeros
+  std::vector<std::vector<PairSlots>> spring_slots_;  // [loop][spring]
+  std::vector<PairSlots> edge_slots_;
   std::vector<std::array<Slot, 36>> prism_slots_;
 };
 

@@ -32,6 +32,8 @@ inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics:
   for (const mechanics::SpringLoop& loop : loops.springs)
     result.value += weights.elastic *
                     mechanics::add_spring_gradient(loop, x, weights.elastic, gradient, kernels);
+  result.value += weights.elastic *
+                  mechanics::add_edge_gradient(loops.edges, x, weights.elastic, gradient, kernels);
   result.value += mechanics::add_prism_gradient(loops.prisms, x, weights, gradient, kernels);
   result.gradient = flattened(gradient);
   return result;
@@ -39,7 +41,8 @@ inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics:
 
 /// The dense Hessian from the 3×3 blocks.
 inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::Weights& weights,
-                                const std::vector<Vec3>& x, mechanics::Curvature curvature) {
+                                const std::vector<Vec3>& x, mechanics::Curvature curvature,
+                                const std::vector<double>& slopes = {}) {
   const int64_t n = 3 * static_cast<int64_t>(x.size());
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);
   const auto add = [&](int32_t i, int32_t j, const Mat3& block) {
@@ -54,7 +57,19 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
                                        add(i, j, -block);
                                        add(j, i, -block);
                                      });
-  mechanics::for_each_prism_block(loops.prisms, x, weights, curvature,
+  std::vector<double> most_slope = slopes;
+  most_slope.resize(loops.prisms.size(), 0.0);
+  const bool exact = curvature == mechanics::Curvature::exact;
+  for (int64_t e = 0; e < loops.edges.size(); ++e) {
+    const auto [i, j] = loops.edges.points[e];
+    const Mat3 block = weights.elastic * loops.edges.weight[e] * Mat3::Identity();
+    add(i, i, block);
+    add(j, j, block);
+    add(i, j, -block);
+    add(j, i, -block);
+  }
+  mechanics::for_each_prism_block(loops.prisms, x, weights,
+                                  exact ? std::span<const double>() : most_slope,
                                   [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                     const auto& corner = loops.prisms.points[e];
                                     for (int i = 0; i < 6; ++i)

@@ -219,6 +219,37 @@ TEST_P(RunsOfAGraph, EveryElementIsEvaluatedOnce) {
   EXPECT_EQ(here, there);
 }
 
+TEST(RunsOfASolid, KernelsAgree) {
+  model::Model model = test::layered_patch({7, 5, 5, 1.0, 0.8});
+  model.springs = {};
+  Random random(14);
+  for (const double volume : model.prisms.rest_volume) {
+    model.prisms.shear_modulus.push_back(1.0 + 0.8 * random());
+    model.prisms.modulus.push_back(5.0 + 4 * random());
+    model.prisms.target_volume.push_back(volume * 1.2);
+  }
+  model::assemble_edges("patch", model);
+  const auto count = static_cast<int64_t>(model.prisms.points.size());
+  const auto edges = static_cast<int64_t>(model.edges.points.size());
+  for (const int64_t owned : {edges, edges / 2, int64_t{0}}) {
+    const Loops loops = make_loops(model, 0, count * owned / edges, owned);
+    EXPECT_GT(loops.edges.counted_runs.elements + loops.edges.other_runs.elements, edges / 2);
+    std::vector<Vec3> x = model.points.position;
+    for (Vec3& p : x) p += 0.2 * random.vector();
+    const Weights weights{1, VolumeTerm::penalty, 1};
+    const auto plain = test::evaluate(loops, weights, x, Kernels::plain);
+    const auto directions = test::random_directions(x.size());
+    const auto product = test::hessian_action(loops, weights, x, directions, Kernels::plain);
+    for (const Kernels kernels : available_kernels()) {
+      const auto here = test::evaluate(loops, weights, x, kernels);
+      EXPECT_NEAR(here.value, plain.value, 1e-13 * std::abs(plain.value));
+      EXPECT_LE(largest(here.gradient - plain.gradient), 1e-13 * largest(plain.gradient));
+      const auto acted = test::hessian_action(loops, weights, x, directions, kernels);
+      EXPECT_LE(largest(acted - product), 1e-13 * largest(product));
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Graphs, RunsOfAGraph, testing::ValuesIn(all_graphs),
                          [](const auto& info) { return std::string(info.param.name); });
 

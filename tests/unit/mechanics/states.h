@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "../../layered_patch.h"
+#include "repose/model/material.h"
 
 /// A small piece of tissue with uneven springs, and the states it is tried in.
 namespace repose::test {
@@ -37,6 +38,20 @@ inline model::Model uneven_patch() {
   model.prisms.points.erase(model.prisms.points.begin());
   model.prisms.rest_volume.erase(model.prisms.rest_volume.begin());
   for (double& volume : model.prisms.rest_volume) volume *= 1.0 + 0.2 * random();
+  return model;
+}
+
+/// The patch without springs, as a solid whose moduli differ from prism to prism.
+inline model::Model uneven_solid() {
+  model::Model model = layered_patch({});
+  model.springs = {};
+  Random random(8);
+  for (const double volume : model.prisms.rest_volume) {
+    model.prisms.shear_modulus.push_back(1.0 + 0.8 * random());
+    model.prisms.modulus.push_back(5.0 + 4 * random());
+    model.prisms.target_volume.push_back(volume * (1.2 + 0.1 * random()));
+  }
+  model::assemble_edges("patch", model);
   return model;
 }
 

@@ -40,8 +40,14 @@ inline Rest find_rest(const model::Model& model, const solve::Settings& settings
   base::Stages stages(MPI_COMM_WORLD);
   Rest rest;
   const auto keep = [&](const model::StepNumbers&, const model::StepRows& slabs) {
-    rest.rows = {gather(slabs.position), gather(slabs.residual_force), gather(slabs.volume_ratio),
-                 gather(slabs.pressure), gather(slabs.elongation),     gather(slabs.tension)};
+    rest.rows = {gather(slabs.position),
+                 gather(slabs.residual_force),
+                 gather(slabs.volume_ratio),
+                 gather(slabs.pressure),
+                 {},
+                 {},
+                 gather(slabs.elongation),
+                 gather(slabs.tension)};
   };
   rest.summary = solve::find_repose(MPI_COMM_WORLD, model, settings, {}, stages, keep);
   return rest;

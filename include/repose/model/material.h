@@ -1,0 +1,54 @@
+#pragma once
+#include <array>
+#include <optional>
+#include <string>
+
+#include "repose/model/model.h"
+#include "repose/scene/scene.h"
+
+/// Tissue as a neo-Hookean solid on the model's prisms (docs/model.md "The continuum").
+namespace repose::model {
+
+/// Moduli of the energy of a solid, N/mm².
+struct Moduli {
+  double shear;   ///< μ = E / (2 (1 + ν))
+  double volume;  ///< κ = E ν / ((1 + ν)(1 − 2 ν)) + μ
+};
+Moduli moduli(const scene::Elasticity& elasticity);
+
+/// The pairs of a prism's six points, in the order of their weights.
+inline constexpr std::array<std::array<int, 2>, 15> prism_pairs = {{{0, 1},
+                                                                    {0, 2},
+                                                                    {1, 2},
+                                                                    {3, 4},
+                                                                    {3, 5},
+                                                                    {4, 5},
+                                                                    {0, 3},
+                                                                    {1, 4},
+                                                                    {2, 5},
+                                                                    {0, 4},
+                                                                    {1, 3},
+                                                                    {1, 5},
+                                                                    {2, 4},
+                                                                    {0, 5},
+                                                                    {2, 3}}};
+
+/// −∫ ∇N_i · ∇N_j dV (mm) over a prism for the pairs of its points, N the wedge's shape functions,
+/// by 3 × 2 Gauss points. Empty where the map of the wedge is not invertible at one of them.
+std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners);
+
+/// A prism's deformation gradient in the middle, from its corners before and now.
+Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Vec3, 6>& now);
+
+/// Gives every prism of make_layers its moduli, a target volume t = V (1 + μ/κ), at which it is
+/// free of stress as it is, and the model the edges of all (C2), in place of springs. A prism takes
+/// the means of the strata that it crosses, by the share of its depth, and the material of the last
+/// region that its middle lies in. Reads the regions' meshes and volumes. Throws InputError naming
+/// `file` and the place of a prism too distorted, or of a region that holds no prism. Serial.
+void set_material(const scene::Material& material, const std::string& file, Model& model);
+
+/// The edges anew from the prisms and their shear moduli, sorted by their points. InputError as
+/// above. Serial, O(prisms).
+void assemble_edges(const std::string& file, Model& model);
+
+}  // namespace repose::model

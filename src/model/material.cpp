@@ -1,0 +1,237 @@
+#include "repose/model/material.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numeric>
+
+#include "repose/base/error.h"
+#include "repose/surface/defects.h"
+#include "repose/surface/distance.h"
+#include "repose/surface/read.h"
+#include "repose/surface/volume.h"
+
+namespace repose::model {
+
+namespace {
+
+using Gradients = Eigen::Matrix<double, 3, 6>;
+
+/// Derivatives of the wedge's shape functions by its own coordinates: ξ, η in the triangle, ζ from
+/// a (0) to b (1).
+Gradients local_gradients(double xi, double eta, double zeta) {
+  const double in_triangle[3] = {1 - xi - eta, xi, eta};
+  const double by_xi[3] = {-1, 1, 0}, by_eta[3] = {-1, 0, 1};
+  Gradients g;
+  for (int i = 0; i < 3; ++i) {
+    g.col(i) << by_xi[i] * (1 - zeta), by_eta[i] * (1 - zeta), -in_triangle[i];
+    g.col(i + 3) << by_xi[i] * zeta, by_eta[i] * zeta, in_triangle[i];
+  }
+  return g;
+}
+
+/// ∂X/∂(ξ, η, ζ).
+Mat3 map_gradient(const std::array<Vec3, 6>& corners, const Gradients& local) {
+  Mat3 map = Mat3::Zero();
+  for (int i = 0; i < 6; ++i) map += corners[i] * local.col(i).transpose();
+  return map;
+}
+
+std::array<Vec3, 6> corners_of(const Model& model, size_t prism) {
+  std::array<Vec3, 6> corners;
+  for (int c = 0; c < 6; ++c) corners[c] = model.points.position[model.prisms.points[prism][c]];
+  return corners;
+}
+
+Vec3 middle_of(const std::array<Vec3, 6>& corners) {
+  return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
+}
+
+using Inside = std::function<bool(const Vec3&)>;
+
+Inside inside_of(const scene::SphereRegion& sphere, const std::string&) {
+  return [sphere](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius; };
+}
+
+Inside inside_of(const scene::MeshRegion& mesh, const std::string&) {
+  const surface::Surface read = surface::read_surface(mesh.file);
+  const surface::Defects defects = surface::inspect(read, false);
+  if (defects.border_edges > 0 || defects.non_manifold_edges > 0)
+    base::refuse("{}: a region of a material is the inside of a closed mesh; this one has {}",
+                 mesh.file.string(), surface::describe(defects));
+  const auto tree = std::make_shared<surface::DistanceTree>(read);
+  return [tree](const Vec3& x) { return tree->contains(x); };
+}
+
+Inside inside_of(const scene::LabelRegion& region, const std::string&) {
+  const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
+  const Mat3 to_voxels = surface::inverse_axes(*labels);
+  return [labels, to_voxels, label = region.label](const Vec3& x) {
+    const Vec3 at = to_voxels * (x - labels->origin);
+    std::array<int64_t, 3> voxel;
+    for (int axis = 0; axis < 3; ++axis) {
+      voxel[axis] = std::lround(at[axis]);
+      if (voxel[axis] < 0 || voxel[axis] >= labels->size[axis]) return false;
+    }
+    return labels->at(voxel[0], voxel[1], voxel[2]) == static_cast<float>(label);
+  };
+}
+
+/// How deep a prism's upper and lower triangle lie below the skin, mm.
+std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism) {
+  std::array<double, 2> depth{};
+  for (int c = 0; c < 6; ++c) {
+    const Vec3& skin = model.points.position[prism[c] - model.points.layer[prism[c]]];
+    depth[c / 3] += (model.points.position[prism[c]] - skin).norm() / 3;
+  }
+  return depth;
+}
+
+/// The means of the strata between two depths.
+Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>& depth) {
+  const double thickness = depth[1] - depth[0];
+  const Moduli deep = moduli(material.deep);
+  Moduli mean{0, 0};
+  double top = 0, left = 1;
+  for (const scene::Stratum& stratum : material.strata) {
+    const double bottom = top + stratum.thickness;
+    const double within = std::min(bottom, depth[1]) - std::max(top, depth[0]);
+    const double share = std::clamp(within / thickness, 0.0, left);
+    const Moduli here = moduli(stratum.elasticity);
+    mean.shear += share * here.shear;
+    mean.volume += share * here.volume;
+    left -= share;
+    top = bottom;
+  }
+  return {mean.shear + left * deep.shear, mean.volume + left * deep.volume};
+}
+
+void give_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
+  prisms.shear_modulus[prism] = here.shear;
+  prisms.modulus[prism] = here.volume;
+}
+
+void give_regions(const scene::Material& material, const std::string& file, Model& model) {
+  for (size_t r = 0; r < material.regions.size(); ++r) {
+    const scene::MaterialRegion& region = material.regions[r];
+    const Inside inside =
+        std::visit([&](const auto& where) { return inside_of(where, file); }, region.where);
+    int64_t found = 0;
+    for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+      if (!inside(middle_of(corners_of(model, m)))) continue;
+      give_moduli(moduli(region.elasticity), m, model.prisms);
+      ++found;
+    }
+    if (found == 0)
+      base::refuse(
+          "{}: tissue.material.regions[{}]: holds no prism of the tissue; move or enlarge it, or "
+          "give the tissue more layers",
+          file, r);
+  }
+}
+
+/// The weights of all prisms by the lower of their points, which is a row.
+struct PairRows {
+  std::vector<int64_t> begin;  // [N + 1]
+  struct Entry {
+    int64_t other;
+    double weight;
+  };
+  std::vector<Entry> entry;
+};
+
+PairRows pair_rows(const std::string& file, const Model& model) {
+  const Prisms& prisms = model.prisms;
+  PairRows rows;
+  rows.begin.assign(model.points.position.size() + 1, 0);
+  const auto lower = [](const std::array<int64_t, 6>& p, const std::array<int, 2>& pair) {
+    return std::min(p[pair[0]], p[pair[1]]);
+  };
+  for (const auto& p : prisms.points)
+    for (const auto& pair : prism_pairs) ++rows.begin[lower(p, pair) + 1];
+  std::partial_sum(rows.begin.begin(), rows.begin.end(), rows.begin.begin());
+  rows.entry.resize(rows.begin.back());
+  std::vector<int64_t> end(rows.begin.begin(), rows.begin.end() - 1);
+  for (size_t m = 0; m < prisms.points.size(); ++m) {
+    const std::array<Vec3, 6> corners = corners_of(model, m);
+    const auto weights = pair_weights(corners);
+    if (!weights) {
+      const Vec3 at = middle_of(corners);
+      base::refuse(
+          "{}: prism {} near ({:.2f}, {:.2f}, {:.2f}) mm is too distorted to be a solid: its map "
+          "folds; smooth or remesh the skin there",
+          file, m, at.x(), at.y(), at.z());
+    }
+    for (size_t k = 0; k < prism_pairs.size(); ++k) {
+      const int64_t p = prisms.points[m][prism_pairs[k][0]],
+                    q = prisms.points[m][prism_pairs[k][1]];
+      rows.entry[end[std::min(p, q)]++] = {std::max(p, q), prisms.shear_modulus[m] * (*weights)[k]};
+    }
+  }
+  return rows;
+}
+
+}  // namespace
+
+Moduli moduli(const scene::Elasticity& e) {
+  const double shear = e.young / (2 * (1 + e.poisson));
+  return {shear, e.young * e.poisson / ((1 + e.poisson) * (1 - 2 * e.poisson)) + shear};
+}
+
+std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners) {
+  constexpr double in_triangle[3][2] = {{1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3}};
+  const double half = 0.5 / std::sqrt(3.0);
+  std::array<double, 15> weights{};
+  for (const auto& [xi, eta] : in_triangle)
+    for (const double zeta : {0.5 - half, 0.5 + half}) {
+      const Gradients local = local_gradients(xi, eta, zeta);
+      const Mat3 map = map_gradient(corners, local);
+      const double determinant = map.determinant();
+      if (!(determinant > 0)) return {};
+      const Gradients gradients = map.inverse().transpose() * local;
+      for (size_t k = 0; k < prism_pairs.size(); ++k)
+        weights[k] -= determinant / 12 *
+                      gradients.col(prism_pairs[k][0]).dot(gradients.col(prism_pairs[k][1]));
+    }
+  return weights;
+}
+
+Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Vec3, 6>& now) {
+  const Gradients local = local_gradients(1. / 3, 1. / 3, 0.5);
+  return map_gradient(now, local) * map_gradient(before, local).inverse();
+}
+
+void assemble_edges(const std::string& file, Model& model) {
+  PairRows rows = pair_rows(file, model);
+  model.edges = {};
+  for (size_t p = 0; p + 1 < rows.begin.size(); ++p) {
+    const auto first = rows.entry.begin() + rows.begin[p];
+    const auto last = rows.entry.begin() + rows.begin[p + 1];
+    std::stable_sort(first, last, [](auto& a, auto& b) { return a.other < b.other; });
+    for (auto next = first; next != last;) {
+      double weight = 0;
+      const int64_t other = next->other;
+      for (; next != last && next->other == other; ++next) weight += next->weight;
+      model.edges.points.push_back({static_cast<int64_t>(p), other});
+      model.edges.weight.push_back(weight);
+    }
+  }
+}
+
+void set_material(const scene::Material& material, const std::string& file, Model& model) {
+  Prisms& prisms = model.prisms;
+  const size_t count = prisms.points.size();
+  prisms.shear_modulus.resize(count);
+  prisms.modulus.resize(count);
+  for (size_t m = 0; m < count; ++m)
+    give_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
+  give_regions(material, file, model);
+  for (size_t m = 0; m < count; ++m)
+    prisms.target_volume.push_back(prisms.rest_volume[m] *
+                                   (1 + prisms.shear_modulus[m] / prisms.modulus[m]));
+  assemble_edges(file, model);
+}
+
+}  // namespace repose::model

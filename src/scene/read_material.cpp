@@ -1,0 +1,59 @@
+#include "read_material.h"
+
+#include "material_presets.h"
+
+namespace repose::scene {
+
+namespace {
+
+/// The moduli of an item; Poisson's ratio is `poisson` where it gives none.
+Elasticity read_elasticity(const Map& map, double poisson) {
+  const auto given = map.find("poisson");
+  return {map.at("young").number(), given ? given->number() : poisson};
+}
+
+Stratum read_stratum(const Value& value, double poisson) {
+  const Map map(value);
+  return {map.at("thickness").number(), read_elasticity(map, poisson)};
+}
+
+MaterialRegion read_region(const Value& value, double poisson) {
+  const Map map(value);
+  const auto sphere = map.find("sphere"), mesh = map.find("mesh"), volume = map.find("volume");
+  if (sphere.has_value() + mesh.has_value() + volume.has_value() != 1)
+    value.refuse("needs one of sphere, mesh and volume");
+  const Elasticity elasticity = read_elasticity(map, poisson);
+  if (mesh) return {MeshRegion{mesh->file()}, elasticity};
+  if (volume) return {LabelRegion{volume->file_or_folder(), map.at("label").integer()}, elasticity};
+  const Map ball(*sphere);
+  return {SphereRegion{ball.at("center").vector(), ball.at("radius").number()}, elasticity};
+}
+
+}  // namespace
+
+Material default_material() { return material_presets().front().material; }
+
+Material read_material(const Value& value) {
+  const Map map(value);
+  const auto preset = map.find("preset");
+  Material material = material_presets()[preset ? preset->choice() : 0].material;
+  if (const auto young = map.find("young")) material.deep.young = young->number();
+  if (const auto poisson = map.find("poisson")) {
+    material.deep.poisson = poisson->number();
+    for (Stratum& stratum : material.strata) stratum.elasticity.poisson = poisson->number();
+  }
+  const auto skin = map.find("skin"), strata = map.find("strata");
+  if (skin && strata) strata->refuse("and tissue.material.skin exclude each other; remove one");
+  if (skin) material.strata = {read_stratum(*skin, material.deep.poisson)};
+  if (strata) {
+    material.strata.clear();
+    for (const Value& item : strata->items())
+      material.strata.push_back(read_stratum(item, material.deep.poisson));
+  }
+  if (const auto regions = map.find("regions"))
+    for (const Value& item : regions->items())
+      material.regions.push_back(read_region(item, material.deep.poisson));
+  return material;
+}
+
+}  // namespace repose::scene

@@ -1,0 +1,169 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "assembled.h"
+#include "repose/mechanics/stress.h"
+#include "states.h"
+
+/// Closed forms of the neo-Hookean solid (docs/model.md "The continuum").
+namespace repose::mechanics {
+namespace {
+
+constexpr scene::Elasticity soft{0.015, 0.45};
+constexpr int64_t across = 5, layers = 4;
+constexpr double spacing = 1.0, gap = 0.8;
+
+/// A block of one material whose inner points are moved about, so that its prisms are irregular.
+model::Model block() {
+  model::Model model = test::layered_patch({across, across, layers, spacing, gap});
+  model.springs = {};
+  test::Random random(3);
+  for (size_t i = 0; i < model.points.position.size(); ++i) {
+    const auto column = model.points.column[i], x = column % across, y = column / across;
+    const auto layer = model.points.layer[i];
+    const bool inner =
+        x > 0 && x + 1 < across && y > 0 && y + 1 < across && layer > 0 && layer + 1 < layers;
+    if (inner) model.points.position[i] += 0.15 * random.vector();
+  }
+  model.points.set.assign(model.points.set.size(), model::PointSet::soft_tissue);
+  const model::Moduli moduli = model::moduli(soft);
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = model.points.position[model.prisms.points[m][c]];
+    const double volume = model::prism_volume(corners.data());
+    model.prisms.rest_volume[m] = volume;
+    model.prisms.shear_modulus.push_back(moduli.shear);
+    model.prisms.modulus.push_back(moduli.volume);
+    model.prisms.target_volume.push_back(volume * (1 + moduli.shear / moduli.volume));
+  }
+  model::assemble_edges("block", model);
+  return model;
+}
+
+class SolidBlock : public testing::Test {
+ protected:
+  /// The forces that hold the block at x = F X, N.
+  std::vector<Vec3> forces(const Mat3& f) const {
+    std::vector<Vec3> x = model_.points.position;
+    for (Vec3& p : x) p = f * p;
+    const Eigen::VectorXd gradient = test::evaluate(loops_, weights_, x).gradient;
+    std::vector<Vec3> forces(x.size());
+    for (size_t i = 0; i < x.size(); ++i) forces[i] = gradient.segment<3>(3 * i);
+    return forces;
+  }
+  bool at(size_t i, int axis, double value) const {
+    return std::abs(model_.points.position[i][axis] - value) < 1e-12;
+  }
+  Vec3 sum_at(const std::vector<Vec3>& forces, int axis, double value) const {
+    Vec3 sum = Vec3::Zero();
+    for (size_t i = 0; i < forces.size(); ++i)
+      if (at(i, axis, value)) sum += forces[i];
+    return sum;
+  }
+
+  model::Model model_ = block();
+  Weights weights_{1, VolumeTerm::penalty, 1};
+  Loops loops_ = make_loops(model_, 0, static_cast<int64_t>(model_.prisms.points.size()),
+                            static_cast<int64_t>(model_.edges.points.size()));
+  const double shear_ = model::moduli(soft).shear, modulus_ = model::moduli(soft).volume;
+  const double side_ = spacing * (across - 1), area_ = side_ * side_;
+};
+
+TEST_F(SolidBlock, ModuliAreHookesAtSmallStrains) {
+  const double young = 2 * shear_ * (1 + soft.poisson);
+  EXPECT_NEAR(young, soft.young, 1e-15);
+  const double lame = modulus_ - shear_;
+  EXPECT_NEAR(lame / (2 * (lame + shear_)), soft.poisson, 1e-14);
+}
+
+TEST_F(SolidBlock, NoForceAndNoEnergyByRigidMotion) {
+  const Mat3 turn = Eigen::AngleAxisd(2.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+  const double rest = test::evaluate(loops_, weights_, model_.points.position).value;
+  for (const Vec3& force : forces(turn)) EXPECT_LE(force.norm(), 1e-15);
+  std::vector<Vec3> x = model_.points.position;
+  for (Vec3& p : x) p = turn * p + Vec3(3, 4, 5);
+  EXPECT_NEAR(test::evaluate(loops_, weights_, x).value, rest, 1e-14);
+}
+
+TEST_F(SolidBlock, InnerPointsOfAnyAffineMapAreInBalance) {
+  Mat3 f;
+  f << 1.3, 0.2, -0.1, 0.05, 0.8, 0.3, 0.1, -0.2, 1.1;
+  const std::vector<Vec3> force = forces(f);
+  const double bottom = -gap * (layers - 1);
+  int inner = 0;
+  for (size_t i = 0; i < force.size(); ++i) {
+    if (at(i, 0, 0) || at(i, 0, side_) || at(i, 1, 0) || at(i, 1, side_) || at(i, 2, 0) ||
+        at(i, 2, bottom))
+      continue;
+    EXPECT_LE(force[i].norm(), 1e-15);
+    ++inner;
+  }
+  EXPECT_EQ(inner, (across - 2) * (across - 2) * (layers - 2));
+}
+
+TEST_F(SolidBlock, UniaxialStretch) {
+  const double along = 1.4;
+  double low = 0.5, high = 1.2;  // of the lateral stretch, by bisection of ∂W/∂λ₂
+  for (int i = 0; i < 100; ++i) {
+    const double l = 0.5 * (low + high), volume = along * l * l;
+    const double slope = shear_ * l - shear_ * along * l + modulus_ * (volume - 1) * along * l;
+    (slope < 0 ? low : high) = l;
+  }
+  const std::vector<Vec3> force = forces(Vec3(low, low, along).asDiagonal());
+  const double expected =
+      shear_ * along + (modulus_ * (along * low * low - 1) - shear_) * low * low;
+  EXPECT_NEAR(sum_at(force, 2, 0).z(), expected * area_, 1e-12 * area_);
+  for (size_t i = 0; i < force.size(); ++i) EXPECT_LE(force[i].head<2>().norm(), 1e-14);
+}
+
+TEST_F(SolidBlock, SimpleShear) {
+  Mat3 f = Mat3::Identity();
+  f(0, 2) = 0.7;
+  EXPECT_NEAR(sum_at(forces(f), 2, 0).x(), shear_ * 0.7 * area_, 1e-14 * area_);
+}
+
+TEST_F(SolidBlock, StateOfAPrism) {
+  std::array<Vec3, 6> before, now;
+  const Mat3 turn = Eigen::AngleAxisd(0.4, Vec3(0, 1, 2).normalized()).toRotationMatrix();
+  const Mat3 f = turn * Vec3(1.1, 0.9, 1.3).asDiagonal();
+  for (int c = 0; c < 6; ++c) {
+    before[c] = model_.points.position[model_.prisms.points[5][c]];
+    now[c] = f * before[c];
+  }
+  const PrismState state =
+      prism_state({shear_, modulus_, model_.prisms.rest_volume[5], model_.prisms.target_volume[5]},
+                  before, now);
+  EXPECT_LE((state.stretch - Vec3(1.3, 1.1, 0.9)).norm(), 1e-12);
+  const double volume = 1.1 * 0.9 * 1.3;
+  const Vec3 stress =
+      shear_ / volume * Vec3(1.69, 1.21, 0.81) + Vec3::Constant(modulus_ * (volume - 1) - shear_);
+  EXPECT_NEAR(state.pressure, -stress.mean(), 1e-12);
+  const double mises =
+      std::sqrt(0.5 * (std::pow(stress[0] - stress[1], 2) + std::pow(stress[1] - stress[2], 2) +
+                       std::pow(stress[2] - stress[0], 2)));
+  EXPECT_NEAR(state.von_mises, mises, 1e-12);
+}
+
+TEST_F(SolidBlock, LimitedSlopesMakeTheHessianSemidefinite) {
+  for (const auto& info : test::all_states) {
+    if (info.state == test::State::far || info.state == test::State::nearly_coincident) continue;
+    SCOPED_TRACE(info.name);
+    const model::Model model = test::uneven_solid();
+    const Loops loops = make_loops(model, 0, static_cast<int64_t>(model.prisms.points.size()),
+                                   static_cast<int64_t>(model.edges.points.size()));
+    const auto x = test::positions(model, info.state);
+    const std::vector<double> slopes = semidefinite_slopes(loops.prisms, model.points.position, x);
+    for (size_t e = 0; e < slopes.size(); ++e) EXPECT_GT(slopes[e], 0);
+    const Eigen::MatrixXd matrix = test::assemble(loops, weights_, x, Curvature::convex, slopes);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix, Eigen::EigenvaluesOnly);
+    const double least = solver.eigenvalues()[0] / solver.eigenvalues().tail<1>()[0];
+    const bool usual = info.state == test::State::mild || info.state == test::State::stretched;
+    EXPECT_GE(least, usual ? -1e-5 : -0.03);
+  }
+}
+
+}  // namespace
+}  // namespace repose::mechanics

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "models.h"
+#include "repose/model/material.h"
+#include "rest.h"
+
+/// The neo-Hookean solid solved: closed forms, and the same answer on any way to it.
+namespace repose {
+namespace {
+
+using model::PointSet;
+using testing::Rest;
+
+solve::Settings settings(double accuracy, int load_steps = 0) {
+  solve::Settings s;
+  s.weights = {1, mechanics::VolumeTerm::penalty, 1};
+  s.volume = "material";
+  s.path.accuracy = accuracy;
+  s.path.load_steps = load_steps;
+  return s;
+}
+
+/// The block as a solid; its inner points are moved by up to `uneven` mm.
+model::Model solid_block(int columns, int rows, int layers, double poisson, double uneven,
+                         const std::function<PointSet(int, int, int)>& set) {
+  model::Model m = testing::block(columns, rows, layers, 0, set);
+  m.springs = {};
+  m.spring_sets.clear();
+  std::mt19937 random(5);
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    for (double& x : m.points.position[i]) {
+      const double noise = uneven * (random() / 2147483648.0 - 1.0);
+      if (m.points.set[i] == PointSet::soft_tissue) x += noise;
+    }
+  m.points.target = m.points.position;
+  const model::Moduli moduli = model::moduli({0.015, poisson});
+  for (size_t p = 0; p < m.prisms.points.size(); ++p) {
+    Vec3 corners[6];
+    for (int c = 0; c < 6; ++c) corners[c] = m.points.position[m.prisms.points[p][c]];
+    m.prisms.rest_volume[p] = model::prism_volume(corners);
+    m.prisms.shear_modulus.push_back(moduli.shear);
+    m.prisms.modulus.push_back(moduli.volume);
+    m.prisms.target_volume.push_back(m.prisms.rest_volume[p] * (1 + moduli.shear / moduli.volume));
+  }
+  model::assemble_edges("block", m);
+  return m;
+}
+
+TEST(Solid, PatchTestIsExactOnIrregularPrisms) {
+  const auto inner = [](int i, int j, int a) {
+    return i > 0 && i < 6 && j > 0 && j < 5 && a > 0 && a < 4;
+  };
+  model::Model m = solid_block(7, 6, 5, 0.45, 0.6, [&](int i, int j, int a) {
+    return inner(i, j, a) ? PointSet::soft_tissue : PointSet::held;
+  });
+  Mat3 f;
+  f << 1.2, 0.1, 0, -0.05, 0.9, 0.15, 0.1, 0, 1.1;
+  testing::aim(m, [&](const Vec3& x) -> Vec3 { return f * x; });
+  const Rest rest = testing::find_rest(m, settings(1e-10));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    EXPECT_LE((rest.rows.position[i] - f * m.points.position[i]).norm(), 1e-9);
+  for (const double ratio : rest.rows.volume_ratio) EXPECT_NEAR(ratio, f.determinant(), 1e-10);
+}
+
+model::Model sheared_block(double poisson) {
+  model::Model m = solid_block(8, 7, 4, poisson, 0.3, [](int i, int j, int a) {
+    return a == 3 && i > 0 && j > 0 ? PointSet::bone : PointSet::soft_tissue;
+  });
+  testing::aim(m, [](const Vec3& x) -> Vec3 { return x + Vec3(4, -2, 1); });
+  return m;
+}
+
+TEST(Solid, RigidMotionOfItsBoneCarriesItAlong) {
+  const model::Model m = sheared_block(0.45);
+  const Rest rest = testing::find_rest(m, settings(1e-8));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    EXPECT_LE((rest.rows.position[i] - m.points.position[i] - Vec3(4, -2, 1)).norm(), 1e-8);
+}
+
+/// One side held, the other pulled and turned by a fifth of a turn.
+model::Model twisted_block(double poisson) {
+  model::Model m = solid_block(9, 5, 4, poisson, 0.3, [](int i, int, int) {
+    return i == 0 ? PointSet::boundary : i == 8 ? PointSet::held : PointSet::soft_tissue;
+  });
+  testing::aim(m, [](const Vec3& x) -> Vec3 {
+    const Vec3 centre(40, 10, -4.5), d = x - centre;
+    const double c = std::cos(0.6), s = std::sin(0.6);
+    return centre + Vec3(4, c * d.y() - s * d.z(), s * d.y() + c * d.z());
+  });
+  return m;
+}
+
+TEST(Solid, AnyNumberOfLoadStepsLeadsToOneRestPosition) {
+  for (const double poisson : {0.3, 0.45, 0.49}) {
+    const model::Model m = twisted_block(poisson);
+    const Rest one = testing::find_rest(m, settings(1e-6, 1));
+    EXPECT_TRUE(one.summary.path.complete()) << one.summary.last.reason;
+    EXPECT_EQ(one.summary.last.inverted_prisms, 0);
+    for (const int steps : {2, 5, 10}) {
+      const Rest more = testing::find_rest(m, settings(1e-6, steps));
+      EXPECT_TRUE(more.summary.path.complete()) << more.summary.last.reason;
+      for (size_t i = 0; i < m.points.position.size(); ++i)
+        EXPECT_LE((one.rows.position[i] - more.rows.position[i]).norm(), 2e-6);
+    }
+  }
+}
+
+TEST(Solid, TakesFewEvaluations) {
+  const Rest rest = testing::find_rest(twisted_block(0.45), settings(0.01));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  EXPECT_LE(rest.summary.evaluations, 60);
+  EXPECT_LE(rest.summary.assemblies, 20);
+}
+
+TEST(Solid, ReportsWhatItsForcesAre) {
+  model::Model m = twisted_block(0.45);
+  for (size_t i = 0; i < m.points.mass.size(); ++i) m.points.mass[i] = 1e-6;
+  m.gravity = {0, 0, -9.81};
+  const Rest rest = testing::find_rest(m, settings(1e-8));
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    EXPECT_LE(rest.rows.residual_force[i].norm(), 1e-8);
+  EXPECT_GT(rest.summary.last.f_e, 0);
+  EXPECT_NEAR(rest.summary.last.objective, rest.summary.last.f_e + rest.summary.last.potential,
+              1e-9 * rest.summary.last.f_e);
+}
+
+}  // namespace
+}  // namespace repose
