@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""The same solid by finite elements of another program, DOLFINx, on the model's own points: every prism
-is split into three tetrahedra, and J is not averaged. Says how far a result of repose-solve is from it.
+"""The same solid by finite elements of another program, DOLFINx, on the model's own points: every
+prism is split into three tetrahedra, and J is not averaged. Says how far a result of repose-solve
+is from it.
 
     tests/benchmark/finite_elements.py FILE.h5 [-degree 2] [-against reference.npy] [-loads 4]
                                        [-young 0.015 -poisson 0.45] [-moving 0.1] [-solver mumps]
                                        [-save points.npy]
 
-FILE.h5 is a result or a model of repose-solve; one of springs gets the moduli given. Its fixed points
-go to their targets on straight lines. -degree 1 or 2: linear or quadratic tetrahedra; an edge between
-two fixed points stays straight. -against compares the result with positions saved before instead, and
--save keeps the positions at the model's points. A row of the table: the mean and largest distance over
-the points of the skin that moved by more than -moving mm in the finite elements, and the mean over the
-mean motion. One core; times are CPU s.
+FILE.h5 is a result or a model of repose-solve; one of springs gets the moduli given. Its fixed
+points go to their targets on straight lines. -degree 1 or 2: linear or quadratic tetrahedra; an
+edge between two fixed points stays straight. -solver mumps factors, gamg iterates, which quadratic
+tetrahedra of more than half a million unknowns want for lack of memory. -against compares the
+result with positions saved before instead, and -save keeps the positions at the model's points. A
+row of the table: the mean and largest distance over the points of the skin that moved by more than
+-moving mm in the finite elements, and the mean over the mean motion. One core; times are CPU s.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx python3-h5py
 python3-scipy (and Debian's own /usr/bin/python3, not another).
 """
@@ -46,15 +48,16 @@ EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # of a quadr
 
 
 def tetrahedra(x, prisms):
-    """Three tetrahedra a prism, [3 M, 4]: each side is cut from the point of least number (Dompierre
-    and others, 1999), so that neighbours agree."""
+    """Three tetrahedra a prism, [3 M, 4]: each side is cut from the point of least number
+    (Dompierre and others, 1999), so that neighbours agree."""
     turned = np.take_along_axis(prisms, TURNED[prisms.argmin(1)], 1)
     first = turned[:, [1, 5]].min(1) < turned[:, [2, 4]].min(1)
-    cells = turned[np.arange(len(prisms))[:, None, None], CUTS[np.where(first, 0, 1)]].reshape(-1, 4)
+    rows = np.arange(len(prisms))[:, None, None]
+    cells = turned[rows, CUTS[np.where(first, 0, 1)]].reshape(-1, 4)
     a, b, c, d = x[cells].transpose(1, 0, 2)
     flat = np.einsum("md,md->m", np.cross(b - a, c - a), d - a) <= 0
     if flat.any():
-        raise SystemExit(f"{flat.sum()} tetrahedra have no positive volume: prisms too skewed to split")
+        raise SystemExit(f"{flat.sum()} tetrahedra have no positive volume: prisms too skewed")
     return cells
 
 
@@ -231,8 +234,8 @@ def solve(model, degree, kind="mumps", loads=4, tolerance=1e-4):
 
 
 def difference(model, position, other, moving):
-    """Mean and largest distance over the points of the skin that `other` moves by more than `moving`
-    mm, and their mean motion, mm."""
+    """Mean and largest distance over the points of the skin that `other` moves by more than
+    `moving` mm, and their mean motion, mm."""
     skin = np.unique(model["skin/points"])
     motion = np.linalg.norm(other - model["point/position"], axis=1)[skin]
     moved = motion > moving
@@ -258,8 +261,8 @@ def main():
     else:
         solved = solve(model, options.degree, options.solver, options.loads)
         reference = solved.position
-        how = (f"degree {options.degree}, {solved.unknowns} unknowns, {solved.solves} linear systems, "
-               f"{solved.seconds:.1f} s")
+        how = (f"degree {options.degree}, {solved.unknowns} unknowns, "
+               f"{solved.solves} linear systems, {solved.seconds:.1f} s")
         if options.save:
             np.save(options.save, reference)
     print(f"| {options.file} against finite elements ({how}) | mean | most | mean motion | ratio |")
@@ -267,8 +270,8 @@ def main():
     found = steps(options.file)
     position = found[-1]["point/position"] if found else model["point/position"]
     mean, most, motion = difference(model, position, reference, options.moving)
-    print(f"| skin that moves > {options.moving} mm | {mean:.4f} mm | {most:.3f} mm | {motion:.3f} mm "
-          f"| {100 * mean / motion:.2f} % |")
+    print(f"| skin that moves > {options.moving} mm | {mean:.4f} mm | {most:.3f} mm "
+          f"| {motion:.3f} mm | {100 * mean / motion:.2f} % |")
 
 
 if __name__ == "__main__":

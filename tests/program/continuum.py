@@ -1,6 +1,6 @@
 """The neo-Hookean solid in numpy and scipy, from the formulas alone: it judges the programs and
-shares nothing with them. Per prism of reference volume V, with F the deformation gradient of the wedge's
-shape functions N_i, J its determinant averaged over the prism, mu and kappa in N/mm²:
+shares nothing with them. Per prism of reference volume V, with F the deformation gradient of the
+wedge's shape functions N_i, J its determinant averaged over the prism, mu and kappa in N/mm²:
 
     W = mu/2 (|F|² - 3) - mu (J - 1) + kappa/2 (J - 1)²
 
@@ -70,7 +70,7 @@ def jacobians(x, prisms):
 
 
 def wedge_laplacians(x, prisms):
-    """∫ ∇N_i·∇N_j dV of each prism, mm, [M, 6, 6]; a ValueError where a prism's map is degenerate."""
+    """∫ ∇N_i·∇N_j dV of each prism, mm, [M, 6, 6]; a ValueError where a map is degenerate."""
     maps = jacobians(x, prisms)
     det = np.linalg.det(maps)
     if det.size and det.min() <= 0:
