@@ -1,19 +1,18 @@
 #!/usr/bin/env python3
 """The same solid by finite elements of another program, DOLFINx, on the model's own points: every
-prism is split into three tetrahedra, and J is not averaged. Says how far a result of repose-solve
-is from it.
+prism is split into three tetrahedra, and J is not averaged. Says how far results of repose-solve
+are from it.
 
-    tests/benchmark/finite_elements.py FILE.h5 [-degree 2] [-against reference.npy] [-loads 4]
-                                       [-young 0.015 -poisson 0.45] [-moving 0.1] [-solver mumps]
-                                       [-save points.npy]
+    tests/benchmark/finite_elements.py RESULT.h5 … [-degree 2] [-solver mumps] [-loads 4]
+                                       [-young 0.015 -poisson 0.45] [-moving 0.1] [-folder .]
 
-FILE.h5 is a result or a model of repose-solve; one of springs gets the moduli given. Its fixed
-points go to their targets on straight lines. -degree 1 or 2: linear or quadratic tetrahedra; an
-edge between two fixed points stays straight. -solver mumps factors, gamg iterates, which quadratic
-tetrahedra of more than half a million unknowns want for lack of memory. -against compares the
-result with positions saved before instead, and -save keeps the positions at the model's points. A
-row of the table: the mean and largest distance over the points of the skin that moved by more than
--moving mm in the finite elements, and the mean over the mean motion. One core; times are CPU s.
+A result of springs gets the moduli given. Fixed points go to their targets on straight lines, in
+-loads parts. -degree 1 or 2: linear or quadratic tetrahedra; an edge between two fixed points stays
+straight. -solver mumps factors; gamg iterates, which quadratic tetrahedra of more than half a
+million unknowns want for lack of memory. Positions at the model's points are kept in -folder, as
+RESULT_linear.npy or RESULT_quadratic.npy, and found there the next time. A row of the table: the
+mean and largest distance over the points of the skin that moved by more than -moving mm in the
+finite elements, and the mean over the mean motion. One core; times are CPU s.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx python3-h5py
 python3-scipy (and Debian's own /usr/bin/python3, not another).
 """
@@ -21,6 +20,7 @@ python3-scipy (and Debian's own /usr/bin/python3, not another).
 import dataclasses
 import logging
 import os
+import pathlib
 import time
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: everything on one core
@@ -33,9 +33,9 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from page import option_parser
+from page import option_parser, print_table
 from continuum import with_material
-from tissue import model_of, steps
+from tissue import last, model_of
 
 
 # a prism turned so that a given corner comes first
@@ -249,29 +249,35 @@ def model_with_moduli(file, young, poisson):
     return model if "prism/shear_modulus" in model else with_material(model, young, poisson)
 
 
+def reference(model, name, folder, degree=2, kind="mumps", loads=4):
+    """Positions at a model's points and how they came to be; kept in a folder."""
+    file = pathlib.Path(folder) / f"{name}_{'quadratic' if degree == 2 else 'linear'}.npy"
+    if file.exists():
+        return np.load(file), "found"
+    solved = solve(model, degree, kind, loads)
+    np.save(file, solved.position)
+    return solved.position, (f"{solved.unknowns} unknowns, {solved.solves} linear systems, "
+                             f"{solved.seconds:.0f} s")
+
+
+def rows(options):
+    for file in options.files:
+        model = model_with_moduli(file, options.young, options.poisson)
+        fine, how = reference(model, pathlib.Path(file).stem, options.folder, options.degree,
+                              options.solver, options.loads)
+        mean, most, motion = difference(model, last(file)["point/position"], fine, options.moving)
+        yield (f"| {pathlib.Path(file).stem} | {how} | {mean:.4f} mm | {most:.3f} mm "
+               f"| {motion:.3f} mm | {100 * mean / motion:.2f} % |")
+
+
 def main():
     logging.disable()  # what the forms' compiler says
     parser = option_parser(__doc__, degree=2, loads=4, young=0.015, poisson=0.45, moving=0.1,
-                           solver="mumps", against="", save="")
-    parser.add_argument("file")
+                           solver="mumps", folder=pathlib.Path("."))
+    parser.add_argument("files", nargs="+")
     options = parser.parse_args()
-    model = model_with_moduli(options.file, options.young, options.poisson)
-    if options.against:
-        reference, how = np.load(options.against), options.against
-    else:
-        solved = solve(model, options.degree, options.solver, options.loads)
-        reference = solved.position
-        how = (f"degree {options.degree}, {solved.unknowns} unknowns, "
-               f"{solved.solves} linear systems, {solved.seconds:.1f} s")
-        if options.save:
-            np.save(options.save, reference)
-    print(f"| {options.file} against finite elements ({how}) | mean | most | mean motion | ratio |")
-    print("|---|--:|--:|--:|--:|")
-    found = steps(options.file)
-    position = found[-1]["point/position"] if found else model["point/position"]
-    mean, most, motion = difference(model, position, reference, options.moving)
-    print(f"| skin that moves > {options.moving} mm | {mean:.4f} mm | {most:.3f} mm "
-          f"| {motion:.3f} mm | {100 * mean / motion:.2f} % |")
+    print_table(f"| result | tetrahedra of degree {options.degree} | mean | most | mean motion "
+                "| ratio |\n|---|---|--:|--:|--:|--:|", rows(options))
 
 
 if __name__ == "__main__":

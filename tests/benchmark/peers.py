@@ -235,15 +235,9 @@ class Race:
         write_model(self.file, model)
         self.solid = Solid(model)
         self.rest = rest_position(self.solid)
-        self.quadratic = self.find_quadratic()
+        part = "" if options.part == 1 else f"_{options.part:g}"
+        self.quadratic, _ = finite_elements.reference(model, self.name + part, options.folder)
         self.evaluation = None  # CPU s of one in C++
-
-    def find_quadratic(self):
-        part = "" if self.options.part == 1 else f"_{self.options.part}"
-        file = self.options.folder / f"{self.name}{part}_quadratic.npy"
-        if not file.exists():
-            np.save(file, finite_elements.solve(self.model, 2).position)
-        return np.load(file)
 
     def rows(self):
         for method in self.options.methods.split(","):
