@@ -62,7 +62,7 @@ void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
 void complete(const scene::Scene& scene, const SkinMesh& mesh,
               const std::vector<surface::Surface>& bones, Model& model) {
   if (scene.tissue.material)
-    set_material(*scene.tissue.material, scene.file.string(), model);
+    set_material(scene.tissue, scene.file.string(), model);
   else
     set_stiffness(scene.tissue, mesh, model);
   set_masses(scene.tissue, mesh, model);

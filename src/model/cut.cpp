@@ -4,6 +4,7 @@
 #include <map>
 
 #include "cut_sides.h"
+#include "repose/model/material.h"
 
 namespace repose::model {
 namespace {
@@ -30,7 +31,10 @@ class Knife {
     measure_sides();
     share_loads();
     part_springs();
+    const std::vector<double> beyond = weights_beyond_material();
+    const Edges before = model_.edges;
     part_prisms();
+    part_edges(before, beyond);
     part_skin();
     return pairs_;
   }
@@ -115,6 +119,12 @@ class Knife {
     springs.exponent.push_back(before.exponent[row]);
     springs.reference.push_back(before.reference[row]);
   }
+  /// The ends of a spring or edge that lies beside the cut, on its side.
+  void go_to_side(int64_t& p, int64_t& q) const {
+    const int64_t a = column(p), b = column(q);
+    if (doubled(p) && sides_.left_edge(a, b)) p = doubles_[p];
+    if (doubled(q) && sides_.left_edge(b, a)) q = doubles_[q];
+  }
   /// A spring in the cut is followed by its left half, so that they stay sorted by set.
   void part_springs() {
     Springs springs;
@@ -126,12 +136,43 @@ class Knife {
         add_spring(j, {double_of(p), double_of(q)}, share, springs);
         continue;
       }
-      const int64_t a = column(p), b = column(q);
-      if (doubled(p) && sides_.left_edge(a, b)) p = doubles_[p];
-      if (doubled(q) && sides_.left_edge(b, a)) q = doubles_[q];
+      go_to_side(p, q);
       add_spring(j, {p, q}, 1, springs);
     }
     model_.springs = std::move(springs);
+  }
+
+  /// Of a solid's edges the weights that skin tension and an initial equilibrium gave them.
+  std::vector<double> weights_beyond_material() {
+    std::vector<double> beyond = model_.edges.weight;
+    if (!is_solid(model_)) return beyond;
+    assemble_edges("", model_);
+    for (size_t j = 0; j < beyond.size(); ++j) beyond[j] -= model_.edges.weight[j];
+    return beyond;
+  }
+
+  void add_to_edge(int64_t p, int64_t q, double weight) {
+    Edges& edges = model_.edges;
+    const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
+    const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
+    edges.weight[edge - edges.points.begin()] += weight;
+  }
+
+  /// The edges of the parted prisms, with what else they carried.
+  void part_edges(const Edges& before, const std::vector<double>& beyond) {
+    if (!is_solid(model_)) return;
+    assemble_edges("", model_);
+    for (size_t j = 0; j < before.points.size(); ++j) {
+      auto [p, q] = before.points[j];
+      if (in_cut(p, q)) {
+        const double share = left_share(p, q);
+        add_to_edge(p, q, (1 - share) * beyond[j]);
+        add_to_edge(double_of(p), double_of(q), share * beyond[j]);
+        continue;
+      }
+      go_to_side(p, q);
+      add_to_edge(p, q, beyond[j]);
+    }
   }
 
   void part_prisms() {

@@ -1,5 +1,6 @@
 #include "repose/model/material.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -173,6 +174,31 @@ PairRows pair_rows(const std::string& file, const Model& model) {
   return rows;
 }
 
+/// N/mm.
+double skin_tension(const scene::Tissue& tissue, const std::string& file) {
+  const std::vector<scene::Stratum>& strata = tissue.material->strata;
+  if (strata.empty())
+    base::refuse(
+        "{}: tissue.turgor stretches the outermost stratum of tissue.material, which has none; "
+        "give tissue.material.skin",
+        file);
+  const auto& [thickness, skin] = strata.front();
+  return skin.young * tissue.turgor * thickness / (1 - skin.poisson);
+}
+
+void add_skin_tension(double tension, Model& model) {
+  const std::vector<Vec3>& x = model.points.position;
+  Edges& edges = model.edges;
+  for (const Triangle& t : model.skin)
+    for (int corner = 0; corner < 3; ++corner) {
+      const int64_t p = t[(corner + 1) % 3], q = t[(corner + 2) % 3];
+      const Vec3 a = x[p] - x[t[corner]], b = x[q] - x[t[corner]];
+      const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
+      const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
+      edges.weight[edge - edges.points.begin()] += tension * a.dot(b) / a.cross(b).norm() / 2;
+    }
+}
+
 }  // namespace
 
 Moduli moduli(const scene::Elasticity& e) {
@@ -220,7 +246,8 @@ void assemble_edges(const std::string& file, Model& model) {
   }
 }
 
-void set_material(const scene::Material& material, const std::string& file, Model& model) {
+void set_material(const scene::Tissue& tissue, const std::string& file, Model& model) {
+  const scene::Material& material = *tissue.material;
   Prisms& prisms = model.prisms;
   const size_t count = prisms.points.size();
   prisms.shear_modulus.resize(count);
@@ -232,6 +259,7 @@ void set_material(const scene::Material& material, const std::string& file, Mode
     prisms.target_volume.push_back(prisms.rest_volume[m] *
                                    (1 + prisms.shear_modulus[m] / prisms.modulus[m]));
   assemble_edges(file, model);
+  if (tissue.turgor > 0) add_skin_tension(skin_tension(tissue, file), model);
 }
 
 }  // namespace repose::model

@@ -184,9 +184,8 @@ void refuse_unattached(const Model& m, const std::string& file) {
   for (size_t i = 0; i < held.size(); ++i)
     if (!held[i] && m.points.set[i] == PointSet::soft_tissue)
       refuse(
-          "{}: /model/point: row {} is soft tissue and no spring or edge holds it; remove it, join "
-          "it "
-          "with one or make it a boundary point (set 1)",
+          "{}: /model/point: row {} is soft tissue and no spring holds it; remove it, join it with "
+          "a spring or make it a boundary point (set 1)",
           file, i);
 }
 

@@ -103,7 +103,8 @@ model::Model read_model(const std::filesystem::path& file) {
   model.springs = read_springs(in);
   model.prisms = read_prisms(in);
   model.edges = read_edges(in);
-  if (in.has("/model/spring_set")) model.spring_sets = in.names("/model/spring_set");
+  if (in.has("/model/spring") || in.has("/model/spring_set"))
+    model.spring_sets = in.names("/model/spring_set");
   if (in.has("/model/skin/points")) model.skin = in.tuples<3>("/model/skin/points", Shape::any);
   if (in.has("/model/bone")) model.bones = in.names("/model/bone");
   if (in.has("/model/bone_transform"))

@@ -231,6 +231,8 @@ Solve read_solve(const Value& value) {
 
 double read_tearing(const Value& value, const Scene& scene) {
   const double limit = Map(value).at("limit").number();
+  if (scene.tissue.material)
+    value.refuse("is of springs, and the tissue is a solid; give tissue.springs, or remove it");
   if (scene.forces.empty())
     value.refuse("needs forces, at whose points springs tear; give forces, or remove it");
   for (const Instrument& body : scene.instruments)

@@ -178,6 +178,8 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   rows = element_rows(plan, model.edges.points, rank, part.owned_edges);
   part.model.edges = {pick_elements(model.edges.points, rows, local),
                       pick(model.edges.weight, rows)};
+  rows.resize(part.owned_edges);
+  part.edge_row = std::move(rows);
   part.point_row = local.take();
   pick_points(plan, part);
   part.solid = model::is_solid(model);
@@ -204,7 +206,7 @@ void pass(Archive& archive, Part& part) {
   archive(m.prisms.points, m.prisms.rest_volume, m.prisms.shear_modulus, m.prisms.modulus,
           m.prisms.target_volume, m.edges.points, m.edges.weight, m.bone_transform);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
-          part.point_row, part.spring_row, part.prism_row, part.unknown);
+          part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
           part.total_prisms, part.total_unknowns);
 }

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
+#include "repose/model/material.h"
 #include "repose/solve/message.h"
 #include "repose/solve/part.h"
 #include "repose/solve/tangent.h"
@@ -20,6 +23,7 @@ using model::Model;
 namespace {
 
 constexpr double balanced = 1e-12;  // of the largest force before
+constexpr mechanics::Weights solid_weights{1, mechanics::VolumeTerm::penalty, 1};
 
 double length(const Model& model, size_t spring) {
   const auto& [p, q] = model.springs.points[spring];
@@ -52,8 +56,8 @@ double elongation_at(const model::Springs& springs, size_t j, double tension) {
   });
 }
 
-/// The part whose Hessian at the initial position is A K Aᵀ: linear springs at rest, none in the
-/// skin.
+/// Linear springs at rest between the points of `part` and, of a solid, prisms at rest. At the
+/// initial position the Hessian of their energy is A K Aᵀ.
 Part stiffness_part(Part part, const std::vector<char>& skin) {
   Model& model = part.model;
   model.prisms = {};
@@ -66,33 +70,79 @@ Part stiffness_part(Part part, const std::vector<char>& skin) {
   return part;
 }
 
+/// What Σ q² r⁴/(Y v) + Σ p² V/K makes of a solid: springs of stiffness Y v / r² in place of its
+/// edges, prisms of modulus K that are at rest.
+Part solid_stiffness_part(Part part) {
+  constexpr double pairs = 15;
+  Model& model = part.model;
+  model::Springs& springs = model.springs;
+  std::map<std::array<int64_t, 2>, double> share;  // Σ E V / 15, N·mm
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
+    const double young = shear * (3 * lame + 2 * shear) / (lame + shear);
+    for (const auto& [a, b] : model::prism_pairs) {
+      const int64_t p = model.prisms.points[m][a], q = model.prisms.points[m][b];
+      share[{std::min(p, q), std::max(p, q)}] += young * model.prisms.rest_volume[m] / pairs;
+    }
+    model.prisms.modulus[m] = lame + 2 * shear / 3;
+  }
+  model.prisms.target_volume = model.prisms.rest_volume;
+  model.prisms.shear_modulus.assign(model.prisms.points.size(), 0.0);
+  springs.points = std::move(model.edges.points);
+  model.edges = {};
+  const size_t count = springs.points.size();
+  springs.exponent.assign(count, 0);
+  springs.reference.assign(count, 1);
+  for (size_t j = 0; j < count; ++j) {
+    const auto [p, q] = springs.points[j];
+    const auto energy = share.find({std::min(p, q), std::max(p, q)});
+    springs.rest_length.push_back(length(model, j));
+    springs.stiffness.push_back(
+        energy == share.end() ? 0 : energy->second / std::pow(springs.rest_length[j], 2));
+  }
+  part.owned_springs = part.owned_edges;
+  return part;
+}
+
 /// A K Aᵀ and its solver. One object so that they live and end together.
 class Stiffness {
  public:
-  Stiffness(MPI_Comm comm, const Part& part, const std::vector<char>& skin)
-      : part_(stiffness_part(part, skin)),
+  Stiffness(MPI_Comm comm, Part part)
+      : part_(std::move(part)),
         positions_(comm, part_),
-        objective_(positions_, {}),
+        objective_(positions_, part_.solid ? solid_weights : mechanics::Weights{}),
         tangent_(objective_),
         solver_(positions_, tangent_),
-        skin_(skin) {}
+        multiplier_(part_.model.points.position.size(), Vec3::Zero()) {}
 
-  /// Adds to `tension` [local springs] the K Aᵀ μ with (A K Aᵀ) μ = −`force`.
-  void balance(Vec force, std::vector<double>& tension) {
+  /// Solves (A K Aᵀ) μ = −`force`.
+  void solve(Vec force) {
     base::VecHandle multiplier = positions_.make_vector();
     const base::VecHandle initial = positions_.make_vector();
     check(VecScale(force, -1));
     solver_.solve(initial, force, multiplier, 1e-10);
+    positions_.spread(multiplier, multiplier_);
+  }
+  /// Of K Aᵀ μ what a spring carries, N.
+  double tension(size_t spring) const {
     const Model& model = part_.model;
-    std::vector<Vec3> mu(model.points.position.size(), Vec3::Zero());
-    positions_.spread(multiplier, mu);
-    for (size_t j = 0; j < skin_.size(); ++j) {
-      const auto& [p, q] = model.springs.points[j];
-      const double r = length(model, j);
-      if (skin_[j] || r == 0) continue;
-      const Vec3 u = (model.points.position[q] - model.points.position[p]) / r;
-      tension[j] += model.springs.stiffness[j] * u.dot(mu[p] - mu[q]);
-    }
+    const auto& [p, q] = model.springs.points[spring];
+    const double r = length(model, spring);
+    if (r == 0) return 0;
+    const Vec3 u = (model.points.position[q] - model.points.position[p]) / r;
+    return model.springs.stiffness[spring] * u.dot(multiplier_[p] - multiplier_[q]);
+  }
+  /// And the pressure of a prism, N/mm².
+  double pressure(size_t prism) const {
+    const Model& model = part_.model;
+    mechanics::PrismTriples<double> corners;
+    for (int c = 0; c < 6; ++c)
+      corners[c] = mechanics::triple(model.points.position[model.prisms.points[prism][c]]);
+    const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
+    double change = 0;
+    for (int c = 0; c < 6; ++c)
+      change += mechanics::vec3(v.gradient[c]).dot(multiplier_[model.prisms.points[prism][c]]);
+    return model.prisms.modulus[prism] / model.prisms.rest_volume[prism] * change;
   }
 
  private:
@@ -101,13 +151,13 @@ class Stiffness {
   Objective objective_;
   Tangent tangent_;
   TangentSolver solver_;
-  const std::vector<char>& skin_;
+  std::vector<Vec3> multiplier_;  // [local points] μ, mm
 };
 
 /// The forces on the soft-tissue points at the initial position.
 base::VecHandle initial_forces(MPI_Comm comm, const Part& part) {
   Positions positions(comm, part);
-  Objective objective(positions, {});
+  Objective objective(positions, part.solid ? solid_weights : mechanics::Weights{});
   const base::VecHandle at_rest = positions.make_vector();
   base::VecHandle forces = positions.make_vector();
   positions.update(at_rest);
@@ -204,18 +254,17 @@ void refuse_unbalanced(MPI_Comm comm, const Model& whole, const Part& part, Vec 
   });
 }
 
-/// Brings the rest lengths of all ranks together into `whole` on rank 0. Collective.
-void collect(MPI_Comm comm, const Part& part, Model& whole) {
-  std::vector<int64_t> row = part.spring_row;
-  std::vector<double> rest = part.model.springs.rest_length;
-  rest.resize(row.size());
+/// Brings values of this rank's first rows together in `whole` on rank 0. Collective.
+void collect(MPI_Comm comm, std::vector<int64_t> row, std::vector<double> values,
+             std::vector<double>& whole) {
+  values.resize(row.size());
   if (base::rank(comm) > 0) {
-    Sender(comm, 0)(row, rest);
+    Sender(comm, 0)(row, values);
     return;
   }
   for (int sender = 0; sender < base::size(comm); ++sender) {
-    if (sender > 0) Receiver(comm, sender)(row, rest);
-    for (size_t j = 0; j < row.size(); ++j) whole.springs.rest_length[row[j]] = rest[j];
+    if (sender > 0) Receiver(comm, sender)(row, values);
+    for (size_t j = 0; j < row.size(); ++j) whole[row[j]] = values[j];
   }
 }
 
@@ -227,10 +276,58 @@ double least_rest_ratio(const Model& model) {
   return least;
 }
 
+/// Adds what balances the force to the solid's edges and prisms; returns the largest pressure
+/// added.
+double add_balance(const Stiffness& stiffness, Model& model) {
+  double largest = 0;
+  for (size_t j = 0; j < model.edges.points.size(); ++j) {
+    const auto [p, q] = model.edges.points[j];
+    model.edges.weight[j] +=
+        stiffness.tension(j) / (model.points.position[q] - model.points.position[p]).norm();
+  }
+  model::Prisms& prisms = model.prisms;
+  for (size_t m = 0; m < prisms.points.size(); ++m) {
+    const double pressure = stiffness.pressure(m);
+    prisms.target_volume[m] += pressure * prisms.rest_volume[m] / prisms.modulus[m];
+    largest = std::max(largest, std::abs(pressure));
+  }
+  return largest;
+}
+
+Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
+  Part part = distribute(comm, model);
+  part.model.gravity = gravity;
+  for (Vec3& force : part.model.points.external_force) force.setZero();
+  Prestress result;
+  result.solid = true;
+  Stiffness stiffness(comm, solid_stiffness_part(part));
+  constexpr int most_refinements = 6;
+  constexpr double rounding = 1e-10;  // of the largest force before: edges and prisms cancel
+  for (int pass = 0; pass <= most_refinements; ++pass) {
+    const base::VecHandle force = initial_forces(comm, part);
+    result.residual = largest_block(force);
+    if (pass == 0) result.largest_force = result.residual;
+    if (result.residual <= balanced * result.largest_force) break;
+    if (pass == most_refinements) {
+      if (result.residual <= rounding * result.largest_force) break;
+      refuse_unbalanced(comm, model, part, force, result);
+    }
+    stiffness.solve(force);
+    result.largest_pressure += add_balance(stiffness, part.model);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &result.largest_pressure, 1, MPI_DOUBLE, MPI_MAX, comm);
+  collect(comm, part.edge_row, part.model.edges.weight, model.edges.weight);
+  collect(comm, part.prism_row, part.model.prisms.target_volume, model.prisms.target_volume);
+  return result;
+}
+
 }  // namespace
 
 Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
+  bool solid = model::is_solid(model);
+  MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
+  if (solid) return balance_solid(comm, model, as.gravity);
   Part part = distribute(comm, model);
   const std::vector<char> skin = skin_springs(comm, model, part);
   for (size_t j = 0; j < skin.size(); ++j)
@@ -239,7 +336,7 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   for (Vec3& force : part.model.points.external_force) force.setZero();
 
   Prestress result;
-  Stiffness stiffness(comm, part, skin);
+  Stiffness stiffness(comm, stiffness_part(part, skin));
   std::vector<double> tension(skin.size(), 0.0);
   constexpr int most_refinements = 6;
   for (int pass = 0; pass <= most_refinements; ++pass) {
@@ -251,11 +348,13 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
       if (result.residual <= rounding_force(comm, part)) break;
       refuse_unbalanced(comm, model, part, force, result);
     }
-    stiffness.balance(force, tension);
+    stiffness.solve(force);
+    for (size_t j = 0; j < skin.size(); ++j)
+      if (!skin[j]) tension[j] += stiffness.tension(j);
     set_rest_lengths(skin, tension, part.model);
     require_rest_lengths(comm, model, part, tension);
   }
-  collect(comm, part, model);
+  collect(comm, part.spring_row, part.model.springs.rest_length, model.springs.rest_length);
   result.least_rest_ratio = least_rest_ratio(part.model);
   MPI_Allreduce(MPI_IN_PLACE, &result.least_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
   return result;

@@ -51,6 +51,17 @@ void add_springs(const model::Model& model, const std::vector<double>& x, double
   }
 }
 
+void add_edges(const model::Model& model, const std::vector<double>& x, Groups& groups) {
+  const model::Edges& edges = model.edges;
+  for (size_t j = 0; j < edges.points.size(); ++j) {
+    if (!groups.touch(edges.points[j])) continue;
+    const auto [p, q] = edges.points[j];
+    const Vec3 force = edges.weight[j] * (Vec3::Map(&x[3 * q]) - Vec3::Map(&x[3 * p]));
+    groups.add(p, force);
+    groups.add(q, -force);
+  }
+}
+
 /// Φ_v'(v) of prism m.
 double slope(const model::StepNumbers& n, double change, double rest, double pressure) {
   if (n.volume == "paper") return 2 * (1 - n.lambda) * change;
@@ -67,8 +78,11 @@ void add_prisms(const model::Model& model, const std::vector<double>& x,
     for (int c = 0; c < 6; ++c)
       corners[c] = mechanics::triple(Vec3::Map(&x[3 * prisms.points[m][c]]));
     const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
-    const double by = slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
-                            pressure.empty() ? 0 : pressure[m]);
+    const double by =
+        model::is_solid(model)
+            ? prisms.modulus[m] * (v.volume - prisms.target_volume[m]) / prisms.rest_volume[m]
+            : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
+                    pressure.empty() ? 0 : pressure[m]);
     for (int c = 0; c < 6; ++c)
       groups.add(prisms.points[m][c], -by * mechanics::vec3(v.gradient[c]));
   }
@@ -90,6 +104,7 @@ std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
   Groups groups(model.points.position.size(), held);
   const bool energy = numbers.functional == "energy";
   add_springs(model, x, energy && numbers.volume == "paper" ? numbers.lambda : 1, groups);
+  add_edges(model, x, groups);
   if (energy && numbers.volume != "none") add_prisms(model, x, pressure, numbers, groups);
   return groups.forces();
 }

@@ -76,6 +76,10 @@ std::string describe_cut(const model::Cut& cut, int64_t doubled) {
 }
 
 std::string describe_prestress(const Prestress& p) {
+  if (p.solid)
+    return row("initial equilibrium",
+               fmt::format("{:.3g} N left of {:.3g} N; pressures up to {:.3g} N/mm²", p.residual,
+                           p.largest_force, p.largest_pressure));
   return row("initial equilibrium",
              fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
                          p.residual, p.largest_force, p.least_rest_ratio));

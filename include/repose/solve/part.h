@@ -20,6 +20,7 @@ struct Part {
   std::vector<int64_t> point_row;   ///< [local points] row in the whole model
   std::vector<int64_t> spring_row;  ///< [owned_springs]
   std::vector<int64_t> prism_row;   ///< [owned_prisms]
+  std::vector<int64_t> edge_row;    ///< [owned_edges]
   std::vector<int64_t> unknown;     ///< [local points] block number of its unknowns, −1 if fixed
   int64_t first_unknown = 0;        ///< block number of this rank's first unknown point
   int64_t owned_unknowns = 0;       ///< unknown points owned here

@@ -9,12 +9,14 @@ namespace repose::solve {
 struct Prestress {
   double residual = 0;          ///< largest |F_i| left on a soft-tissue point, N
   double largest_force = 0;     ///< largest |F_i| before: skin tension and weight, N
-  double least_rest_ratio = 1;  ///< smallest rest length over initial length
+  double least_rest_ratio = 1;  ///< of springs: smallest rest length over initial length
+  bool solid = false;
+  double largest_pressure = 0;  ///< of a solid, N/mm²
 };
 
 /// How the tissue was when its surfaces were recorded.
 struct Recording {
-  double turgor = 0;            ///< initial strain of the skin springs
+  double turgor = 0;            ///< initial strain of the skin springs; a solid's model has its own
   Vec3 gravity = Vec3::Zero();  ///< N/kg
 };
 
@@ -26,6 +28,11 @@ struct Recording {
 /// F is 1e-12 of the largest force before, or what the rounding of lengths leaves where that is
 /// more. Model and recording are looked at on rank 0 only. Throws InputError naming the springs
 /// where a rest length would not be positive, or the point that no spring can hold. Collective.
+///
+/// Of a solid it is force densities q of its edges (tension over length) and pressures p of its
+/// prisms that balance skin tension and weight, those of least energy Σ q² r⁴/(Y v) + Σ p² V/K with
+/// the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift the
+/// edges' weights and the prisms' target volumes (docs/model.md "The continuum").
 Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
 
 }  // namespace repose::solve
