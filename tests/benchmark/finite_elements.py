@@ -5,6 +5,7 @@ are from it.
 
     tests/benchmark/finite_elements.py RESULT.h5 … [-degree 2] [-solver mumps] [-loads 4]
                                        [-young 0.015 -poisson 0.45] [-moving 0.1] [-folder .]
+                                       [-against OTHER.h5] [-output page.md]
 
 A result of springs gets the moduli given. Fixed points go to their targets on straight lines, in
 -loads parts. -degree 1 or 2: linear or quadratic tetrahedra; an edge between two fixed points stays
@@ -12,7 +13,9 @@ straight. -solver mumps factors; gamg iterates, which quadratic tetrahedra of mo
 million unknowns want for lack of memory. Positions at the model's points are kept in -folder, as
 RESULT_linear.npy or RESULT_quadratic.npy, and found there the next time. A row of the table: the
 mean and largest distance over the points of the skin that moved by more than -moving mm in the
-finite elements, and the mean over the mean motion. One core; times are CPU s.
+finite elements, and the mean over the mean motion. -against: the finite elements are those of
+another result, of the same skin with other layers. -output puts the table below a page's mark
+<!-- finite elements -->. One core; times are CPU s.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx python3-h5py
 python3-scipy (and Debian's own /usr/bin/python3, not another).
 """
@@ -233,13 +236,19 @@ def solve(model, degree, kind="mumps", loads=4, tolerance=1e-4):
                   time.process_time() - begin)
 
 
-def difference(model, position, other, moving):
-    """Mean and largest distance over the points of the skin that `other` moves by more than
-    `moving` mm, and their mean motion, mm."""
-    skin = np.unique(model["skin/points"])
-    motion = np.linalg.norm(other - model["point/position"], axis=1)[skin]
+def skin_rows(model):
+    """The skin's points, by their columns."""
+    rows = np.flatnonzero(model["point/layer"] == 0)
+    return rows[np.argsort(model["point/column"][rows])]
+
+
+def difference(model, position, other, reference_position, moving):
+    """Mean and largest distance over the points of the skin that the reference, positions of the
+    model `other` of the same skin, moves by more than `moving` mm, and their mean motion, mm."""
+    skin, others = skin_rows(model), skin_rows(other)
+    motion = np.linalg.norm(reference_position - other["point/position"], axis=1)[others]
     moved = motion > moving
-    apart = np.linalg.norm(position - other, axis=1)[skin][moved]
+    apart = np.linalg.norm(position[skin] - reference_position[others], axis=1)[moved]
     return apart.mean(), apart.max(), motion[moved].mean()
 
 
@@ -263,21 +272,25 @@ def reference(model, name, folder, degree=2, kind="mumps", loads=4):
 def rows(options):
     for file in options.files:
         model = model_with_moduli(file, options.young, options.poisson)
-        fine, how = reference(model, pathlib.Path(file).stem, options.folder, options.degree,
+        source = options.against or file
+        other = model_with_moduli(source, options.young, options.poisson)
+        fine, how = reference(other, pathlib.Path(source).stem, options.folder, options.degree,
                               options.solver, options.loads)
-        mean, most, motion = difference(model, last(file)["point/position"], fine, options.moving)
-        yield (f"| {pathlib.Path(file).stem} | {how} | {mean:.4f} mm | {most:.3f} mm "
-               f"| {motion:.3f} mm | {100 * mean / motion:.2f} % |")
+        mean, most, motion = difference(model, last(file)["point/position"], other, fine,
+                                        options.moving)
+        yield (f"| {pathlib.Path(file).stem} | {pathlib.Path(source).stem}: {how} | {mean:.4f} mm "
+               f"| {most:.3f} mm | {motion:.3f} mm | {100 * mean / motion:.2f} % |")
 
 
 def main():
     logging.disable()  # what the forms' compiler says
     parser = option_parser(__doc__, degree=2, loads=4, young=0.015, poisson=0.45, moving=0.1,
-                           solver="mumps", folder=pathlib.Path("."))
+                           solver="mumps", against="", folder=pathlib.Path("."))
     parser.add_argument("files", nargs="+")
     options = parser.parse_args()
     print_table(f"| result | tetrahedra of degree {options.degree} | mean | most | mean motion "
-                "| ratio |\n|---|---|--:|--:|--:|--:|", rows(options))
+                "| ratio |\n|---|---|--:|--:|--:|--:|", rows(options), options.output,
+                "finite elements")
 
 
 if __name__ == "__main__":

@@ -24,7 +24,8 @@ makes a tenth of the move. Who stops how:
 Skin: mean distance from quadratic tetrahedra over the points of the skin that these move by more
 than -moving mm, and the same over their mean motion. They are kept in -folder, as
 FILE_quadratic.npy, and found there the next time. Everything on one core; times are ratios within
-one run, the least of -rounds where they are below 5 s.
+one run, the least of -rounds where they are below 5 s. -output puts each table below a page's mark
+<!-- FILE -->.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx calculix-ccx
 liblbfgs-dev python3-h5py python3-scipy; for PolySolve an environment of one's own:
     /usr/bin/python3 -m venv --system-site-packages VENV; VENV/bin/pip install polyfem-polysolve
@@ -50,7 +51,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from measure import run
-from page import option_parser, write  # which adds the folder of the next ones
+from page import option_parser, print_table  # which adds the folder of the next ones
 import finite_elements
 from continuum import Solid, rest_position
 from tissue import last, write_model
@@ -237,8 +238,8 @@ class Race:
         write_model(self.file, model)
         self.solid = Solid(model)
         self.rest = rest_position(self.solid)
-        part = "" if options.part == 1 else f"_{options.part:g}"
-        self.quadratic, _ = finite_elements.reference(model, self.name + part, options.folder)
+        self.mark = self.name + ("" if options.part == 1 else f"_{options.part:g}")
+        self.quadratic, _ = finite_elements.reference(model, self.mark, options.folder)
         self.evaluation = None  # CPU s of one in C++
 
     def rows(self):
@@ -384,14 +385,17 @@ def calculix_positions(file, model):
     return model["point/position"] + found[np.argsort(found[:, 0]), 1:]
 
 
-def table(race):
-    """Lines of Markdown, each printed when it is known."""
+def head(race):
     moved = np.linalg.norm(race.quadratic - race.model["point/position"], axis=1)
-    yield (f"{race.name}: {3 * len(race.solid.soft)} unknowns, {len(race.solid.prisms)} prisms, "
-           f"{race.options.part:g} of the move, to {race.options.accuracy:g} mm; "
-           f"largest motion {moved.max():.2f} mm\n")
-    yield "| method | CPU s | own | with Repose's evaluation | times Repose's | counts | skin | |"
-    yield "|---|--:|--:|--:|--:|---|--:|---|"
+    return (f"{race.name}: {3 * len(race.solid.soft)} unknowns, {len(race.solid.prisms)} prisms, "
+            f"{race.options.part:g} of the move, to {race.options.accuracy:g} mm; "
+            f"largest motion {moved.max():.2f} mm\n\n"
+            "| method | CPU s | own | with Repose's evaluation | times Repose's | counts "
+            "| skin | |\n"
+            "|---|--:|--:|--:|--:|---|--:|---|")
+
+
+def lines(race):
     base = None
     for row in race.rows():
         base = base or (row.seconds if "Repose" in row.name else None)
@@ -412,8 +416,8 @@ def number(seconds):
 def skin(race, row):
     if row.position is None:
         return "–"
-    mean, _, motion = finite_elements.difference(race.model, row.position, race.quadratic,
-                                                 race.options.moving)
+    mean, _, motion = finite_elements.difference(race.model, row.position, race.model,
+                                                 race.quadratic, race.options.moving)
     return f"{mean:.4f} mm, {100 * mean / motion:.2f} %"
 
 
@@ -424,16 +428,11 @@ def main():
                            folder=pathlib.Path("."))
     parser.add_argument("files", nargs="+")
     options = parser.parse_args()
-    text = ""
     for file in options.files:
         with tempfile.TemporaryDirectory() as folder:
-            for line in table(Race(file, options, pathlib.Path(folder))):
-                print(line, flush=True)
-                text += line + "\n"
-        text += "\n"
-        print()
-    if options.output:
-        write(options.output, text)
+            race = Race(file, options, pathlib.Path(folder))
+            print_table(head(race), lines(race), options.output, race.mark)
+            print()
 
 
 if __name__ == "__main__":
