@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "repose/adapt/discretisation.h"
 #include "repose/adapt/ladder.h"
 #include "repose/adapt/report.h"
 #include "repose/base/agreement.h"
@@ -23,6 +24,7 @@
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
 #include "repose/solve/active_search.h"
+#include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
@@ -92,6 +94,8 @@ std::vector<base::Option> method_options() {
        {"preview", "balanced", "exact"}},
       {"adapt", OptionKind::flag, "",
        "Solve the coarsest model of the scene whose skin is within the accuracy."},
+      {"discretisation", OptionKind::flag, "",
+       "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."},
       {"nested",
        OptionKind::choice,
        "auto",
@@ -289,20 +293,28 @@ void say(const std::string& text) {
   std::fflush(stdout);
 }
 
+/// What coarser models gave.
+struct Coarser {
+  std::string told;                            // on rank 0
+  std::optional<adapt::Ladder> compared;       // with the scene's own model, where asked for
+  std::optional<double> discretisation_error;  // mm, of the model that was chosen, if one was
+};
+
 /// Writes every step to the result, and from time to time the latest to a checkpoint.
 class Writer {
  public:
-  Writer(const std::filesystem::path& name, const model::Model& model,
-         std::optional<double> discretisation_error, double interval)
+  Writer(const std::filesystem::path& name, const model::Model& model, const Coarser& coarser,
+         double interval)
       : name_(name),
         model_(model),
-        discretisation_error_(discretisation_error),
+        coarser_(coarser),
         file_(comm, name, model),
         interval_(interval) {}
 
-  void operator()(model::StepNumbers numbers, const model::StepRows& rows) {
-    if (numbers.load == 1 && discretisation_error_)
-      numbers.discretisation_error = *discretisation_error_;
+  void operator()(model::StepNumbers numbers, model::StepRows rows) {
+    if (numbers.load == 1 && coarser_.discretisation_error)
+      numbers.discretisation_error = *coarser_.discretisation_error;
+    if (coarser_.compared) compare(numbers, rows);
     file_.append(numbers, rows);
     last_numbers_ = numbers;
     last_rows_.position = rows.position;
@@ -316,6 +328,9 @@ class Writer {
     last_ = MPI_Wtime();
   }
   void commit() { file_.commit(); }
+  bool compares() const { return coarser_.compared.has_value(); }
+  /// How far the mesh and the layers leave the skin from the continuum, on rank 0.
+  const std::string& comparison() const { return comparison_; }
   bool makes_checkpoints() const { return interval_ > 0; }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
@@ -325,9 +340,25 @@ class Writer {
   }
 
  private:
+  void compare(model::StepNumbers& numbers, model::StepRows& rows) {
+    rows.discretisation_error.assign(rows.position.size(), 0.0);
+    if (numbers.load < 1) return;
+    const std::vector<Vec3> position = solve::gather_points(comm, rows.position);
+    std::vector<Vec3> at_point(position.size());
+    base::on_first_rank(comm, [&] {
+      const auto found = adapt::discretisation_of(model_, position, *coarser_.compared);
+      numbers.discretisation_error = found.largest;
+      comparison_ = adapt::describe_discretisation(found);
+      for (size_t i = 0; i < at_point.size(); ++i) at_point[i].x() = found.at_point[i];
+    });
+    const std::vector<Vec3> mine = base::deal_out(comm, at_point);
+    for (size_t i = 0; i < mine.size(); ++i) rows.discretisation_error[i] = mine[i].x();
+  }
+
   std::filesystem::path name_;
   const model::Model& model_;
-  std::optional<double> discretisation_error_;
+  const Coarser& coarser_;
+  std::string comparison_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
   model::StepRows last_rows_;  // what reactions need of them
@@ -338,7 +369,7 @@ class Writer {
 /// it: of a large model it is a fifth of the memory.
 solve::Summary search(Job& job, const solve::Settings& settings, const solve::Start& start,
                       base::Stages& stages, Writer& writer) {
-  if (writer.makes_checkpoints() || !job.held.empty())
+  if (writer.makes_checkpoints() || writer.compares() || !job.held.empty())
     return solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
   return solve::find_repose(comm, std::move(job.model), settings, start, stages, std::ref(writer));
 }
@@ -376,6 +407,7 @@ std::string obstacle_to_nesting(const Job& job, const solve::Settings& settings,
 /// What the options say of coarser models.
 struct Wish {
   bool preview, adapt, nested;
+  bool compare;     // to tell how far the scene's own model is from the continuum
   bool insisted;    // not to be passed over where it cannot be
   std::string who;  // the option that asks for it
 };
@@ -387,8 +419,19 @@ Wish wish_of(const base::Options& options) {
   const bool adapt = options.flag("adapt");
   if (adapt && nested == "off")
     base::refuse("-adapt solves coarser models; leave -nested off or -profile exact out");
-  return {profile == "preview", adapt, nested != "off", adapt || nested == "on",
-          adapt ? "-adapt" : "-nested on"};
+  const bool compare = options.flag("discretisation");
+  if (compare && (adapt || nested == "off"))
+    base::refuse(
+        "-discretisation solves coarser models to compare the scene's own with; leave -adapt, "
+        "-nested off and -profile exact out");
+  return {profile == "preview",
+          adapt,
+          nested != "off",
+          compare,
+          adapt || compare || nested == "on",
+          adapt     ? "-adapt"
+          : compare ? "-discretisation"
+                    : "-nested on"};
 }
 
 /// The resolutions that are solved before the scene's own, on rank 0.
@@ -404,6 +447,7 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
   const auto columns = static_cast<int64_t>(job.anatomy->skin.points.size());
   const bool leads = !job.solid && adapt::guides_pay(*job.anatomy, job.model);
   if (!wish.insisted && !wish.preview && !leads) return {};
+  if (wish.compare) return adapt::halved_resolutions(*job.anatomy);
   if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);
   if (wish.preview) return adapt::compared_rungs(*job.anatomy, preview_columns);
   std::vector<adapt::Resolution> rungs = adapt::guiding_rungs(*job.anatomy);
@@ -411,12 +455,6 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
     base::refuse("{}: the skin has only {} vertices; leave the option out", wish.who, columns);
   return rungs;
 }
-
-/// What coarser models gave.
-struct Coarser {
-  std::string told;                            // on rank 0
-  std::optional<double> discretisation_error;  // mm, of the model that was chosen, if one was
-};
 
 /// Solves coarser models first where that pays; `start` is then the guess they lead to, for the
 /// scene's own model or for the coarse one that takes its place in the job.
@@ -434,7 +472,7 @@ Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& s
   const double begin = MPI_Wtime();
   const model::Anatomy none;
   adapt::Ladder ladder = adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
-  Coarser coarser{adapt::describe_ladder(ladder), {}};
+  Coarser coarser{adapt::describe_ladder(ladder), {}, {}};
   if (ladder.near_enough || (wish.preview && ladder.rungs.size() > 1)) {
     coarser.discretisation_error = ladder.rungs.back().discretisation_error;
     coarser.told += adapt::describe_choice(ladder, settings.path.accuracy);
@@ -446,6 +484,7 @@ Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& s
   } else if (!ladder.rungs.empty()) {
     start = {base::deal_out(comm, ladder.position), true};
   }
+  if (wish.compare && !ladder.rungs.empty()) coarser.compared = std::move(ladder);
   settings.time_limit = ladder.stopped ? 0 : settings.time_limit - (MPI_Wtime() - begin);
   return coarser;
 }
@@ -484,13 +523,14 @@ base::Exit run(const base::Options& options) {
   solve::Start start{restart.position};
   const Coarser coarser = solve_coarser(options, job, settings, start);
   if (start.guess) stages.end("coarser models");
-  Writer writer(name, job.model, coarser.discretisation_error,
+  Writer writer(name, job.model, coarser,
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary = search(job, settings, start, stages, writer);
   writer.commit();
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
-  say(coarser.told + solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
+  say(coarser.told + writer.comparison() + solve::describe_sliding(sliding) +
+      solve::describe_tearing(tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
   const bool settled = sliding.settled && tearing.settled;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "repose/adapt/transfer.h"
 #include "repose/base/agreement.h"
@@ -135,7 +136,7 @@ class Climber {
     rung.discretisation_error = safety * rung.skin_change;
     ladder_.last = std::move(built);
     ladder_.last_position = std::move(position);
-    ladder_.position = std::move(carried);
+    ladder_.before = std::exchange(ladder_.position, std::move(carried));
   }
 
   MPI_Comm comm_;

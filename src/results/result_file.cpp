@@ -105,7 +105,7 @@ struct ResultFile::State {
   }
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
-    return 72 * counts.points + 16 * counts.springs + 48 * counts.prisms + 24 * counts.bone_points +
+    return 80 * counts.points + 16 * counts.springs + 48 * counts.prisms + 24 * counts.bone_points +
            (int64_t{1} << 16);
   }
   void create(const model::Model& model);
@@ -150,6 +150,8 @@ void ResultFile::State::require_rows(const model::StepRows& rows) const {
       !agrees(rows.residual_force.size(), counts.points) ||
       !agrees(rows.volume_ratio.size(), counts.prisms) ||
       !(rows.pressure.empty() || agrees(rows.pressure.size(), counts.prisms)) ||
+      !(rows.discretisation_error.empty() ||
+        agrees(rows.discretisation_error.size(), counts.points)) ||
       (counts.stress && !agrees(rows.stretch.size(), counts.prisms)) ||
       !agrees(rows.elongation.size(), counts.springs) ||
       !agrees(rows.tension.size(), counts.springs))
@@ -178,6 +180,9 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) co
   write_dataset(group, "position", counts.points, 3, mine, flat(rows.position));
   write_dataset(group, "displacement", counts.points, 3, mine, flat(displacement));
   write_dataset(group, "residual_force", counts.points, 3, mine, flat(rows.residual_force));
+  if (counts.discretisation)
+    write_dataset(group, "discretisation_error", counts.points, 0, mine,
+                  rows.discretisation_error.data());
 }
 
 void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) const {
@@ -249,6 +254,9 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
   s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
   s.counts.pressure = same.volume == "exact" || s.counts.stress;
+  int estimated = !rows.discretisation_error.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &estimated, 1, MPI_INT, MPI_MAX, s.comm);
+  s.counts.discretisation = estimated != 0;
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

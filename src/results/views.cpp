@@ -51,6 +51,9 @@ XdmfBlock springs(const FileCounts& counts, size_t steps) {
 }
 
 XdmfBlock skin(const FileCounts& counts, size_t steps) {
+  std::vector<XdmfArray> arrays = {{"displacement", "step/point/displacement", true, true}};
+  if (counts.discretisation)
+    arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   return {.name = "skin",
           .topology = "TopologyType=\"Triangle\"",
           .corners = 3,
@@ -58,7 +61,7 @@ XdmfBlock skin(const FileCounts& counts, size_t steps) {
           .points = counts.points,
           .cells = counts.skin,
           .geometry = moving_points(steps),
-          .arrays = {{"displacement", "step/point/displacement", true, true}}};
+          .arrays = arrays};
 }
 
 XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {

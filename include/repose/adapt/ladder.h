@@ -29,6 +29,7 @@ struct Rung {
 struct Ladder {
   std::vector<Rung> rungs;          ///< coarsest first, those that came to rest
   std::vector<Vec3> position;       ///< [N] on rank 0: the last one's answer at the scene's points
+  std::vector<Vec3> before;         ///< likewise of the rung before it, or empty
   model::BuiltModel last;           ///< the last one's model, on rank 0
   std::vector<Vec3> last_position;  ///< its rest position, mm, on rank 0
   solve::Settings last_settings;    ///< what it was solved with

@@ -74,8 +74,10 @@ struct StepRows {
   std::vector<double> volume_ratio;
   /// N/mm², compression positive; with volume "exact" and of a solid, else empty.
   std::vector<double> pressure;
-  std::vector<Vec3> stretch;       ///< principal stretches of a solid, largest first; else empty
-  std::vector<double> von_mises;   ///< N/mm², of a solid; else empty
+  std::vector<Vec3> stretch;      ///< principal stretches of a solid, largest first; else empty
+  std::vector<double> von_mises;  ///< N/mm², of a solid; else empty
+  /// mm, how far mesh and layers leave the skin from the continuum; empty where not estimated.
+  std::vector<double> discretisation_error = {};
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
 };

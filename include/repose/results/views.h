@@ -12,6 +12,7 @@ struct FileCounts {
   int64_t bone_points = 0, bone_triangles = 0;  ///< of the merged bone surfaces
   bool pressure = false;                        ///< every step has pressures, …
   bool stress = false;                          ///< … and the other fields of a solid
+  bool discretisation = false;                  ///< every step has its estimate
 };
 
 /// What ParaView is offered of a result file, one block a file: tissue (wedges), springs (lines),

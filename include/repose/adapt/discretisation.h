@@ -1,0 +1,34 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "repose/adapt/ladder.h"
+
+/// How far a model's own mesh and layers leave the skin from the continuum that it stands for.
+namespace repose::adapt {
+
+/// Resolutions to compare a scene's own with, coarsest first: edges four times and twice as long, a
+/// quarter and half of the gaps between layers where the scene lets them be any number. Those that
+/// would leave fewer than 100 columns are left out. On rank 0.
+std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy);
+
+/// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
+struct Discretisation {
+  double order = 1;              ///< with which differences fall when all lengths are halved
+  bool observed = false;         ///< in three resolutions; else the 1 that is assumed
+  double mean = 0, largest = 0;  ///< over the skin points that move
+  double percentile_95 = 0;
+  std::vector<double> at_point;  ///< [N of the model] 0 below the skin
+};
+
+/// Richardson's extrapolation (1911): where differences between resolutions fall with the order p,
+/// |u_h − u_2h| / (2^p − 1) is left. p is observed where `ladder` has two resolutions, and is kept
+/// within 1/2 and 2. `position` [N] is the rest position of `fine`, the scene's own model. On rank
+/// 0.
+Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
+                                 const Ladder& ladder);
+
+/// One row for a person.
+std::string describe_discretisation(const Discretisation& found);
+
+}  // namespace repose::adapt

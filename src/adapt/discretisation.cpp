@@ -1,0 +1,79 @@
+#include "repose/adapt/discretisation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "repose/surface/remesh.h"
+
+namespace repose::adapt {
+
+namespace {
+
+constexpr double still = 0.1;  // mm, below which a skin point does not count as moving
+
+/// Mean distance of two positions of the skin points that move.
+double mean_difference(const model::Model& model, const std::vector<Vec3>& position,
+                       const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double sum = 0, count = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    if (model.points.layer[i] > 0) continue;
+    if ((position[i] - model.points.position[i]).norm() < still) continue;
+    sum += (a[i] - b[i]).norm();
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+}  // namespace
+
+std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy) {
+  constexpr double fewest = 100;  // columns
+  const scene::Tissue& tissue = anatomy.scene.tissue;
+  const bool free = layers_are_free(tissue);
+  const double edge = surface::even_edge(anatomy.skin);
+  std::vector<Resolution> resolutions;
+  for (const int times : {4, 2}) {
+    if (static_cast<double>(anatomy.skin.points.size()) < fewest * times * times) continue;
+    const int gaps = std::max(1, static_cast<int>(std::lround((tissue.layers - 1.0) / times)));
+    resolutions.push_back({times * edge, free ? gaps + 1 : tissue.layers});
+  }
+  return resolutions;
+}
+
+Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
+                                 const Ladder& ladder) {
+  Discretisation found;
+  found.at_point.assign(position.size(), 0.0);
+  if (!ladder.before.empty()) {
+    const double last = mean_difference(fine, position, position, ladder.position);
+    const double before = mean_difference(fine, position, ladder.position, ladder.before);
+    found.observed = last > 0 && before > last;
+    if (found.observed) found.order = std::clamp(std::log2(before / last), 0.5, 2.0);
+  }
+  const double share = 1 / (std::exp2(found.order) - 1);
+  std::vector<double> moving;
+  for (size_t i = 0; i < position.size(); ++i) {
+    if (fine.points.layer[i] > 0) continue;
+    found.at_point[i] = share * (position[i] - ladder.position[i]).norm();
+    if ((position[i] - fine.points.position[i]).norm() >= still)
+      moving.push_back(found.at_point[i]);
+  }
+  if (moving.empty()) return found;
+  std::sort(moving.begin(), moving.end());
+  for (const double error : moving) found.mean += error / static_cast<double>(moving.size());
+  found.percentile_95 = moving[(moving.size() - 1) * 95 / 100];
+  found.largest = moving.back();
+  return found;
+}
+
+std::string describe_discretisation(const Discretisation& d) {
+  return fmt::format(
+      "  {:<22} leave the moving skin {:.2g} mm from the continuum on average, {:.2g} mm at 95 %, "
+      "{:.2g} mm at most (order {:.2g} {})\n",
+      "mesh and layers", d.mean, d.percentile_95, d.largest, d.order,
+      d.observed ? "observed" : "assumed");
+}
+
+}  // namespace repose::adapt
