@@ -13,7 +13,7 @@ test_packages=(
 )
 # Nobody needs these: what tests/benchmark compares with, and what its pictures are drawn by.
 # To have them: . drivers/setup.sh; install_packages "${benchmark_packages[@]}"
-benchmark_packages=(liblbfgs-dev python3-matplotlib)
+benchmark_packages=(liblbfgs-dev python3-matplotlib python3-dolfinx calculix-ccx)
 
 # Prints those of the given Debian packages that are not installed.
 missing_packages() {

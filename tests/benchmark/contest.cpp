@@ -128,8 +128,8 @@ Task read_task(const std::string& file) {
   const model::StepNumbers& numbers = last.numbers;
   if (numbers.functional != "energy" || numbers.volume == "exact")
     base::refuse(
-        "{}: functional {}, volume {}: the contest takes an energy with volume none, paper "
-        "or penalty",
+        "{}: functional {}, volume {}: the contest takes an energy with volume none, paper, "
+        "penalty or material",
         file, numbers.functional, numbers.volume);
   task.volume = numbers.volume;
   task.lambda = numbers.lambda;
@@ -137,6 +137,7 @@ Task read_task(const std::string& file) {
     task.weights = {1, mechanics::VolumeTerm::penalty, numbers.bulk_modulus};
   if (numbers.volume == "paper")
     task.weights = {numbers.lambda, mechanics::VolumeTerm::paper, 1 - numbers.lambda};
+  if (numbers.volume == "material") task.weights = {1, mechanics::VolumeTerm::penalty, 1};
   task.rest = std::move(last.rows.position);
   return task;
 }
