@@ -5,12 +5,13 @@
 ///     repose-solve opening.h5 -tao_type lmvm -tao_monitor
 ///
 /// Writes NAME.h5 and one XDMF file a block for ParaView. Exit status: 0 converged, 1 bad input
-/// (nothing written), 2 not converged (result written), 3 internal error.
+/// (nothing written), 2 not converged or folded (result written), 3 internal error.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
 
+#include "repose/adapt/given_skin.h"
 #include "repose/adapt/ladder.h"
 #include "repose/adapt/report.h"
 #include "repose/base/agreement.h"
@@ -18,16 +19,20 @@
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
+#include "repose/model/places.h"
 #include "repose/results/model_file.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
 #include "repose/solve/active_search.h"
+#include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
 #include "repose/solve/sliding.h"
 #include "repose/solve/tearing.h"
+#include "repose/surface/read.h"
+#include "repose/surface/write.h"
 
 namespace {
 
@@ -116,6 +121,8 @@ std::vector<base::Option> run_options() {
        "End the search after this, keep the state it has and say how far it is.",
        {0, 1e9},
        "s"},
+      {"allow_folded", OptionKind::flag, "",
+       "Take a rest position with tissue inside out (else exit status 2)."},
       {"dry_run", OptionKind::flag, "", "Build and report the model only."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
@@ -142,6 +149,7 @@ struct Job {
   std::optional<model::Anatomy> anatomy;      // of a scene, on rank 0
   std::optional<solve::Recording> recording;  // of an initial equilibrium, on all ranks
   bool initial_equilibrium = false;           // it holds before the bones move, on all ranks
+  bool remeshed = false;                      // the skin is not the given one, on all ranks
   std::string building;                       // what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;     // points of each instrument, on rank 0
   std::vector<model::Slider> sliders;         // on rank 0
@@ -172,6 +180,17 @@ void make_incisions(Job& job) {
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
 }
 
+/// Builds the model; where no tissue fits, writes those places of the skin to look at.
+model::BuiltModel build(const model::Anatomy& anatomy, const std::filesystem::path& input) {
+  try {
+    return model::build_model(anatomy);
+  } catch (const model::RefusedPlaces& refused) {
+    const std::string file = input.stem().string() + "_refused.ply";
+    surface::write_ply(file, refused.places());
+    base::refuse("{} (these places are in {})", refused.what(), file);
+  }
+}
+
 Job read_job(const std::filesystem::path& input) {
   Job job;
   scene::Scene scene;
@@ -182,7 +201,8 @@ Job read_job(const std::filesystem::path& input) {
     }
     scene = scene::read_scene(input);
     job.anatomy = model::load_anatomy(scene);
-    model::BuiltModel built = model::build_model(*job.anatomy);
+    job.remeshed = job.anatomy->given_skin.has_value();
+    model::BuiltModel built = build(*job.anatomy, input);
     job.model = std::move(built.model);
     job.held = std::move(built.held);
     job.sliders = std::move(built.sliders);
@@ -191,6 +211,7 @@ Job read_job(const std::filesystem::path& input) {
     job.building = solve::describe_build(built.report);
     job.wanted = scene.solve;
   });
+  MPI_Bcast(&job.remeshed, 1, MPI_C_BOOL, 0, comm);
   bring_into_equilibrium(scene, job);
   make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
@@ -288,6 +309,7 @@ class Writer {
     last_numbers_ = numbers;
     last_rows_.position = rows.position;
     last_rows_.pressure = rows.pressure;
+    last_rows_.volume_ratio = rows.volume_ratio;
     int due = interval_ > 0 && MPI_Wtime() - last_ > interval_;
     MPI_Bcast(&due, 1, MPI_INT, 0, comm);
     if (!due || !numbers.converged) return;
@@ -298,6 +320,11 @@ class Writer {
   }
   void commit() { file_.commit(); }
   bool makes_checkpoints() const { return interval_ > 0; }
+  /// [N] and [prisms] of the last step, on rank 0. Collective.
+  std::vector<Vec3> positions() const { return solve::gather_points(comm, last_rows_.position); }
+  std::vector<double> volume_ratios() const {
+    return solve::gather(comm, last_rows_.volume_ratio.data(), last_rows_.volume_ratio.size());
+  }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
     const std::vector<Vec3> forces =
@@ -311,7 +338,7 @@ class Writer {
   std::optional<double> discretisation_error_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
-  model::StepRows last_rows_;  // what reactions need of them
+  model::StepRows last_rows_;  // what reactions and those above need of them
   double interval_, last_ = MPI_Wtime();
 };
 
@@ -322,6 +349,34 @@ solve::Summary search(Job& job, const solve::Settings& settings, const solve::St
   if (writer.makes_checkpoints() || !job.held.empty())
     return solve::find_repose(comm, job.model, settings, start, stages, std::ref(writer));
   return solve::find_repose(comm, std::move(job.model), settings, start, stages, std::ref(writer));
+}
+
+/// Writes the displacement of the given skin, in the place of which another was solved, to
+/// NAME_given_skin.vtp. Collective.
+std::string write_given_skin(const Job& job, const std::string& name, const Writer& writer) {
+  if (!job.remeshed || !job.cuts.empty()) return "";
+  const std::vector<Vec3> position = writer.positions();
+  const std::string file = name + "_given_skin.vtp";
+  base::on_first_rank(comm, [&] {
+    const model::Model model = results::read_model(name + ".h5");
+    std::vector<Vec3> displacement(position.size());
+    for (size_t i = 0; i < position.size(); ++i)
+      displacement[i] = position[i] - model.points.position[i];
+    const surface::Surface& given = *job.anatomy->given_skin;
+    surface::write_surface(file, given, adapt::displacement_of_given(given, model, displacement));
+  });
+  return fmt::format("  {:<22} {}: its vertices, with displacement\n", "given skin", file);
+}
+
+/// What is said of tissue that is inside out at the end. Collective.
+std::string describe_folds(const model::StepNumbers& last, const std::string& name,
+                           const Writer& writer) {
+  if (last.inverted_prisms == 0) return "";
+  const std::vector<double> ratios = writer.volume_ratios();
+  std::string text;
+  base::on_first_rank(
+      comm, [&] { text = solve::describe_folds(results::read_model(name + ".h5"), ratios); });
+  return text;
 }
 
 /// Path of the result without ending; never that of the input.
@@ -468,12 +523,16 @@ base::Exit run(const base::Options& options) {
                 options.has("checkpoint_interval") ? options.number("checkpoint_interval") : 0);
   const solve::Summary summary = search(job, settings, start, stages, writer);
   writer.commit();
+  const bool folded = summary.last.inverted_prisms > 0 && !options.flag("allow_folded");
+  say(folded ? describe_folds(summary.last, name, writer) : "");
+  const std::string given = write_given_skin(job, name, writer);
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
   say(coarser.told + solve::describe_sliding(sliding) + solve::describe_tearing(tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
-  const bool settled = sliding.settled && tearing.settled;
+  say(given);
+  const bool settled = sliding.settled && tearing.settled && !folded;
   return summary.path.complete() && settled ? base::Exit::done : base::Exit::not_converged;
 }
 

@@ -66,6 +66,14 @@ std::vector<Key> tissue_keys() {
            "Where each layer lies, as fractions of the skin–bone distance: "
            "one a layer, from 0 to 1, increasing; evenly spaced when not given.",
            "", Range::between(0, 1)},
+          {"tissue.edge",
+           number,
+           "",
+           "Solve not the given skin but its outside over the bones that move, remeshed with edges "
+           "this long; auto: a seventieth of the head.",
+           "mm",
+           Range::between(1, 20),
+           {"auto"}},
           {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
            "mm", Range::at_least(0)},
           {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
@@ -124,10 +132,11 @@ std::vector<Key> load_keys() {
           {"boundary.rim",
            choice,
            "fixed",
-           "The outermost border of an open skin.",
+           "The outermost border of an open skin; auto, the default with tissue.edge: fixed over "
+           "bone that rests, free elsewhere.",
            "",
            {},
-           {"fixed", "free"}},
+           {"fixed", "free", "auto"}},
           {"forces", list, "", "External forces on the skin."},
           {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
           {"forces[].radius", number, "required", "Spread over the skin points within, by area.",

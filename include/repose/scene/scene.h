@@ -70,6 +70,7 @@ struct SphereRegion {
 
 struct Tissue {
   int layers = 4;              ///< 2 … 64
+  std::optional<double> edge;  ///< mm, of the skin's triangles; 0: by its size; unset: as given
   std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
   double attach_within = 30;   ///< mm
   double free_thickness = 12;  ///< mm
@@ -80,6 +81,9 @@ struct Tissue {
   std::vector<double> mass;                   ///< [layers] kg, or empty
   std::optional<double> density;              ///< kg/mm³, excludes mass
 };
+
+/// What becomes of the outermost border of an open skin; automatic: fixed over bone that rests.
+enum class Rim { fixed, free, automatic };
 
 enum class Functional { energy, force };
 enum class VolumeForm { none, paper, penalty, exact };
@@ -155,7 +159,7 @@ struct Scene {
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
-  bool rim_fixed = true;             ///< the outermost border loop of an open skin
+  Rim rim = Rim::fixed;
   std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::vector<Instrument> instruments;
