@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include "repose/model/bone_field.h"
 #include "repose/surface/face.h"
 
 namespace repose::model {
 namespace {
+
+constexpr double deepest_lifted = 3, thinnest_tissue = 0.3;  // mm
 
 surface::FaceRequest request_of(const Anatomy& anatomy) {
   const scene::Scene& scene = anatomy.scene;
@@ -20,6 +23,21 @@ surface::FaceRequest request_of(const Anatomy& anatomy) {
   return request;
 }
 
+/// Moves vertices out of the bones that they lie in, where that is not deep; returns how many.
+int64_t lift_off(const std::vector<surface::Surface>& bones, surface::Surface& skin) {
+  const BoneField field(bones);
+  int64_t lifted = 0;
+  for (Vec3& point : skin.points) {
+    if (field.containing(point) < 0) continue;
+    const BoneField::Nearest nearest = field.nearest(point);
+    if (nearest.distance > deepest_lifted) continue;
+    const Vec3 out = nearest.point - point;
+    if (out.norm() > 0) point = nearest.point + thinnest_tissue * out.normalized();
+    ++lifted;
+  }
+  return lifted;
+}
+
 }  // namespace
 
 void solve_remeshed(Anatomy& anatomy) {
@@ -30,6 +48,10 @@ void solve_remeshed(Anatomy& anatomy) {
       "them 95 % lie within {:.2f} mm of the given skin ({} triangles), all within {:.2f} mm",
       face.skin.points.size(), request.edge, face.least_angle, face.off_95,
       anatomy.skin.triangles.size(), face.off_most));
+  if (const int64_t lifted = lift_off(anatomy.bones, face.skin); lifted > 0)
+    anatomy.remarks.push_back(
+        fmt::format("{} vertices of it lay up to {:g} mm inside bone and were moved out", lifted,
+                    deepest_lifted));
   anatomy.given_skin = std::move(anatomy.skin);
   anatomy.skin = std::move(face.skin);
 }

@@ -7,6 +7,8 @@
 
 #include "patches.h"
 #include "repose/base/error.h"
+#include "repose/model/places.h"
+#include "repose/model/solved_skin.h"
 
 namespace repose::model {
 namespace {
@@ -95,6 +97,21 @@ TEST(Build, an_automatic_rim_is_held_over_bone_that_rests_only) {
   for (const double x : resting) EXPECT_LT(x, 60);
   scene.moves[0] = RigidMotion::translation({0, 0, -3});
   EXPECT_TRUE(boundary().empty());
+}
+
+TEST(Build, a_remeshed_skin_is_lifted_off_bone_that_reaches_through_it) {
+  Anatomy anatomy{patches::scene_of(3, {"skull"}), patches::sphere(45, 5), {}, {}, {}};
+  anatomy.scene.tissue.edge = 4;
+  anatomy.bones = {patches::sphere(20, 4)};
+  for (Vec3& x : anatomy.bones[0].points) x.z() += 25.6;  // 0.6 mm beyond the skin
+  anatomy.bones[0].name = "skull";
+  EXPECT_THROW(build_model(anatomy), RefusedPlaces);
+  solve_remeshed(anatomy);
+  ASSERT_TRUE(anatomy.given_skin.has_value());
+  const BuiltModel built = build_model(anatomy);
+  EXPECT_TRUE(remarked(built.report, "inside bone and were moved out"));
+  EXPECT_TRUE(remarked(built.report, "edges of 4 mm"));
+  for (const double volume : built.model.prisms.rest_volume) EXPECT_GT(volume, 0);
 }
 
 TEST(Build, columns_without_bone_beneath_end_free) {
