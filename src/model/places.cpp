@@ -27,11 +27,22 @@ std::vector<std::vector<int64_t>> groups_of(const SkinMesh& mesh,
 }
 
 surface::Surface triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
-  surface::Surface places{"places", mesh.points, {}};
+  surface::Surface places{"places", {}, {}};
   std::vector<char> taken(mesh.triangles.size(), 0);
+  std::vector<int64_t> row(mesh.points.size(), -1);
   for (const int64_t v : vertices)
-    for (const int64_t f : mesh.triangles_of[v])
-      if (!std::exchange(taken[f], 1)) places.triangles.push_back(mesh.triangles[f]);
+    for (const int64_t f : mesh.triangles_of[v]) {
+      if (std::exchange(taken[f], 1)) continue;
+      Triangle triangle = mesh.triangles[f];
+      for (int64_t& corner : triangle) {
+        if (row[corner] < 0) {
+          row[corner] = static_cast<int64_t>(places.points.size());
+          places.points.push_back(mesh.points[corner]);
+        }
+        corner = row[corner];
+      }
+      places.triangles.push_back(triangle);
+    }
   return places;
 }
 

@@ -59,6 +59,15 @@ def test_all_move_alike(faces, variant, other):
     assert len(distances) > 300 and np.quantile(distances, 0.95) < 0.5
 
 
+def test_without_an_edge_all_places_are_listed_and_written(folder, environment):
+    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace("edge: 4, ", ""))
+    result = runner(folder, environment)("repose-solve", "as_it_is.yaml")
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "in 2 places" in result.stderr and "tissue.edge" in result.stderr
+    places = meshio.read(folder / "as_it_is_refused.ply")
+    assert 300 < len(places.points) < 1000
+
+
 def test_metres_are_refused(folder, environment):
     mesh = meshio.read(folder / "decimated.ply")
     write(folder / "metres.ply", mesh.points / 1000, mesh.cells_dict["triangle"])

@@ -154,7 +154,11 @@ TEST(Columns, every_place_is_named_once_and_its_triangles_are_kept) {
         << text;
     EXPECT_NE(text.find("and 2 more around it, vertex 97 ("), std::string::npos) << text;
     EXPECT_NE(text.find("; mend it"), std::string::npos);
-    EXPECT_EQ(error.places().triangles.size(), 13u + 6u);
+    const surface::Surface& places = error.places();
+    EXPECT_EQ(places.triangles.size(), 13u + 6u);
+    EXPECT_EQ(places.points.size(), 12u + 7u);
+    for (const Triangle& t : places.triangles)
+      EXPECT_LT((places.points[t[0]] - places.points[t[1]]).norm(), 15);
   }
 }
 
