@@ -160,7 +160,7 @@ struct Scene {
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
   Rim rim = Rim::fixed;
-  std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
+  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::vector<Instrument> instruments;
   std::vector<Incision> incisions;
