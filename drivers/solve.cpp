@@ -5,7 +5,7 @@
 ///     repose-solve opening.h5 -tao_type lmvm -tao_monitor
 ///
 /// Writes NAME.h5 and one XDMF file a block for ParaView. Exit status: 0 converged, 1 bad input
-/// (nothing written), 2 not converged (result written), 3 internal error.
+/// (nothing written), 2 not converged or folded (result written), 3 internal error.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "repose/adapt/discretisation.h"
+#include "repose/adapt/given_skin.h"
 #include "repose/adapt/ladder.h"
 #include "repose/adapt/report.h"
 #include "repose/base/agreement.h"
@@ -22,6 +23,7 @@
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
+#include "repose/model/places.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
@@ -34,6 +36,8 @@
 #include "repose/solve/report.h"
 #include "repose/solve/sliding.h"
 #include "repose/solve/tearing.h"
+#include "repose/surface/read.h"
+#include "repose/surface/write.h"
 
 namespace {
 
@@ -124,6 +128,8 @@ std::vector<base::Option> run_options() {
        "End all searches after this, keep the state and say how far it is.",
        {0, 1e9},
        "s"},
+      {"allow_folded", OptionKind::flag, "",
+       "Take a rest position with tissue inside out (else exit status 2)."},
       {"dry_run", OptionKind::flag, "", "Build and report the model only."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
@@ -151,6 +157,7 @@ struct Job {
   std::optional<solve::Recording> recording;  // of an initial equilibrium, on all ranks
   bool solid = false;                         // the tissue is a solid, on all ranks
   bool initial_equilibrium = false;           // it holds before the bones move, on all ranks
+  bool remeshed = false;                      // the skin is not the given one, on all ranks
   std::string building;                       // what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;     // points of each instrument, on rank 0
   std::vector<model::Slider> sliders;         // on rank 0
@@ -181,6 +188,17 @@ void make_incisions(Job& job) {
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
 }
 
+/// Builds the model; where no tissue fits, writes those places of the skin to look at.
+model::BuiltModel build(const model::Anatomy& anatomy, const std::filesystem::path& input) {
+  try {
+    return model::build_model(anatomy);
+  } catch (const model::RefusedPlaces& refused) {
+    const std::string file = input.stem().string() + "_refused.ply";
+    surface::write_ply(file, refused.places());
+    base::refuse("{} (these places are in {})", refused.what(), file);
+  }
+}
+
 Job read_job(const std::filesystem::path& input) {
   Job job;
   scene::Scene scene;
@@ -191,7 +209,8 @@ Job read_job(const std::filesystem::path& input) {
     }
     scene = scene::read_scene(input);
     job.anatomy = model::load_anatomy(scene);
-    model::BuiltModel built = model::build_model(*job.anatomy);
+    job.remeshed = job.anatomy->given_skin.has_value();
+    model::BuiltModel built = build(*job.anatomy, input);
     job.model = std::move(built.model);
     job.held = std::move(built.held);
     job.sliders = std::move(built.sliders);
@@ -202,6 +221,7 @@ Job read_job(const std::filesystem::path& input) {
   });
   job.solid = model::is_solid(job.model);
   MPI_Bcast(&job.solid, 1, MPI_C_BOOL, 0, comm);
+  MPI_Bcast(&job.remeshed, 1, MPI_C_BOOL, 0, comm);
   bring_into_equilibrium(scene, job);
   make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
@@ -329,6 +349,7 @@ class Writer {
     last_numbers_ = numbers;
     last_rows_.position = rows.position;
     last_rows_.pressure = rows.pressure;
+    last_rows_.volume_ratio = rows.volume_ratio;
     if (!makes_checkpoints() || !numbers.converged) return;
     reached_ = {numbers, rows};
     saved_ = false;
@@ -344,6 +365,11 @@ class Writer {
   /// How far the mesh and the layers leave the skin from the continuum, on rank 0.
   const std::string& comparison() const { return comparison_; }
   bool makes_checkpoints() const { return interval_ > 0; }
+  /// [N] and [prisms] of the last step, on rank 0. Collective.
+  std::vector<Vec3> positions() const { return solve::gather_points(comm, last_rows_.position); }
+  std::vector<double> volume_ratios() const {
+    return solve::gather(comm, last_rows_.volume_ratio.data(), last_rows_.volume_ratio.size());
+  }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
     const std::vector<Vec3> forces =
@@ -397,7 +423,7 @@ class Writer {
   std::string unsettled_;
   results::ResultFile file_;
   model::StepNumbers last_numbers_;
-  model::StepRows last_rows_;    // what reactions need of them
+  model::StepRows last_rows_;    // what reactions and those above need of them
   std::optional<Step> reached_;  // where checkpoints are made: the last rest position, …
   bool saved_ = false;           // … and whether a checkpoint has it
   double interval_, last_ = MPI_Wtime();
@@ -419,6 +445,34 @@ solve::Summary search(Job& job, solve::Settings settings, const solve::Start& st
     summary.last.reason += "; " + writer.unsettled();
   }
   return summary;
+}
+
+/// Writes the displacement of the given skin, in the place of which another was solved, to
+/// NAME_given_skin.vtp. Collective.
+std::string write_given_skin(const Job& job, const std::string& name, const Writer& writer) {
+  if (!job.remeshed || !job.cuts.empty()) return "";
+  const std::vector<Vec3> position = writer.positions();
+  const std::string file = name + "_given_skin.vtp";
+  base::on_first_rank(comm, [&] {
+    const model::Model model = results::read_model(name + ".h5");
+    std::vector<Vec3> displacement(position.size());
+    for (size_t i = 0; i < position.size(); ++i)
+      displacement[i] = position[i] - model.points.position[i];
+    const surface::Surface& given = *job.anatomy->given_skin;
+    surface::write_surface(file, given, adapt::displacement_of_given(given, model, displacement));
+  });
+  return fmt::format("  {:<22} {}: its vertices, with displacement\n", "given skin", file);
+}
+
+/// What is said of tissue that is inside out at the end. Collective.
+std::string describe_folds(const model::StepNumbers& last, const std::string& name,
+                           const Writer& writer) {
+  if (last.inverted_prisms == 0) return "";
+  const std::vector<double> ratios = writer.volume_ratios();
+  std::string text;
+  base::on_first_rank(
+      comm, [&] { text = solve::describe_folds(results::read_model(name + ".h5"), ratios); });
+  return text;
 }
 
 /// Path of the result without ending; never that of the input.
@@ -591,13 +645,17 @@ base::Exit solve_job(const base::Options& options, Job& job, solve::Settings set
                 rounds.unsettled());
   const solve::Summary summary = search(job, settings, start, stages, writer);
   writer.commit();
+  const bool folded = summary.last.inverted_prisms > 0 && !options.flag("allow_folded");
+  say(folded ? describe_folds(summary.last, name, writer) : "");
+  const std::string given = write_given_skin(job, name, writer);
   stages.end("write");
   say(solve::describe_run(summary, settings, base::size(comm), stages));
   say(coarser.told + writer.comparison() + solve::describe_sliding(rounds.sliding) +
       solve::describe_tearing(rounds.tearing));
   say(writer.reactions(job.held));
   say(fmt::format("  {:<22} {}.h5, {}_*.xdmf (ParaView)\n", "result", name, name));
-  return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
+  say(given);
+  return summary.path.complete() && !folded ? base::Exit::done : base::Exit::not_converged;
 }
 
 base::Exit run(const base::Options& options) {

@@ -14,6 +14,7 @@
 #include "repose/model/orientation.h"
 #include "repose/model/point_sets.h"
 #include "repose/model/release.h"
+#include "repose/model/solved_skin.h"
 #include "repose/model/stiffness.h"
 
 namespace repose::model {
@@ -42,6 +43,26 @@ SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin
   surface::Surface refined = skin;
   cuts = insert_paths(scene.incisions, scene.file.string(), refined);
   return make_skin_mesh(refined);
+}
+
+/// Which columns are held as the rim; those let go of bone, as do those near other pieces.
+std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
+                             const Columns& columns, const BoneField& field,
+                             Attachment& attachment) {
+  std::vector<char> rim = rim_columns(mesh, scene.rim != scene::Rim::free);
+  const auto let_go = [&] {
+    for (size_t c = 0; c < rim.size(); ++c)
+      if (rim[c]) attachment.bone[c] = -1;
+  };
+  if (scene.rim == scene::Rim::fixed) let_go();
+  release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
+  if (scene.rim != scene::Rim::automatic) return rim;
+  for (size_t c = 0; c < rim.size(); ++c) {
+    const int32_t bone = attachment.bone[c];
+    rim[c] = rim[c] && bone >= 0 && scene.moves[bone].is_identity();
+  }
+  let_go();
+  return rim;
 }
 
 void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
@@ -85,6 +106,9 @@ void report_columns(const Columns& columns, const Attachment& attachment, BuildR
   report.shortened = columns.shortened;
   report.released = attachment.released;
   report.remarks.insert(report.remarks.end(), attachment.remarks.begin(), attachment.remarks.end());
+  if (columns.bent > 0)
+    report.remarks.push_back(fmt::format(
+        "{} columns were bent towards their neighbours, which they crossed", columns.bent));
   if (columns.shortened > 0)
     report.remarks.push_back(fmt::format(
         "{} columns were shortened so that neighbours do not cross", columns.shortened));
@@ -115,18 +139,15 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   BuiltModel built;
   SkinMesh mesh = mesh_with_paths(scene, skin, built.cuts);
   const BoneField field(bones);
-  require_same_place(skin, bones, field);
+  require_same_place(mesh, skin.name, bones, field);
   const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);
 
   if (face_outwards(nearest, mesh))
     built.report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   const Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
-  const std::vector<char> rim = rim_columns(mesh, scene.rim_fixed);
   Attachment attachment = attach_columns(columns, field, scene.tissue);
-  for (size_t c = 0; c < rim.size(); ++c)
-    if (rim[c]) attachment.bone[c] = -1;
-  release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
+  const std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
   release_near_rim(columns.deep, rim, scene.moves, scene.tissue.release, attachment);
 
   built.model = make_layers(mesh, columns.deep, depths, scene.tissue.depths_mm,
@@ -143,12 +164,14 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 }
 
 Anatomy load_anatomy(const scene::Scene& scene) {
-  Anatomy anatomy{scene, load_entry(scene.skin, surface::Role::skin), {}, {}};
+  const auto role = scene.tissue.edge ? surface::Role::raw : surface::Role::skin;
+  Anatomy anatomy{scene, load_entry(scene.skin, role), {}, {}, {}};
   Bones bones = read_bones(scene);
   anatomy.bones = std::move(bones.surfaces);
   anatomy.remarks = std::move(bones.remarks);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
   heed_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
+  if (scene.tissue.edge) solve_remeshed(anatomy);
   return anatomy;
 }
 

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
-#include "repose/base/error.h"
+#include "repose/model/places.h"
 #include "repose/model/smoothing.h"
 
 namespace repose::model {
@@ -58,11 +59,12 @@ double trust(const Vec3& normal, const Vec3& towards, double distance, double at
   return inward * near;
 }
 
-/// Averages each direction with its neighbours' and puts it back into its cone.
-void smooth_locally(const SkinMesh& mesh, const std::vector<Cone>& cones,
-                    std::vector<Vec3>& directions) {
+}  // namespace
+
+void bend(const SkinMesh& mesh, const std::vector<Cone>& cones,
+          const std::vector<int64_t>& vertices, std::vector<Vec3>& directions) {
   const std::vector<Vec3> old = directions;
-  for (size_t v = 0; v < old.size(); ++v) {
+  for (const int64_t v : vertices) {
     Vec3 sum = Vec3::Zero();
     for (const int64_t e : mesh.edges_of[v]) sum += old[mesh.other_end(e, v)];
     sum /= static_cast<double>(mesh.edges_of[v].size());
@@ -70,21 +72,18 @@ void smooth_locally(const SkinMesh& mesh, const std::vector<Cone>& cones,
   }
 }
 
-}  // namespace
-
 std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_name) {
   std::vector<Cone> cones(mesh.points.size());
+  std::vector<int64_t> folded;
   for (size_t v = 0; v < cones.size(); ++v) {
     cones[v] = widest_cone(mesh, v);
-    if (!(cones[v].cosine >= smallest_cosine)) {
-      const Vec3& at = mesh.points[v];
-      base::refuse(
-          "{}: the skin is folded at vertex {} ({:.2f}, {:.2f}, {:.2f}), no direction is inward of "
-          "all its triangles; smooth or remesh the skin there",
-          skin_name, v, at.x(), at.y(), at.z());
-    }
+    if (!(cones[v].cosine >= smallest_cosine)) folded.push_back(static_cast<int64_t>(v));
     cones[v].cosine = std::min(wanted_cosine, 0.7 * cones[v].cosine);
   }
+  if (!folded.empty())
+    refuse_places(skin_name, mesh, folded,
+                  "the skin is folded (no direction is inward of all triangles around a vertex)",
+                  "set tissue.edge to have it remeshed, or smooth it there");
   return cones;
 }
 
@@ -105,7 +104,9 @@ std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone
   std::vector<Vec3> directions(vertices);
   for (int64_t v = 0; v < vertices; ++v)
     directions[v] = into_cone(mesh, v, cones[v], smoothed.row(v).transpose().normalized());
-  for (int round = 0; round < local_rounds; ++round) smooth_locally(mesh, cones, directions);
+  std::vector<int64_t> all(directions.size());
+  std::iota(all.begin(), all.end(), 0);
+  for (int round = 0; round < local_rounds; ++round) bend(mesh, cones, all, directions);
   return directions;
 }
 

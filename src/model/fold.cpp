@@ -2,8 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <iterator>
 
-#include "repose/base/error.h"
+#include "repose/model/places.h"
 #include "repose/model/smoothing.h"
 
 namespace repose::model {
@@ -12,7 +13,7 @@ namespace {
 constexpr double least_margin = 0.05;
 constexpr double shortening = 0.9;
 constexpr double steepest = 1.0;
-constexpr double thinnest = 0.05;  // mm, and as a part of the first thickness
+constexpr double thinnest = 0.05;  // mm
 
 /// Least value of c[0] + c[1] s + c[2] s² for s in [0, 1].
 double least_on_unit_interval(const std::array<double, 3>& c) {
@@ -30,16 +31,6 @@ double margin_of(const SkinMesh& mesh, int64_t triangle, const std::vector<Vec3>
   return fold_margin(
       {mesh.points[i], mesh.points[j], mesh.points[k]},
       {thickness[i] * directions[i], thickness[j] * directions[j], thickness[k] * directions[k]});
-}
-
-void refuse_thin(const SkinMesh& mesh, const std::string& skin_name, int64_t v, double from) {
-  const Vec3& at = mesh.points[v];
-  base::refuse(
-      "{}: no sound column of tissue fits under skin vertex {} ({:.2f}, {:.2f}, {:.2f}): of {:.2f} "
-      "mm less than {:.2f} mm would be left before neighbouring columns cross; smooth or coarsen "
-      "the "
-      "skin mesh there, or set tissue.free_thickness or attach_within smaller",
-      skin_name, v, at.x(), at.y(), at.z(), from, std::max(thinnest, thinnest * from));
 }
 
 std::vector<int64_t> corners(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
@@ -87,15 +78,14 @@ std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Ve
 
 void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
                     const std::string& skin_name, std::vector<double>& thickness) {
-  const std::vector<double> first = thickness;
+  std::vector<int64_t> stuck;
+  const auto too_thin = [&](int64_t v) { return !(shortening * thickness[v] > thinnest); };
   std::vector<int64_t> folded = folded_triangles(mesh, directions, thickness);
   while (!folded.empty()) {
     std::vector<int64_t> changed = corners(mesh, folded);
-    for (const int64_t v : changed) {
-      thickness[v] *= shortening;
-      if (!(thickness[v] > std::max(thinnest, thinnest * first[v])))
-        refuse_thin(mesh, skin_name, v, first[v]);
-    }
+    std::copy_if(changed.begin(), changed.end(), std::back_inserter(stuck), too_thin);
+    std::erase_if(changed, too_thin);
+    for (const int64_t v : changed) thickness[v] *= shortening;
     const std::vector<int64_t> drawn = limit_slope(mesh, steepest, changed, thickness);
     changed.insert(changed.end(), drawn.begin(), drawn.end());
     folded = triangles_around(mesh, changed);
@@ -103,6 +93,18 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
       return margin_of(mesh, f, directions, thickness) >= least_margin;
     });
   }
+  std::erase_if(stuck, [&](int64_t v) {
+    const auto around = triangles_around(mesh, {v});
+    return std::all_of(around.begin(), around.end(), [&](int64_t f) {
+      return margin_of(mesh, f, directions, thickness) >= least_margin;
+    });
+  });
+  if (!stuck.empty())
+    refuse_places(skin_name, mesh, stuck,
+                  fmt::format("no sound column of tissue fits (neighbouring ones cross even where "
+                              "they are only {:g} mm long)",
+                              thinnest),
+                  "set tissue.edge to have the skin remeshed, or smooth or coarsen it there");
 }
 
 }  // namespace repose::model

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "repose/base/error.h"
+#include "repose/model/places.h"
 
 namespace repose::model {
 namespace {
@@ -11,9 +11,9 @@ constexpr double far_apart = 200, near = 50;  // mm
 
 using Box = Eigen::AlignedBox3d;
 
-Box box_of(const surface::Surface& surface) {
+Box box_of(const std::vector<Vec3>& points) {
   Box box;
-  for (const Vec3& x : surface.points) box.extend(x);
+  for (const Vec3& x : points) box.extend(x);
   return box;
 }
 
@@ -22,14 +22,14 @@ std::string corner_text(const Box& box) {
                      box.min().y(), box.min().z(), box.max().x(), box.max().y(), box.max().z());
 }
 
-void refuse_far_apart(const surface::Surface& skin, const surface::Surface& bone,
+void refuse_far_apart(const std::string& skin_name, const surface::Surface& bone,
                       const Box& skin_box, const Box& bone_box) {
   const Vec3 turn(-1, -1, 1);
   Box turned;
   turned.extend(turn.cwiseProduct(bone_box.min()));
   turned.extend(turn.cwiseProduct(bone_box.max()));
   const bool other_frame = skin_box.exteriorDistance(turned) <= near;
-  base::refuse("{} is at {}, but {} at {}: {:.0f} mm apart; {}", skin.name, corner_text(skin_box),
+  base::refuse("{} is at {}, but {} at {}: {:.0f} mm apart; {}", skin_name, corner_text(skin_box),
                bone.name, corner_text(bone_box), skin_box.exteriorDistance(bone_box),
                other_frame ? "one is in LPS and the other in RAS coordinates, export both in one"
                            : "export both in the coordinates of one scan, in mm");
@@ -37,21 +37,22 @@ void refuse_far_apart(const surface::Surface& skin, const surface::Surface& bone
 
 }  // namespace
 
-void require_same_place(const surface::Surface& skin, const std::vector<surface::Surface>& bones,
-                        const BoneField& field) {
-  const Box skin_box = box_of(skin);
+void require_same_place(const SkinMesh& mesh, const std::string& skin_name,
+                        const std::vector<surface::Surface>& bones, const BoneField& field) {
+  const Box skin_box = box_of(mesh.points);
   for (const surface::Surface& bone : bones)
-    if (const Box box = box_of(bone); skin_box.exteriorDistance(box) > far_apart)
-      refuse_far_apart(skin, bone, skin_box, box);
-  for (size_t v = 0; v < skin.points.size(); ++v)
-    if (const int32_t bone = field.containing(skin.points[v]); bone >= 0) {
-      const Vec3& at = skin.points[v];
-      base::refuse(
-          "{}: vertex {} ({:.2f}, {:.2f}, {:.2f}) lies inside {}; the skin must be outside all "
-          "bone, "
-          "check that both come from one scan and in one frame",
-          skin.name, v, at.x(), at.y(), at.z(), bones[bone].name);
-    }
+    if (const Box box = box_of(bone.points); skin_box.exteriorDistance(box) > far_apart)
+      refuse_far_apart(skin_name, bone, skin_box, box);
+  std::vector<int64_t> inside;
+  for (size_t v = 0; v < mesh.points.size(); ++v)
+    if (field.containing(mesh.points[v]) >= 0) inside.push_back(static_cast<int64_t>(v));
+  if (!inside.empty())
+    refuse_places(
+        skin_name, mesh, inside,
+        fmt::format("{} of {} vertices lie inside bone (the first in {})", inside.size(),
+                    mesh.points.size(), bones[field.containing(mesh.points[inside.front()])].name),
+        "the skin must be outside all bone: check that both come from one scan and in one "
+        "frame; set tissue.edge where the skin has inner walls");
 }
 
 bool face_outwards(const std::vector<BoneField::Nearest>& nearest, SkinMesh& mesh) {

@@ -225,8 +225,8 @@ void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
                                   [](const XdmfBlock& block) { return block.cells > 0; });
   if (shown == blocks.end() || loads.empty()) return;
   unfinished->reserve(vtkhdf_bytes(*shown, loads.size()));
-  say_where(part(), [&] {
-    base::Hdf5File whole = base::open_hdf5(part(), MPI_COMM_SELF);
+  say_where(unfinished->file(), [&] {
+    base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
     write_vtkhdf(whole, *shown, loads);
     whole.close();
   });

@@ -73,6 +73,14 @@ std::vector<Key> tissue_keys() {
        "the others are spread evenly below. Excludes depths. Where tissue is too thin for "
        "them, layers are spread evenly.",
        "mm", Range::at_least(0)},
+      {"tissue.edge",
+       number,
+       "",
+       "Solve not the given skin but its outside over the bones that move, remeshed with edges "
+       "this long; auto: a seventieth of the head.",
+       "mm",
+       Range::between(1, 20),
+       {"auto"}},
       {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
        "mm", Range::at_least(0)},
       {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
@@ -190,10 +198,11 @@ std::vector<Key> load_keys() {
           {"boundary.rim",
            choice,
            "fixed",
-           "The outermost border of an open skin.",
+           "The outermost border of an open skin; auto, the default with tissue.edge: fixed over "
+           "bone that rests, free elsewhere.",
            "",
            {},
-           {"fixed", "free"}},
+           {"fixed", "free", "auto"}},
           {"forces", list, "", "External forces on the skin."},
           {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
           {"forces[].radius", number, "required", "Spread over the skin points within, by area.",

@@ -193,6 +193,8 @@ Tissue read_tissue(const Value& value) {
   if (depths) tissue.depths = read_depths(*depths, tissue.layers);
   if (depths && depths_mm) depths_mm->refuse("and tissue.depths exclude each other; remove one");
   if (depths_mm) tissue.depths_mm = read_depths_mm(*depths_mm, tissue.layers);
+  if (const auto edge = map.find("edge"))
+    tissue.edge = edge->is_word("auto") ? 0.0 : edge->number();
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);
@@ -267,8 +269,8 @@ void read_surroundings(Scene& scene, const Map& map) {
     scene.scan_gravity = before->vector();
     if (!scene.gravity) before->refuse("needs gravity, the field of now ([0, 0, 0] for none)");
   }
-  if (const auto boundary = map.find("boundary"))
-    if (const auto rim = Map(*boundary).find("rim")) scene.rim_fixed = rim->choice() == 0;
+  if (scene.tissue.edge) scene.rim = Rim::automatic;
+  if (const auto boundary = map.find("boundary")) set_choice<Rim>(scene.rim, Map(*boundary), "rim");
   if (const auto bodies = map.find("instruments")) scene.instruments = read_instruments(*bodies);
   if (const auto cuts = map.find("incisions"))
     scene.incisions = read_incisions(*cuts, scene.tissue.layers);

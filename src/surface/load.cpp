@@ -76,6 +76,7 @@ Surface load_surface(const std::filesystem::path& file, Role role) {
 
 Surface accept_surface(const Surface& raw, Role role) {
   if (role != Role::mesh) check_size(raw);
+  if (role == Role::raw) return raw;
   Surface surface = weld_and_orient(raw);
   if (surface.triangles.empty())
     base::refuse("{}: none of its {} triangles has an area; export the mesh anew", surface.name,

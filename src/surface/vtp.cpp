@@ -41,6 +41,12 @@ std::string point_data(const PointData& data) {
     for (const double value : field.values) append(bytes, value);
     text += array("Float64", field.name, 1, bytes);
   }
+  for (const auto& field : data.vectors) {
+    std::string bytes;
+    for (const Vec3& value : field.values)
+      for (int axis = 0; axis < 3; ++axis) append(bytes, value[axis]);
+    text += array("Float64", field.name, 3, bytes);
+  }
   if (!data.colours.empty()) {
     std::string bytes;
     for (const auto& colour : data.colours)

@@ -30,7 +30,7 @@ def solve(run, tmp_path):
 
 def finished(run, folder, given, options=(), statuses=(0,)):
     """The last step of a run that ended with one of the statuses and left a valid result."""
-    result = run("repose-solve", given, *options, "-output", "out")
+    result = run("repose-solve", given, *options, "-allow_folded", "-output", "out")
     assert result.returncode in statuses and result.stderr == "", result
     assert run("repose-check", "out.h5").returncode == 0
     step = last(folder / "out.h5")
@@ -99,6 +99,17 @@ WILD = {
 def test_a_wild_extreme_ends_with_a_valid_result(solve, case):
     scene, changes, options, statuses = WILD[case]
     solve(scene, *changes, options=options, statuses=statuses)
+
+
+def test_folded_tissue_is_no_success_unless_allowed(solve, run, tmp_path):
+    """The jaw comes 40 mm forward: the tissue beside it is turned inside out."""
+    folded = solve(ADVANCE, TWO, (JAW, "-40, 0]"), options=["-accuracy", 1])
+    assert folded["inverted_prisms"] > 0 and folded["converged"]
+    result = run("repose-solve", "scene.yaml", "-accuracy", 1, "-output", "out")
+    assert result.returncode == 2 and result.stderr == ""
+    line = next(line for line in result.stdout.splitlines() if line.startswith("FOLDED"))
+    assert f"{folded['inverted_prisms']} prisms" in line and "-allow_folded" in line
+    assert last(tmp_path / "out.h5")["inverted_prisms"] == folded["inverted_prisms"]
 
 
 def test_coordinates_far_from_the_origin(solve, solved, tmp_path):

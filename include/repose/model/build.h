@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +38,10 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 
 /// What a scene's model is built from, at any resolution.
 struct Anatomy {
-  scene::Scene scene;  ///< with moves that heed collisions
-  surface::Surface skin;
+  scene::Scene scene;     ///< with moves that heed collisions
+  surface::Surface skin;  ///< that is solved
+  /// The skin that the scene names, where another is solved in its place (solved_skin.h).
+  std::optional<surface::Surface> given_skin;
   std::vector<surface::Surface> bones;  ///< [scene.bones]
   std::vector<std::string> remarks;     ///< lines for a person, each complete
 };

@@ -13,8 +13,8 @@ struct Cone {
   double cosine;  ///< 0.3, or less where the skin is so sharp that little room is left
 };
 
-/// One cone a skin vertex. Throws InputError naming the vertex where no direction is inward of all
-/// triangles around it (a fold of the skin mesh).
+/// One cone a skin vertex. Throws RefusedPlaces (places.h) where no direction is inward of all
+/// triangles around a vertex (a fold of the skin mesh).
 std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_name);
 
 /// Unit directions [V] of the columns: towards the nearest bone where that is inward and within
@@ -23,5 +23,10 @@ std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_nam
 std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone>& cones,
                                     const std::vector<BoneField::Nearest>& nearest,
                                     double attach_within, const std::vector<double>& length);
+
+/// Averages the directions of `vertices` with their neighbours' and puts them back into their
+/// cones.
+void bend(const SkinMesh& mesh, const std::vector<Cone>& cones,
+          const std::vector<int64_t>& vertices, std::vector<Vec3>& directions);
 
 }  // namespace repose::model

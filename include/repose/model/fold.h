@@ -19,8 +19,8 @@ std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Ve
                                       const std::vector<double>& thickness);
 
 /// Shortens columns (×0.9 at a time, neighbours with them so that the deep surface stays no steeper
-/// than it was made) until no triangle is folded. Throws InputError naming the skin vertex where a
-/// column would become shorter than 0.05 mm or a twentieth of what it was.
+/// than it was made) until no triangle is folded. Throws RefusedPlaces (places.h) where columns
+/// would become shorter than 0.05 mm.
 void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
                     const std::string& skin_name, std::vector<double>& thickness);
 

@@ -105,6 +105,7 @@ struct Material {
 
 struct Tissue {
   int layers = 4;              ///< 2 … 64
+  std::optional<double> edge;  ///< mm, of the skin's triangles; 0: by its size; unset: as given
   std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
   /// mm below the skin of the upper layers, the skin's 0 first, increasing; empty: by `depths`.
   std::vector<double> depths_mm;
@@ -119,6 +120,9 @@ struct Tissue {
   std::vector<double> mass;       ///< [layers] kg, or empty
   std::optional<double> density;  ///< kg/mm³, excludes mass
 };
+
+/// What becomes of the outermost border of an open skin; automatic: fixed over bone that rests.
+enum class Rim { fixed, free, automatic };
 
 enum class Functional { energy, force };
 enum class VolumeForm { none, paper, penalty, exact };
@@ -194,8 +198,8 @@ struct Scene {
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
-  bool rim_fixed = true;             ///< the outermost border loop of an open skin
-  std::vector<RigidMotion> moves;    ///< [bones] the whole motion of each bone
+  Rim rim = Rim::fixed;
+  std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::vector<Instrument> instruments;
   std::vector<Incision> incisions;

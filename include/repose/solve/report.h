@@ -31,6 +31,10 @@ std::string describe_sliding(const Sliding& sliding);
 /// What tore and where, in two rows; nothing where no limit was asked for.
 std::string describe_tearing(const Tearing& tearing);
 
+/// How many prisms have volume ratios [M] ≤ 0 and where the worst one was at first, in a line that
+/// says what can be done; nothing where there is none.
+std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio);
+
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 

@@ -9,7 +9,8 @@ namespace repose::surface {
 enum class Role {
   skin,  ///< may be open: a manifold patch or a closed surface, one component
   bone,  ///< closed, manifold, oriented outwards; several components are allowed
-  mesh   ///< manifold, open or closed, of any size and any number of components
+  mesh,  ///< manifold, open or closed, of any size and any number of components
+  raw    ///< any triangles of a head's size, which stay as they are
 };
 
 /// Reads PLY, STL, OBJ or OFF (binary or text, by content and ending) and returns its triangles as
@@ -30,8 +31,8 @@ void write_ply(const std::filesystem::path& file, const Surface& surface);
 
 /// read_surface, weld_and_orient, inspect (defects.h), then refuse what `role` does not allow, in
 /// one line naming file, defect, number and remedy. Self-intersections are not looked for: whoever
-/// cannot bear them inspects. A skin or bone smaller than 20 mm or larger
-/// than 2000 mm across is refused as being in metres or in micrometres, saying so.
+/// cannot bear them inspects. What is smaller than 20 mm or larger than 2000 mm
+/// across is refused, but as a mesh, as being in metres or in micrometres, saying so.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
 /// The same for a surface that has been read, or taken from a volume, already.

@@ -15,8 +15,13 @@ struct PointData {
     std::string name;            ///< letters, digits and _
     std::vector<double> values;  ///< [P]
   };
+  struct VectorField {
+    std::string name;
+    std::vector<Vec3> values;  ///< [P]
+  };
   std::vector<std::array<uint8_t, 3>> colours;  ///< red, green, blue
   std::vector<Field> fields;
+  std::vector<VectorField> vectors;
 };
 
 /// Refuses a file whose ending is none of .ply, .stl, .obj and .vtp (in any case).
@@ -24,8 +29,9 @@ void check_surface_ending(const std::filesystem::path& file);
 
 /// Writes a surface in the format its ending names, complete or not at all: .ply (binary little
 /// endian, double coordinates), .stl (binary, float), .obj (text, exact) or .vtp (VTK's XML,
-/// binary). PLY and VTP keep colours and fields, OBJ colours, STL neither. Throws InputError for
-/// another ending, more points than the format can number, or a file that cannot be written.
+/// binary). PLY and VTP keep colours and fields, VTP vectors too, OBJ colours, STL nothing. Throws
+/// InputError for another ending, more points than the format can number, or a file that cannot be
+/// written.
 void write_surface(const std::filesystem::path& file, const Surface& surface,
                    const PointData& data = {});
 

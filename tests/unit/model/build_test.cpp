@@ -7,6 +7,8 @@
 
 #include "patches.h"
 #include "repose/base/error.h"
+#include "repose/model/places.h"
+#include "repose/model/solved_skin.h"
 
 namespace repose::model {
 namespace {
@@ -73,10 +75,43 @@ TEST(Build, only_the_longest_border_is_the_rim) {
   const surface::Surface bone = patches::box({-100, -100, -30}, {100, 100, -10});
   scene::Scene scene = patches::scene_of(2, {"skull"});
   EXPECT_EQ(count(build_model(scene, skin, {bone}).model).boundary, 60 * 2);
-  scene.rim_fixed = false;
+  scene.rim = scene::Rim::free;
   const Counts free = count(build_model(scene, skin, {bone}).model);
   EXPECT_EQ(free.boundary, 0);
   EXPECT_EQ(free.bone, 477);
+}
+
+TEST(Build, an_automatic_rim_is_held_over_bone_that_rests_only) {
+  const surface::Surface half = patches::box({-50, -50, -25}, {50, 150, -10});
+  scene::Scene scene = patches::scene_of(2, {"skull"});
+  scene.rim = scene::Rim::automatic;
+  const auto boundary = [&] {
+    std::vector<double> x;
+    const Points points = build_model(scene, patches::square(20, 100), {half}).model.points;
+    for (size_t i = 0; i < points.set.size(); ++i)
+      if (points.set[i] == PointSet::boundary) x.push_back(points.position[i].x());
+    return x;
+  };
+  const std::vector<double> resting = boundary();
+  EXPECT_GT(resting.size(), 60u);
+  for (const double x : resting) EXPECT_LT(x, 60);
+  scene.moves[0] = RigidMotion::translation({0, 0, -3});
+  EXPECT_TRUE(boundary().empty());
+}
+
+TEST(Build, a_remeshed_skin_is_lifted_off_bone_that_reaches_through_it) {
+  Anatomy anatomy{patches::scene_of(3, {"skull"}), patches::sphere(45, 5), {}, {}, {}};
+  anatomy.scene.tissue.edge = 4;
+  anatomy.bones = {patches::sphere(20, 4)};
+  for (Vec3& x : anatomy.bones[0].points) x.z() += 25.6;  // 0.6 mm beyond the skin
+  anatomy.bones[0].name = "skull";
+  EXPECT_THROW(build_model(anatomy), RefusedPlaces);
+  solve_remeshed(anatomy);
+  ASSERT_TRUE(anatomy.given_skin.has_value());
+  const BuiltModel built = build_model(anatomy);
+  EXPECT_TRUE(remarked(built.report, "inside bone and were moved out"));
+  EXPECT_TRUE(remarked(built.report, "edges of 4 mm"));
+  for (const double volume : built.model.prisms.rest_volume) EXPECT_GT(volume, 0);
 }
 
 TEST(Build, columns_without_bone_beneath_end_free) {
@@ -146,7 +181,7 @@ TEST(Build, tissue_on_a_moving_bone_lets_go_near_the_fixed_rim) {
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
   scene.moves[0] = RigidMotion::translation({0, -6, 0});
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 16);  // the ring next to the rim
-  scene.rim_fixed = false;
+  scene.rim = scene::Rim::free;
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
 }
 
@@ -157,7 +192,7 @@ TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {
   EXPECT_EQ(build_model(jaws.scene, jaws.skin, jaws.bones).report.free_deep, 0);
   jaws.scene.tissue.release = 10;
   jaws.scene.moves[0] = jaws.scene.moves[1];
-  jaws.scene.rim_fixed = false;
+  jaws.scene.rim = scene::Rim::free;
   EXPECT_EQ(build_model(jaws.scene, jaws.skin, jaws.bones).report.free_deep, 0);
   jaws.scene.moves[0] = RigidMotion::rotation({0, 0, 1}, {50, 50, 0}, 1);
   EXPECT_GT(build_model(jaws.scene, jaws.skin, jaws.bones).report.released, 0);
@@ -244,7 +279,7 @@ TEST(Build, twice_is_the_same_to_the_bit) {
 
 TEST(BuildRefuses, what_nothing_holds) {
   scene::Scene scene = patches::scene_of(2, {});
-  scene.rim_fixed = false;
+  scene.rim = scene::Rim::free;
   EXPECT_TRUE(says(refusal(scene, patches::square(6, 60), {}), "nothing holds"));
 }
 

@@ -8,6 +8,7 @@
 #include "repose/base/error.h"
 #include "repose/model/directions.h"
 #include "repose/model/fold.h"
+#include "repose/model/places.h"
 #include "repose/model/smoothing.h"
 
 namespace repose::model {
@@ -139,6 +140,41 @@ TEST(Columns, where_no_length_is_short_enough_the_place_is_named) {
     EXPECT_NE(std::string(error.what()).find("skin.ply"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("skin vertex"), std::string::npos);
   }
+}
+
+TEST(Columns, every_place_is_named_once_and_its_triangles_are_kept) {
+  const SkinMesh mesh = make_skin_mesh(patches::square(10, 100));
+  try {
+    refuse_places("skin.ply", mesh, {12, 13, 24, 97}, "it does not fit", "mend it");
+    FAIL() << "accepted";
+  } catch (const RefusedPlaces& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.find("skin.ply: it does not fit in 2 places, skin vertex 12 (10.00, 10.00, "),
+              0u)
+        << text;
+    EXPECT_NE(text.find("and 2 more around it, vertex 97 ("), std::string::npos) << text;
+    EXPECT_NE(text.find("; mend it"), std::string::npos);
+    const surface::Surface& places = error.places();
+    EXPECT_EQ(places.triangles.size(), 13u + 6u);
+    EXPECT_EQ(places.points.size(), 12u + 7u);
+    for (const Triangle& t : places.triangles)
+      EXPECT_LT((places.points[t[0]] - places.points[t[1]]).norm(), 15);
+  }
+}
+
+TEST(Columns, with_an_edge_they_are_bent_before_they_are_shortened) {
+  surface::Surface skin = patches::square(40, 80);
+  for (Vec3& x : skin.points) x.z() = -1.7 * std::abs(x.x() - 40);
+  const SkinMesh mesh = make_skin_mesh(skin);
+  scene::Tissue tissue;
+  tissue.free_thickness = 25;
+  const Columns straight = lay(mesh, {}, tissue);
+  EXPECT_EQ(straight.bent, 0);
+  tissue.edge = 2;
+  const Columns bent = lay(mesh, {}, tissue);
+  EXPECT_GT(bent.bent, 0);
+  EXPECT_LT(bent.shortened, straight.shortened);
+  expect_unfolded(mesh, bent);
 }
 
 TEST(Columns, a_fold_of_the_skin_is_named) {

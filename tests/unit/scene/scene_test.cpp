@@ -47,7 +47,7 @@ TEST(Scene, MinimalHasTheDefaults) {
   EXPECT_TRUE(scene.tissue.springs.empty());
   EXPECT_TRUE(scene.tissue.mass.empty());
   EXPECT_FALSE(scene.gravity);
-  EXPECT_TRUE(scene.rim_fixed);
+  EXPECT_EQ(scene.rim, Rim::fixed);
   ASSERT_EQ(scene.moves.size(), 2u);
   EXPECT_TRUE(scene.moves[0].is_identity());
   EXPECT_EQ(scene.solve.functional, Functional::energy);
@@ -65,7 +65,7 @@ TEST(Scene, TableHasTheDefaultsOfTheCode) {
       "accuracy: {}, load_steps: {}}}\n",
       minimal, standard("boundary.rim"), standard("solve.functional"), standard("solve.lambda"),
       standard("solve.accuracy"), standard("solve.load_steps")));
-  EXPECT_EQ(plain.rim_fixed, spelt.rim_fixed);
+  EXPECT_EQ(plain.rim, spelt.rim);
   EXPECT_EQ(plain.solve.functional, spelt.solve.functional);
   EXPECT_EQ(plain.solve.volume, spelt.solve.volume);
   EXPECT_EQ(plain.solve.lambda, spelt.solve.lambda);
@@ -146,7 +146,7 @@ TEST(Scene, FullRest) {
   EXPECT_EQ(scene.bones[1].surface.file.parent_path(), scene.skin.file.parent_path())
       << "normalised";
   EXPECT_EQ(*scene.gravity, Vec3(0, 0, -9.80665));
-  EXPECT_FALSE(scene.rim_fixed);
+  EXPECT_EQ(scene.rim, Rim::free);
   ASSERT_EQ(scene.forces.size(), 1u);
   EXPECT_EQ(scene.forces[0].at, Vec3(1, 2, 3));
   EXPECT_EQ(scene.forces[0].radius, 5);
@@ -397,7 +397,7 @@ TEST(SceneRefuses, NumbersOutOfRangeOrNone) {
 TEST(SceneRefuses, Words) {
   expect_refused({
       {"boundary: {rim: fxied}\n",
-       "6:17: boundary.rim must be one of fixed, free, it is 'fxied'; the nearest is fixed"},
+       "6:17: boundary.rim must be one of fixed, free, auto, it is 'fxied'; the nearest is fixed"},
       {"boundary: {rim: true}\n", "it is 'true'"},
       {"solve: {functional: forces}\n",
        "solve.functional must be one of energy, force, it is 'forces'; the nearest is force"},

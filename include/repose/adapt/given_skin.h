@@ -1,0 +1,16 @@
+#pragma once
+#include "repose/model/model.h"
+#include "repose/surface/write.h"
+
+namespace repose::adapt {
+
+/// The displacement of the solved skin carried to the vertices of a given one, which may be dense,
+/// dirty and larger: an affine motion fitted to the 16 nearest skin points of the model by moving
+/// least squares, for what lies farther off than they do (ears, inner walls) that at their border.
+/// Beyond the rim of the solved skin it fades to nothing over 20 mm. The fields are `displacement`
+/// (mm) and `solved`, the share of it that is left (1 over the solved skin). `displacement` [N] is
+/// the model's. Serial.
+surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
+                                         const std::vector<Vec3>& displacement);
+
+}  // namespace repose::adapt

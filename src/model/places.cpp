@@ -1,0 +1,67 @@
+#include "repose/model/places.h"
+
+#include <utility>
+
+namespace repose::model {
+namespace {
+
+/// The vertices in connected groups.
+std::vector<std::vector<int64_t>> groups_of(const SkinMesh& mesh,
+                                            const std::vector<int64_t>& vertices) {
+  std::vector<char> open(mesh.points.size(), 0);
+  for (const int64_t v : vertices) open[v] = 1;
+  std::vector<std::vector<int64_t>> groups;
+  for (const int64_t v : vertices) {
+    if (!open[v]) continue;
+    open[v] = 0;
+    groups.push_back({v});
+    for (size_t next = 0; next < groups.back().size(); ++next)
+      for (const int64_t e : mesh.edges_of[groups.back()[next]]) {
+        const int64_t other = mesh.other_end(e, groups.back()[next]);
+        if (!open[other]) continue;
+        open[other] = 0;
+        groups.back().push_back(other);
+      }
+  }
+  return groups;
+}
+
+surface::Surface triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
+  surface::Surface places{"places", {}, {}};
+  std::vector<char> taken(mesh.triangles.size(), 0);
+  std::vector<int64_t> row(mesh.points.size(), -1);
+  for (const int64_t v : vertices)
+    for (const int64_t f : mesh.triangles_of[v]) {
+      if (std::exchange(taken[f], 1)) continue;
+      Triangle triangle = mesh.triangles[f];
+      for (int64_t& corner : triangle) {
+        if (row[corner] < 0) {
+          row[corner] = static_cast<int64_t>(places.points.size());
+          places.points.push_back(mesh.points[corner]);
+        }
+        corner = row[corner];
+      }
+      places.triangles.push_back(triangle);
+    }
+  return places;
+}
+
+}  // namespace
+
+void refuse_places(const std::string& skin_name, const SkinMesh& mesh,
+                   const std::vector<int64_t>& vertices, const std::string& what,
+                   const std::string& remedy) {
+  const auto groups = groups_of(mesh, vertices);
+  std::string list;
+  for (const std::vector<int64_t>& group : groups) {
+    const Vec3& at = mesh.points[group.front()];
+    list += fmt::format("{}vertex {} ({:.2f}, {:.2f}, {:.2f})", list.empty() ? "" : ", ",
+                        group.front(), at.x(), at.y(), at.z());
+    if (group.size() > 1) list += fmt::format(" and {} more around it", group.size() - 1);
+  }
+  throw RefusedPlaces(fmt::format("{}: {} in {} place{}, skin {}; {}", skin_name, what,
+                                  groups.size(), groups.size() == 1 ? "" : "s", list, remedy),
+                      triangles_at(mesh, vertices));
+}
+
+}  // namespace repose::model

@@ -1,0 +1,76 @@
+"""Any mesh of a head's skin, however dirty, is solved as it comes, and all of one head move alike. The
+data are not shipped: they lie beside the project, in ../shared/data/head."""
+
+from itertools import combinations
+
+import meshio
+import numpy as np
+import pytest
+
+from conftest import runner
+from heads import (DATA, SCENE, VARIANTS, apart, face_of, make_scenes, make_surfaces, read_vtp,
+                   scene_of, write)
+from tissue import last
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, environment):
+    """The scenes VARIANT.yaml of one head and what they name."""
+    top = tmp_path_factory.mktemp("any_head")
+    make_surfaces(top, runner(top, environment))
+    make_scenes(top)
+    return top
+
+
+@pytest.fixture(scope="module")
+def faces(folder, environment):
+    """VARIANT → vertices over the solved skin, and their displacements, in the head's own frame."""
+    run = runner(folder, environment)
+    for variant in VARIANTS:
+        result = run("repose-solve", f"{variant}.yaml", "-output", variant)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        step = last(folder / f"{variant}.h5")
+        assert step["load"] == 1 and step["converged"] and step["inverted_prisms"] == 0
+    return {variant: face_of(folder, variant) for variant in VARIANTS}
+
+
+def test_the_scene_has_ten_lines():
+    lines = [line for line in SCENE.read_text().splitlines() if not line.startswith("#")]
+    assert len(lines) == 10
+
+
+def test_the_given_skin_keeps_its_vertices(folder, faces):
+    mesh, skin = meshio.read(folder / "soup.ply"), read_vtp(folder / "soup_given_skin.vtp")
+    assert np.array_equal(mesh.points, skin["Points"])
+    assert np.array_equal(mesh.cells_dict["triangle"].ravel(), skin["connectivity"])
+
+
+def test_the_chin_follows_the_jaw(faces):
+    points, moved = faces["volume"]
+    chin = np.argmin(np.linalg.norm(points - [3.3, -303.9, 343.2], axis=1))
+    assert 12 < np.linalg.norm(moved[chin]) < 17 and moved[chin][2] < -8
+
+
+@pytest.mark.parametrize("variant, other", combinations(VARIANTS, 2))
+def test_all_move_alike(faces, variant, other):
+    distances = apart(faces[variant], faces[other])
+    assert len(distances) > 300 and np.quantile(distances, 0.95) < 0.5
+
+
+def test_without_an_edge_all_places_are_listed_and_written(folder, environment):
+    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace("edge: 4, ", ""))
+    result = runner(folder, environment)("repose-solve", "as_it_is.yaml")
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "in 2 places" in result.stderr and "tissue.edge" in result.stderr
+    places = meshio.read(folder / "as_it_is_refused.ply")
+    assert 300 < len(places.points) < 1000
+
+
+def test_metres_are_refused(folder, environment):
+    mesh = meshio.read(folder / "decimated.ply")
+    write(folder / "metres.ply", mesh.points / 1000, mesh.cells_dict["triangle"])
+    (folder / "metres.yaml").write_text(scene_of("metres.ply"))
+    result = runner(folder, environment)("repose-solve", "metres.yaml")
+    assert result.returncode == 1 and "metres" in result.stderr
