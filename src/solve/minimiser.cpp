@@ -18,6 +18,8 @@ constexpr double linear = 1e-6;  // mm, below which a Newton step need not be co
 // Of the accuracy: where a preconditioned gradient this long is worth a Newton step, which also
 // says how far the rest position is; and one so short that it is rest, whatever the preconditioner.
 constexpr double closing = 5, negligible = 1e-6;
+constexpr double farthest_closing = 0.2;  // mm, whatever the accuracy
+constexpr double sure_share = 0.1;        // of the accuracy, what a linear system may leave unknown
 // A step by which the next is not shorter than this is no measure: the search goes on.
 constexpr double trusted_contraction = 0.7, most_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
@@ -194,9 +196,12 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
     gradient = certified_gradient_;
   }
   double step = certificate_.solver.newton_distance(displacement, gradient);
-  if (last || safety * step <= accuracy_)
-    step = certificate_.solver.sure_distance(displacement, gradient);
-  const double estimate = safety * step;
+  double unsure = 0;
+  if (last || safety * step <= accuracy_) {
+    step = certificate_.solver.sure_distance(displacement, gradient, sure_share * accuracy_);
+    unsure = certificate_.solver.unsure();
+  }
+  const double estimate = safety * step + unsure;
   const bool curved = estimate > linear && estimate <= accuracy_;
   if (!curved) return estimate;
   // A step just taken says as much of the quadratic model as one on trial.
@@ -236,7 +241,8 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   }
   if (quick && &certificate_.function == &function_) {
     const double glance = certificate_.solver.glance(gradient);
-    if (glance > (closes_ ? closing : 1) * accuracy_) {
+    const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
+    if (glance > (may_close_ ? near : accuracy_)) {
       error_ = safety * glance;
       return false;
     }
@@ -251,7 +257,8 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     softest_ = largest_force / error_;
   else
     softest_ = 2 * std::max(softest_, largest_force / accuracy_);
-  return error_ <= accuracy_ || (closes_ && error_ <= farthest_correction());
+  closed_ = may_close_ && error_ > accuracy_ && error_ <= farthest_correction();
+  return error_ <= accuracy_ || closed_;
 }
 
 double Minimiser::farthest_correction() const {
@@ -278,11 +285,11 @@ int Minimiser::polish(Vec displacement) {
     check(VecCopy(displacement, saved_));
     check(VecAXPY(displacement, -1.0, certificate_.solver.latest()));
     taken_ = largest_block(certificate_.solver.latest());
-    measure(displacement);
+    measure(displacement, true);
     taken_ = 0;
     if (error_ > 0.5 * before) {
       check(VecCopy(saved_, displacement));
-      measure(displacement);
+      measure(displacement, true);
       break;
     }
     ++corrections;
@@ -290,9 +297,9 @@ int Minimiser::polish(Vec displacement) {
   return corrections;
 }
 
-double Minimiser::measure(Vec displacement) {
+double Minimiser::measure(Vec displacement, bool last) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, true);
+  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, last);
   return objective;
 }
 
@@ -304,7 +311,7 @@ std::string Minimiser::reason_of(const Outcome& outcome, TaoConvergedReason reas
 }
 
 Outcome Minimiser::summary(Vec displacement) {
-  measure(displacement);
+  measure(displacement, !closed_);
   const int corrections = polish(displacement);
   Outcome outcome;
   outcome.objective = function_.evaluate(displacement, gradient_);
@@ -352,8 +359,17 @@ Outcome Minimiser::run(Vec displacement, double accuracy) {
   thrown_ = nullptr;
   stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
+  may_close_ = closes_;
+  closed_ = false;
   search(displacement);
-  return summary(displacement);
+  Outcome outcome = summary(displacement);
+  if (!closed_ || outcome.converged || outcome.stopped) return outcome;
+  may_close_ = closed_ = false;  // Newton steps do not end it: it goes on where they led
+  const int64_t iterations = outcome.iterations;
+  search(displacement);
+  outcome = summary(displacement);
+  outcome.iterations += iterations;
+  return outcome;
 }
 
 }  // namespace repose::solve

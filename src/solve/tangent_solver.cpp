@@ -257,20 +257,25 @@ bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
   return convex && finished_;
 }
 
-double TangentSolver::sure_distance(Vec displacement, Vec gradient) {
-  // Of the distance; the preconditioner's norm, which is looked at, is the energy's but roughly.
-  constexpr double share = 0.05;
+double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack) {
+  // The preconditioner's norm, which is looked at, is the energy's but roughly.
+  constexpr double margin = 20;
   constexpr double finest = 1e-12;
   const double rough = newton_distance(displacement, gradient);
   if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_) return rough;
   PetscReal energy = 0;
   check(VecDot(gradient, work_, &energy));
-  const double wanted = share * rough / std::sqrt(largest_compliance(displacement) * energy);
-  if (wanted < usual_) {
+  const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm
+  const double bound = std::max(rough, slack);
+  double left = usual_ * reach;
+  if (left > bound) {
+    const double wanted = bound / reach;
+    left = bound;
     const bool sure = wanted > finest && improve(displacement, gradient, wanted / usual_);
     distance_ =
         sure ? std::max(rough, largest_block(work_)) : std::numeric_limits<double>::infinity();
   }
+  unsure_ = left > rough ? left : 0;
   sure_at_ = measured_at_;
   return distance_;
 }

@@ -56,7 +56,7 @@ class Minimiser : public RestSearch {
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   double farthest_correction() const;  ///< mm, of a Newton step that ends a search
   bool stalled(int64_t iteration, double value);
-  double measure(Vec displacement);
+  double measure(Vec displacement, bool last);
   int polish(Vec displacement);
   std::string reason_of(const Outcome& outcome, TaoConvergedReason reason) const;
   Outcome summary(Vec displacement);
@@ -67,6 +67,8 @@ class Minimiser : public RestSearch {
   Watch watch_;
   TaoHandle tao_;
   std::optional<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
+  bool may_close_ = false;                 // … in the search under way
+  bool closed_ = false;                    // it did
   bool closes_ = false;                    // near rest its search gives way to Newton steps
   bool newton_ = true;                     // the TAO method uses the Hessian
   bool slowed_ = false;                    // the initial Hessian is to be renewed

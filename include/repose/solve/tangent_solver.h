@@ -47,9 +47,11 @@ class TangentSolver {
 
   /// newton_distance that holds wherever stiffnesses lie far apart: conjugate gradients bound the
   /// error e of the step in the energy norm, in which soft points hardly count; no point is off by
-  /// more than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it.
-  /// Infinite where that is out of reach, or a random load meets negative curvature.
-  double sure_distance(Vec displacement, Vec gradient);
+  /// more than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it,
+  /// or below `slack`, mm. Infinite where that is out of reach, or a random load meets negative
+  /// curvature.
+  double sure_distance(Vec displacement, Vec gradient, double slack);
+  double unsure() const { return unsure_; }  ///< mm, of the latest, where it is not little of it
 
   /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
   /// yet.
@@ -85,6 +87,7 @@ class TangentSolver {
   bool improve(Vec displacement, Vec gradient, double factor);
   void renew_columns();
 
+  double unsure_ = 0;
   static constexpr double usual_ = 0.05;  // to which Newton steps are solved for
 
   Positions& positions_;
