@@ -14,8 +14,8 @@ million unknowns want for lack of memory. Positions at the model's points are ke
 RESULT_linear.npy or RESULT_quadratic.npy, and found there the next time. A row of the table: the
 mean and largest distance over the points of the skin that moved by more than -moving mm in the
 finite elements, and the mean over the mean motion. -against: the finite elements are those of
-another result, of the same skin with other layers. -output puts the table below a page's mark
-<!-- finite elements -->. One core; times are CPU s.
+another result, of the same skin with other layers. -output puts the table below the mark
+<!-- finite elements --> of a page that is there. One core; times are CPU s.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx python3-h5py
 python3-scipy (and Debian's own /usr/bin/python3, not another).
 """

@@ -18,14 +18,14 @@ makes a tenth of the move. Who stops how:
 - dolfinx_*: linear tetrahedra, Newton until a step is within -accuracy; all but the start of the
   program and the compilation of its forms, the best of 1 and 4 load steps.
 - ccx_*: CalculiX, wedges C3D6, its own neo-Hookean law (isochoric, with the same small strains),
-  its own tests and increments from a quarter of the load on, or from all of it where that is
-  sooner (SPOOLES alone); -seconds is its limit of wall time.
+  its own tests and increments, the best of beginning with a quarter of the load and with all of
+  it; -seconds is its limit of wall time.
 
 Skin: mean distance from quadratic tetrahedra over the points of the skin that these move by more
 than -moving mm, and the same over their mean motion. They are kept in -folder, as
 FILE_quadratic.npy, and found there the next time. Everything on one core; times are ratios within
-one run, the least of -rounds where they are below 5 s. -output puts each table below a page's mark
-<!-- FILE -->.
+one run, the least of -rounds where they are below 5 s. -output puts each table below the mark
+<!-- FILE --> of a page that is there.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx calculix-ccx
 liblbfgs-dev python3-h5py python3-scipy; for PolySolve an environment of one's own:
     /usr/bin/python3 -m venv --system-site-packages VENV; VENV/bin/pip install polyfem-polysolve
@@ -329,10 +329,11 @@ def calculix(race, solver):
     if not shutil.which("ccx"):
         return Row(title, remark="not installed")
     rows = []
-    for first in FIRST[solver]:
+    for first in (0.25, 1):  # with which conjugate gradients need not end
         (race.folder / "peer.inp").write_text(calculix_deck(race.model, solver, first))
+        limit = 10 * rows[0].seconds + 10 if rows else race.options.seconds
         try:
-            done = run(["ccx", "-i", "peer"], race.folder, ends=None, timeout=race.options.seconds)
+            done = run(["ccx", "-i", "peer"], race.folder, ends=None, timeout=limit)
         except subprocess.TimeoutExpired:
             continue
         found = calculix_positions(race.folder / "peer.dat", race.model)
@@ -347,8 +348,6 @@ def calculix(race, solver):
 
 
 SOLVERS = {"spooles": "SPOOLES", "cholesky": "ITERATIVE CHOLESKY", "scaling": "ITERATIVE SCALING"}
-# part of the load that increments begin with: conjugate gradients do not end beyond a stable start
-FIRST = {"spooles": (1, 0.25), "cholesky": (0.25,), "scaling": (0.25,)}
 
 
 def calculix_deck(model, solver, first):
