@@ -475,13 +475,14 @@ std::string describe_folds(const model::StepNumbers& last, const std::string& na
   return text;
 }
 
-/// Path of the result without ending; never that of the input.
+/// Path of the result without ending; never that of the input, which is read first: what is wrong
+/// with it is to be said first.
 std::string result_name(const base::Options& options, const std::filesystem::path& input) {
   const std::string name = options.has("output") ? options.text("output") : input.stem().string();
   std::error_code missing;
-  if (std::filesystem::equivalent(name + ".h5", input, missing) && !missing)
-    base::refuse("{}: the result would replace the input; give another -output", input.string());
-  return name;
+  if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
+  read_job(input);
+  base::refuse("{}: the result would replace the input; give another -output", input.string());
 }
 
 /// Sliding points find their places and springs tear, in rounds of searches.

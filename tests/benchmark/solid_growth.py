@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""How the work of solving a solid grows with the mesh, by method: a table.
+
+    tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
+                                    [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]
+                                    [-output docs/continuum.md]
+
+Synthetic heads of the given numbers of skin vertices, four layers, the jaw opened by 8° and brought
+6 mm forward, to 0.01 mm. lmvm is the default: limited-memory BFGS that begins with a multigrid cycle
+and ends with Newton steps; ntr, nls and cg are TAO's. Seconds are those of the search on its own
+model, the estimate of the distance to rest included. Needs: apt-get install
+--no-install-recommends python3-h5py python3-numpy
+"""
+
+import h5py
+import numpy as np
+
+from measure import run, synthetic
+from page import option_parser, print_table
+
+SCENE = """skin: head_skin.ply
+bones:
+  - {name: skull, file: head_skull.ply}
+  - {name: mandible, file: head_mandible.ply}
+tissue:
+  layers: 4
+  material: {young: 0.015, poisson: POISSON}
+moves:
+  - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}
+  - {bone: mandible, translate: [0, -6, 0]}
+solve: {accuracy: 0.01}
+"""
+HEAD = ("| unknowns | ν | method | evaluations | Hessians | search, s | µs/unknown | memory, MiB | "
+        "inverted prisms | from the first, mm |\n|--:|--:|---" + "|--:" * 7 + "|")
+
+
+def rows_of(size, poisson, chosen):
+    with synthetic(chosen.bin, size, SCENE.replace("POISSON", poisson)) as folder:
+        first = None
+        for method in chosen.methods.split(","):
+            solved = run([chosen.bin / "repose-solve", "scene.yaml", "-tao_type", method,
+                          "-active_region", "off", "-output", method], folder, chosen.ranks)
+            with h5py.File(folder / f"{method}.h5") as h5:
+                step = h5["step"][max(h5["step"])]
+                position, inverted = step["point/position"][()], step.attrs["inverted_prisms"]
+                unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
+            first = position if first is None else first
+            apart = np.linalg.norm(position - first, axis=1).max()
+            said = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
+            seconds = solved.stages["solve"][0]
+            yield (f"| {unknowns} | {poisson} | {method} | {solved.evaluations[0]} | "
+                   f"{solved.evaluations[1]} | {seconds:.2f} | {1e6 * seconds / unknowns:.0f} | "
+                   f"{solved.memory:.0f} | {inverted} | {said} |")
+
+
+def main():
+    chosen = option_parser(__doc__, sizes="500,2500,12500,125000", methods="lmvm,ntr",
+                           poissons="0.45,0.49", ranks=1).parse_args()
+    rows = (row for size in chosen.sizes.split(",") for poisson in chosen.poissons.split(",")
+            for row in rows_of(size, poisson, chosen))
+    print_table(HEAD, rows, chosen.output, "growth")
+
+
+if __name__ == "__main__":
+    main()

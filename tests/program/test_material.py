@@ -1,0 +1,154 @@
+"""Scenes whose tissue is a solid: what is refused, one face on any way to it, and how far its mesh
+leaves it from the continuum."""
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import apart, last, model_of, steps
+
+MESHES = PROJECT / "meshes"
+JAW_FORWARD = "  - {bone: mandible, translate: [0, -6, 0]}"
+JAW_OPENS = "  - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}"
+CHIN = """osteotomies:
+  - bone: mandible
+    piece: chin
+    planes: [{point: [0, -88, -52], normal: [0, -0.42, -0.91]}]
+    kerf: 0.5
+"""
+
+
+def scene(tissue="", moves=JAW_FORWARD, more="", head="head"):
+    return f"""
+skin: {MESHES}/{head}_skin.ply
+bones:
+  - {{name: skull, file: {MESHES}/{head}_skull.ply}}
+  - {{name: mandible, file: {MESHES}/{head}_mandible.ply}}
+tissue:
+  layers: 4
+{tissue}
+moves:
+{moves}
+{more}"""
+
+
+REFUSED = {
+    "poisson": ("  material: {poisson: 0.5}", "", "tissue.material.poisson must be a number"),
+    "young": ("  material: {young: -1}", "", "tissue.material.young must be a number"),
+    "preset": ("  material: {preset: fase}", "", "one of face"),
+    "key": ("  material: {yung: 1}", "", "nearest known one is 'young'"),
+    "both": ("  material: {young: 1}\n  springs: {default: {modulus: 1}}", "",
+             "tissue.springs exclude each other"),
+    "thickness": ("  material: {skin: {thickness: 0, young: 0.1}}", "", "thickness must be"),
+    "skin and strata": (
+        "  material: {skin: {thickness: 1, young: 1}, strata: [{thickness: 1, young: 1}]}", "",
+        "exclude each other"),
+    "region": ("  material: {regions: [{young: 1}]}", "", "needs one of sphere, mesh and volume"),
+    "nowhere": ("  material: {regions: [{sphere: {center: [900, 0, 0], radius: 1}, young: 1}]}", "",
+                "regions[0]: holds no prism"),
+    "turgor": ("  turgor: 0.1", "", "give tissue.material.skin"),
+    "depths": ("  depths: [0, 0.2, 0.5, 1]\n  depths_mm: [0, 1]", "", "exclude each other"),
+    "first depth": ("  depths_mm: [1, 2]", "", "must begin with 0"),
+    "isotropic": ("  springs: {isotropic: {young: 1, poisson: 0.45}, default: {modulus: 1}}", "",
+                  "exclude each other"),
+    "volume": ("", "solve: {volume: {form: exact}}", "the tissue is a solid"),
+    "functional": ("", "solve: {functional: force}", "the tissue is a solid"),
+    "tearing": ("", "forces: [{at: [47, -80, 8], radius: 6, force: [0, -3, 0]}]\n"
+                    "tearing: {limit: 0.5}", "the tissue is a solid"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_material_is_refused_in_one_line(run, tmp_path, case):
+    tissue, more, told = REFUSED[case]
+    (tmp_path / "scene.yaml").write_text(scene(tissue, more=more))
+    result = run("repose-solve", "scene.yaml", "-output", "out")
+    assert result.returncode == 1, result
+    assert told in result.stderr and result.stderr.count("\n") == 1, result.stderr
+    assert not (tmp_path / "out.h5").exists()
+
+
+def solve(run, tmp_path, name, text, *options, ranks=1):
+    (tmp_path / f"{name}.yaml").write_text(text)
+    result = run("repose-solve", f"{name}.yaml", "-output", name, *options, ranks=ranks)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    return tmp_path / f"{name}.h5", result.stdout
+
+
+@pytest.mark.parametrize("moves, more, tissue", [
+    (JAW_FORWARD, "", ""), (JAW_OPENS, "", ""),
+    ("  - {bone: chin, translate: [0, -8, 0]}", CHIN, "  release: 5")])
+def test_one_face_whatever_the_load_steps_and_the_ranks(run, tmp_path, moves, more, tissue):
+    text, accuracy = scene(tissue, moves, more), 0.001
+    options = "-accuracy", accuracy, "-active_region", "off"
+    one = last(solve(run, tmp_path, "one", text, *options)[0])
+    assert one["inverted_prisms"] == 0
+    assert one["evaluations"] <= 80
+    for steps_wanted in 2, 5:
+        other = solve(run, tmp_path, "other", text, *options, "-load_steps", steps_wanted)[0]
+        assert apart(one, last(other)) <= 2 * accuracy
+    for ranks in 2, 3:
+        other = solve(run, tmp_path, "other", text, *options, ranks=ranks)[0]
+        assert apart(one, last(other)) <= 2 * accuracy
+
+
+def test_every_method_finds_the_face(run, tmp_path):
+    text, accuracy = scene(head="paper"), 0.001
+    default = last(solve(run, tmp_path, "default", text, "-accuracy", accuracy)[0])
+    for method in ["ntr"], ["nls"], ["ntl"], ["cg"], ["lmvm", "-tao_lmvm_initial", "diagonal"]:
+        other = solve(run, tmp_path, "other", text, "-accuracy", accuracy, "-tao_type", *method)[0]
+        assert apart(default, last(other)) <= 2 * accuracy, method
+
+
+def test_what_a_move_is_not_felt_by_need_not_be_searched(run, tmp_path):
+    text = scene("  release: 5", "  - {bone: chin, translate: [0, -8, 0]}", CHIN)
+    options = "-accuracy", 0.01
+    whole = last(solve(run, tmp_path, "whole", text, *options, "-active_region", "off")[0])
+    part, told = solve(run, tmp_path, "part", text, *options, "-active_region", "on")
+    assert "active region" in told
+    assert apart(whole, last(part)) <= 0.02
+
+
+def test_strata_regions_and_depths(run, tmp_path):
+    tissue = """  depths_mm: [0, 1.5]
+  material:
+    young: 0.015
+    strata: [{thickness: 1.5, young: 0.08}, {thickness: 4, young: 0.003}]
+    regions: [{sphere: {center: [60, -60, -20], radius: 15}, young: 0.05, poisson: 0.3}]"""
+    file = solve(run, tmp_path, "layered", scene(tissue), "-accuracy", 0.1)[0]
+    model = model_of(file)
+    young = 2 * (1 + 0.45) * model["prism/shear_modulus"]
+    x, layer = model["point/position"], model["point/layer"]
+    second = np.linalg.norm(x[layer == 1] - x[layer == 0], axis=1)
+    assert np.isclose(second, 1.5).mean() > 0.9 and second.max() < 1.5 + 1e-9
+    at_skin = young[layer[model["prism/points"][:, 0]] == 0]
+    assert np.isclose(at_skin, 0.08).mean() > 0.8
+    inside = np.linalg.norm(
+        x[model["prism/points"]].mean(axis=1) - [60, -60, -20], axis=1) <= 15
+    assert inside.sum() > 10
+    assert np.allclose(model["prism/shear_modulus"][inside], 0.05 / 2.6)
+
+
+def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path):
+    file, told = solve(run, tmp_path, "springs",
+                       scene("  springs: {isotropic: {young: 0.015, poisson: 0.45}}"))
+    shear = 0.015 / 2.9
+    assert np.isclose(last(file)["bulk_modulus"], 0.015 / 0.3 - 5 * shear / 3)
+    assert set(model_of(file)["spring/exponent"]) == {0}
+
+
+def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
+    file, told = solve(run, tmp_path, "coarse", scene(), "-discretisation")
+    assert "mesh and layers" in told and "order" in told
+    step, model = last(file), model_of(file)
+    error, layer = step["point/discretisation_error"], model["point/layer"]
+    assert error.max() > 0.01 and (error[layer > 0] == 0).all()
+    moves = np.linalg.norm(step["point/displacement"], axis=1) >= 0.1
+    assert np.isclose(error[moves].max(), step["discretisation_error"])
+    assert all("point/discretisation_error" in s for s in steps(file))
+    # The layers doubled, the face moves by about as much as the estimate says.
+    finer = scene().replace("layers: 4", "layers: 7")
+    other = solve(run, tmp_path, "finer", finer, "-accuracy", 0.01)[0]
+    skin = lambda f: last(f)["point/position"][model_of(f)["point/layer"] == 0]
+    apart_at_skin = np.linalg.norm(skin(file) - skin(other), axis=1)
+    assert apart_at_skin.mean() <= 2 * error[layer == 0].mean()
