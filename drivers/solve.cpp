@@ -93,6 +93,12 @@ std::vector<base::Option> method_options() {
        {1, 100000},
        "",
        {"auto"}},
+  };
+}
+
+/// On which models.
+std::vector<base::Option> model_options() {
+  return {
       {"profile",
        OptionKind::choice,
        "balanced",
@@ -144,8 +150,8 @@ std::vector<base::Option> run_options() {
 
 std::vector<base::Option> option_table() {
   std::vector<base::Option> table = method_options();
-  const std::vector<base::Option> more = run_options();
-  table.insert(table.end(), more.begin(), more.end());
+  for (const auto& more : {model_options(), run_options()})
+    table.insert(table.end(), more.begin(), more.end());
   return table;
 }
 

@@ -262,7 +262,10 @@ double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack
   constexpr double margin = 20;
   constexpr double finest = 1e-12;
   const double rough = newton_distance(displacement, gradient);
-  if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_) return rough;
+  PetscBool trusting = PETSC_FALSE;  // the preconditioner alone, by the user's wish
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(static_cast<KSP>(krylov_)), KSPPREONLY,
+                               &trusting));
+  if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_ || trusting) return rough;
   PetscReal energy = 0;
   check(VecDot(gradient, work_, &energy));
   const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm

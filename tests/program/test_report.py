@@ -92,7 +92,7 @@ def test_numbers_are_those_of_the_result(report, opened, tmp_path):
     assert f"{step['displacement_error']:.2g} mm" in page.text["p"]
     assert page.rows["1.00"][0] == "yes"
     assert page.rows["ranks"] == ["1"] and page.rows["program"][0].startswith("Repose ")
-    assert page.rows["command"][0].endswith(f"{SCENE} -output {opened.with_suffix('')}")
+    assert page.rows["command"][0].endswith(f"{SCENE} -allow_folded -output {opened.with_suffix('')}")
 
 
 def test_the_page_stands_alone(report, opened, tmp_path):
