@@ -19,7 +19,7 @@ constexpr double linear = 1e-6;  // mm, below which a Newton step need not be co
 // says how far the rest position is; and one so short that it is rest, whatever the preconditioner.
 constexpr double closing = 5, negligible = 1e-6;
 constexpr double farthest_closing = 0.2;  // mm, whatever the accuracy
-constexpr double sure_share = 0.1;        // of the accuracy, what a linear system may leave unknown
+constexpr double sure_share = 0.05;       // of the accuracy, what a linear system may leave unknown
 // A step by which the next is not shorter than this is no measure: the search goes on.
 constexpr double trusted_contraction = 0.7, most_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <string_view>
 
 #include "repose/base/error.h"
@@ -37,6 +36,15 @@ void give_room(PC pc) {
   check(MatFactorGetSolverType(factor, &type));
   if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
   check(MatMumpsSetIcntl(factor, more_memory, percent));
+}
+
+/// 1 or −1, the same for a number on any ranks (the mixing of SplitMix64: Steele, Lea & Flood
+/// 2014).
+double random_sign(uint64_t number) {
+  uint64_t bits = (number + 1) * 0x9e3779b97f4a7c15u;
+  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+  return (bits >> 63) == 0 ? 1.0 : -1.0;
 }
 
 /// In iterations: what a new preconditioner costs as much as.
@@ -237,8 +245,7 @@ double TangentSolver::largest_compliance(Vec displacement) {
   PetscScalar* values = nullptr;
   check(VecGetOwnershipRange(load, &begin, &end));
   check(VecGetArray(load, &values));
-  for (PetscInt i = begin; i < end; ++i)
-    values[i - begin] = std::mt19937(static_cast<uint32_t>(i))() & 1 ? 1.0 : -1.0;
+  for (PetscInt i = begin; i < end; ++i) values[i - begin] = random_sign(static_cast<uint64_t>(i));
   check(VecRestoreArray(load, &values));
   check(VecSet(next_, 0));
   const bool known = solve(displacement, load, next_, rough) && finished_;
@@ -258,8 +265,9 @@ bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
 }
 
 double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack) {
-  // The preconditioner's norm, which is looked at, is the energy's but roughly.
-  constexpr double margin = 20;
+  // The preconditioner's norm, which is looked at, is the energy's but roughly, and a random load
+  // does not find the largest compliance.
+  constexpr double margin = 50;
   constexpr double finest = 1e-12;
   const double rough = newton_distance(displacement, gradient);
   PetscBool trusting = PETSC_FALSE;  // the preconditioner alone, by the user's wish
@@ -278,7 +286,7 @@ double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack
     distance_ =
         sure ? std::max(rough, largest_block(work_)) : std::numeric_limits<double>::infinity();
   }
-  unsure_ = left > rough ? left : 0;
+  unsure_ = left > rough ? 2 * left : 0;
   sure_at_ = measured_at_;
   return distance_;
 }
