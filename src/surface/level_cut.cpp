@@ -1,5 +1,6 @@
 #include "level_cut.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
