@@ -46,7 +46,7 @@ if [ -n "$ct" ]; then
   unpack_ct "$build/demo/ct"
   scene=$build/demo/ct/ct_maxilla.yaml
 else
-  scene=meshes/head_jaw_opening.yaml
+  scene=meshes/head_solid.yaml
 fi
 result=$build/demo/$(basename "$scene" .yaml)
 mpirun -n 2 "$build/bin/repose-solve" "$scene" -output "$result"
