@@ -52,11 +52,11 @@ Vec3 middle_of(const std::array<Vec3, 6>& corners) {
 
 using Inside = std::function<bool(const Vec3&)>;
 
-Inside inside_of(const scene::SphereRegion& sphere, const std::string&) {
+Inside inside_of(const scene::SphereRegion& sphere) {
   return [sphere](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius; };
 }
 
-Inside inside_of(const scene::MeshRegion& mesh, const std::string&) {
+Inside inside_of(const scene::MeshRegion& mesh) {
   const surface::Surface read = surface::read_surface(mesh.file);
   const surface::Defects defects = surface::inspect(read, false);
   if (defects.border_edges > 0 || defects.non_manifold_edges > 0)
@@ -66,7 +66,7 @@ Inside inside_of(const scene::MeshRegion& mesh, const std::string&) {
   return [tree](const Vec3& x) { return tree->contains(x); };
 }
 
-Inside inside_of(const scene::LabelRegion& region, const std::string&) {
+Inside inside_of(const scene::LabelRegion& region) {
   const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
   const Mat3 to_voxels = surface::inverse_axes(*labels);
   return [labels, to_voxels, label = region.label](const Vec3& x) {
@@ -118,7 +118,7 @@ void give_regions(const scene::Material& material, const std::string& file, Mode
   for (size_t r = 0; r < material.regions.size(); ++r) {
     const scene::MaterialRegion& region = material.regions[r];
     const Inside inside =
-        std::visit([&](const auto& where) { return inside_of(where, file); }, region.where);
+        std::visit([&](const auto& where) { return inside_of(where); }, region.where);
     int64_t found = 0;
     for (size_t m = 0; m < model.prisms.points.size(); ++m) {
       if (!inside(middle_of(corners_of(model, m)))) continue;
