@@ -1,4 +1,4 @@
-# find_package(Repose): targets Repose::base … Repose::tradeoff, one a room of docs/design.md; a room
+# find_package(Repose): targets Repose::base … Repose::tradeoff, one a room of docs/develop/design.md; a room
 # brings those it builds on. On Debian the packages that build Repose are needed.
 include(CMakeFindDependencyMacro)
 find_dependency(MPI COMPONENTS C)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How the weight of the volume term changes conditioning, work, time and volume error: a table.
 
-    drivers/weights.py [SCENE] [-bin build/bin] [-output docs/weights.md]
+    drivers/weights.py [SCENE] [-bin build/bin] [-output docs/measurements/weights.md]
 
 Solves SCENE (default: meshes/paper_jaw_advance.yaml) once a weight: λ of the paper's term from 1e-9
 to 1 − 1e-9, the bulk modulus κ of the penalty from 1e-6 to 1e3 N/mm². Times are ratios to κ = 1;

@@ -4,7 +4,7 @@
 
 #include "repose/scene/scene.h"
 
-/// Materials from the literature, by name (sources in docs/materials.md).
+/// Materials from the literature, by name (sources in docs/guide/materials.md).
 namespace repose::scene {
 
 struct MaterialPreset {

@@ -2,7 +2,7 @@
 """What searching only the tissue that feels a move costs: a table.
 
     tests/benchmark/active_region.py [-bin build/bin] [-sizes 2000,8000] [-whole 8000]
-                                     [-output docs/active_region.md] [-mark measured]
+                                     [-output docs/measurements/active_region.md] [-mark measured]
 
 Synthetic heads of the given numbers of skin vertices, 4 layers, springs by moduli with s_ref = r_0,
 penalty volume term, the chin cut off and moved 8 mm forward, solved to 0.1 mm: with -active_region

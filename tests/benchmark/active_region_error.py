@@ -2,7 +2,7 @@
 """Whether the error that a search in an active region says can be leaned on: a table.
 
     tests/benchmark/active_region_error.py [-bin build/bin] [-accuracies 0.3,0.1,0.02]
-                                           [-output docs/active_region.md]
+                                           [-output docs/measurements/active_region.md]
 
 Scenes of the shipped head, as they are and changed, solved with -active_region on and compared with
 -active_region off at 1e-5 mm.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Any skin of one head: what is solved in its place, and how far the answers are apart.
 
-    tests/benchmark/any_head.py [-bin build/bin] [-output docs/any_head.md]
+    tests/benchmark/any_head.py [-bin build/bin] [-output docs/measurements/any_head.md]
 
 Makes the skins of tests/program/heads.py from the CT in ../shared/data/head; builds a model of each
 with edges of 2, 4 and 8 mm, solves those of 4 mm, and compares the displacements on the given skins.

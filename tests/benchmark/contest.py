@@ -2,7 +2,7 @@
 """The contest: evaluations and time of several methods to a known rest position; writes a page.
 
     tests/benchmark/contest.py [-bin build/bin] [-cases forward,large] [-methods default,lmvm]
-                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/contest.md]
+                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/measurements/contest.md]
 
 Each case is solved by repose-solve to 1e-9 mm; its result is the model file and the rest position
 of all methods. The methods in C++ are run by benchmark_contest, SciPy's here, with an evaluation in
@@ -77,7 +77,7 @@ def cross(a, b):
 
 
 class Evaluation:
-    """Objective and gradient of a model in NumPy, as docs/model.md writes them, as fast as arrays
+    """Objective and gradient of a model in NumPy, as docs/theory/model.md writes them, as fast as arrays
     go: components in rows, only springs and prisms that move, sums over points by a sparse matrix."""
 
     def __init__(self, model, step):
@@ -418,7 +418,7 @@ of the default, the least of {chosen.rounds} rounds, or of fewer where they take
 (reading, sharing out, index arrays) is in nobody's.
 
 - L-BFGS from the stiffness: `-tao_type lmvm -tao_lmvm_initial stiffness`, see
-  [linear_solver.md](linear_solver.md).
+  [the linear solver](../theory/linear_solver.md).
 - The equations of motion: unit masses, damping c and step h the best of a scan, which a person would
   have to find first; one evaluation of the forces a step (Euler) or three (Runge–Kutta); a run
   that takes {PATIENCE} times the default's time is stopped.
@@ -439,7 +439,7 @@ of the default, the least of {chosen.rounds} rounds, or of fewer where they take
 
 
 def arguments():
-    parser = option_parser(__doc__, PROJECT / "docs/contest.md", **SETTINGS)
+    parser = option_parser(__doc__, PROJECT / "docs/measurements/contest.md", **SETTINGS)
     chosen = parser.parse_args()
     for given, known in ((chosen.cases, CASES), (chosen.methods, METHODS)):
         for word in set(given.split(",")) - set(known):

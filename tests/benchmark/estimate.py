@@ -3,7 +3,7 @@
 page and its picture.
 
     tests/benchmark/estimate.py [-bin build/bin] [-seeds 8] [-few] [-rows rows.csv]
-                                [-output docs/estimate.md] [-picture docs/images/estimate.png]
+                                [-output docs/measurements/estimate.md] [-picture docs/images/estimate.png]
 
 Problems are the shipped heads of the paper's size and as many synthetic heads as there are seeds,
 with random size, layers, springs, moves and loads. Each is solved by several methods to several
@@ -377,7 +377,7 @@ one core of a machine with {os.cpu_count()} cores.
 
 
 def arguments():
-    parser = option_parser(__doc__, PROJECT / "docs/estimate.md", seeds=8)
+    parser = option_parser(__doc__, PROJECT / "docs/measurements/estimate.md", seeds=8)
     parser.add_argument("-few", action="store_true")
     parser.add_argument("-rows", type=pathlib.Path)
     parser.add_argument("-picture", type=pathlib.Path,

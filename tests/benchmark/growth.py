@@ -3,7 +3,7 @@
 
     tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm,stiffness]
                               [-layers 4,…] [-turgor 0] [-nested auto] [-ranks 1]
-                              [-output docs/growth.md] [-mark measured]
+                              [-output docs/measurements/growth.md] [-mark measured]
 
 Synthetic heads of the given numbers of skin vertices, each with its number of layers, springs by
 moduli with s_ref = r_0, penalty volume term, the jaw 6 mm forward; solved to 0.01 mm by each method: TAO's

@@ -1,7 +1,7 @@
 /// Time of each kernel per spring and per prism, by instruction set, in the cache and out of it,
 /// beside STREAM's triad and copy in the same run; writes the table. One core, best on an idle
 /// machine; a minute or two:
-///     benchmark_kernels [docs/kernels.md] [--benchmark_repetitions=5]
+///     benchmark_kernels [docs/measurements/kernels.md] [--benchmark_repetitions=5]
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <unistd.h>

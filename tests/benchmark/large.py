@@ -2,7 +2,7 @@
 """What each stage of a large model's way costs, in time and memory: two tables.
 
     tests/benchmark/large.py [-bin build/bin] [-sizes 477,2500,25000,250000,750000] [-ranks 1]
-                             [-output docs/growth.md] [-mark large]
+                             [-output docs/measurements/growth.md] [-mark large]
 
 Synthetic heads of the given numbers of skin vertices, four layers, penalty volume term, the jaw 6 mm
 forward: benchmark_large builds, writes, reads and shares out the model of each, evaluates it,

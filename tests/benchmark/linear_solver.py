@@ -3,7 +3,7 @@
 
     tests/benchmark/linear_solver.py [-bin build/bin] [-sizes 3000,12500] [-solvers NAME;…]
                                      [-ranks 1] [-nested off] [-seconds 600]
-                                     [-output docs/linear_solver.md]
+                                     [-output docs/measurements/linear_solver.md]
 
 Synthetic heads as in growth.py, by default without nested iteration, so that each solver does the
 same work; each solve may take -seconds. Counts are PETSc's: preconditioners made, applications of them, seconds in both.

@@ -2,7 +2,7 @@
 """Do long load steps lead where many short ones do? Many small solves against the end of a path in
 many steps; writes the table of a page.
 
-    tests/benchmark/load_path.py [-bin build/bin] [-seeds 30] [-output docs/load_path.md]
+    tests/benchmark/load_path.py [-bin build/bin] [-seeds 30] [-output docs/measurements/load_path.md]
 
 Problems are the shipped heads of the paper's size and as many synthetic heads as there are seeds,
 with random size, layers, springs, moves and loads (estimate.py), each with three volume terms.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What coarser models are worth: a table of a scene solved with and without them.
 
-    tests/benchmark/nested.py [-bin build/bin] [-output docs/nested.md] SCENE …
+    tests/benchmark/nested.py [-bin build/bin] [-output docs/measurements/nested.md] SCENE …
 
 Solves each scene to 0.01 mm along the load path and with nested iteration, and with -adapt and as a
 preview; says what each took, on all levels, in evaluations on the scene's own mesh, and how far its

@@ -2,7 +2,7 @@
 """What ranks save of a whole solve: a table of wall times, for a machine that does nothing else.
 
     tests/benchmark/ranks.py [-bin build/bin] [-sizes 12500] [-ranks 1,2] [-accuracy 0.01]
-                             [-output docs/growth.md]
+                             [-output docs/measurements/growth.md]
 
 The synthetic heads and the move of growth.py. The preconditioner depends on how a model is shared
 out, and where tissue buckles so do the steps that are taken; the last columns but two are therefore

@@ -1,7 +1,7 @@
 /// How the cost of a model grows with its points: builds synthetic heads in four layers from 2e3 to
 /// 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes; wants
 /// 6 GB of memory:
-///     benchmark_scaling docs/scaling.md
+///     benchmark_scaling docs/measurements/scaling.md
 #include <unistd.h>
 
 #include <algorithm>
@@ -117,7 +117,7 @@ std::string machine() {
 std::string page(const std::vector<Cost>& costs) {
   std::string text = fmt::format(
       "# Scaling: cost per point from 2e3 to 1e6 points\n\n"
-      "Made by `benchmark_scaling docs/scaling.md` (`cmake --preset release "
+      "Made by `benchmark_scaling docs/measurements/scaling.md` (`cmake --preset release "
       "-DREPOSE_BENCHMARKS=ON`)\n"
       "in one run, on one core of a machine with {}.\n\n"
       "Synthetic heads (`repose-phantom`), {} layers, quartic springs, penalty volume term; the\n"

@@ -3,7 +3,7 @@
 
     tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
                                     [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]
-                                    [-output docs/continuum.md]
+                                    [-output docs/measurements/solid.md]
 
 Synthetic heads of the given numbers of skin vertices, four layers, the jaw opened by 8° and brought
 6 mm forward, to 0.01 mm. lmvm is the default: limited-memory BFGS that begins with a multigrid cycle

@@ -3,7 +3,7 @@
 solves with stiff volume terms; writes the table of a page.
 
     tests/benchmark/stiff_volume.py [-bin build/bin] [-first 0] [-seeds 14]
-                                    [-output docs/stiff_volume.md]
+                                    [-output docs/measurements/stiff_volume.md]
 
 Problems are the heads of load_path.py, with the penalty at multiples of its usual κ and the paper's
 volume term.

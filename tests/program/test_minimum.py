@@ -1,4 +1,4 @@
-"""The rest position is a minimum of the model as docs/model.md writes it: numpy computes the same
+"""The rest position is a minimum of the model as docs/theory/model.md writes it: numpy computes the same
 objective and gradient, and scipy's minimiser, started elsewhere, comes back to it."""
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Result files read with h5py, and the model of docs/model.md in numpy, which shares nothing with
+"""Result files read with h5py, and the model of docs/theory/model.md in numpy, which shares nothing with
 the programs."""
 
 import h5py

@@ -62,7 +62,7 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
                  int64_t owned_edges = 0);
 
 /// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:
-///     paper    weight (t − v)²             (MODEL.md Eq. 10, weight = 1 − λ)
+///     paper    weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)
 ///     penalty  weight ½ (v − t)² / v_0     (weight = κ; 1 of a solid, whose prisms have their own)
 /// t = v_0 but in a solid, and where multipliers move it (exact volume).
 enum class VolumeTerm { none, paper, penalty };

@@ -4,7 +4,8 @@
 #include "repose/mechanics/triple.h"
 #include "repose/model/prism_geometry.h"
 
-/// Derivatives of the volume of a prism with bilinear lateral faces (MODEL.md "Prism volume"):
+/// Derivatives of the volume of a prism with bilinear lateral faces (docs/theory/model.md "Prism
+/// volume"):
 ///     v = D · [ 2 A1×A2 + A1×B2 + B1×A2 + 2 B1×B2 ] / 12,
 /// a cubic polynomial of its six corners a0 a1 a2 b0 b1 b2. S is double, or Pair for two prisms.
 namespace repose::mechanics {

@@ -1,6 +1,7 @@
 #pragma once
 
-/// The spring laws (MODEL.md "Spring laws"; Teschner, Girod & Girod 2000, Eq. 13, Fig. 3):
+/// The spring laws (docs/theory/model.md "Spring laws"; Teschner, Girod & Girod 2000, Eq. 13, Fig.
+/// 3):
 ///     T(s) = k0 (1 + σ²)^p s,   σ = s / s_ref,   p ∈ {0, 1, 2},   E(s) = ∫₀ˢ T ds.
 /// Free of any library, templated on the scalar so that a dual number differentiates it, and on the
 /// spring's own numbers so that several springs can go through it at once.

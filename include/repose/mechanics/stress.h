@@ -17,7 +17,7 @@ struct PrismState {
   double von_mises;  ///< N/mm²
 };
 
-/// Of the Cauchy stress σ = μ F Fᵀ / J + κ (v − t)/V (docs/model.md "The continuum"), with F in the
+/// Of the Cauchy stress σ = μ F Fᵀ / J + κ (v − t)/V (docs/theory/continuum.md), with F in the
 /// middle of the prism and its volume v by `volume`; force densities of an initial equilibrium are
 /// not in it. Zero stress at rest.
 PrismState prism_state(const SolidPrism& prism, const std::array<Vec3, 6>& before,

@@ -12,13 +12,13 @@ namespace repose::model {
 /// fractions are not as many, do not run from 0 to 1, or do not increase.
 std::vector<double> layer_depths(const scene::Tissue& tissue);
 
-/// Repeats the skin in layers (MODEL.md "Points", "Springs"): n layers of V vertices, E edges and F
-/// triangles give nV points, nE + (n−1)(V + 2E) springs and (n−1)F prisms. Point = column · n +
-/// layer; springs by set ("layer 0" … , "connecting 0" …, "diagonal 0" …), in a set by edge or
-/// column; prisms by gap, ordered so that their volume is positive inwards. Everything is soft
-/// tissue, without mass, force, stiffness or bone; rest lengths and volumes are the initial ones.
-/// `deep` [V] are the deepest points, mm. `depths_mm`, if any, are how deep the upper layers lie
-/// (scene::Tissue), in place of `depths`. A solid has no springs.
+/// Repeats the skin in layers (docs/theory/model.md "Points", "Springs"): n layers of V vertices, E
+/// edges and F triangles give nV points, nE + (n−1)(V + 2E) springs and (n−1)F prisms. Point =
+/// column · n + layer; springs by set ("layer 0" … , "connecting 0" …, "diagonal 0" …), in a set by
+/// edge or column; prisms by gap, ordered so that their volume is positive inwards. Everything is
+/// soft tissue, without mass, force, stiffness or bone; rest lengths and volumes are the initial
+/// ones. `deep` [V] are the deepest points, mm. `depths_mm`, if any, are how deep the upper layers
+/// lie (scene::Tissue), in place of `depths`. A solid has no springs.
 enum class Elements { springs, solid };
 Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,
                   const std::vector<double>& depths, const std::vector<double>& depths_mm = {},

@@ -6,7 +6,7 @@
 #include "repose/model/model.h"
 #include "repose/scene/scene.h"
 
-/// Tissue as a neo-Hookean solid on the model's prisms (docs/model.md "The continuum").
+/// Tissue as a neo-Hookean solid on the model's prisms (docs/theory/continuum.md).
 namespace repose::model {
 
 /// Moduli of the energy of a solid, N/mm².

@@ -44,7 +44,7 @@ struct Prisms {
 };
 
 /// The part of a solid's energy that is quadratic in the positions: ½ Σ w |x_i − x_j|²
-/// (docs/model.md "The continuum").
+/// (docs/theory/continuum.md).
 struct Edges {
   std::vector<std::array<int64_t, 2>> points;  ///< [E]
   std::vector<double> weight;                  ///< [E] w, N/mm, of either sign

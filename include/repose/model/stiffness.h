@@ -9,7 +9,8 @@ namespace repose::model {
 
 /// The volume v_j (mm³) that belongs to each spring of make_layers, [S], from those of its prisms:
 /// each prism's initial volume is shared equally over its 15 springs, and a spring sums the shares
-/// of the prisms around it, so that Σ_j v_j is the volume of the tissue (MODEL.md "Spring laws").
+/// of the prisms around it, so that Σ_j v_j is the volume of the tissue (docs/theory/model.md
+/// "Spring laws").
 std::vector<double> spring_volumes(const SkinMesh& mesh, const std::vector<double>& prism_volumes);
 
 /// Gives each spring k0, law and s_ref by the scene's rules: for the set "layer 2" the rule of that

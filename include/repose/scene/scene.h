@@ -96,7 +96,7 @@ struct MaterialRegion {
   Elasticity elasticity;
 };
 
-/// Tissue as a neo-Hookean solid (docs/model.md "The continuum").
+/// Tissue as a neo-Hookean solid (docs/theory/continuum.md).
 struct Material {
   Elasticity deep;                      ///< below all strata
   std::vector<Stratum> strata;          ///< from the skin down

@@ -8,7 +8,8 @@
 #include "states.h"
 
 /// One test of derivatives for every term and sum of terms, in every state: Taylor expansions
-/// with gradient and Hessian, and automatic differentiation of the formulas of MODEL.md.
+/// with gradient and Hessian, and automatic differentiation of the formulas of
+/// docs/theory/model.md.
 namespace repose::mechanics {
 namespace {
 

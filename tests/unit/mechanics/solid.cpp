@@ -8,7 +8,7 @@
 #include "repose/mechanics/stress.h"
 #include "states.h"
 
-/// Closed forms of the neo-Hookean solid (docs/model.md "The continuum").
+/// Closed forms of the neo-Hookean solid (docs/theory/continuum.md).
 namespace repose::mechanics {
 namespace {
 

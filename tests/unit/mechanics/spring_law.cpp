@@ -16,7 +16,7 @@ constexpr std::array<double, 11> elongations = {-30.0, -3.0, -0.7, -0.1, -1e-9, 
 constexpr std::array<double, 4> references = {0.05, 1.0, 3.7, 1000.0};
 constexpr double k0 = 0.37;
 
-/// The table of MODEL.md "Spring laws", written with powers of the strain.
+/// The table of docs/theory/model.md "Spring laws", written with powers of the strain.
 double table_tension(int p, double s, double reference) {
   return k0 * std::pow(1 + std::pow(s / reference, 2), p) * s;
 }

@@ -11,7 +11,7 @@ namespace {
 
 using test::State;
 
-/// Spring energy of MODEL.md, in long double.
+/// Spring energy of docs/theory/model.md, in long double.
 long double plain_spring_energy(const model::Model& model, const std::vector<Vec3>& x, size_t e) {
   const auto [i, j] = model.springs.points[e];
   const Eigen::Matrix<long double, 3, 1> d = x[j].cast<long double>() - x[i].cast<long double>();

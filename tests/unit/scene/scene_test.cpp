@@ -675,10 +675,10 @@ TEST(Keys, DescribedInMarkdown) {
 }
 
 TEST(Keys, DocumentationHoldsTheTable) {
-  std::ifstream page(REPOSE_MESHES "/../docs/scene.md");
+  std::ifstream page(REPOSE_MESHES "/../docs/reference/scene_keys.md");
   const std::string text{std::istreambuf_iterator<char>(page), {}};
   EXPECT_NE(text.find(describe_keys()), std::string::npos)
-      << "replace the table in docs/scene.md by\n"
+      << "replace the table in docs/reference/scene_keys.md by\n"
       << describe_keys();
 }
 
