@@ -1,6 +1,7 @@
-"""What a machine can see of the house rules: rooms, sizes of functions, headers, words."""
+"""What a machine can see of the house rules: rooms, sizes of functions, headers, words, links."""
 
 import ast
+import posixpath
 import re
 
 import pytest
@@ -168,3 +169,58 @@ def test_no_word_that_does_not_belong():
 @pytest.mark.parametrize("text", ["// TO" "DO later", "/ho" "me/me/head.ply", 'open("/tm' 'p/x")'])
 def test_a_word_is_seen(text):
     assert WORDS.search(text)
+
+
+def pages():
+    """The Markdown pages by name, without their fenced blocks of code."""
+    return {name: re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+            for name, text in files(".md")}
+
+
+def anchors(text):
+    """What a page's headings are called behind a #, as on GitHub."""
+    heads = [re.sub(r"[^\w\- ]", "", head.lower()) for head in re.findall(r"^#+ (.*)", text, re.M)]
+    return {head.strip().replace(" ", "-") for head in heads}
+
+
+def links(name, text):
+    """(file, anchor, as written) of each link of a page to something of the project's own."""
+    for written in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not re.match(r"\w+:", written):
+            file, _, anchor = written.partition("#")
+            folder = posixpath.dirname(name)
+            yield posixpath.normpath(posixpath.join(folder, file)) if file else name, anchor, written
+
+
+def broken_links(name, text, others):
+    """Links of a page that lead nowhere, one message each; `others` are all pages by name."""
+    for file, anchor, written in links(name, text):
+        if not (PROJECT / file).exists():
+            yield f"{name} links to {written}, which is not there"
+        elif anchor and anchor not in anchors(others.get(file, "")):
+            yield f"{name} links to {written}, but no heading there is called so"
+
+
+def test_links_lead_somewhere():
+    all_pages = pages()
+    faults = [fault for name, text in all_pages.items()
+              for fault in broken_links(name, text, all_pages)]
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("text", ["[a](no.md)", "![a](docs/images/no.png)", "[a](#no)",
+                                  "[a](docs/index.md#no)"])
+def test_a_broken_link_is_seen(text):
+    assert list(broken_links("README.md", text, {"docs/index.md": "# Yes"}))
+
+
+def test_every_page_is_reached_from_the_index():
+    all_pages = pages()
+    reached, ahead = set(), ["docs/index.md"]
+    while ahead:
+        name = ahead.pop()
+        if name in all_pages and name not in reached:
+            reached.add(name)
+            ahead += [file for file, _, _ in links(name, all_pages[name])]
+    assert "docs/index.md" in {file for file, _, _ in links("README.md", all_pages["README.md"])}
+    assert not all_pages.keys() - reached - {"README.md"}
