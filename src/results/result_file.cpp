@@ -1,8 +1,10 @@
 #include "repose/results/result_file.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <unordered_map>
 
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
@@ -31,6 +33,24 @@ void say_where(const std::filesystem::path& file, Work&& work) {
     base::refuse("{}: cannot be written: {}; free space or choose another -output", file.string(),
                  reason.what());
   }
+}
+
+/// Of every point the outward unit normal of the skin above it, area-weighted, at the initial
+/// position; zero where there is no skin above.
+std::vector<Vec3> outward_normals(const model::Model& model) {
+  const model::Points& points = model.points;
+  std::unordered_map<int64_t, Vec3> of_column;
+  for (const Triangle& t : model.skin) {
+    const Vec3& a = points.position[t[0]];
+    const Vec3 area = (points.position[t[1]] - a).cross(points.position[t[2]] - a);
+    for (const int64_t corner : t)
+      of_column.try_emplace(points.column[corner], Vec3::Zero()).first->second += area;
+  }
+  std::vector<Vec3> normals(points.position.size(), Vec3::Zero());
+  for (size_t i = 0; i < normals.size(); ++i)
+    if (const auto found = of_column.find(points.column[i]); found != of_column.end())
+      normals[i] = found->second.normalized();
+  return normals;
 }
 
 struct PackNumbers {
@@ -92,8 +112,10 @@ struct ResultFile::State {
   MergedBones bones;                              // rank 0
   std::optional<model::PrescribedMotion> motion;  // rank 0
   std::vector<Vec3> initial;                      // this rank's slab of point/position
-  std::vector<double> loads;                      // of the steps written
-  std::vector<bool> moved;                        // whether they hold bone surfaces
+  std::vector<Vec3> outward;                      // likewise, of the skin's normals
+  std::vector<OptionalField> fields;
+  std::vector<double> loads;  // of the steps written
+  std::vector<bool> moved;    // whether they hold bone surfaces
 
   base::Slab slab(int64_t rows) const {
     return base::slab(rows, base::rank(comm), base::size(comm));
@@ -105,15 +127,16 @@ struct ResultFile::State {
   }
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
-    return 80 * counts.points + 16 * counts.springs + 48 * counts.prisms + 24 * counts.bone_points +
-           (int64_t{1} << 16);
+    return (88 + 24 * static_cast<int64_t>(fields.size())) * counts.points + 16 * counts.springs +
+           48 * counts.prisms + 24 * counts.bone_points + (int64_t{1} << 16);
   }
   void create(const model::Model& model, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
   void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
                      const base::Slab& mine, const double* values) const;
-  void write_points(hid_t step, const model::StepRows& rows) const;
+  void write_points(hid_t step, const model::StepRows& rows);
+  void write_field(hid_t group, const model::PointField& field);
   void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
   void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
@@ -156,6 +179,10 @@ void ResultFile::State::require_rows(const model::StepRows& rows) const {
       !(rows.pressure.empty() || agrees(rows.pressure.size(), counts.prisms)) ||
       !(rows.discretisation_error.empty() ||
         agrees(rows.discretisation_error.size(), counts.points)) ||
+      !std::all_of(rows.point_fields.begin(), rows.point_fields.end(),
+                   [&](const model::PointField& field) {
+                     return agrees(field.values.size() / (field.vector ? 3 : 1), counts.points);
+                   }) ||
       (counts.stress && !agrees(rows.stretch.size(), counts.prisms)) ||
       !agrees(rows.elongation.size(), counts.springs) ||
       !agrees(rows.tension.size(), counts.springs))
@@ -176,7 +203,18 @@ void ResultFile::State::write_dataset(hid_t group, const char* dataset, int64_t 
   on_disk([&] { write_rows(comm, created, mine, values); });
 }
 
-void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) const {
+/// A dataset that other steps may be without.
+void ResultFile::State::write_field(hid_t group, const model::PointField& field) {
+  write_dataset(group, field.name.c_str(), counts.points, field.vector ? 3 : 0, slab(counts.points),
+                field.values.data());
+  auto known = std::find_if(fields.begin(), fields.end(),
+                            [&](const OptionalField& other) { return other.name == field.name; });
+  if (known == fields.end()) known = fields.insert(known, {field.name, field.vector, {}});
+  known->in_step.resize(loads.size() + 1);
+  known->in_step.back() = true;
+}
+
+void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
   const base::Hdf5Group group = create_group(step, "point");
   const base::Slab mine = slab(counts.points);
   std::vector<Vec3> displacement(rows.position.size());
@@ -184,9 +222,15 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) co
   write_dataset(group, "position", counts.points, 3, mine, flat(rows.position));
   write_dataset(group, "displacement", counts.points, 3, mine, flat(displacement));
   write_dataset(group, "residual_force", counts.points, 3, mine, flat(rows.residual_force));
-  if (counts.discretisation)
-    write_dataset(group, "discretisation_error", counts.points, 0, mine,
-                  rows.discretisation_error.data());
+  model::PointField advance{"advance", false, std::vector<double>(displacement.size())};
+  for (size_t i = 0; i < displacement.size(); ++i)
+    advance.values[i] = displacement[i].dot(outward[i]);
+  if (counts.skin > 0) write_field(group, advance);
+  int estimated = !rows.discretisation_error.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &estimated, 1, MPI_INT, MPI_MAX, comm);
+  if (estimated != 0)
+    write_field(group, {"discretisation_error", false, rows.discretisation_error});
+  for (const model::PointField& field : rows.point_fields) write_field(group, field);
 }
 
 void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) const {
@@ -219,21 +263,23 @@ bool ResultFile::State::write_bones(hid_t step, double load) const {
   return true;
 }
 
-/// The first block with a cell, for readers that open the file itself.
+/// The first block with a cell and the bones, for readers that open the file itself.
 void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
-  const auto shown = std::find_if(blocks.begin(), blocks.end(),
-                                  [](const XdmfBlock& block) { return block.cells > 0; });
-  if (shown == blocks.end() || loads.empty()) return;
-  unfinished->reserve(vtkhdf_bytes(*shown, loads.size()));
+  std::vector<XdmfBlock> shown;
+  for (const XdmfBlock& block : blocks)
+    if (block.cells > 0 && (shown.empty() || block.name == "bones")) shown.push_back(block);
+  if (shown.empty() || loads.empty()) return;
+  unfinished->reserve(vtkhdf_bytes(shown, loads.size()));
   say_where(unfinished->file(), [&] {
     base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
-    write_vtkhdf(whole, *shown, loads);
+    write_vtkhdf(whole, shown, loads);
     whole.close();
   });
 }
 
 void ResultFile::State::publish() {
-  const std::vector<XdmfBlock> blocks = views(counts, moved);
+  for (OptionalField& field : fields) field.in_step.resize(loads.size());
+  const std::vector<XdmfBlock> blocks = views(counts, fields, moved);
   add_vtkhdf(blocks);
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
   for (const XdmfBlock& block : blocks) {
@@ -261,6 +307,7 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
   base::share(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
   s.initial = base::deal_out(comm, model.points.position);
+  s.outward = base::deal_out(comm, outward_normals(model));
   s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
 }
 
@@ -274,9 +321,6 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
   s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
   s.counts.pressure = same.volume == "exact" || s.counts.stress;
-  int estimated = !rows.discretisation_error.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &estimated, 1, MPI_INT, MPI_MAX, s.comm);
-  s.counts.discretisation = estimated != 0;
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

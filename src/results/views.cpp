@@ -17,6 +17,15 @@ std::vector<std::string> moving_points(size_t steps) {
   return paths;
 }
 
+void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
+  for (const OptionalField& field : fields)
+    block.arrays.push_back({.name = field.name,
+                            .path = "step/point/" + field.name,
+                            .at_points = true,
+                            .vector = field.vector,
+                            .in_steps = field.in_step});
+}
+
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
   XdmfBlock block{.name = "tissue",
                   .topology = "TopologyType=\"Wedge\"",
@@ -28,12 +37,11 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
                   .geometry = moving_points(steps),
                   .arrays = {{"displacement", "step/point/displacement", true, true},
                              {"residual_force", "step/point/residual_force", true, true},
+                             {"initial_position", "/model/point/position", true, true},
                              {"set", "/model/point/set", true, false, small_integer},
                              {"layer", "/model/point/layer", true, false, short_integer},
                              {"column", "/model/point/column", true, false, long_integer},
                              {"volume_ratio", "step/prism/volume_ratio"}}};
-  if (counts.discretisation)
-    block.arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
   if (counts.stress) {
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});
@@ -57,9 +65,6 @@ XdmfBlock springs(const FileCounts& counts, size_t steps) {
 }
 
 XdmfBlock skin(const FileCounts& counts, size_t steps) {
-  std::vector<XdmfArray> arrays = {{"displacement", "step/point/displacement", true, true}};
-  if (counts.discretisation)
-    arrays.push_back({"discretisation_error", "step/point/discretisation_error", true});
   return {.name = "skin",
           .topology = "TopologyType=\"Triangle\"",
           .vtk_cell = 5,
@@ -68,7 +73,8 @@ XdmfBlock skin(const FileCounts& counts, size_t steps) {
           .points = counts.points,
           .cells = counts.skin,
           .geometry = moving_points(steps),
-          .arrays = arrays};
+          .arrays = {{"displacement", "step/point/displacement", true, true},
+                     {"initial_position", "/model/point/position", true, true}}};
 }
 
 XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
@@ -90,10 +96,13 @@ XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
 
 }  // namespace
 
-std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<bool>& bones_moved) {
+std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<OptionalField>& fields,
+                             const std::vector<bool>& bones_moved) {
   const size_t steps = bones_moved.size();
-  return {tissue(counts, steps), springs(counts, steps), skin(counts, steps),
-          bones(counts, bones_moved)};
+  std::vector<XdmfBlock> all = {tissue(counts, steps), springs(counts, steps), skin(counts, steps),
+                                bones(counts, bones_moved)};
+  for (const size_t block : {0, 2}) add_fields(fields, all[block]);
+  return all;
 }
 
 }  // namespace repose::results

@@ -1,5 +1,7 @@
 #include "repose/results/vtkhdf.h"
 
+#include <algorithm>
+
 #include "repose/results/writer.h"
 
 namespace repose::results {
@@ -7,6 +9,7 @@ namespace repose::results {
 namespace {
 
 using Numbers = std::vector<int64_t>;
+using Blocks = std::vector<XdmfBlock>;
 
 void write_numbers(hid_t place, const char* name, const Numbers& values) {
   write_array(place, name, {values.size()}, values.data());
@@ -19,66 +22,120 @@ Numbers beginnings(size_t steps, int64_t rows) {
   return offsets;
 }
 
-void write_cells(hid_t file, hid_t root, const XdmfBlock& block) {
-  write_numbers(root, "NumberOfPoints", {block.points});
-  write_numbers(root, "NumberOfCells", {block.cells});
-  write_numbers(root, "NumberOfConnectivityIds", {block.cells * block.corners});
-  write_numbers(root, "Offsets", beginnings(block.cells + 1, block.corners));
-  const std::vector<uint8_t> types(block.cells, block.vtk_cell);
-  write_array(root, "Types", {types.size()}, types.data());
-  write_virtual(file, root, "Connectivity", {block.connectivity},
-                {static_cast<hsize_t>(block.cells * block.corners)});
+int64_t rows_of(const XdmfBlock& block, bool at_points) {
+  return at_points ? block.points : block.cells;
 }
 
-/// Arrays at the points or at the cells, and where each of their steps begins.
-void write_arrays(hid_t file, hid_t root, hid_t steps, const XdmfBlock& block, bool at_points,
+int64_t rows_of(const Blocks& blocks, bool at_points) {
+  int64_t rows = 0;
+  for (const XdmfBlock& block : blocks) rows += rows_of(block, at_points);
+  return rows;
+}
+
+void write_cells(hid_t file, hid_t root, const Blocks& blocks) {
+  Numbers points, cells, ids, offsets;
+  std::vector<uint8_t> types;
+  std::vector<VirtualPiece> connectivity;
+  hsize_t corners = 0;
+  for (const XdmfBlock& block : blocks) {
+    points.push_back(block.points);
+    cells.push_back(block.cells);
+    ids.push_back(block.cells * block.corners);
+    const Numbers in_block = beginnings(block.cells + 1, block.corners);
+    offsets.insert(offsets.end(), in_block.begin(), in_block.end());
+    types.insert(types.end(), block.cells, block.vtk_cell);
+    connectivity.push_back({block.connectivity, corners});
+    corners += ids.back();
+  }
+  write_numbers(root, "NumberOfPoints", points);
+  write_numbers(root, "NumberOfCells", cells);
+  write_numbers(root, "NumberOfConnectivityIds", ids);
+  write_numbers(root, "Offsets", offsets);
+  write_array(root, "Types", {types.size()}, types.data());
+  write_virtual(file, root, "Connectivity", connectivity, {corners});
+}
+
+void write_points(hid_t file, hid_t root, const Blocks& blocks, size_t steps) {
+  std::vector<VirtualPiece> pieces;
+  hsize_t row = 0;
+  for (size_t step = 0; step < steps; ++step)
+    for (const XdmfBlock& block : blocks) {
+      pieces.push_back({block.geometry[step], row});
+      row += block.points;
+    }
+  write_virtual(file, root, "Points", pieces, {row, 3});
+}
+
+/// The pieces of the arrays of one name, at points or at cells: of every step, if they move.
+std::vector<VirtualPiece> pieces_of(const Blocks& blocks, const XdmfArray& like, size_t steps) {
+  std::vector<VirtualPiece> pieces;
+  hsize_t row = 0;
+  for (size_t step = 0; step < steps; ++step)
+    for (const XdmfBlock& block : blocks) {
+      for (const XdmfArray& array : block.arrays)
+        if (array.name == like.name && array.at_points == like.at_points && array.is_in(step))
+          pieces.push_back({array.in_step(step), row});
+      row += rows_of(block, like.at_points);
+    }
+  return pieces;
+}
+
+/// An array of all parts, and where each of its steps begins.
+void write_array_of(hid_t file, hid_t data, hid_t begin, const Blocks& blocks,
+                    const XdmfArray& array, size_t steps) {
+  const int64_t rows = rows_of(blocks, array.at_points);
+  write_numbers(begin, array.name.c_str(), beginnings(steps, array.moves() ? rows : 0));
+  const size_t stored = array.moves() ? steps : 1;
+  std::vector<hsize_t> shape = {stored * rows};
+  if (array.vector) shape.push_back(3);
+  write_virtual(file, data, array.name, pieces_of(blocks, array, stored), shape);
+}
+
+/// The arrays at the points or at the cells of any part.
+void write_arrays(hid_t file, hid_t root, hid_t steps, const Blocks& blocks, bool at_points,
                   size_t count) {
   const std::string place = at_points ? "PointData" : "CellData";
   const base::Hdf5Group data = base::create_hdf5_group(root, place.c_str());
   const base::Hdf5Group begin = base::create_hdf5_group(steps, (place + "Offsets").c_str());
-  const int64_t rows = at_points ? block.points : block.cells;
-  for (const XdmfArray& array : block.arrays) {
-    if (array.at_points != at_points) continue;
-    const bool moves = array.moves();
-    write_numbers(begin, array.name.c_str(), beginnings(count, moves ? rows : 0));
-    if (!moves) {
-      link_to(file, array.path, data, array.name);
-      continue;
+  std::vector<std::string> written;
+  for (const XdmfBlock& block : blocks)
+    for (const XdmfArray& array : block.arrays) {
+      const bool known = std::find(written.begin(), written.end(), array.name) != written.end();
+      if (array.at_points != at_points || known) continue;
+      write_array_of(file, data, begin, blocks, array, count);
+      written.push_back(array.name);
     }
-    std::vector<std::string> paths;
-    for (size_t step = 0; step < count; ++step) paths.push_back(array.in_step(step));
-    std::vector<hsize_t> shape = {count * rows};
-    if (array.vector) shape.push_back(3);
-    write_virtual(file, data, array.name, paths, shape);
-  }
 }
 
 }  // namespace
 
-void write_vtkhdf(hid_t file, const XdmfBlock& block, const std::vector<double>& loads) {
+void write_vtkhdf(hid_t file, const Blocks& blocks, const std::vector<double>& loads) {
   const size_t count = loads.size();
   const base::Hdf5Group root = base::create_hdf5_group(file, "VTKHDF");
   write_attribute(root, "Version", Numbers{2, 0});
   write_attribute(root, "Type", std::string("UnstructuredGrid"));
-  write_cells(file, root, block);
-  write_virtual(file, root, "Points", block.geometry,
-                {count * static_cast<hsize_t>(block.points), 3});
+  write_cells(file, root, blocks);
+  write_points(file, root, blocks, count);
   const base::Hdf5Group steps = base::create_hdf5_group(root, "Steps");
   write_attribute(steps, "NSteps", static_cast<int64_t>(count));
   write_array(steps, "Values", {count}, loads.data());
   write_numbers(steps, "PartOffsets", beginnings(count, 0));
-  write_numbers(steps, "NumberOfParts", Numbers(count, 1));
-  write_numbers(steps, "PointOffsets", beginnings(count, block.points));
+  write_numbers(steps, "NumberOfParts", Numbers(count, static_cast<int64_t>(blocks.size())));
+  write_numbers(steps, "PointOffsets", beginnings(count, rows_of(blocks, true)));
   const Numbers same = beginnings(count, 0);
   write_array(steps, "CellOffsets", {count, 1}, same.data());
   write_array(steps, "ConnectivityIdOffsets", {count, 1}, same.data());
   for (const bool at_points : {true, false})
-    write_arrays(file, root, steps, block, at_points, count);
+    write_arrays(file, root, steps, blocks, at_points, count);
 }
 
-int64_t vtkhdf_bytes(const XdmfBlock& block, size_t steps) {
-  const size_t a_step = (block.arrays.size() + 2) * 256;  // a mapping names its dataset
-  return 9 * block.cells + static_cast<int64_t>(steps * a_step) + (int64_t{1} << 16);
+int64_t vtkhdf_bytes(const Blocks& blocks, size_t steps) {
+  int64_t bytes = int64_t{1} << 16;
+  for (const XdmfBlock& block : blocks) {
+    const size_t a_step = (block.arrays.size() + 2) * 256;  // a mapping names its dataset
+    bytes += 9 * block.cells + static_cast<int64_t>(steps * a_step);
+  }
+  return bytes;
 }
 
 }  // namespace repose::results

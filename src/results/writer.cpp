@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <limits>
 
 namespace repose::results {
 
@@ -107,29 +108,38 @@ void write_attribute(hid_t object, const char* name, const std::vector<int64_t>&
                   values.data());
 }
 
+namespace {
+
+/// What the rows of a virtual dataset hold that no piece covers.
+void set_fill(hid_t creation, hid_t type) {
+  const double nothing = std::numeric_limits<double>::quiet_NaN();
+  const int64_t none = -1;
+  const bool whole = H5Tget_class(type) == H5T_INTEGER;
+  check_hdf5(H5Pset_fill_value(creation, whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE,
+                               whole ? static_cast<const void*>(&none) : &nothing));
+}
+
+}  // namespace
+
 void write_virtual(hid_t file, hid_t place, const std::string& name,
-                   const std::vector<std::string>& datasets, const std::vector<hsize_t>& shape) {
+                   const std::vector<VirtualPiece>& pieces, const std::vector<hsize_t>& shape) {
   const base::Hdf5Space whole = make_space(shape);
   const base::Hdf5Properties creation(H5Pcreate(H5P_DATASET_CREATE));
   check_hdf5(H5Pset_obj_track_times(creation, false));
   base::Hdf5Type type;
-  std::vector<hsize_t> start(shape.size(), 0), count = shape;
-  for (const std::string& path : datasets) {
-    const base::Hdf5Dataset source(H5Dopen2(file, path.c_str(), H5P_DEFAULT));
+  const hsize_t columns = shape.size() > 1 ? shape[1] : 1;
+  for (const VirtualPiece& piece : pieces) {
+    const base::Hdf5Dataset source(H5Dopen2(file, piece.path.c_str(), H5P_DEFAULT));
     const base::Hdf5Space of_source(H5Dget_space(source));
     type = base::Hdf5Type(H5Dget_type(source));
-    count[0] = shape[0] / datasets.size();
-    check_hdf5(
-        H5Sselect_hyperslab(whole, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr));
-    check_hdf5(H5Pset_virtual(creation, whole, ".", path.c_str(), of_source));
-    start[0] += count[0];
+    const auto numbers = static_cast<hsize_t>(H5Sget_simple_extent_npoints(of_source));
+    const hsize_t start[2] = {piece.first, 0}, count[2] = {numbers / columns, columns};
+    check_hdf5(H5Sselect_hyperslab(whole, H5S_SELECT_SET, start, nullptr, count, nullptr));
+    check_hdf5(H5Pset_virtual(creation, whole, ".", piece.path.c_str(), of_source));
   }
+  set_fill(creation, type);
   base::Hdf5Dataset(
       H5Dcreate2(place, name.c_str(), type, whole, H5P_DEFAULT, creation, H5P_DEFAULT));
-}
-
-void link_to(hid_t file, const std::string& path, hid_t place, const std::string& name) {
-  check_hdf5(H5Lcreate_hard(file, path.c_str(), place, name.c_str(), H5P_DEFAULT, H5P_DEFAULT));
 }
 
 namespace {

@@ -55,7 +55,8 @@ std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, dou
                       data_item(h5, block.connectivity, block.cells, block.corners, integer));
   text += fmt::format("        <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
                       data_item(h5, block.geometry[step], block.points, 3, real));
-  for (const XdmfArray& array : block.arrays) text += attribute(block, array, h5, step);
+  for (const XdmfArray& array : block.arrays)
+    if (array.is_in(step)) text += attribute(block, array, h5, step);
   return text + "      </Grid>\n";
 }
 

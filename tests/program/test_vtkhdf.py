@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
-from tissue import model_of, steps, write_model
+from tissue import last, model_of, steps, write_model
 
 OPENING = "paper_jaw_opening.yaml"
-MOVING = {"PointData/displacement": "point/displacement",
+MOVING = {"PointData/displacement": "point/displacement", "PointData/advance": "point/advance",
           "PointData/residual_force": "point/residual_force",
           "CellData/volume_ratio": "prism/volume_ratio", "Points": "point/position"}
 STAYING = {"PointData/set": "point/set", "PointData/layer": "point/layer",
-           "PointData/column": "point/column"}
+           "PointData/column": "point/column", "PointData/initial_position": "point/position"}
+OF_BONES = {"CellData/bone": "bone_surfaces/bone",
+            "PointData/initial_position": "bone_surfaces/points"}
 
 
 @pytest.fixture
@@ -24,23 +26,52 @@ def opening(solved):
     return file
 
 
+def where_bones_are(model, step):
+    return step.get("bone_surface/points", model["bone_surfaces/points"])
+
+
+def of_both_parts(name, tissue, model, step, bones_rows):
+    """An array of the tissue followed by what the bones have of it."""
+    if name == "Points":
+        bones = where_bones_are(model, step)
+    elif name in OF_BONES:
+        bones = model[OF_BONES[name]]
+    else:
+        bones = np.full((bones_rows, *tissue.shape[1:]),
+                        np.nan if tissue.dtype.kind == "f" else -1, tissue.dtype)
+    return np.concatenate([tissue, bones])
+
+
+def same(one, other):
+    return one.dtype == other.dtype and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+
+
 def test_what_moves_is_every_step_and_what_stays_is_the_models(opening):
     path, model = steps(opening), model_of(opening)
     with h5py.File(opening) as h5:
         root = h5["VTKHDF"]
         assert root.attrs["Type"] == b"UnstructuredGrid" and list(root.attrs["Version"]) == [2, 0]
-        prisms = len(model["prism/points"])
-        assert np.array_equal(root["Connectivity"][:], model["prism/points"].ravel())
-        assert np.array_equal(root["Offsets"][:], np.arange(0, 6 * prisms + 1, 6))
-        assert root["Types"].dtype == np.uint8 and set(root["Types"][:]) == {13}
+        prisms, faces = len(model["prism/points"]), len(model["bone_surfaces/triangles"])
+        bones = {"PointData": len(model["bone_surfaces/points"]), "CellData": faces}
+        assert np.array_equal(root["Connectivity"][:], np.concatenate(
+            [model["prism/points"].ravel(), model["bone_surfaces/triangles"].ravel()]))
+        assert np.array_equal(root["Offsets"][:], np.concatenate(
+            [np.arange(0, 6 * prisms + 1, 6), np.arange(0, 3 * faces + 1, 3)]))
+        assert root["Types"].dtype == np.uint8
+        assert np.array_equal(root["Types"][:], [13] * prisms + [5] * faces)
         assert root["Steps"].attrs["NSteps"] == len(path)
         assert list(root["Steps/Values"][:]) == [step["load"] for step in path]
         for name, array in MOVING.items():
-            assert np.array_equal(root[name][:], np.concatenate([step[array] for step in path]))
+            rows = bones.get(name.split("/", maxsplit=1)[0])
+            assert same(root[name][:], np.concatenate(
+                [of_both_parts(name, step[array], model, step, rows) for step in path])), name
         for name, array in STAYING.items():
-            assert root[name] == h5["model"][array], name  # the same object
+            rows = bones[name.split("/", maxsplit=1)[0]]
+            assert same(root[name][:], of_both_parts(name, model[array], model, {}, rows)), name
+        assert np.array_equal(root["CellData/bone"][:prisms], np.full(prisms, -1))
+        assert np.array_equal(root["CellData/bone"][prisms:], model["bone_surfaces/bone"])
         names = {f"{place}/{name}" for place in ("PointData", "CellData") for name in root[place]}
-        assert names == (MOVING.keys() | STAYING.keys()) - {"Points"}
+        assert names == (MOVING.keys() | STAYING.keys() | OF_BONES.keys()) - {"Points"}
         for place in ("PointData", "CellData"):
             assert set(root[f"Steps/{place}Offsets"]) == set(root[place])
 
@@ -48,14 +79,14 @@ def test_what_moves_is_every_step_and_what_stays_is_the_models(opening):
 def test_nothing_is_stored_twice(opening):
     with h5py.File(opening) as h5:
         root = h5["VTKHDF"]
-        for name in [*MOVING, "Connectivity"]:
+        for name in [*MOVING, *STAYING, *OF_BONES, "Connectivity"]:
             assert root[name].is_virtual, name
             assert root[name].id.get_storage_size() == 0, name
             assert {source.file_name for source in root[name].virtual_sources()} == {"."}
-        cells = root["NumberOfCells"][0]
+        cells = sum(root["NumberOfCells"])
         held = {}
         root.visititems(lambda name, item: held.update({name: item.id.get_storage_size()})
-                        if isinstance(item, h5py.Dataset) and name not in STAYING else None)
+                        if isinstance(item, h5py.Dataset) else None)
     assert sum(held.values()) < 9 * cells + 4096
 
 
@@ -65,9 +96,25 @@ def test_pressures_are_shown_where_the_volume_is_exact(solved):
 
 
 def shows(h5, name, place="prism"):
-    stored = [h5["step"][step][place][name][:] for step in sorted(h5["step"])]
-    data = h5["VTKHDF/PointData" if place == "point" else "VTKHDF/CellData"]
-    assert np.array_equal(data[name][:], np.concatenate(stored))
+    place_there = "PointData" if place == "point" else "CellData"
+    first = h5[f"VTKHDF/Steps/{place_there}Offsets/{name}"][:]
+    for begin, step in zip(first, sorted(h5["step"])):
+        stored = h5["step"][step][place][name][:]
+        assert np.array_equal(h5["VTKHDF"][place_there][name][begin:begin + len(stored)], stored)
+
+
+def test_advance_is_the_way_along_the_normal_of_the_skin_above(opening):
+    step, model = last(opening), model_of(opening)
+    x, column = model["point/position"], model["point/column"]
+    a, b, c = (x[model["skin/points"][:, k]] for k in range(3))
+    normal = np.zeros((column.max() + 1, 3))
+    for k in range(3):
+        np.add.at(normal, column[model["skin/points"][:, k]], np.cross(b - a, c - a))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    wanted = (step["point/displacement"] * normal[column]).sum(1)
+    assert np.abs(step["point/advance"] - wanted).max() < 1e-12 and abs(wanted).max() > 1
+    mouth = np.argmin(((x - (0, -90, -70))**2).sum(1))  # the chin: outwards is forward, −y
+    assert normal[column[mouth]][1] < 0
 
 
 def test_stress_stretch_and_uncertainty_of_a_solid_are_shown(run, tmp_path):
@@ -96,12 +143,16 @@ def test_a_model_without_prisms_shows_its_springs(solved, run, tmp_path):
         assert np.array_equal(h5["VTKHDF/Connectivity"][:], model["spring/points"].ravel())
 
 
-def shown(grid, name, vtk):
-    """An array of a grid that VTK read, by its name in the file."""
+def shown(grids, name, vtk):
+    """An array of the parts that VTK read, by its name in the file."""
     place, _, array = name.partition("/")
-    data = {"Points": grid.GetPoints, "PointData": grid.GetPointData,
-            "CellData": grid.GetCellData}[place]()
-    return vtk.util.numpy_support.vtk_to_numpy(data.GetArray(array) if array else data.GetData())
+    found = []
+    for grid in grids:
+        data = {"Points": grid.GetPoints, "PointData": grid.GetPointData,
+                "CellData": grid.GetCellData}[place]()
+        found.append(vtk.util.numpy_support.vtk_to_numpy(
+            data.GetArray(array) if array else data.GetData()))
+    return np.concatenate(found)
 
 
 def test_vtk_reads_every_array_of_every_step(opening):
@@ -117,11 +168,21 @@ def test_vtk_reads_every_array_of_every_step(opening):
     assert list(times) == [step["load"] for step in path]
     for time, step in zip(times, path):
         reader.UpdateTimeStep(time)
-        grid = reader.GetOutputDataObject(0)
-        for name, array in MOVING.items():
-            assert np.array_equal(shown(grid, name, vtkmodules), step[array]), (time, name)
-        for name, array in STAYING.items():
-            assert np.array_equal(shown(grid, name, vtkmodules), model[array]), (time, name)
-        corners = vtkmodules.util.numpy_support.vtk_to_numpy(grid.GetCells().GetConnectivityArray())
-        assert np.array_equal(corners, model["prism/points"].ravel())
-        assert {grid.GetCellType(i) for i in range(grid.GetNumberOfCells())} == {13}
+        read = reader.GetOutputDataObject(0)
+        grids = [read]  # VTK 9.3 merges the parts, later ones do not
+        if read.IsA("vtkPartitionedDataSet"):
+            grids = [read.GetPartition(part) for part in range(read.GetNumberOfPartitions())]
+        rows = {"PointData": len(model["bone_surfaces/points"]),
+                "CellData": len(model["bone_surfaces/bone"])}
+        for name, array in (MOVING | STAYING).items():
+            tissue = step[array] if name in MOVING else model[array]
+            wanted = of_both_parts(name, tissue, model, step, rows.get(name.split("/")[0]))
+            assert same(shown(grids, name, vtkmodules), wanted), (time, name)
+        bone = shown(grids, "CellData/bone", vtkmodules)
+        assert np.array_equal(bone[-len(model["bone_surfaces/bone"]):], model["bone_surfaces/bone"])
+        types = [grid.GetCellType(i) for grid in grids for i in range(grid.GetNumberOfCells())]
+        assert np.array_equal(types, np.where(bone < 0, 13, 5))
+        kind = vtkmodules.util.numpy_support.vtk_to_numpy
+        corners = kind(grids[0].GetCells().GetConnectivityArray())
+        prisms = model["prism/points"].size
+        assert np.array_equal(corners[:prisms], model["prism/points"].ravel())

@@ -67,6 +67,13 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("discretisation_error", numbers.discretisation_error);
 }
 
+/// A further number or vector of every point; its name is that of the dataset.
+struct PointField {
+  std::string name;            ///< with the unit's meaning in docs/formats.md
+  bool vector = false;         ///< [N,3], else [N]
+  std::vector<double> values;  ///< row by row
+};
+
 /// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.
 struct StepRows {
   std::vector<Vec3> position;        ///< mm
@@ -80,6 +87,8 @@ struct StepRows {
   std::vector<double> discretisation_error = {};
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
+  /// What else is known of the points at this step; the same names on all ranks.
+  std::vector<PointField> point_fields = {};
 };
 
 }  // namespace repose::model

@@ -44,12 +44,15 @@ void write_attribute(hid_t object, const char* name, const std::string& value);
 void write_attribute(hid_t object, const char* name, const std::vector<double>& values);
 void write_attribute(hid_t object, const char* name, const std::vector<int64_t>& values);
 
-/// A dataset that stores nothing: equal datasets of the same file one after the other, in the given
-/// shape, which has as many numbers as they. MPI-IO can make it and not read it.
+/// A dataset of the same file and the row of a virtual one at which it begins.
+struct VirtualPiece {
+  std::string path;
+  hsize_t first;
+};
+/// A dataset of the given shape that stores nothing but where its rows are: `pieces`, of one type
+/// and at least one. Rows of none are NaN, −1 of integers. MPI-IO can make it and not read it.
 void write_virtual(hid_t file, hid_t place, const std::string& name,
-                   const std::vector<std::string>& datasets, const std::vector<hsize_t>& shape);
-/// Another name for what is at `path` of the file.
-void link_to(hid_t file, const std::string& path, hid_t place, const std::string& name);
+                   const std::vector<VirtualPiece>& pieces, const std::vector<hsize_t>& shape);
 
 /// Creates a dataset of `rows` × `columns` doubles (columns 0: one-dimensional) that all ranks will
 /// write. Collective where the file is.

@@ -12,8 +12,10 @@ struct XdmfArray {
   bool at_points = false;  ///< else one a cell
   bool vector = false;     ///< [.,3], else [.]
   const char* type = "NumberType=\"Float\" Precision=\"8\"";
+  std::vector<bool> in_steps = {};  ///< [steps] which have it; empty: all
 
   bool moves() const { return path.starts_with("step/"); }
+  bool is_in(size_t step) const { return in_steps.empty() || in_steps[step]; }
   /// Its path in the file, at a step.
   std::string in_step(size_t step) const;
 };
