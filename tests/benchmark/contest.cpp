@@ -1,4 +1,4 @@
-/// One method of the contest of docs/measurements/contest.md, which tests/benchmark/contest.py
+/// One method of the contest of docs/measurements/minimisers.md, which tests/benchmark/contest.py
 /// runs:
 ///     benchmark_contest RESULT.h5 METHOD [-scene SCENE.yaml] [-accuracy 0.01] [-count]
 /// Takes model, volume term and rest position from a result of repose-solve, starts from the

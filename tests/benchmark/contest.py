@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""The contest: evaluations and time of several methods to a known rest position; writes a page.
+"""Evaluations and time of several methods to a known rest position; writes a page.
 
     tests/benchmark/contest.py [-bin build/bin] [-cases forward,large] [-methods default,lmvm]
-                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/measurements/contest.md]
+                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/measurements/minimisers.md]
 
 Each case is solved by repose-solve to 1e-9 mm; its result is the model file and the rest position
 of all methods. The methods in C++ are run by benchmark_contest, SciPy's here, with an evaluation in
@@ -324,7 +324,7 @@ def row(contest, method, entry):
 def table(contest):
     cost, unit = contest.costs, contest.costs["evaluation"]
     text = (f"## {contest.title}\n\n{contest.unknowns} unknowns. In evaluations of Repose's kernel, "
-            f"one new preconditioner takes {cost['renewal'] / unit:.0f}, one\naction of the Hessian with one "
+            f"one new preconditioner takes {cost['renewal'] / unit:.0f}, one\nproduct with the Hessian and one "
             f"application of it {cost['action'] / unit:.1f}")
     if "numpy" in cost:
         text += f", one evaluation in NumPy {cost['numpy'] / unit:.0f}"
@@ -333,7 +333,7 @@ def table(contest):
     text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its linear systems "
              f"{'on this model ' * bool(own['coarse_evaluations'])}are about "
              f"{100 * spent / own['seconds']:.0f} %.\n\n"
-             "| method | evaluations | Hessians, preconditioners, actions, applications | time | distance |\n"
+             "| method | evaluations | Hessians, preconditioners, products, applications | time | distance |\n"
              "|---|--:|--:|--:|---|\n")
     for (method, _), entry in contest.entries.items():
         text += row(contest, method, entry)
@@ -355,10 +355,10 @@ def verdict(contest, own, rival, what, times):
 
 
 def verdicts(contests, own, name):
-    """By how much one of Repose's methods beats the others."""
+    """How much faster one of Repose's methods is than the others."""
     names = {"polak_ribiere": "the paper's algorithm", "liblbfgs": "liblbfgs on the same kernel",
              "L-BFGS-B": "SciPy L-BFGS-B"}
-    text = f"| by how much {name} beats | " + " | ".join(contests) + " |\n"
+    text = f"| {name} is faster than | " + " | ".join(contests) + " |\n"
     text += "|---|" + "---|" * len(contests) + "\n"
     for rival, what, times in GOALS:
         word = "evaluations" if what == "evaluations" else "time"
@@ -385,11 +385,11 @@ def conclusion(contests):
     if not over["seconds"]:
         return ""
     return f"""
-The goals are counted with the first row of each table, evaluations on the smaller, coarser model left
-out. The paper's algorithm takes {spread(over['evaluations'])} times the evaluations of the default, and {spread(over['seconds'])} times its time: an action of the Hessian
-with an application of the preconditioner takes as long as {spread(action)} evaluations, and there are many in each of
-Newton's steps, predictions and estimates. {astray} of the other {len(others)} races, which
-start with the bones in their places, came to another minimum than the load path's.
+The goals refer to the first row of each table, without evaluations on a coarser model. The paper's
+algorithm takes {spread(over['evaluations'])} times the evaluations of the default, and {spread(over['seconds'])} times its time: a product with
+the Hessian and an application of the preconditioner take as long as {spread(action)} evaluations, and each
+Newton step, prediction and estimate needs many. {astray} of the other {len(others)} runs, which start with the bones in
+their final places, reached another minimum than the load path's.
 """
 
 
@@ -403,33 +403,34 @@ def page(contests, chosen, where):
     accuracy = f"{chosen.accuracy:g} mm"
     words = [f"-{name} {getattr(chosen, name)}" for name, default in SETTINGS.items()
              if getattr(chosen, name) != default]
-    text = f"""# The contest: Repose against others, to {accuracy}
+    text = f"""# Other minimisers, to {accuracy}
 
-Made by `{" ".join(["tests/benchmark/contest.py", *words])}` in one run, on {where}.
+Evaluations and CPU time of Repose, the paper's methods, liblbfgs and SciPy on the paper's springs.
+Made by `{" ".join(["tests/benchmark/contest.py", *words])}` in one run, on
+{where}.
 
-Every method starts from the initial positions, with the bones in their places at once, on the same
-model file, and is stopped at the first state it evaluates that is within {accuracy} (largest distance
+Every method starts from the initial positions, with the bones at once in their final places, on the same
+model file. It is stopped at the first state it evaluates that is within {accuracy} (largest distance
 of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default and
 L-BFGS from the stiffness take load steps (and, where the skin is large enough, solve a coarser model
-first): their cost is in their figures. An evaluation is one of the value, or of the value with its gradient, which in Repose's kernel
-cost the same. Counted apart are the states at which a Hessian is taken, the
-preconditioners made, the actions of the Hessian and the applications of preconditioners; their time is in the times. Times are CPU times over that
-of the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up
-(reading, sharing out, index arrays) is in nobody's.
+first); this cost is included. An evaluation is one of the value, or of value and gradient, which cost
+the same in Repose's kernel. Hessians, new preconditioners, products with the Hessian and applications
+of preconditioners are counted separately; their time is included. Times are CPU times relative to
+the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up
+(reading, distribution, index arrays) is excluded.
 
 - L-BFGS from the stiffness: `-tao_type lmvm -tao_lmvm_initial stiffness`, see
   [the linear solver](../theory/linear_solver.md).
-- The equations of motion: unit masses, damping c and step h the best of a scan, which a person would
-  have to find first; one evaluation of the forces a step (Euler) or three (Runge–Kutta); a run
+- The equations of motion: unit masses, with the best damping c and step h of a scan, which a user would
+  have to find first; one evaluation of the forces per step (Euler) or three (Runge–Kutta); a run
   that takes {PATIENCE} times the default's time is stopped.
-- liblbfgs: its defaults (m = 6, Moré–Thuente), its own stopping tests off, calling Repose's evaluation.
-- SciPy {scipy.__version__ if scipy else ""}: an evaluation in NumPy of the model file, vectorised over springs and
+- liblbfgs: its defaults (m = 6, Moré–Thuente), without its own stopping tests, with Repose's kernel.
+- SciPy {scipy.__version__ if scipy else ""}: an evaluation of the model file in NumPy, vectorised over springs and
   prisms, sums by sparse matrices; L-BFGS-B with m = 10; Newton-CG with Hessian products by differences
   of gradients.
-- Distance: of the state where the race ended. "Another minimum": the evaluations and the time are to
-  {accuracy} of that one.
+- Distance: of the last state. "Another minimum": evaluations and time are to {accuracy} of that minimum.
 
-## The goals
+## Goals
 
 {verdicts(contests, "default", "Repose's default")}{conclusion(contests)}
 {verdicts(contests, "stiffness", "Repose's L-BFGS from the stiffness")}
@@ -439,7 +440,7 @@ of the default, the least of {chosen.rounds} rounds, or of fewer where they take
 
 
 def arguments():
-    parser = option_parser(__doc__, PROJECT / "docs/measurements/contest.md", **SETTINGS)
+    parser = option_parser(__doc__, PROJECT / "docs/measurements/minimisers.md", **SETTINGS)
     chosen = parser.parse_args()
     for given, known in ((chosen.cases, CASES), (chosen.methods, METHODS)):
         for word in set(given.split(",")) - set(known):

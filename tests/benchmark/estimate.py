@@ -268,8 +268,8 @@ def verdict(runs):
             f"{'reached' if sound >= 0.99 else 'missed'}) and not more than 10 times above it in "
             f"{sharp:.1%} (wanted: 90 %, {'reached' if sharp >= 0.9 else 'missed'}).")
     if lost:
-        text += (f" {len(lost)} more came to another rest position than the load path's, of which no "
-                 f"estimate at one state can know; with them counted as too low, {strict:.1%} of "
+        text += (f" {len(lost)} more ended at another rest position than the load path's, which no "
+                 f"estimate at one state can detect; with them counted as too low, {strict:.1%} of "
                  f"{len(runs)} are not below.")
     return text + "\n"
 
@@ -283,8 +283,8 @@ def weak_place(weak):
     return f"""
 ## Where it is weakest
 
-The paper's volume term (λ = 0.5) makes an energy that is hardly convex. {heads} more heads with it, by
-Newton's methods to coarse accuracies ({", ".join(WEAK[2])} mm). These runs are not in the figures above, in which
+The paper's volume term (λ = 0.5) gives an energy that is hardly convex. {heads} more heads with it, by
+Newton's methods to coarse accuracies ({", ".join(WEAK[2])} mm). These runs are not in the figures above, of which
 such runs are a small part.
 
 {table([])}{rows}{row("**all**", weak)}{listed(weak, [])}"""
@@ -303,7 +303,7 @@ def listed(runs, left_out):
                    for run in runs if run.elsewhere)
     text += f"\nAt another rest position:\n\n{lost}" if lost else ""
     if left_out:
-        text += "\nLeft out, because the program came to no end in 120 s or no rest position is known:\n\n"
+        text += "\nLeft out, because the program did not finish in 120 s or no rest position is known:\n\n"
         text += "".join(f"- {line}\n" for line in left_out)
     return text
 
@@ -349,30 +349,31 @@ def page(runs, weak, study, seconds, picture):
         matplotlib) else ""
     stops = ", ".join(f"{solver} {how} {value:g}" for solver, how, value in INTERRUPTED)
     heads = len({run.problem for run in runs})
-    return f"""# Can the estimate be trusted?
+    return f"""# The error estimate against known errors
 
-Every result says how far it is from the rest position (`displacement_error`): twice the largest
-block of its Newton step, confirmed by the next one. Here {len(runs)} runs on {heads} problems are compared with rest positions known
-to {KNOWN:g} mm. Made by `tests/benchmark/estimate.py{options}` in {seconds / 60:.0f} minutes of CPU time on
-one core of a machine with {os.cpu_count()} cores.
+Every result holds an estimate of its distance to the rest position (`displacement_error`,
+[theory](../theory/error_estimate.md)). Here {len(runs)} runs on {heads} problems are compared with rest
+positions known to {KNOWN:g} mm. Made by `tests/benchmark/estimate.py{options}` in {seconds / 60:.0f} minutes of CPU
+time on one core of a machine with {os.cpu_count()} cores.
 
 {verdict(runs)}
 {shown}{table(runs)}
-- Problems: the heads of the paper's size as shipped (jaw forward, jaw opened), and a synthetic head for
-  each seed, with 477 to 800 skin vertices, 2 to 4 layers, a spring law, stiffnesses, a move of the jaw and
-  in some of them turgor and weight at random; volume term penalty, none or paper, or forces minimised.
+- Problems, all of springs: the shipped heads of the paper's size (jaw forward, jaw opened), and for each
+  seed a synthetic head with 477 to 800 skin vertices, 2 to 4 layers, and a random spring law, stiffnesses,
+  move of the jaw and, in some, turgor and weight; volume term penalty, none or paper, or the force
+  functional.
 - Runs: {", ".join(SOLVERS)} to {", ".join(ACCURACIES)} mm, and runs to {HARD} mm that are interrupted:
   {stops} (of the time to {TIMED} mm).
-  A load step that comes to its iteration limit is halved five times before the run ends.
-- The true error is the largest distance of a point from the rest position at which the load path ends,
+  A load step that reaches its iteration limit is halved five times before the run ends.
+- The true error is the largest distance of a point from the rest position at the end of the load path,
   solved to {KNOWN:g} mm. A run that ends before the last load is compared with the rest position at its own
-  load, and one whose error is above its estimate with the rest position that it is near, found from it by
-  Newton's method to {KNOWN:g} mm: if that is more than {SAME:g} mm from the load path's, the run is at
-  another rest position and is counted there.
-- The estimate is that of a quadratic model of what is minimised, and can be too low only where that
-  model is poor: far from rest, or where the energy is hardly convex.
-- No minimum yet: the state has negative curvature, and the estimate is infinite. Not counted as within
-  10 times.
+  load. A run whose error is above its estimate is compared with the rest position near it, found by Newton's
+  method to {KNOWN:g} mm: if this is more than {SAME:g} mm from the load path's, the run is counted as at
+  another rest position.
+- The estimate relies on a quadratic model of the objective. It can be too low only where that model is
+  poor: far from rest, or where the energy is hardly convex.
+- No minimum yet: the state has negative curvature, and the estimate is infinite. It does not count as
+  within 10 times.
 {listed(runs, study.left_out)}{weak_place(weak)}"""
 
 

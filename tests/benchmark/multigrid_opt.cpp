@@ -1,6 +1,6 @@
 /// Nonlinear multigrid in its optimisation form (MG/OPT: Nash 2000, Optimization Methods and
 /// Software 14; Gratton, Sartenaer & Toint 2008, SIAM J. Optim. 19) against the default and against
-/// L-BFGS, all from the answer of a coarser model; docs/measurements/growth.md, which
+/// L-BFGS, all from the answer of a coarser model; docs/measurements/nonlinear_multigrid.md, which
 /// tests/benchmark/multigrid_opt.py fills:
 ///     benchmark_multigrid_opt SCENE.yaml [-methods default,lbfgs,cycles,…] [-coarsening 3]
 ///                             [-smoothing 10] [-switch 0.05] [-accuracy 0.01]

@@ -4,7 +4,7 @@
     tests/benchmark/multigrid_opt.py [-bin build/bin] [-sizes 500,2500,12500] [-coarsening 2,2,3]
                                      [-methods default,lbfgs,cycles,…] [-smoothing 10]
                                      [-accuracy 0.01] [-limit 2000] [-seconds 60]
-                                     [-output docs/measurements/growth.md] [-mark multigrid] [SCENE.yaml …]
+                                     [-output docs/measurements/nonlinear_multigrid.md] [-mark multigrid] [SCENE.yaml …]
 
 The scenes given (coarsened by 2), and those of growth.py for synthetic heads of the given numbers of
 skin vertices, each with its coarsening of the edges; run by benchmark_multigrid_opt, with -smoothing
