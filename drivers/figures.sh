@@ -4,8 +4,7 @@
 #
 #     drivers/figures.sh [BIN [FOLDER]]      BIN: build/bin, FOLDER: figures
 #
-# Needs ParaView, matplotlib and h5py: apt-get install --no-install-recommends python3-paraview xvfb
-# xauth python3-matplotlib python3-h5py
+# Needs matplotlib, h5py and what drivers/render.py asks for.
 set -euo pipefail
 project="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 . "$project/drivers/setup.sh"

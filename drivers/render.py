@@ -1,33 +1,43 @@
 #!/usr/bin/env python3
-"""A picture of a result, drawn without a screen: before, after and displacement, one row a view.
+"""Pictures of a result, drawn without a screen, and a film of its way.
 
-    drivers/render.py NAME [-output picture.png] [-views front,three-quarter,side] [-step last]
+    drivers/render.py NAME [-output picture.png] [-views front,three-quarter,profile]
+        [-columns before,after,movement,bones] [-step last] [-film film.gif] [-frames 24]
 
-NAME is the path without ending: NAME_skin.xdmf and, if it is there, NAME_bones.xdmf are read.
-Needs ParaView: apt-get install --no-install-recommends python3-paraview xvfb xauth
+NAME is the result (NAME.h5, the ending may be left out). One row a view, one column a way to see it:
+
+    before, after   the skin
+    movement        how far each place of the skin has gone, mm
+    advance         how far outwards (red) or inwards (blue), mm
+    stress          von Mises stress of the skin's prisms; tension of its springs
+    bones           the skin as a veil over the bones
+
+-film draws the columns along the load steps, between which it moves evenly, into an animated GIF.
+Needs VTK and h5py, and no display: pip install vtk h5py, with apt-get install libegl1
+libgl1-mesa-dri; or, without pip, apt-get install --no-install-recommends python3-paraview
+python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
 """
 
 import argparse
+import ctypes.util
+import importlib.util
 import json
 import os
 import shutil
 import sys
 
-if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see in_paraview
-    import numpy as np
-    import vtkmodules.all as vtk
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-
+if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_screen
     sys.argv[1:] = json.loads(os.environ["REPOSE_RENDER"])
 
 # Where the camera stands as seen from the head: +x patient left, +y posterior, +z up.
-VIEWS = {"front": (0, -1, 0), "three-quarter": (0.65, -0.75, 0.1), "side": (1, 0, 0)}
-COLUMNS = ("before", "after", "displacement")
-WIDTH = 1600  # pixels
-BAR = 0.09  # share of the width that the colour bar takes
+VIEWS = {"front": (0, -1, 0), "three-quarter": (0.65, -0.75, 0.1), "profile": (1, 0, 0)}
+COLOURED = ("movement", "advance", "stress")
+COLUMNS = ("before", "after", *COLOURED, "bones")
+COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
+SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
 MAGMA = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")  # light to dark
-SUPER = 2  # pixels drawn for one of the picture, along each axis
+BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
 
 
 class Arguments(argparse.ArgumentParser):
@@ -40,126 +50,199 @@ def refuse(message):
     sys.exit(1)
 
 
+def words(option, text, known):
+    chosen = text.split(",")
+    for word in chosen:
+        if word not in known:
+            refuse(f"{option} {word}: unknown, take some of {','.join(known)}")
+    return chosen
+
+
 def arguments():
-    parser = Arguments(prog="render.py", description=__doc__, add_help=False,
+    parser = Arguments(prog="render.py", description=__doc__, add_help=False, allow_abbrev=False,
                        formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-help", action="help")
     parser.add_argument("name")
     parser.add_argument("-output")
     parser.add_argument("-views", default=",".join(VIEWS))
+    parser.add_argument("-columns", default="before,after,movement,bones")
     parser.add_argument("-step", default="last")
+    parser.add_argument("-film")
+    parser.add_argument("-frames", type=int, default=24)
     chosen = parser.parse_args()
-    chosen.output = os.path.abspath(chosen.output or chosen.name + ".png")
-    chosen.name = os.path.abspath(chosen.name)
-    chosen.views = chosen.views.split(",")
-    for view in chosen.views:
-        if view not in VIEWS:
-            refuse(f"-views {view}: unknown, take some of {','.join(VIEWS)}")
-    if not os.path.isfile(chosen.name + "_skin.xdmf"):
-        refuse(f"{chosen.name}_skin.xdmf is missing: NAME is the result's path without ending")
+    chosen.name = os.path.abspath(chosen.name.removesuffix(".h5"))
+    chosen.output = os.path.abspath(chosen.film or chosen.output or chosen.name + ".png")
+    chosen.views = words("-views", chosen.views, tuple(VIEWS))
+    chosen.columns = words("-columns", chosen.columns, COLUMNS)
+    if not os.path.isfile(chosen.name + ".h5"):
+        refuse(f"{chosen.name}.h5 is missing: NAME is the result's path")
     if not os.path.isdir(os.path.dirname(chosen.output)):
-        refuse(f"-output {chosen.output}: make its folder first")
+        refuse(f"{chosen.output}: make its folder first")
+    if chosen.film and not (chosen.film.endswith(".gif") and 2 <= chosen.frames <= 1000):
+        refuse("-film must end in .gif, -frames be from 2 to 1000")
     return chosen
 
 
-def in_paraview():
-    """Runs this script again in ParaView's own interpreter on a screen in memory. That interpreter
-    would take options for its own, so they travel in the environment."""
-    for program in ("pvbatch", "xvfb-run"):
+def find_screen():
+    """Where there is no display VTK draws without one from 9.4 on. An older one does on a screen in
+    memory; where this interpreter has none, ParaView's does. That would take options for its own,
+    so they travel in the environment."""
+    own = importlib.util.find_spec("vtkmodules") is not None
+    if "DISPLAY" in os.environ and own:
+        return
+    if own:
+        from vtkmodules.vtkCommonCore import vtkVersion
+        if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 4):
+            for library, window in (("EGL", "vtkEGLRenderWindow"),
+                                    ("OSMesa", "vtkOSOpenGLRenderWindow")):
+                if ctypes.util.find_library(library):
+                    os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = window
+                    return
+            refuse("neither a display nor libEGL: apt-get install libegl1 libgl1-mesa-dri")
+    for program in ("xvfb-run",) if own else ("pvbatch", "xvfb-run"):
         if not shutil.which(program):
-            refuse(f"{program} is missing: "
-                   "apt-get install --no-install-recommends python3-paraview xvfb xauth")
+            refuse("VTK is missing: pip install vtk h5py, or apt-get install "
+                   "--no-install-recommends python3-paraview python3-h5py xvfb xauth")
     os.environ["REPOSE_RENDER"] = json.dumps(sys.argv[1:])
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "pvbatch", os.path.abspath(__file__)])
+    os.execvp("xvfb-run", ["xvfb-run", "-a", sys.executable if own else "pvbatch",
+                           os.path.abspath(__file__)])
 
 
-def read(file, step):
-    """The surface of one time step of an XDMF file, before and after, with smooth normals."""
-    reader = vtk.vtkXdmfReader()
-    reader.SetFileName(file)
-    reader.UpdateInformation()
-    times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
-    if step != "last" and not (step.isdecimal() and int(step) < len(times)):
-        refuse(f"-step {step}: {file} has the steps 0 to {len(times) - 1}, or last")
-    reader.UpdateTimeStep(times[-1 if step == "last" else int(step)])
-    surface = vtk.vtkDataSetSurfaceFilter()
-    surface.SetInputData(reader.GetOutputDataObject(0))
-    surface.Update()
-    after = surface.GetOutput()
-    return {"before": smooth(initial(after, file)), "after": smooth(after)}
+# ----- what is drawn
 
 
-def initial(surface, file):
-    """The surface where it was before: at its initial_position or back along its displacement."""
-    arrays = surface.GetPointData()
-    points = vtk.vtkPoints()
-    if arrays.HasArray("initial_position"):
-        points.SetData(arrays.GetArray("initial_position"))
-    elif arrays.HasArray("displacement"):
-        moved = vtk_to_numpy(surface.GetPoints().GetData())
-        back = moved - vtk_to_numpy(arrays.GetArray("displacement"))
-        points.SetData(numpy_to_vtk(back, deep=True))
-    else:
-        refuse(f"{file} has neither the array displacement nor initial_position")
-    before = vtk.vtkPolyData()
-    before.ShallowCopy(surface)
-    before.SetPoints(points)
-    return before
+class Result:
+    """The steps of a result: skin and bones before and on their way, and numbers at the skin."""
+
+    def __init__(self, file):
+        try:
+            self.h5 = h5py.File(file)
+        except OSError as reason:
+            refuse(f"{file}: cannot be read: {reason}")
+        if "step" not in self.h5 or not len(self.h5["step"]) or "model/skin/points" not in self.h5:
+            refuse(f"{file}: holds no solved skin; solve it with repose-solve first")
+        self.model = self.h5["model"]
+        self.steps = [self.h5["step"][name] for name in sorted(self.h5["step"])]
+        self.loads = [step.attrs["load"] for step in self.steps]
+        self.used, corners = np.unique(self.model["skin/points"][:], return_inverse=True)
+        self.corners = corners.reshape(-1, 3)
+        self.before = self.model["point/position"][:][self.used]
+        bones = self.model.get("bone_surfaces")
+        self.bone_corners = bones["triangles"][:] if bones else np.zeros((0, 3), int)
+        self.bones_before = bones["points"][:] if bones else np.zeros((0, 3))
+
+    def skin(self, step):
+        return self.steps[step]["point/position"][:][self.used]
+
+    def bones(self, step):
+        moved = self.steps[step].get("bone_surface/points")
+        return moved[:] if moved else self.bones_before
+
+    def stress(self, step):
+        """At each point of the skin the mean of the prisms, or the most of the springs, there."""
+        total, count = np.zeros(len(self.model["point/layer"])), 0
+        layer = self.model["point/layer"][:]
+        if "prism/von_mises" in self.steps[step]:
+            prisms = self.model["prism/points"][:]
+            top = (layer[prisms] == 0).any(1)
+            values, count = self.steps[step]["prism/von_mises"][:][top], np.zeros(len(layer))
+            for corner in prisms[top].T:
+                np.add.at(total, corner, values)
+                np.add.at(count, corner, 1)
+            return (total / np.maximum(count, 1))[self.used]
+        springs = self.model["spring/points"][:]
+        top = (layer[springs] == 0).all(1)
+        for end in springs[top].T:
+            np.maximum.at(total, end, np.abs(self.steps[step]["spring/tension"][:][top]))
+        return total[self.used]
+
+    def state(self, step):
+        """Skin, bones and the numbers of each coloured column, at a step."""
+        skin = self.skin(step)
+        numbers = {"movement": np.linalg.norm(skin - self.before, axis=1)}
+        if "point/advance" in self.steps[step]:
+            numbers["advance"] = self.steps[step]["point/advance"][:][self.used]
+        if "prism/von_mises" in self.steps[step] or "spring/tension" in self.steps[step]:
+            numbers["stress"] = self.stress(step)
+        return {"skin": skin, "bones": self.bones(step), "load": self.loads[step], **numbers}
+
+    def between(self, load):
+        """The state at a load: between two steps everything moves evenly."""
+        after = min(int(np.searchsorted(self.loads, load)), len(self.steps) - 1)
+        before = max(after - 1, 0)
+        width = self.loads[after] - self.loads[before]
+        share = (load - self.loads[before]) / width if width > 0 else 1.0
+        one, two = self.state(before), self.state(after)
+        return {name: (1 - share) * one[name] + share * two[name] for name in two}
 
 
-def clipped(surface, function, inside):
-    """The part of a surface inside or outside an implicit function."""
-    clip = vtk.vtkClipPolyData()
-    clip.SetInputData(surface)
-    clip.SetClipFunction(function)
-    clip.SetInsideOut(inside)
-    clip.Update()
-    return clip.GetOutput()
+def head(column, result):
+    """What stands above a column."""
+    unit = "N/mm²" if "prism/von_mises" in result.steps[-1] else "N"
+    return {"movement": "movement, mm", "advance": "outwards, mm",
+            "stress": ("stress, " if unit != "N" else "tension, ") + unit}.get(column, column)
+
+
+# ----- VTK
+
+
+def surface(points, corners, numbers=None):
+    """A surface with smooth normals, and a number a point."""
+    cells = vtk.vtkCellArray()
+    offsets = np.arange(0, 3 * len(corners) + 1, 3, dtype=np.int64)
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True),
+                  numpy_to_vtkIdTypeArray(corners.ravel().astype(np.int64), deep=True))
+    drawn = vtk.vtkPolyData()
+    drawn.SetPoints(vtk.vtkPoints())
+    drawn.GetPoints().SetData(numpy_to_vtk(points, deep=True))
+    drawn.SetPolys(cells)
+    if numbers is not None:
+        drawn.GetPointData().SetScalars(numpy_to_vtk(numbers, deep=True))
+    normals = vtk.vtkPolyDataNormals()
+    normals.SetInputData(drawn)
+    normals.SplittingOff()
+    normals.Update()
+    return normals.GetOutput()
 
 
 def beside(bones, skin):
     """The part of the bones in the box of the skin."""
     box = vtk.vtkBox()
     box.SetBounds(skin.GetBounds())
-    return clipped(bones, box, True)
+    clip = vtk.vtkClipPolyData()
+    clip.SetInputData(bones)
+    clip.SetClipFunction(box)
+    clip.InsideOutOn()
+    clip.Update()
+    return clip.GetOutput()
 
 
-def smooth(surface):
-    normals = vtk.vtkPolyDataNormals()
-    normals.SetInputData(surface)
-    normals.SplittingOff()
-    normals.Update()
-    return normals.GetOutput()
-
-
-def colours(surface):
-    """The colour table of |displacement|, from 0 to its largest value in mm."""
-    largest = surface.GetPointData().GetArray("displacement").GetRange(-1)[1] or 1
+def colours(column, numbers):
+    """The colour table of a column: from 0, or as far inwards as outwards."""
+    largest = float(np.abs(numbers).max()) or 1.0
+    ramp, low = (BOTH, -largest) if column == "advance" else (MAGMA, 0.0)
     table = vtk.vtkColorTransferFunction()
-    for i, text in enumerate(MAGMA):
+    for i, text in enumerate(ramp):
         red, green, blue = (int(text[k:k + 2], 16) / 255 for k in (0, 2, 4))
-        table.AddRGBPoint(largest * i / (len(MAGMA) - 1), red, green, blue)
-    table.SetVectorModeToMagnitude()
+        table.AddRGBPoint(low + (largest - low) * i / (len(ramp) - 1), red, green, blue)
     return table
 
 
-def actor(surface, colour, table=None, opacity=1.0):
+def actor(drawn, colour, table=None, opacity=1.0):
     mapper = vtk.vtkPolyDataMapper()
-    mapper.SetInputData(surface)
+    mapper.SetInputData(drawn)
     mapper.SetScalarVisibility(table is not None)
     if table:
         mapper.SetLookupTable(table)
-        mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray("displacement")
-    drawn = vtk.vtkActor()
-    drawn.SetMapper(mapper)
-    drawn.GetProperty().SetColor(colour)
-    drawn.GetProperty().SetOpacity(opacity)
-    drawn.GetProperty().SetAmbient(0.2)
-    drawn.GetProperty().SetDiffuse(0.8)
-    drawn.GetProperty().SetSpecular(0.12)
-    drawn.GetProperty().SetSpecularPower(25)
-    return drawn
+    shown = vtk.vtkActor()
+    shown.SetMapper(mapper)
+    shown.GetProperty().SetColor(colour)
+    shown.GetProperty().SetOpacity(opacity)
+    shown.GetProperty().SetAmbient(0.2)
+    shown.GetProperty().SetDiffuse(0.8)
+    shown.GetProperty().SetSpecular(0.12)
+    shown.GetProperty().SetSpecularPower(25)
+    return shown
 
 
 def renderer(actors):
@@ -167,7 +250,7 @@ def renderer(actors):
     scene = vtk.vtkRenderer()
     scene.SetBackground(1, 1, 1)
     scene.SetUseDepthPeeling(True)
-    scene.SetMaximumNumberOfPeels(12)
+    scene.SetMaximumNumberOfPeels(8)
     for drawn in actors:
         scene.AddActor(drawn)
     scene.RemoveAllLights()
@@ -180,13 +263,13 @@ def renderer(actors):
     return scene
 
 
-def extent(surfaces, view):
-    """Middle, half width and half height of surfaces seen from a view, as (middle, half, half)."""
+def extent(points, view):
+    """Middle, half width and half height of points seen from a view."""
     forward = -np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view])
     right = np.cross(forward, (0, 0, 1)) / np.linalg.norm(np.cross(forward, (0, 0, 1)))
     frame = np.array([right, np.cross(right, forward), forward])
-    points = np.concatenate([vtk_to_numpy(s.GetPoints().GetData()) for s in surfaces]) @ frame.T
-    low, high = points.min(axis=0), points.max(axis=0)
+    seen = points @ frame.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
     return (low + high) / 2 @ frame, *((high - low)[:2] / 2)
 
 
@@ -200,74 +283,73 @@ def look(scene, view, middle, half_height):
     scene.ResetCameraClippingRange()
 
 
-def label(scene, text):
+def label(text):
+    scene = renderer([])
     drawn = vtk.vtkTextActor()
     drawn.SetInput(text)
     drawn.GetTextProperty().SetColor(INK)
-    drawn.GetTextProperty().SetFontSize(SUPER * 26)
+    drawn.GetTextProperty().SetFontSize(SUPER * TEXT)
     drawn.GetTextProperty().SetJustificationToCentered()
     drawn.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
     drawn.GetPositionCoordinate().SetValue(0.5, 0.25)
     scene.AddViewProp(drawn)
+    return scene
 
 
-def colour_bar(scene, table, height):
+def colour_bar(table):
+    scene = renderer([])
     bar = vtk.vtkScalarBarActor()
     bar.SetLookupTable(table)
-    bar.SetTitle("mm")
-    bar.SetNumberOfLabels(5)
-    bar.SetLabelFormat("%.3g")
+    bar.SetOrientationToHorizontal()
+    bar.SetNumberOfLabels(3)
+    bar.SetLabelFormat("{:.2g}" if vtk.vtkVersion.GetVTKMinorVersion() >= 6 else "%.2g")
     bar.UnconstrainedFontSizeOn()
-    for text in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
-        text.SetColor(INK)
-        text.SetFontSize(SUPER * 20)
-        text.BoldOff()
-        text.ItalicOff()
-        text.ShadowOff()
-    bar.SetPosition(0.1, 0.95 - height)
-    bar.SetWidth(0.8)
-    bar.SetHeight(height)
+    text = bar.GetLabelTextProperty()
+    text.SetColor(INK)
+    text.SetFontSize(SUPER * TEXT)
+    text.BoldOff()
+    text.ItalicOff()
+    text.ShadowOff()
+    bar.SetBarRatio(0.35)
+    bar.SetPosition(0.12, 0.05)
+    bar.SetWidth(0.76)
+    bar.SetHeight(0.85)
     scene.AddViewProp(bar)
+    return scene
 
 
-def cut_away(skin, bones):
-    """Skin over bones: whole on the patient's right, a veil on the left."""
-    if not bones:
-        return [actor(skin, SKIN)]
-    middle = vtk.vtkPlane()
-    middle.SetOrigin(skin.GetCenter())
-    middle.SetNormal(1, 0, 0)
-    return [actor(clipped(skin, middle, True), SKIN), actor(beside(bones, skin), IVORY),
-            actor(clipped(skin, middle, False), SKIN, opacity=0.3)]
-
-
-def columns(skin, bones, table):
-    """The actors of each column; an actor may stand in several scenes of a window."""
-    coloured = [actor(skin["after"], SKIN, table)]
-    if bones:
-        coloured.append(actor(beside(bones["after"], skin["after"]), IVORY))
-    return {"displacement": coloured, **{
-        state: cut_away(skin[state], bones and bones[state]) for state in ("before", "after")}}
+def actors(column, state, result, tables):
+    if column == "before":
+        return [actor(surface(result.before, result.corners), SKIN)]
+    if column == "after":
+        return [actor(surface(state["skin"], result.corners), SKIN)]
+    if column == "bones":
+        skin = surface(state["skin"], result.corners)
+        veil = [actor(skin, SKIN, opacity=0.35)]
+        if len(result.bone_corners) == 0:
+            return veil
+        return [actor(beside(surface(state["bones"], result.bone_corners), skin), IVORY), *veil]
+    return [actor(surface(state["skin"], result.corners, state[column]), SKIN, tables[column])]
 
 
 class Sheet:
     """A window that scenes are put on, in pixels from the upper left corner."""
 
-    def __init__(self, height):
-        self.height = int(height)
+    def __init__(self, width, height):
+        self.width, self.height = width, int(height)
         self.window = vtk.vtkRenderWindow()
         self.window.SetOffScreenRendering(True)
         self.window.SetAlphaBitPlanes(True)
         self.window.SetMultiSamples(0)
-        self.window.SetSize(SUPER * WIDTH, SUPER * self.height)
+        self.window.SetSize(SUPER * width, SUPER * self.height)
 
     def put(self, scene, left, top, width, height):
-        scene.SetViewport(left / WIDTH, 1 - (top + height) / self.height,
-                          (left + width) / WIDTH, 1 - top / self.height)
+        scene.SetViewport(left / self.width, 1 - (top + height) / self.height,
+                          (left + width) / self.width, 1 - top / self.height)
         self.window.AddRenderer(scene)
 
-    def save(self, output):
-        """Writes to another name first: a picture is complete or absent."""
+    def pixels(self):
+        """[height, width, 3]"""
         self.window.Render()
         image = vtk.vtkWindowToImageFilter()
         image.SetInput(self.window)
@@ -275,47 +357,87 @@ class Sheet:
         small = vtk.vtkImageShrink3D()
         small.SetInputConnection(image.GetOutputPort())
         small.SetShrinkFactors(SUPER, SUPER, 1)
-        writer = vtk.vtkPNGWriter()
-        writer.SetInputConnection(small.GetOutputPort())
-        writer.SetFileName(output + ".part")
-        writer.Write()
-        os.replace(output + ".part", output)
+        small.Update()
+        flat = vtk_to_numpy(small.GetOutput().GetPointData().GetScalars())
+        wide, high, _ = small.GetOutput().GetDimensions()
+        return flat.reshape(high, wide, 3)[::-1]
 
 
-def picture(skin, bones, views):
-    """A sheet of one row a view and one column a state, cropped to the skin."""
-    table = colours(skin["after"])
-    drawn = columns(skin, bones, table)
-    margin, title, wide = 1.05, 44, WIDTH * (1 - BAR) / len(COLUMNS)
-    frames = [extent(skin.values(), view) for view in views]
+def picture(result, state, chosen, tables, title=""):
+    """A sheet of one row a view, cropped to the skin, and one column a way to see it."""
+    margin, wide = 1.05, COLUMN
+    frames = [extent(np.concatenate([result.before, result.skin(-1)]), view)
+              for view in chosen.views]
     scale = wide / (2 * margin * max(across for _, across, _ in frames))  # pixels per mm
-    sheet = Sheet(title + sum(2 * margin * up * scale for _, _, up in frames))
-    top = title
-    for view, (middle, _, up) in zip(views, frames):
-        for i, column in enumerate(COLUMNS):
-            scene = renderer(drawn[column])
-            sheet.put(scene, i * wide, top, wide, 2 * margin * up * scale)
+    rows = [2 * margin * up * scale for _, _, up in frames]
+    bars = BAR if tables else 0
+    sheet = Sheet(wide * len(chosen.columns), TITLE * (1 + bool(title)) + sum(rows) + bars)
+    if title:
+        sheet.put(label(title), 0, 0, sheet.width, TITLE)
+    for i, column in enumerate(chosen.columns):
+        top = TITLE * (1 + bool(title))
+        sheet.put(label(head(column, result)), i * wide, top - TITLE, wide, TITLE)
+        for view, (middle, _, up), high in zip(chosen.views, frames, rows):
+            scene = renderer(actors(column, state, result, tables))
+            sheet.put(scene, i * wide, top, wide, high)
             look(scene, view, middle, margin * up)
-        top += 2 * margin * up * scale
-    for i, column in enumerate(COLUMNS):
-        scene = renderer([])
-        label(scene, column)
-        sheet.put(scene, i * wide, 0, wide, title)
-    scene = renderer([])
-    colour_bar(scene, table, min(0.85, 500 / sheet.height))
-    sheet.put(scene, (1 - BAR) * WIDTH, 0, BAR * WIDTH, sheet.height)
-    return sheet
+            top += high
+        bar = colour_bar(tables[column]) if column in tables else renderer([])
+        sheet.put(bar, i * wide, top, wide, bars)
+    return sheet.pixels()
+
+
+def write_picture(pixels, output):
+    """To another name first: a picture is complete or absent."""
+    image = vtk.vtkImageData()
+    image.SetDimensions(pixels.shape[1], pixels.shape[0], 1)
+    flat = np.ascontiguousarray(pixels[::-1].reshape(-1, 3))
+    image.GetPointData().SetScalars(numpy_to_vtk(flat, deep=True))
+    writer = vtk.vtkPNGWriter()
+    writer.SetInputData(image)
+    writer.SetFileName(output + ".part")
+    writer.Write()
+    os.replace(output + ".part", output)
+
+
+def write_film(frames, output):
+    try:
+        from PIL import Image
+    except ImportError:
+        refuse("-film needs Pillow: pip install pillow, or apt-get install python3-pil")
+    images = [Image.fromarray(np.ascontiguousarray(frame)) for frame in frames]
+    hold = [80] * (len(images) - 1) + [1500]  # ms
+    images[0].save(output + ".part", format="GIF", save_all=True, append_images=images[1:],
+                   duration=hold, loop=0)
+    os.replace(output + ".part", output)
 
 
 def main():
     chosen = arguments()
-    if "REPOSE_RENDER" not in os.environ:
-        in_paraview()
-    skin = read(chosen.name + "_skin.xdmf", chosen.step)
-    bones_file = chosen.name + "_bones.xdmf"
-    bones = read(bones_file, chosen.step) if os.path.isfile(bones_file) else None
-    picture(skin, bones, chosen.views).save(chosen.output)
+    result = Result(chosen.name + ".h5")
+    last = len(result.steps) - 1
+    if chosen.step != "last" and not (chosen.step.isdecimal() and int(chosen.step) <= last):
+        refuse(f"-step {chosen.step}: {chosen.name}.h5 has the steps 0 to {last}, or last")
+    state = result.state(last if chosen.step == "last" else int(chosen.step))
+    for column in chosen.columns:
+        if column in COLOURED and column not in state:
+            refuse(f"-columns {column}: {chosen.name}.h5 does not have it; solve it again")
+    tables = {column: colours(column, state[column]) for column in chosen.columns
+              if column in COLOURED}
+    if chosen.film:
+        loads = np.linspace(0, state["load"], chosen.frames)
+        write_film([picture(result, result.between(load), chosen, tables, f"load {load:.2f}")
+                    for load in loads], chosen.output)
+    else:
+        write_picture(picture(result, state, chosen, tables), chosen.output)
     print(chosen.output)
 
 
-main()
+if __name__ == "__main__":
+    arguments()
+    find_screen()
+    import h5py
+    import numpy as np
+    import vtkmodules.all as vtk
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    main()

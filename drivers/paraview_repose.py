@@ -1,0 +1,144 @@
+"""A result in ParaView at one look: before, after and bones through the skin, and the profile line.
+
+As a macro: Macros → Import new macro → this file; then open NAME_skin.xdmf (or NAME.h5), select it
+and press the macro's button. Without ParaView's window:
+
+    pvpython drivers/paraview_repose.py NAME [picture.png] [state.pvsm]
+
+NAME is the result without ending. It reads NAME_skin.xdmf and NAME_bones.xdmf, which ParaView reads
+from version 5.6 on; the time slider shows the load steps.
+"""
+
+import os
+import sys
+
+from paraview.simple import (AddCameraLink, AssignViewToLayout, Calculator, ColorBy,
+                             CreateLayout, CreateRenderView, GetActiveSource, GetAnimationScene,
+                             GetColorTransferFunction, GetParaViewVersion, GetScalarBar,
+                             RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show, Slice,
+                             Text, XDMFReader)
+
+BLUE, RED, INK = (0.12, 0.44, 0.71), (0.75, 0.22, 0.17), (0.15, 0.15, 0.15)
+SKIN, IVORY = (0.87, 0.68, 0.58), (0.96, 0.92, 0.8)
+PARTS = ("_skin.xdmf", "_bones.xdmf", "_tissue.xdmf", "_springs.xdmf", ".h5", ".vtkhdf")
+
+
+def result_name():
+    """The result that is named or, in ParaView's window, the one that is selected."""
+    if len(sys.argv) > 1:
+        return os.path.abspath(sys.argv[1].removesuffix(".h5"))
+    source = GetActiveSource()
+    files = getattr(source, "FileNames", None) or getattr(source, "FileName", None) or ""
+    file = files if isinstance(files, str) else files[0]
+    for part in PARTS:
+        if file.endswith(part):
+            return file.removesuffix(part)
+    raise SystemExit("paraview_repose.py: select a result's NAME_skin.xdmf or NAME.h5 first")
+
+
+def view(layout, hint, title):
+    """A white view of the head from the front left, with a title."""
+    made = CreateRenderView()
+    AssignViewToLayout(view=made, layout=layout, hint=hint)
+    made.UseColorPaletteForBackground = 0
+    made.Background = [1, 1, 1]
+    made.OrientationAxesVisibility = 0
+    made.CameraParallelProjection = 1
+    made.CameraViewUp = [0, 0, 1]
+    drawn = Show(Text(registrationName=title, Text=title), made)
+    drawn.WindowLocation = "Upper Center"
+    drawn.FontSize, drawn.Color = 18, list(INK)
+    return made
+
+
+def bounds(source):
+    source.UpdatePipeline()
+    return source.GetDataInformation().GetBounds()
+
+
+def look_from(made, direction, skin):
+    """Fills the view with the skin."""
+    box = bounds(skin)
+    middle = [(box[2 * axis] + box[2 * axis + 1]) / 2 for axis in range(3)]
+    made.CameraFocalPoint = middle
+    made.CameraPosition = [m + 1000 * d for m, d in zip(middle, direction)]
+    made.CameraParallelScale = 0.65 * (box[5] - box[4])
+
+
+def shown(source, made, colour, opacity=1.0):
+    drawn = Show(source, made)
+    ColorBy(drawn, None)
+    drawn.DiffuseColor = drawn.AmbientColor = list(colour)
+    drawn.Opacity = opacity
+    return drawn
+
+
+def initial(source, name):
+    """A surface where it was before."""
+    made = Calculator(registrationName=name, Input=source)
+    made.CoordinateResults = 1
+    made.Function = "initial_position"
+    return made
+
+
+def coloured_by_movement(source, made):
+    drawn = shown(source, made, SKIN, 0.75)
+    ColorBy(drawn, ("POINTS", "displacement", "Magnitude"))
+    drawn.RescaleTransferFunctionToDataRange(False)
+    table = GetColorTransferFunction("displacement")
+    table.ApplyPreset("Magma (matplotlib)", True)
+    table.InvertTransferFunction()
+    bar = GetScalarBar(table, made)
+    bar.Title, bar.ComponentTitle = "movement, mm", ""
+    bar.TitleColor = bar.LabelColor = list(INK)
+    bar.TitleFontSize = bar.LabelFontSize = 16
+    bar.Orientation, bar.WindowLocation = "Horizontal", "Lower Center"
+    if GetParaViewVersion() < 6:
+        bar.AutomaticLabelFormat = 0
+        bar.LabelFormat = bar.RangeLabelFormat = "%.3g"
+    drawn.SetScalarBarVisibility(made, True)
+
+
+def profile(source, name, made, colour):
+    """The cut of a skin with the plane through its middle."""
+    low, high = bounds(source)[:2]
+    line = Slice(registrationName=name, Input=source)
+    line.SliceType.Origin, line.SliceType.Normal = [(low + high) / 2, 0, 0], [1, 0, 0]
+    shown(line, made, colour).LineWidth = 4
+
+
+def main():
+    name = result_name()
+    skin = XDMFReader(registrationName="skin", FileNames=[name + "_skin.xdmf"])
+    scene = GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    scene.GoToLast()
+    bones = XDMFReader(registrationName="bones", FileNames=[name + "_bones.xdmf"]) \
+        if os.path.isfile(name + "_bones.xdmf") else None
+    before = initial(skin, "skin before")
+    layout = CreateLayout("Repose")
+    second = layout.SplitHorizontal(0, 1 / 3) + 1
+    third = layout.SplitHorizontal(second, 1 / 2) + 1
+    left, middle = view(layout, second - 1, "before"), view(layout, third - 1, "after")
+    right = view(layout, third, "profile: blue before, red after")
+    for made, drawn in ((left, before), (middle, skin)):
+        if bones:
+            shown(initial(bones, "bones before") if drawn is before else bones, made, IVORY)
+        shown(drawn, made, SKIN, 0.5)
+        look_from(made, (0.65, -0.75, 0.1), skin)
+    coloured_by_movement(skin, middle)
+    profile(before, "profile before", right, BLUE)
+    profile(skin, "profile after", right, RED)
+    look_from(right, (1, 0, 0), skin)
+    AddCameraLink(left, middle, "before and after")
+    SetActiveView(middle)
+    RenderAllViews()
+    for file in sys.argv[2:]:
+        if file.endswith(".pvsm"):
+            SaveState(file)
+        else:
+            layout.SetSize(1500, 600)
+            SaveScreenshot(file, layout, ImageResolution=[3000, 1200])
+
+
+main()

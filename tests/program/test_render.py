@@ -1,0 +1,75 @@
+"""Pictures of a result: what they are of, and what is refused. Needs VTK ≥ 9.4 (pip install vtk)."""
+
+import importlib.util
+import struct
+import sys
+
+import pytest
+
+from conftest import PROJECT, TIME_LIMIT, finish
+
+SCRIPT = PROJECT / "drivers/render.py"
+
+
+@pytest.fixture
+def render(tmp_path, environment):
+    def draw(*arguments):
+        return finish([sys.executable, "-B", str(SCRIPT), *map(str, arguments)], tmp_path,
+                      environment, TIME_LIMIT)
+
+    return draw
+
+
+def needs_vtk():
+    if importlib.util.find_spec("vtkmodules") is None:
+        pytest.skip("VTK is not installed (pip install vtk)")
+
+
+WRONG = {"no result": (["none"], "none.h5 is missing"),
+         "unknown view": (["{}", "-views", "back"], "-views back: unknown, take some of front"),
+         "unknown column": (["{}", "-columns", "x"], "-columns x: unknown, take some of before"),
+         "not a film": (["{}", "-film", "way.mp4"], "-film must end in .gif"),
+         "no folder": (["{}", "-output", "none/p.png"], "none/p.png: make its folder first")}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_said_in_one_line(render, solved, case):
+    arguments, part = WRONG[case]
+    result = render(*(a.format(solved("paper_jaw_opening.yaml")) for a in arguments))
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1
+    assert part in result.stderr
+
+
+def size_of(png):
+    """Width and height."""
+    data = png.read_bytes()
+    assert data.startswith(b"\x89PNG")
+    return struct.unpack(">II", data[16:24])
+
+
+def test_a_picture_has_a_column_a_way_and_a_row_a_view(render, solved, tmp_path):
+    needs_vtk()
+    result = solved("paper_jaw_opening.yaml")
+    one = render(result, "-output", "one.png", "-views", "profile", "-columns", "before")
+    assert (one.returncode, one.stdout) == (0, f"{tmp_path / 'one.png'}\n"), one.stderr
+    many = render(result, "-output", "many.png", "-views", "profile,front",
+                  "-columns", "movement,advance,stress,bones")
+    assert (many.returncode, many.stderr) == (0, "")
+    wide, high = size_of(tmp_path / "one.png")
+    four_wide, two_high = size_of(tmp_path / "many.png")
+    assert four_wide == 4 * wide and two_high > 1.2 * high
+
+
+def test_a_film_shows_the_load_steps(render, solved, tmp_path):
+    needs_vtk()
+    if importlib.util.find_spec("PIL") is None:
+        pytest.skip("Pillow is not installed")
+    from PIL import Image
+    film = render(solved("paper_jaw_opening.yaml"), "-film", "way.gif", "-frames", 3, "-views",
+                  "profile", "-columns", "after")
+    assert (film.returncode, film.stderr) == (0, "")
+    with Image.open(tmp_path / "way.gif") as frames:
+        assert frames.n_frames == 3
+        first = frames.convert("RGB").tobytes()
+        frames.seek(2)
+        assert frames.convert("RGB").tobytes() != first
