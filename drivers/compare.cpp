@@ -3,11 +3,14 @@
 ///     repose-compare predicted.ply postoperative.ply
 ///     repose-compare predicted.ply postoperative.ply -both -regions labels.nii.gz -output compared
 ///     repose-compare predicted.ply postoperative.ply -landmarks face.mrk.json -radius 20
+///     repose-compare predicted.ply scan.ply -register upper -parts -landmarks face.mrk.json
+///         -actual_landmarks scan.mrk.json
 ///
-/// Distances are positive where PREDICTED lies in front of ACTUAL (outside it), weighted by area.
-/// Writes NAME.vtp, PREDICTED coloured by them, and NAME.csv, their histogram, which
-/// drivers/plot_compare.py draws. Exit status: 0 done, 1 bad input (nothing written), 3 internal
-/// error.
+/// The last is the scorecard of a prediction: the scan is brought to it by what no surgery moved,
+/// then come the parts of the face and the landmarks. Distances are positive where PREDICTED lies
+/// in front of ACTUAL (outside it), weighted by area. Writes NAME.vtp, PREDICTED coloured by them,
+/// and NAME.csv, their histogram, which drivers/plot_compare.py draws. Exit status: 0 done, 1 bad
+/// input (nothing written), 3 internal error.
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -18,7 +21,9 @@
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/compare.h"
+#include "repose/surface/face_parts.h"
 #include "repose/surface/read.h"
+#include "repose/surface/register.h"
 #include "repose/surface/write.h"
 
 namespace {
@@ -34,7 +39,18 @@ std::vector<base::Option> option_table() {
       {"spacing", OptionKind::number, "1", "Longest side of the parts measured.", length, "MM"},
       {"skip_rim", OptionKind::flag, "", "Leave out what lies beyond the rim of an open surface."},
       {"regions", OptionKind::path, "", "Label map: numbers for each label on their own, too."},
-      {"landmarks", OptionKind::path, "", "Numbers around each landmark (.mrk.json, .fcsv, .csv)."},
+      {"landmarks", OptionKind::path, "",
+       "Landmarks of PREDICTED (.mrk.json, .fcsv, .csv): numbers around each."},
+      {"actual_landmarks", OptionKind::path, "",
+       "Those of ACTUAL: how far apart landmarks of one name are."},
+      {"parts", OptionKind::flag, "", "Numbers for nose, lips, chin and cheeks, by -landmarks."},
+      {"register",
+       OptionKind::choice,
+       "none",
+       "Bring ACTUAL to PREDICTED first: by all of it, or by what lies above subnasale.",
+       {},
+       "",
+       {"none", "all", "upper"}},
       {"radius", OptionKind::number, "15", "How far around a landmark.", length, "MM"},
       {"reach",
        OptionKind::number,
@@ -47,15 +63,15 @@ std::vector<base::Option> option_table() {
 }
 
 void print_header() {
-  std::printf("%-28s %10s %8s %8s %8s %8s %8s %8s\n", "distances in mm", "samples", "signed",
-              "mean", "rms", "90 %", "95 %", "max");
+  std::printf("%-28s %10s %8s %8s %8s %8s %8s %8s %8s %8s %8s\n", "distances in mm", "samples",
+              "signed", "mean", "rms", "median", "90 %", "95 %", "max", "% <= 1", "% <= 2");
 }
 
 void print_row(const std::string& name, const std::vector<Sample>& samples) {
   const auto s = surface::statistics(samples);
-  std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f\n", name.c_str(),
-              static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.percentile_90,
-              s.percentile_95, s.most);
+  std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.1f %8.1f\n", name.c_str(),
+              static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.median,
+              s.percentile_90, s.percentile_95, s.most, 100 * s.within_1, 100 * s.within_2);
 }
 
 /// The label at the nearest voxel; 0 outside the map.
@@ -85,6 +101,97 @@ void print_landmarks(const std::string& file, double radius, const std::vector<S
       if ((sample.point - landmark.position).norm() <= radius) near.push_back(sample);
     print_row("  " + landmark.name, near);
   }
+}
+
+void print_parts(const surface::FaceParts& parts, const std::vector<Sample>& samples) {
+  std::map<std::string, std::vector<Sample>> regions;
+  for (const Sample& sample : samples) regions[parts.at(sample.point)].push_back(sample);
+  for (const char* name : {"nose", "upper lip", "lower lip", "chin", "left cheek", "right cheek"})
+    print_row(std::string("  ") + name, regions[name]);
+}
+
+/// The vertices above a height, with the triangles between them.
+surface::Surface above(const surface::Surface& whole, double height) {
+  surface::Surface part{whole.name, {}, {}};
+  std::vector<int64_t> row(whole.points.size(), -1);
+  for (size_t i = 0; i < row.size(); ++i)
+    if (whole.points[i].z() > height) {
+      row[i] = static_cast<int64_t>(part.points.size());
+      part.points.push_back(whole.points[i]);
+    }
+  for (const Triangle& t : whole.triangles)
+    if (row[t[0]] >= 0 && row[t[1]] >= 0 && row[t[2]] >= 0)
+      part.triangles.push_back({row[t[0]], row[t[1]], row[t[2]]});
+  return part;
+}
+
+using Marks = std::map<std::string, Vec3>;
+
+/// What brings landmarks of ACTUAL to those of PREDICTED; nothing where fewer than three agree.
+surface::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
+  std::vector<Vec3> moving, fixed;
+  for (const auto& [name, position] : actual)
+    if (const auto found = predicted.find(name); found != predicted.end()) {
+      moving.push_back(position);
+      fixed.push_back(found->second);
+    }
+  if (moving.size() < 3) return {};
+  return surface::fit_landmarks(moving, fixed, false).transform;
+}
+
+surface::Similarity bring(const base::Options& options, const surface::Surface& actual,
+                          const surface::Surface& predicted, const Marks& marks,
+                          const Marks& actual_marks) {
+  const surface::Similarity start = by_landmarks(marks, actual_marks);
+  surface::Surface moving = surface::weld_and_orient(surface::moved(actual, start));
+  surface::Surface fixed = surface::weld_and_orient(predicted);
+  if (options.text("register") == "upper") {
+    const double height = surface::FaceParts(marks, options.text("landmarks")).upper_face();
+    moving = above(moving, height);
+    fixed = above(fixed, height);
+  }
+  const surface::IcpResult icp = surface::refine_by_icp(moving, fixed, {}, {});
+  std::printf("ACTUAL is brought to PREDICTED (%s): rms %.4g mm over the nearest %lld vertices\n",
+              icp.converged ? "converged" : "NOT CONVERGED", icp.rms_plane,
+              static_cast<long long>(icp.pairs));
+  return icp.transform.after(start);
+}
+
+/// Where both have the same triangles, each vertex stands for one place of the skin.
+void print_vertices(const surface::Surface& predicted, const surface::Surface& actual) {
+  if (predicted.triangles != actual.triangles || predicted.points.size() != actual.points.size())
+    return;
+  std::vector<Sample> apart;
+  for (size_t i = 0; i < actual.points.size(); ++i)
+    apart.push_back(
+        {predicted.points[i], 1, (predicted.points[i] - actual.points[i]).norm(), false});
+  print_row("corresponding vertices", apart);
+}
+
+/// From each landmark of ACTUAL to that of PREDICTED.
+void print_pairs(const Marks& predicted, const Marks& actual, const surface::Similarity& brought) {
+  std::printf("%-28s %10s %10s %10s %10s\n", "predicted - actual, mm", "distance", "forward",
+              "left", "up");
+  for (const auto& [name, position] : predicted)
+    if (const auto found = actual.find(name); found != actual.end()) {
+      const Vec3 off = position - brought.apply(found->second);
+      std::printf("  %-26s %10.3f %10.3f %10.3f %10.3f\n", name.c_str(), off.norm(), -off.y(),
+                  off.x(), off.z());
+    }
+}
+
+Marks marks_of(const base::Options& options, const char* name) {
+  return options.has(name) ? scene::landmarks_by_name(options.text(name)) : Marks{};
+}
+
+void require_landmarks(const base::Options& options) {
+  const bool named = options.has("landmarks");
+  if (options.flag("parts") && !named)
+    base::refuse("-parts needs -landmarks, which tell the parts of the face");
+  if (options.has("actual_landmarks") && !named)
+    base::refuse("-actual_landmarks needs -landmarks, those of PREDICTED");
+  if (options.text("register") == "upper" && !named)
+    base::refuse("-register upper needs -landmarks with subnasale; or take -register all");
 }
 
 /// Distances one way, with a row of the table.
@@ -135,16 +242,28 @@ void write_results(const std::string& name, const surface::Surface& predicted,
 }
 
 void run(const base::Options& options) {
+  require_landmarks(options);
   const surface::Surface predicted = surface::read_surface(options.arguments()[0]);
-  const surface::Surface actual = surface::read_surface(options.arguments()[1]);
+  surface::Surface actual = surface::read_surface(options.arguments()[1]);
+  const Marks marks = marks_of(options, "landmarks"),
+              actual_marks = marks_of(options, "actual_landmarks");
+  surface::Similarity brought;
+  if (options.text("register") != "none") {
+    brought = bring(options, actual, predicted, marks, actual_marks);
+    actual = surface::moved(actual, brought);
+  }
   const surface::SignedDistance to_actual(actual);
   print_header();
   const auto samples = measure(options, predicted, to_actual, "PREDICTED to ACTUAL");
+  print_vertices(predicted, actual);
+  if (options.flag("parts"))
+    print_parts(surface::FaceParts(marks, options.text("landmarks")), samples);
   if (options.has("regions")) print_regions(options.text("regions"), samples);
   if (options.has("landmarks"))
     print_landmarks(options.text("landmarks"), options.number("radius"), samples);
   if (options.flag("both"))
     measure(options, actual, surface::SignedDistance(predicted), "ACTUAL to PREDICTED");
+  if (!actual_marks.empty()) print_pairs(marks, actual_marks, brought);
   const double widest = std::max(surface::statistics(samples).percentile_95, 1e-3);
   const double reach = options.text("reach") == "auto" ? widest : options.number("reach");
   write_results(options.text("output"), predicted, to_actual, samples, reach);

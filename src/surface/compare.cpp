@@ -64,6 +64,15 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
       if ((area += part) >= share * result.area) return distance;
     return result.most;
   };
+  const auto within = [&](double limit) {
+    double area = 0;
+    for (const auto& [distance, part] : sorted)
+      if (distance <= limit) area += part;
+    return area / result.area;
+  };
+  result.within_1 = within(1);
+  result.within_2 = within(2);
+  result.median = percentile(0.50);
   result.percentile_90 = percentile(0.90);
   result.percentile_95 = percentile(0.95);
   return result;

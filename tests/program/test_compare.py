@@ -1,6 +1,7 @@
 """repose-compare from outside: the numbers of surfaces at known distances, its files, and what it
 refuses."""
 
+import json
 import re
 import subprocess
 import sys
@@ -35,7 +36,12 @@ def sphere(file, radius, n=60):
 
 def rows(text):
     """The table's numbers by the name of each row: samples, signed, mean, rms, 90 %, 95 %, max."""
-    pattern = r"^ *(\S.*?)  +(\d+)" + r" +(-?[\d.]+)" * 6 + r"$"
+    return {name: found[:4] + found[5:8] for name, found in full_rows(text).items()}
+
+
+def full_rows(text):
+    """Samples, signed, mean, rms, median, 90 %, 95 %, max, % within 1 mm, % within 2 mm."""
+    pattern = r"^ *(\S.*?)  +(\d+)" + r" +(-?[\d.]+)" * 9 + r"$"
     return {m[1]: [float(n) for n in m.groups()[1:]] for m in re.finditer(pattern, text, re.M)}
 
 
@@ -63,7 +69,7 @@ def test_regions_by_a_label_map(run, tmp_path):
     meshio.Mesh(mesh.points + middle, mesh.cells).write(tmp_path / "a.ply")
     result = run("repose-compare", "a.ply", "a.ply", "-regions", "labels.mha")
     assert result.returncode == 0, result
-    assert list(rows(result.stdout)) == ["PREDICTED to ACTUAL", "label 2"]
+    assert [*rows(result.stdout)] == ["PREDICTED to ACTUAL", "corresponding vertices", "label 2"]
 
 
 def test_numbers_around_landmarks(run, tmp_path):
@@ -79,6 +85,59 @@ def test_numbers_around_landmarks(run, tmp_path):
     assert found["top"][1:] == pytest.approx([3] * 6, abs=0.2)
     assert found["side"][1:] == pytest.approx([0] * 6, abs=0.05)
     assert found["side"][0] > 100 and found["far"] == [0] * 7
+
+
+SKIN, MARKS = PROJECT / "meshes/head_skin.ply", PROJECT / "meshes/head.mrk.json"
+
+
+def turned(points):
+    """What a patient lay differently by."""
+    a = np.radians(6)
+    turn = [[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]
+    return points @ np.array(turn).T + [4, -7, 9]
+
+
+def marks_of(file):
+    points = json.loads(file.read_text())["markups"][0]
+    assert points["coordinateSystem"] == "LPS"
+    return {p["label"]: np.array(p["position"]) for p in points["controlPoints"]}
+
+
+@pytest.fixture
+def follow_up(tmp_path):
+    """A scan of the shipped head after its chin came 2.5 mm forward, elsewhere in space."""
+    mesh, marks = meshio.read(SKIN), marks_of(MARKS)
+    chin = marks["pogonion_soft"]
+
+    def grown(points):
+        near = np.clip(1.5 - np.linalg.norm(points - chin, axis=-1) / 20, 0, 1)
+        return points + np.multiply.outer(near, [0, -2.5, 0])
+
+    meshio.Mesh(turned(grown(mesh.points)), [("triangle", mesh.cells_dict["triangle"])]).write(
+        tmp_path / "scan.ply")
+    (tmp_path / "scan.csv").write_text("# CoordinateSystem = LPS\n" + "".join(
+        f"{name},{x},{y},{z}\n" for name, place in marks.items()
+        for x, y, z in [turned(grown(place))]))
+    return tmp_path / "scan.ply"
+
+
+def test_the_scorecard_finds_the_chin(run, follow_up):
+    card = ["repose-compare", SKIN, follow_up, "-parts", "-landmarks", MARKS, "-actual_landmarks",
+            follow_up.with_suffix(".csv"), "-register"]
+    result = run(*card, "upper")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    found = full_rows(result.stdout)
+    chin, nose, all_of_it = found["chin"], found["nose"], found["corresponding vertices"]
+    assert chin[1] < -0.3 and chin[7] == pytest.approx(2.5, abs=0.1)  # behind where the chin came
+    assert nose[4] < 0.02 and nose[8:] == [100, 100] and chin[8] < 90
+    assert all_of_it[0] == len(meshio.read(SKIN).points)
+    assert all_of_it[7] == pytest.approx(2.5, abs=0.05)
+    apart = dict(re.findall(r"^  (\w+) +([\d.]+)", result.stdout.split("predicted - actual")[1], re.M))
+    assert float(apart["pogonion_soft"]) == pytest.approx(2.5, abs=0.05)
+    assert float(apart["nasion_soft"]) < 0.05 and len(apart) == len(marks_of(MARKS))
+    assert {"upper lip", "lower lip", "left cheek", "right cheek"} <= found.keys()
+    # By all of it the chin pulls the rest along.
+    assert full_rows(run(*card, "all").stdout)["chin"][7] < 3
 
 
 def test_beyond_the_rim_is_left_out(run, tmp_path):
@@ -111,6 +170,10 @@ CASES = {
     "no folder": (["a.ply", "a.ply", "-output", "no/such/x"], ["no/such/x"]),
     "no such regions": (["a.ply", "a.ply", "-regions", "none.nii"], ["none.nii"]),
     "no such landmarks": (["a.ply", "a.ply", "-landmarks", "none.csv"], ["none.csv"]),
+    "parts of nothing": (["a.ply", "a.ply", "-parts"], ["-landmarks"]),
+    "parts of a head without nose": (["a.ply", "a.ply", "-parts", "-landmarks", "marks.csv"],
+                                     ["marks.csv", "pronasale is missing"]),
+    "registered by nothing": (["a.ply", "a.ply", "-register", "upper"], ["-landmarks"]),
     "spacing of zero": (["a.ply", "a.ply", "-spacing", "0"], ["-spacing"]),
 }
 
@@ -120,6 +183,7 @@ def test_bad_input_is_refused(run, tmp_path, case):
     arguments, words = CASES[case]
     sphere(tmp_path / "a.ply", 30, n=6)
     (tmp_path / "text.ply").write_text("no mesh\n")
+    (tmp_path / "marks.csv").write_text("# CoordinateSystem = LPS\ntop, 0, 0, 40\n")
     before = sorted(tmp_path.iterdir())
     result = run("repose-compare", *arguments)
     assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result

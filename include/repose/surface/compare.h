@@ -55,7 +55,9 @@ struct DistanceStatistics {
   int64_t samples = 0;
   double area = 0;                                        ///< mm²
   double mean_signed = 0, mean = 0, rms = 0;              ///< mm
+  double median = 0;                                      ///< mm
   double percentile_90 = 0, percentile_95 = 0, most = 0;  ///< mm
+  double within_1 = 0, within_2 = 0;  ///< share of the area with |distance| of at most 1, 2 mm
 };
 
 /// Of no samples: zeros.
