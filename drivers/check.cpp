@@ -9,9 +9,9 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/check/check_step.h"
 #include "repose/results/merged_bones.h"
 #include "repose/results/model_file.h"
-#include "repose/solve/check_step.h"
 
 namespace {
 
@@ -50,12 +50,12 @@ base::Comparison check_file(const std::string& file) {
   const results::MergedBones bones = results::merge_bones(model.bone_surfaces);
   base::Comparison comparison(tolerance);
   comparison.begin("model");
-  solve::check_model(model, comparison);
+  check::check_model(model, comparison);
   std::vector<model::StepNumbers> steps;
   for (int64_t s = 0; s < count; ++s) {
     const results::StoredStep step = results::read_step(file, s, model);
     comparison.begin(fmt::format("step {:04}", s));
-    solve::check_step(model, motion, step.numbers, step.rows, step.displacement, comparison);
+    check::check_step(model, motion, step.numbers, step.rows, step.displacement, comparison);
     check_bones(bones, motion, step, comparison);
     steps.push_back(step.numbers);
   }

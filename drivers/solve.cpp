@@ -21,6 +21,7 @@
 #include "repose/base/deal_out.h"
 #include "repose/base/interrupt.h"
 #include "repose/base/program.h"
+#include "repose/discrete/gather.h"
 #include "repose/model/build.h"
 #include "repose/model/cut.h"
 #include "repose/model/places.h"
@@ -30,7 +31,6 @@
 #include "repose/results/result_file.h"
 #include "repose/scene/scene.h"
 #include "repose/solve/active_search.h"
-#include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/reaction.h"
 #include "repose/solve/report.h"
@@ -372,9 +372,9 @@ class Writer {
   const std::string& comparison() const { return comparison_; }
   bool makes_checkpoints() const { return interval_ > 0; }
   /// [N] and [prisms] of the last step, on rank 0. Collective.
-  std::vector<Vec3> positions() const { return solve::gather_points(comm, last_rows_.position); }
+  std::vector<Vec3> positions() const { return discrete::gather_points(comm, last_rows_.position); }
   std::vector<double> volume_ratios() const {
-    return solve::gather(comm, last_rows_.volume_ratio.data(), last_rows_.volume_ratio.size());
+    return discrete::gather(comm, last_rows_.volume_ratio.data(), last_rows_.volume_ratio.size());
   }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const {
@@ -388,7 +388,7 @@ class Writer {
   void compare(model::StepNumbers& numbers, model::StepRows& rows) {
     rows.discretisation_error.assign(rows.position.size(), 0.0);
     if (numbers.load < 1) return;
-    const std::vector<Vec3> position = solve::gather_points(comm, rows.position);
+    const std::vector<Vec3> position = discrete::gather_points(comm, rows.position);
     std::vector<Vec3> at_point(position.size());
     base::on_first_rank(comm, [&] {
       const auto found = adapt::discretisation_of(model_, position, *coarser_.compared);

@@ -12,8 +12,8 @@
 #include "repose/base/deal_out.h"
 #include "repose/base/error.h"
 #include "repose/base/scoped_option.h"
+#include "repose/discrete/gather.h"
 #include "repose/model/motion.h"
-#include "repose/solve/gather.h"
 #include "repose/surface/remesh.h"
 
 namespace repose::adapt {
@@ -75,7 +75,7 @@ class Climber {
     const solve::Summary summary =
         solve::find_repose(comm_, built.model, settings, start_for(built.model), unused,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             position = solve::gather_points(comm_, rows.position);
+                             position = discrete::gather_points(comm_, rows.position);
                            });
     if (!summary.path.complete()) {
       ladder_.refusal = fmt::format("a coarse model did not come to rest: {}", summary.last.reason);

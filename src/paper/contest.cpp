@@ -37,7 +37,7 @@ double dot(Vec x, Vec y) {
 /// Finds the rest position of a problem by a function that watches it.
 class WatchedSearch {
  public:
-  WatchedSearch(solve::Problem& problem, solve::Function& watched)
+  WatchedSearch(solve::Problem& problem, discrete::Function& watched)
       : minimiser_(watched, problem.solver(), certificate(problem, watched), nullptr) {
     if (problem.force()) force_search_.emplace(*problem.force(), minimiser_);
   }
@@ -47,7 +47,7 @@ class WatchedSearch {
   }
 
  private:
-  static solve::Certificate certificate(solve::Problem& problem, solve::Function& watched) {
+  static solve::Certificate certificate(solve::Problem& problem, discrete::Function& watched) {
     const solve::Certificate own = problem.certificate();
     if (&own.function != &problem.function()) return own;
     return {watched, own.solver};
@@ -64,7 +64,7 @@ Contest::Contest(const model::Model& model, const Functional& functional, const 
 
 Contest::Contest(const model::Model& model, const mechanics::Weights& weights, bool force,
                  const Rules& rules)
-    : part_(solve::distribute(comm, model)),
+    : part_(discrete::distribute(comm, model)),
       positions_(comm, part_),
       problem_(positions_, weights, force),
       reference_(positions_.make_vector()),
@@ -92,7 +92,7 @@ base::VecHandle Contest::displacement_to(const std::vector<Vec3>& position) cons
 double Contest::distance(Vec displacement) const {
   const base::VecHandle difference = positions_.make_vector();
   check(VecWAXPY(difference, -1, reference_, displacement));
-  return solve::largest_block(difference);
+  return discrete::largest_block(difference);
 }
 
 Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
@@ -118,7 +118,7 @@ Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec d
 }
 
 Contest::Search Contest::path_search(Vec guess, int load_steps, bool& complete) {
-  return [this, guess, load_steps, &complete](solve::Function& watched, Vec displacement) {
+  return [this, guess, load_steps, &complete](discrete::Function& watched, Vec displacement) {
     positions_.set_load(0);
     WatchedSearch search(problem_, watched);
     const auto unheard = [](const solve::Outcome&, double, double) {};
@@ -148,7 +148,7 @@ bool Contest::refine(double accuracy, Vec start) {
   positions_.set_load(1);
   if (start) check(VecCopy(start, reference_));
   bool known = false;
-  const Search settle = [&](solve::Function& watched, Vec displacement) {
+  const Search settle = [&](discrete::Function& watched, Vec displacement) {
     WatchedSearch search(problem_, watched);
     known = search.search().run(displacement, accuracy).converged;
   };
@@ -166,7 +166,7 @@ bool Contest::find_own_minimum(Vec displacement) {
   solve::Minimiser newton(problem_.function(), problem_.solver(), nullptr);
   const solve::Outcome outcome = newton.run(displacement, 0.01 * rules_.accuracy);
   check(VecAXPY(moved, -1, displacement));
-  return outcome.converged && solve::largest_block(moved) < nearby;
+  return outcome.converged && discrete::largest_block(moved) < nearby;
 }
 
 Entry Contest::race(const std::string& method, const Search& search) {
@@ -187,14 +187,14 @@ Entry Contest::race(const std::string& method, const Search& search) {
 }
 
 Entry Contest::race_polak_ribiere() {
-  return race("Polak–Ribière, Brent", [](solve::Function& function, Vec displacement) {
+  return race("Polak–Ribière, Brent", [](discrete::Function& function, Vec displacement) {
     solve::polak_ribiere(function, displacement);
   });
 }
 
 Entry Contest::race_tao(const std::string& type) {
   const base::ScopedOption chosen("-tao_type", type);
-  return race("TAO " + type, [&](solve::Function& function, Vec displacement) {
+  return race("TAO " + type, [&](discrete::Function& function, Vec displacement) {
     solve::Minimiser minimiser(function, problem_.solver(), nullptr);
     minimiser.run(displacement, 0);
   });
@@ -203,7 +203,7 @@ Entry Contest::race_tao(const std::string& type) {
 Contest::Curvature Contest::curvature() {
   constexpr int inverse_steps = 10, steps = 60;
   const base::VecHandle v = positions_.make_vector(), w = positions_.make_vector();
-  solve::TangentSolver& solver = problem_.solver();
+  linear::TangentSolver& solver = problem_.solver();
   solver.hessian().assemble(reference_);
   Curvature found{};
   check(VecSet(v, 1));

@@ -16,9 +16,9 @@ namespace {
 const MPI_Comm comm = PETSC_COMM_SELF;
 
 /// F_i of every local point at the initial positions.
-std::vector<Vec3> initial_forces(const solve::Part& part) {
-  solve::Positions positions(comm, part);
-  solve::Objective objective(positions, {});
+std::vector<Vec3> initial_forces(const discrete::Part& part) {
+  discrete::Positions positions(comm, part);
+  discrete::Objective objective(positions, {});
   positions.update(positions.make_vector());
   return objective.residual_force();
 }
@@ -54,8 +54,8 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
   model::Model strained = model;
   strain_skin(strained, turgor);
   solve::prestress(comm, model, {turgor, model.gravity});
-  const solve::Part part = solve::distribute(comm, model);
-  const std::vector<Vec3> before = initial_forces(solve::distribute(comm, strained));
+  const discrete::Part part = discrete::distribute(comm, model);
+  const std::vector<Vec3> before = initial_forces(discrete::distribute(comm, strained));
   const std::vector<Vec3> after = initial_forces(part);
   std::string text = "x,y,z,before_x,before_y,before_z,after_x,after_y,after_z,layer\n";
   for (int64_t i = 0; i < part.owned_points; ++i) {

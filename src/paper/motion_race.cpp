@@ -29,7 +29,7 @@ void scan_steps(Contest& contest, double damping, double longest, std::optional<
     if (damping * step >= 2) continue;  // the damping alone is unstable
     const Entry tried =
         contest.race(fmt::format("semi-implicit Euler, c = {:.2g}, h = {:.2g}", damping, step),
-                     [&](solve::Function& function, Vec displacement) {
+                     [&](discrete::Function& function, Vec displacement) {
                        solve::move_by_euler(function, displacement, {damping}, step, unlimited);
                      });
     keep_better(best, tried);
@@ -49,7 +49,7 @@ std::vector<Entry> race_motion(Contest& contest, double accuracy) {
     scan_steps(contest, damping, longest, euler);
     const Entry tried =
         contest.race(fmt::format("Runge–Kutta 3(2), c = {:.2g}", damping),
-                     [&](solve::Function& function, Vec displacement) {
+                     [&](discrete::Function& function, Vec displacement) {
                        solve::move_by_runge_kutta(function, displacement, {damping},
                                                   {.tolerance = accuracy, .first_step = longest});
                      });

@@ -9,7 +9,7 @@ namespace repose::paper {
 
 using base::check, base::cpu_seconds;
 
-Referee::Referee(solve::Function& inner, Vec goal, const Rules& rules)
+Referee::Referee(discrete::Function& inner, Vec goal, const Rules& rules)
     : Function(inner.positions()),
       inner_(inner),
       goal_(goal),
@@ -25,7 +25,7 @@ double Referee::value_and_gradient(Vec displacement, Vec gradient) {
   if (goal_) {
     const double look = cpu_seconds();
     check(VecWAXPY(difference_, -1, goal_, displacement));
-    closest_ = std::min(closest_, solve::largest_block(difference_));
+    closest_ = std::min(closest_, discrete::largest_block(difference_));
     looking_ += cpu_seconds() - look;
     if (closest_ <= rules_.accuracy) throw RaceOver{true};
   }

@@ -1,9 +1,9 @@
 #include "repose/paper/size.h"
 
 #include "repose/base/usage.h"
+#include "repose/discrete/tangent.h"
+#include "repose/linear/tangent_solver.h"
 #include "repose/model/build.h"
-#include "repose/solve/tangent.h"
-#include "repose/solve/tangent_solver.h"
 
 namespace repose::paper {
 
@@ -14,9 +14,9 @@ namespace {
 void measure_solver(const model::Model& model, Size& size) {
   constexpr int evaluations = 100;
   double bytes = heap_bytes(), begin = cpu_seconds();
-  const solve::Part part = solve::distribute(PETSC_COMM_SELF, model);
-  solve::Positions positions(PETSC_COMM_SELF, part);
-  solve::Objective objective(positions, {});
+  const discrete::Part part = discrete::distribute(PETSC_COMM_SELF, model);
+  discrete::Positions positions(PETSC_COMM_SELF, part);
+  discrete::Objective objective(positions, {});
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
   size.ready = cpu_seconds() - begin;
   size.descent_bytes = heap_bytes() - bytes;
@@ -24,8 +24,8 @@ void measure_solver(const model::Model& model, Size& size) {
   for (int k = 0; k < evaluations; ++k) objective.evaluate(at, gradient);
   size.evaluation = (cpu_seconds() - begin) / evaluations;
   bytes = heap_bytes();
-  solve::Tangent tangent(objective);
-  solve::TangentSolver solver(positions, tangent);
+  discrete::Tangent tangent(objective);
+  linear::TangentSolver solver(positions, tangent);
   solver.renew(at);
   size.newton_bytes = heap_bytes() - bytes;
 }

@@ -185,7 +185,7 @@ std::vector<Vec3> initial_forces(const Model& model) {
 }
 
 ActiveRegion::ActiveRegion(const Model& model, const std::vector<Vec3>& force)
-    : model_(model), graph_(column_graph(model)), distance_(graph_.columns(), infinity) {
+    : model_(model), graph_(discrete::column_graph(model)), distance_(graph_.columns(), infinity) {
   measure(set_in_motion(force));
 }
 

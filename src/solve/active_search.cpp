@@ -8,10 +8,10 @@
 #include "repose/base/deal_out.h"
 #include "repose/base/error.h"
 #include "repose/base/pick.h"
+#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/model/motion.h"
 #include "repose/solve/active_region.h"
-#include "repose/solve/gather.h"
-#include "repose/solve/natural_rows.h"
 #include "repose/solve/problem.h"
 
 namespace repose::solve {
@@ -47,13 +47,13 @@ struct Plan {
 
 /// A model shared out with the objective on it, and its points' natural rows.
 struct Shared {
-  Part part;
-  Positions positions;
-  NaturalRows natural;
+  discrete::Part part;
+  discrete::Positions positions;
+  discrete::NaturalRows natural;
   base::VecHandle displacement, gradient;
 
   Shared(MPI_Comm comm, const model::Model& model)
-      : part(distribute(comm, model)),
+      : part(discrete::distribute(comm, model)),
         positions(comm, part),
         natural(comm, part),
         displacement(positions.make_vector()),
@@ -123,7 +123,7 @@ class RegionSearch {
   double growth(double error, double allowed) const;
   double correct(Shared& band, const Submodel& part, Vec step, Vec mask);
   void go_to(const std::vector<Vec3>& position, double load);
-  double outside_force() { return largest_block(masked(whole_->gradient, outside_)); }
+  double outside_force() { return discrete::largest_block(masked(whole_->gradient, outside_)); }
 
   MPI_Comm comm_;
   const model::Model& model_;
@@ -133,14 +133,14 @@ class RegionSearch {
   Plan plan_;
   std::optional<ActiveRegion> region_;  // on rank 0
   std::optional<Shared> whole_;
-  std::optional<Objective> objective_;  // of the whole
-  double value_ = 0;                    // of the objective
-  base::VecHandle outside_;             // 1 at the whole's unknowns that are held
-  double reach_ = 0;                    // thicknesses, of the region
-  double width_ = narrowest;            // thicknesses, of the band on either side of its border
-  Submodel part_;                       // on rank 0
-  std::vector<Vec3> position_;          // [N] on rank 0, of the state reached
-  double load_ = 0;                     // of that state
+  std::optional<discrete::Objective> objective_;  // of the whole
+  double value_ = 0;                              // of the objective
+  base::VecHandle outside_;                       // 1 at the whole's unknowns that are held
+  double reach_ = 0;                              // thicknesses, of the region
+  double width_ = narrowest;    // thicknesses, of the band on either side of its border
+  Submodel part_;               // on rank 0
+  std::vector<Vec3> position_;  // [N] on rank 0, of the state reached
+  double load_ = 0;             // of that state
   std::optional<model::StepNumbers> pending_;  // of the last step, not handed on yet
   double quiet_ = 0;  // N, largest force outside in the initial state: rounding
   Border measured_;   // last, for the steps on the way
@@ -192,7 +192,7 @@ Settings RegionSearch::settings_inside() const {
 
 Start RegionSearch::restricted(const Start& start) const {
   if (!start.guess) return {};
-  const std::vector<Vec3> all = gather_points(comm_, start.position);
+  const std::vector<Vec3> all = discrete::gather_points(comm_, start.position);
   return {base::deal_out(comm_, first() ? pick(all, part_.point_row) : all), start.guess};
 }
 
@@ -238,7 +238,7 @@ void RegionSearch::go_to(const std::vector<Vec3>& position, double load) {
 
 /// A step of the search in the region, as one of the whole.
 void RegionSearch::take(model::StepNumbers numbers, const model::StepRows& rows) {
-  const std::vector<Vec3> places = gather_points(comm_, rows.position);
+  const std::vector<Vec3> places = discrete::gather_points(comm_, rows.position);
   if (first()) {
     position_ = model_.points.position;
     for (size_t k = 0; k < places.size(); ++k) position_[part_.point_row[k]] = places[k];
@@ -258,7 +258,7 @@ void RegionSearch::emit(model::StepNumbers& numbers, double border_error) {
   const double wanted = settings_.path.accuracy;
   measure(*objective_, numbers);
   numbers.objective = value_;
-  numbers.gradient_max = largest_block(whole_->gradient);
+  numbers.gradient_max = discrete::largest_block(whole_->gradient);
   numbers.displacement_error += border_error;
   if (numbers.converged && numbers.displacement_error > wanted) {
     numbers.converged = false;
@@ -317,7 +317,7 @@ Border RegionSearch::border(double width, double& passed_on) {
   check(VecPointwiseMult(band.gradient, band.gradient, band.mask(held)));
   const base::VecHandle step = band.positions.make_vector();
   const bool convex = problem.solver().solve(band.displacement, band.gradient, step, 1e-2);
-  found.error = convex ? safety * largest_block(step) : infinity;
+  found.error = convex ? safety * discrete::largest_block(step) : infinity;
   for (char& flag : unknown) flag = !flag;
   passed_on = correct(band, part, step, whole_->mask(unknown)) / sum_of_blocks(band.gradient);
   return found;
@@ -329,7 +329,7 @@ double RegionSearch::correct(Shared& band, const Submodel& part, Vec step, Vec m
   check(VecAXPY(band.displacement, -1.0, step));
   band.positions.update(band.displacement);
   const std::span<const Vec3> local = band.positions.local();
-  const std::vector<Vec3> places = gather_points(comm_, band.natural.natural(local));
+  const std::vector<Vec3> places = discrete::gather_points(comm_, band.natural.natural(local));
   std::vector<Vec3> corrected = position_;
   for (size_t k = 0; k < places.size(); ++k) corrected[part.point_row[k]] = places[k];
   base::VecHandle before;

@@ -17,7 +17,7 @@ constexpr double huge = 1e99;  // a value beyond is one that overflowed
 /// Positions and velocities, or their rates of change.
 struct State {
   base::VecHandle x, v;
-  explicit State(const Positions& positions)
+  explicit State(const discrete::Positions& positions)
       : x(positions.make_vector()), v(positions.make_vector()) {}
 };
 
@@ -32,7 +32,7 @@ void add(State& state, double weight, const State& rate) {
 }
 
 /// rate.x = v, rate.v = F − c v. Returns whether the function's value is finite.
-bool find_rate(Function& function, const State& state, Damping damping, State& rate) {
+bool find_rate(discrete::Function& function, const State& state, Damping damping, State& rate) {
   const double value = function.evaluate(state.x, rate.v);
   check(VecScale(rate.v, -1));
   check(VecAXPY(rate.v, -damping.coefficient, state.v));
@@ -43,7 +43,7 @@ bool find_rate(Function& function, const State& state, Damping damping, State& r
 /// One step of the 3(2) pair after another: rates k1 … k4, of which k4 is the next step's k1.
 class BogackiShampine {
  public:
-  BogackiShampine(Function& function, Damping damping)
+  BogackiShampine(discrete::Function& function, Damping damping)
       : function_(function),
         damping_(damping),
         trial_(function.positions()),
@@ -62,7 +62,7 @@ class BogackiShampine {
     check(VecSet(error_.x, 0));
     check(VecSet(error_.v, 0));
     for (int s = 0; s < 4; ++s) add(error_, h * difference[s], k_[s]);
-    return largest_block(error_.x) + h * largest_block(error_.v);
+    return discrete::largest_block(error_.x) + h * discrete::largest_block(error_.v);
   }
 
   void accept(State& state) {
@@ -79,7 +79,7 @@ class BogackiShampine {
     return find_rate(function_, trial_, damping_, k_[number]);
   }
 
-  Function& function_;
+  discrete::Function& function_;
   Damping damping_;
   State trial_, error_;
   State k_[4];
@@ -87,7 +87,7 @@ class BogackiShampine {
 
 }  // namespace
 
-bool move_by_euler(Function& function, Vec displacement, Damping damping, double step,
+bool move_by_euler(discrete::Function& function, Vec displacement, Damping damping, double step,
                    int64_t steps) {
   const base::VecHandle velocity = function.positions().make_vector(),
                         gradient = function.positions().make_vector();
@@ -100,7 +100,7 @@ bool move_by_euler(Function& function, Vec displacement, Damping damping, double
   return true;
 }
 
-bool move_by_runge_kutta(Function& function, Vec displacement, Damping damping,
+bool move_by_runge_kutta(discrete::Function& function, Vec displacement, Damping damping,
                          const RungeKuttaSettings& settings) {
   constexpr double safety = 0.9, least_factor = 0.2, most_factor = 5, least_step = 1e-12;
   BogackiShampine pair(function, damping);

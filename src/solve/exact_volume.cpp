@@ -8,21 +8,8 @@ namespace repose::solve {
 
 using base::check;
 
-std::vector<double> pressures(Objective& objective) {
-  const mechanics::PrismLoop& prisms = objective.prisms();
-  const auto position = objective.positions().local();
-  std::vector<double> pressure;
-  for (int64_t e = 0; e < prisms.size(); ++e) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
-    const double change = prisms.target_volume[e] - mechanics::prism_volume(corners.data());
-    pressure.push_back(objective.weights().volume_weight * change / prisms.rest_volume[e]);
-  }
-  return pressure;
-}
-
-ExactVolume::ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& solver,
-                         Minimiser& minimiser)
+ExactVolume::ExactVolume(discrete::Objective& objective, discrete::Tangent& tangent,
+                         linear::TangentSolver& solver, Minimiser& minimiser)
     : objective_(objective),
       tangent_(tangent),
       solver_(solver),
@@ -58,13 +45,13 @@ void ExactVolume::balance(Vec displacement, Outcome& outcome) {
   constexpr int most = 5;
   constexpr double close = 1e-10;  // of the right-hand side, for the linear systems
   outcome.objective = objective_.evaluate(displacement, gradient_);
-  outcome.gradient_max = largest_block(gradient_);
+  outcome.gradient_max = discrete::largest_block(gradient_);
   for (int i = 0; i < most && outcome.gradient_max > 0; ++i) {
     check(VecCopy(displacement, before_));
     if (!solver_.solve(displacement, gradient_, correction_, close)) break;
     check(VecAXPY(displacement, -1, correction_));
     const double objective = objective_.evaluate(displacement, gradient_);
-    const double largest = largest_block(gradient_);
+    const double largest = discrete::largest_block(gradient_);
     if (largest > 0.5 * outcome.gradient_max) {
       check(VecCopy(before_, displacement));
       objective_.positions().update(displacement);
@@ -92,7 +79,7 @@ Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
     objective_.positions().update(displacement);
     error = objective_.totals().volume_error_max;
     check(VecAXPY(before_, -1, displacement));
-    if (round > 0) outcome.displacement_error += largest_block(before_);
+    if (round > 0) outcome.displacement_error += discrete::largest_block(before_);
     if (outcome.stopped) outcome.converged = false;
     // Only the next round tells how far a state is from that with the volume kept.
     const bool at_rest = round > 0 && outcome.converged && outcome.displacement_error <= accuracy;
@@ -104,7 +91,7 @@ Outcome ExactVolume::search(Vec displacement, double accuracy, double allowed) {
         "the volume cannot be kept where the bones have moved: a prism's error stays at {:.3g}",
         error);
     if (weight > stiffest * first_weight_) break;
-    set_multipliers(pressures(objective_), weight);
+    set_multipliers(discrete::pressures(objective_), weight);
     before = error;
   }
   outcome.iterations = iterations;

@@ -6,7 +6,7 @@ namespace repose::solve {
 
 using base::check;
 
-ForceSearch::ForceSearch(ForceFunctional& functional, Minimiser& minimiser)
+ForceSearch::ForceSearch(discrete::ForceFunctional& functional, Minimiser& minimiser)
     : functional_(functional),
       minimiser_(minimiser),
       before_(functional.positions().make_vector()) {}
@@ -26,7 +26,7 @@ Outcome ForceSearch::run(Vec displacement, double accuracy) {
     if (outcome.stopped) outcome.converged = outcome.converged && same_minimum;
     if (outcome.stopped || (outcome.converged && same_minimum)) break;
     check(VecAXPY(before_, -1, displacement));
-    const double moved = largest_block(before_);
+    const double moved = discrete::largest_block(before_);
     if (stage > 0) outcome.displacement_error += moved;
     outcome.converged = stage > 0 && outcome.displacement_error <= accuracy;
     if (outcome.converged) break;

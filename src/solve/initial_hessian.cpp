@@ -60,7 +60,7 @@ bool StepWear::take(double force, double length) {
   return cut_ + steps_ - folds / best_rate_ > price_;
 }
 
-InitialHessian::InitialHessian(Tao tao, TangentSolver& solver)
+InitialHessian::InitialHessian(Tao tao, linear::TangentSolver& solver)
     : solver_(solver), wear_(wanted_by_options(comm_of(solver.hessian().action())).price) {
   const Mat action = solver.hessian().action();
   PetscInt rows = 0, all_rows = 0;
@@ -90,7 +90,7 @@ bool InitialHessian::worn_out(double force, double length) {
   return wear_.take(force, length);
 }
 
-bool begins_with_stiffness(const Positions& positions) {
+bool begins_with_stiffness(const discrete::Positions& positions) {
   return wanted_by_options(positions.comm(), positions.part().solid).initial == 1;
 }
 

@@ -30,7 +30,7 @@ class Stopwatch {
 
 }  // namespace
 
-LoadPath::LoadPath(Objective& objective, Predictor& predictor, RestSearch& search,
+LoadPath::LoadPath(discrete::Objective& objective, Predictor& predictor, RestSearch& search,
                    const PathSettings& settings)
     : objective_(objective),
       predictor_(predictor),
@@ -60,7 +60,7 @@ int64_t LoadPath::inverted(Vec displacement) {
 }
 
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
-  Positions& positions = objective_.positions();
+  discrete::Positions& positions = objective_.positions();
   const double before = positions.load(), step = load - before;
   const int64_t folded_before = inverted(displacement);
   const bool predicted = predictor_.predict(displacement, load, increment_);
@@ -73,10 +73,10 @@ LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   result_.iterations += attempt.outcome.iterations;
   attempt.folded = inverted(trial_) > folded_before;
   if (!predicted) return attempt;
-  attempt.expected = largest_block(increment_);
+  attempt.expected = discrete::largest_block(increment_);
   check(VecAXPY(increment_, 1.0, displacement));
   check(VecAXPY(increment_, -1.0, trial_));
-  attempt.miss = largest_block(increment_);
+  attempt.miss = discrete::largest_block(increment_);
   const bool sound = attempt.outcome.converged && !attempt.folded;
   // A jump cannot hide in a miss that short steps would have let pass.
   const double hidden = trusted_miss * attempt.expected * std::min(1.0, short_step_ / step);
@@ -92,7 +92,7 @@ double LoadPath::defect(Vec displacement, double before) {
   check(VecAXPY(back, 1.0, trial_));
   check(VecAXPY(back, -1.0, displacement));
   check(VecAXPY(back, -1.0, increment_));
-  return largest_block(back) / 2;
+  return discrete::largest_block(back) / 2;
 }
 
 bool LoadPath::follows(const Attempt& now, bool is_long, const Attempt* coarser) const {
@@ -144,7 +144,7 @@ void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
 }
 
 PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
-  Positions& positions = objective_.positions();
+  discrete::Positions& positions = objective_.positions();
   result_ = {};
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   settle(displacement, on_step);

@@ -111,7 +111,7 @@ struct Minimiser::Callbacks {
       Vec x = nullptr, g = nullptr;
       check(TaoGetSolution(tao, &x));
       check(TaoGetGradient(tao, &g, nullptr, nullptr));
-      const double force = largest_block(g);
+      const double force = discrete::largest_block(g);
       self.force_ = force;
       if (iteration == 0) self.first_force_ = force;
       const bool done = self.near_enough(x, g, force);
@@ -126,11 +126,12 @@ struct Minimiser::Callbacks {
   }
 };
 
-Minimiser::Minimiser(Function& function, TangentSolver& solver, const Watch& watch)
+Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+                     const Watch& watch)
     : Minimiser(function, solver, {function, solver}, watch) {}
 
-Minimiser::Minimiser(Function& function, TangentSolver& solver, const Certificate& certificate,
-                     const Watch& watch)
+Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+                     const Certificate& certificate, const Watch& watch)
     : function_(function),
       solver_(solver),
       certificate_(certificate),
@@ -211,7 +212,7 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
 }
 
 double Minimiser::contraction(Vec displacement) {
-  TangentSolver& solver = certificate_.solver;
+  linear::TangentSolver& solver = certificate_.solver;
   if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
   check(VecWAXPY(trial_, -1.0, solver.latest(), displacement));
   certificate_.function.evaluate(trial_, certified_gradient_);
@@ -284,7 +285,7 @@ int Minimiser::polish(Vec displacement) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
     check(VecAXPY(displacement, -1.0, certificate_.solver.latest()));
-    taken_ = largest_block(certificate_.solver.latest());
+    taken_ = discrete::largest_block(certificate_.solver.latest());
     measure(displacement, true);
     taken_ = 0;
     if (error_ > 0.5 * before) {
@@ -299,7 +300,8 @@ int Minimiser::polish(Vec displacement) {
 
 double Minimiser::measure(Vec displacement, bool last) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ = largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, last);
+  error_ =
+      discrete::largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, last);
   return objective;
 }
 
@@ -315,7 +317,7 @@ Outcome Minimiser::summary(Vec displacement) {
   const int corrections = polish(displacement);
   Outcome outcome;
   outcome.objective = function_.evaluate(displacement, gradient_);
-  outcome.gradient_max = largest_block(gradient_);
+  outcome.gradient_max = discrete::largest_block(gradient_);
   outcome.displacement_error = error_;
   outcome.stable = std::isfinite(error_);
   outcome.converged = error_ <= accuracy_;

@@ -17,7 +17,7 @@ double dot(Vec x, Vec y) {
 }
 
 /// Moves `displacement` to the minimum along `direction`.
-void minimise_along(Function& function, Vec direction, double tolerance, Vec displacement,
+void minimise_along(discrete::Function& function, Vec direction, double tolerance, Vec displacement,
                     Vec trial) {
   const LineFunction value = [&](double step) {
     check(VecWAXPY(trial, step, direction, displacement));
@@ -29,9 +29,9 @@ void minimise_along(Function& function, Vec direction, double tolerance, Vec dis
 
 }  // namespace
 
-PolakRibiereOutcome polak_ribiere(Function& function, Vec displacement,
+PolakRibiereOutcome polak_ribiere(discrete::Function& function, Vec displacement,
                                   const PolakRibiereSettings& settings) {
-  const Positions& positions = function.positions();
+  const discrete::Positions& positions = function.positions();
   const base::VecHandle gradient = positions.make_vector(), residual = positions.make_vector(),
                         direction = positions.make_vector(), trial = positions.make_vector();
   PolakRibiereOutcome outcome;

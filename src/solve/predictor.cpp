@@ -4,13 +4,13 @@ namespace repose::solve {
 
 using base::check;
 
-Predictor::Predictor(Objective& objective, TangentSolver& solver)
+Predictor::Predictor(discrete::Objective& objective, linear::TangentSolver& solver)
     : objective_(objective), solver_(solver), force_(objective.positions().make_vector()) {}
 
 bool Predictor::predict(Vec displacement, double load, Vec increment) {
-  Positions& positions = objective_.positions();
+  discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  const Part& part = positions.part();
+  const discrete::Part& part = positions.part();
   std::vector<Vec3> direction(positions.local().size(), Vec3::Zero());
   for (size_t i = 0; i < direction.size(); ++i)
     if (part.unknown[i] < 0)

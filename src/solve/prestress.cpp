@@ -7,13 +7,13 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/discrete/message.h"
+#include "repose/discrete/part.h"
+#include "repose/discrete/tangent.h"
+#include "repose/linear/tangent_solver.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/model/material.h"
-#include "repose/solve/message.h"
-#include "repose/solve/part.h"
-#include "repose/solve/tangent.h"
-#include "repose/solve/tangent_solver.h"
 
 namespace repose::solve {
 
@@ -30,7 +30,7 @@ double length(const Model& model, size_t spring) {
 }
 
 /// Which local springs are skin, whose tension is given. The names are known on rank 0.
-std::vector<char> skin_springs(MPI_Comm comm, const Model& whole, const Part& part) {
+std::vector<char> skin_springs(MPI_Comm comm, const Model& whole, const discrete::Part& part) {
   const auto name = std::find(whole.spring_sets.begin(), whole.spring_sets.end(), "layer 0");
   auto set = static_cast<int32_t>(name - whole.spring_sets.begin());
   MPI_Bcast(&set, 1, MPI_INT32_T, 0, comm);
@@ -57,7 +57,7 @@ double elongation_at(const model::Springs& springs, size_t j, double tension) {
 
 /// Linear springs at rest between the points of `part` and, of a solid, prisms at rest. At the
 /// initial position the Hessian of their energy is A K Aᵀ.
-Part stiffness_part(Part part, const std::vector<char>& skin) {
+discrete::Part stiffness_part(discrete::Part part, const std::vector<char>& skin) {
   Model& model = part.model;
   model.prisms = {};
   part.owned_prisms = part.total_prisms = 0;
@@ -71,7 +71,7 @@ Part stiffness_part(Part part, const std::vector<char>& skin) {
 
 /// What Σ q² r⁴/(Y v) + Σ p² V/K makes of a solid: springs of stiffness Y v / r² in place of its
 /// edges, prisms of modulus K that are at rest.
-Part solid_stiffness_part(Part part) {
+discrete::Part solid_stiffness_part(discrete::Part part) {
   constexpr double pairs = 15;
   Model& model = part.model;
   model::Springs& springs = model.springs;
@@ -106,7 +106,7 @@ Part solid_stiffness_part(Part part) {
 /// A K Aᵀ and its solver. One object so that they live and end together.
 class Stiffness {
  public:
-  Stiffness(MPI_Comm comm, Part part)
+  Stiffness(MPI_Comm comm, discrete::Part part)
       : part_(std::move(part)),
         positions_(comm, part_),
         objective_(positions_, part_.solid ? mechanics::solid_weights : mechanics::Weights{}),
@@ -145,18 +145,19 @@ class Stiffness {
   }
 
  private:
-  Part part_;
-  Positions positions_;
-  Objective objective_;
-  Tangent tangent_;
-  TangentSolver solver_;
+  discrete::Part part_;
+  discrete::Positions positions_;
+  discrete::Objective objective_;
+  discrete::Tangent tangent_;
+  linear::TangentSolver solver_;
   std::vector<Vec3> multiplier_;  // [local points] μ, mm
 };
 
 /// The forces on the soft-tissue points at the initial position.
-base::VecHandle initial_forces(MPI_Comm comm, const Part& part) {
-  Positions positions(comm, part);
-  Objective objective(positions, part.solid ? mechanics::solid_weights : mechanics::Weights{});
+base::VecHandle initial_forces(MPI_Comm comm, const discrete::Part& part) {
+  discrete::Positions positions(comm, part);
+  discrete::Objective objective(positions,
+                                part.solid ? mechanics::solid_weights : mechanics::Weights{});
   const base::VecHandle at_rest = positions.make_vector();
   base::VecHandle forces = positions.make_vector();
   positions.update(at_rest);
@@ -167,7 +168,7 @@ base::VecHandle initial_forces(MPI_Comm comm, const Part& part) {
 /// The largest force that the rounding of lengths alone can leave on a soft-tissue point, N: each
 /// spring's tension is known to its tangent times half a unit in the last place of its length.
 /// Collective.
-double rounding_force(MPI_Comm comm, const Part& part) {
+double rounding_force(MPI_Comm comm, const discrete::Part& part) {
   const Model& model = part.model;
   std::vector<double> force(model.points.position.size(), 0.0);
   for (size_t j = 0; j < model.springs.points.size(); ++j) {
@@ -201,7 +202,7 @@ double rounding_force(MPI_Comm comm, const Part& part) {
 }
 
 /// Refuses on all ranks where an owned spring of a rank has no positive rest length. Collective.
-void require_rest_lengths(MPI_Comm comm, const Model& whole, const Part& part,
+void require_rest_lengths(MPI_Comm comm, const Model& whole, const discrete::Part& part,
                           const std::vector<double>& tension) {
   struct {
     double row;
@@ -232,7 +233,7 @@ void set_rest_lengths(const std::vector<char>& skin, const std::vector<double>& 
 }
 
 /// Refuses on all ranks, naming the point with the largest force. Collective.
-void refuse_unbalanced(MPI_Comm comm, const Model& whole, const Part& part, Vec force,
+void refuse_unbalanced(MPI_Comm comm, const Model& whole, const discrete::Part& part, Vec force,
                        const Prestress& so_far) {
   const PetscScalar* values = nullptr;
   check(VecGetArrayRead(force, &values));
@@ -258,11 +259,11 @@ void collect(MPI_Comm comm, std::vector<int64_t> row, std::vector<double> values
              std::vector<double>& whole) {
   values.resize(row.size());
   if (base::rank(comm) > 0) {
-    Sender(comm, 0)(row, values);
+    discrete::Sender(comm, 0)(row, values);
     return;
   }
   for (int sender = 0; sender < base::size(comm); ++sender) {
-    if (sender > 0) Receiver(comm, sender)(row, values);
+    if (sender > 0) discrete::Receiver(comm, sender)(row, values);
     for (size_t j = 0; j < row.size(); ++j) whole[row[j]] = values[j];
   }
 }
@@ -294,7 +295,7 @@ double add_balance(const Stiffness& stiffness, Model& model) {
 }
 
 Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
-  Part part = distribute(comm, model);
+  discrete::Part part = discrete::distribute(comm, model);
   part.model.gravity = gravity;
   for (Vec3& force : part.model.points.external_force) force.setZero();
   Prestress result;
@@ -304,7 +305,7 @@ Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
   constexpr double rounding = 1e-10;  // of the largest force before: edges and prisms cancel
   for (int pass = 0; pass <= most_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
-    result.residual = largest_block(force);
+    result.residual = discrete::largest_block(force);
     if (pass == 0) result.largest_force = result.residual;
     if (result.residual <= balanced * result.largest_force) break;
     if (pass == most_refinements) {
@@ -327,7 +328,7 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   bool solid = model::is_solid(model);
   MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
   if (solid) return balance_solid(comm, model, as.gravity);
-  Part part = distribute(comm, model);
+  discrete::Part part = discrete::distribute(comm, model);
   const std::vector<char> skin = skin_springs(comm, model, part);
   for (size_t j = 0; j < skin.size(); ++j)
     part.model.springs.rest_length[j] = length(part.model, j) / (skin[j] ? 1 + as.turgor : 1.0);
@@ -340,7 +341,7 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   constexpr int most_refinements = 6;
   for (int pass = 0; pass <= most_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
-    result.residual = largest_block(force);
+    result.residual = discrete::largest_block(force);
     if (pass == 0) result.largest_force = result.residual;
     if (result.residual <= balanced * result.largest_force) break;
     if (pass == most_refinements) {

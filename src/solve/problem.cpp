@@ -2,7 +2,7 @@
 
 namespace repose::solve {
 
-Problem::Problem(Positions& positions, const mechanics::Weights& weights, bool force)
+Problem::Problem(discrete::Positions& positions, const mechanics::Weights& weights, bool force)
     : objective_(positions, force ? mechanics::Weights{} : weights),
       tangent_(objective_),
       elastic_solver_(positions, tangent_) {
@@ -12,12 +12,14 @@ Problem::Problem(Positions& positions, const mechanics::Weights& weights, bool f
   force_solver_.emplace(positions, *force_hessian_);
 }
 
-Function& Problem::function() {
+discrete::Function& Problem::function() {
   if (force_) return *force_;
   return objective_;
 }
 
-TangentSolver& Problem::solver() { return force_solver_ ? *force_solver_ : elastic_solver_; }
+linear::TangentSolver& Problem::solver() {
+  return force_solver_ ? *force_solver_ : elastic_solver_;
+}
 
 Certificate Problem::certificate() {
   // Without volume term rest is F = 0, of which the energy's Newton step knows more.

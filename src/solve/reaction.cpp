@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "repose/base/agreement.h"
+#include "repose/discrete/gather.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
-#include "repose/solve/gather.h"
 
 namespace repose::solve {
 namespace {
@@ -97,9 +97,10 @@ std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
   MPI_Bcast(&wanted, 1, MPI_INT64_T, 0, comm);
   if (wanted == 0) return {};
   const std::vector<double> x =
-      gather(comm, rows.position.empty() ? nullptr : rows.position.data()->data(),
-             3 * rows.position.size());
-  const std::vector<double> pressure = gather(comm, rows.pressure.data(), rows.pressure.size());
+      discrete::gather(comm, rows.position.empty() ? nullptr : rows.position.data()->data(),
+                       3 * rows.position.size());
+  const std::vector<double> pressure =
+      discrete::gather(comm, rows.pressure.data(), rows.pressure.size());
   if (base::rank(comm) != 0) return {};
   Groups groups(model.points.position.size(), held);
   const bool energy = numbers.functional == "energy";

@@ -11,10 +11,10 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/progress.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/solve/active_search.h"
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
-#include "repose/solve/natural_rows.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
 #include "repose/solve/stiffening.h"
@@ -25,7 +25,7 @@ using base::check;
 
 namespace {
 
-model::StepNumbers numbers_of(Objective& objective, const Settings& settings,
+model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& settings,
                               const Outcome& outcome, double load) {
   model::StepNumbers n;
   n.load = load;
@@ -103,7 +103,7 @@ class Watcher {
 /// and end together.
 class Searcher {
  public:
-  Searcher(Positions& positions, const Settings& settings)
+  Searcher(discrete::Positions& positions, const Settings& settings)
       : problem_(positions, settings.weights, settings.force),
         watcher_(positions.comm(), settings),
         minimiser_(problem_.function(), problem_.solver(), problem_.certificate(),
@@ -119,8 +119,8 @@ class Searcher {
     if (exact_volume_) return *exact_volume_;
     return minimiser_;
   }
-  Objective& objective() { return problem_.objective(); }
-  TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
+  discrete::Objective& objective() { return problem_.objective(); }
+  linear::TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
   Problem& problem() { return problem_; }
   Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
@@ -137,7 +137,7 @@ class Searcher {
 
 }  // namespace
 
-void measure(Objective& objective, model::StepNumbers& numbers) {
+void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
   const bool solid = objective.positions().part().solid;
@@ -157,14 +157,15 @@ void measure(Objective& objective, model::StepNumbers& numbers) {
 namespace {
 
 /// Lets the one who asks for it look at the state of each iteration.
-void show_states(Searcher& searcher, const Settings& settings, const NaturalRows& natural) {
+void show_states(Searcher& searcher, const Settings& settings,
+                 const discrete::NaturalRows& natural) {
   searcher.watcher().on_iteration([&](const Iteration& i) {
     settings.under_way(i.load, [&](const Receiver& receive) {
-      Objective& objective = searcher.objective();
+      discrete::Objective& objective = searcher.objective();
       const base::VecHandle gradient = objective.positions().make_vector();
       Outcome outcome;
       outcome.objective = searcher.problem().function().evaluate(i.displacement, gradient);
-      outcome.gradient_max = largest_block(gradient);
+      outcome.gradient_max = discrete::largest_block(gradient);
       outcome.displacement_error = std::numeric_limits<double>::infinity();
       outcome.iterations = i.number;
       outcome.reason = "the search is under way";
@@ -175,12 +176,12 @@ void show_states(Searcher& searcher, const Settings& settings, const NaturalRows
   });
 }
 
-Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings, const Start& start,
-                      base::Stages& stages, const Receiver& receive) {
+Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
+                      const Start& start, base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
-  Positions positions(comm, part);
-  const NaturalRows natural(comm, part);
+  discrete::Positions positions(comm, part);
+  const discrete::NaturalRows natural(comm, part);
   base::VecHandle displacement = positions.make_vector();
   base::VecHandle guess;
   if (start.guess) guess = positions.make_vector();
@@ -190,7 +191,7 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
 
   Searcher searcher(positions, settings);
   if (settings.under_way) show_states(searcher, settings, natural);
-  Objective& objective = searcher.objective();
+  discrete::Objective& objective = searcher.objective();
   Summary summary;
   int64_t evaluations_before = 0;
   summary.path =
@@ -201,7 +202,7 @@ Summary find_in_whole(MPI_Comm comm, const Part& part, const Settings& settings,
                      const bool start = load == 0 && settings.initial_equilibrium;
                      const bool end = load == 1 || !outcome.converged;
                      if (settings.stability && (start || end)) {
-                       TangentSolver& solver = searcher.elastic_solver();
+                       linear::TangentSolver& solver = searcher.elastic_solver();
                        Spectrum spectrum;
                        spectrum.smallest = smallest_eigenvalue(solver, displacement);
                        spectrum.largest = largest_eigenvalue(solver.hessian().exact());
@@ -228,14 +229,14 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
                     const Start& start, base::Stages& stages, const Receiver& receive) {
   if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
     return *summary;
-  return find_in_whole(comm, distribute(comm, model), settings, start, stages, receive);
+  return find_in_whole(comm, discrete::distribute(comm, model), settings, start, stages, receive);
 }
 
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive) {
   if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
     return *summary;
-  const Part part = distribute(comm, model);
+  const discrete::Part part = discrete::distribute(comm, model);
   model = {};
   return find_in_whole(comm, part, settings, start, stages, receive);
 }

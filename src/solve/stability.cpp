@@ -47,7 +47,7 @@ PetscInt eigenvalues_below(Mat matrix, double shift) {
   base::MatHandle shifted;
   check(MatDuplicate(matrix, MAT_COPY_VALUES, shifted.out()));
   check(MatShift(shifted, -shift));
-  KspHandle krylov;
+  linear::KspHandle krylov;
   check(KSPCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), krylov.out()));
   check(KSPSetOperators(krylov, shifted, shifted));
   choose_factors(krylov);
@@ -87,7 +87,7 @@ void choose_shift_and_invert(EPS eps, Mat matrix) {
   check(EPSSetFromOptions(eps));
 }
 
-void choose_preconditioned(EPS eps, TangentSolver& solver) {
+void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
   ST st = nullptr;
   KSP krylov = nullptr;
   check(EPSSetType(eps, EPSLOBPCG));
@@ -129,7 +129,7 @@ double largest_eigenvalue(Mat hessian) {
   return first_eigenvalue(eps);
 }
 
-double smallest_eigenvalue(TangentSolver& solver, Vec displacement, int64_t direct_limit) {
+double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, int64_t direct_limit) {
   constexpr double tolerance = 1e-8;  // of the eigenvalue
   constexpr int most = 2000;          // iterations
   solver.prepare(displacement);

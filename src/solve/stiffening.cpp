@@ -16,7 +16,7 @@ constexpr double growth = 10;     // of κ at once, at most
 constexpr double loosest = 0.1;   // mm, accuracy of what only leads on
 
 /// How many times stiffer than soft the volume term is, 0 where there is none.
-double stiffness(const Objective& objective) {
+double stiffness(const discrete::Objective& objective) {
   const mechanics::Weights& weights = objective.weights();
   if (weights.volume == mechanics::VolumeTerm::none || weights.elastic == 0) return 0;
   std::array<double, 3> sums{};  // Σ k0 r_0², Σ v_0, prisms
@@ -78,8 +78,8 @@ bool Stiffening::run(Vec displacement, PathSettings settings) {
 PathOutcome follow_bones(Problem& problem, RestSearch& search, bool exact_volume,
                          PathSettings settings, Vec displacement, Vec guess,
                          const LoadPath::OnStep& on_step) {
-  Objective& objective = problem.objective();
-  const Positions& positions = objective.positions();
+  discrete::Objective& objective = problem.objective();
+  const discrete::Positions& positions = objective.positions();
   Predictor predictor(objective, problem.elastic_solver());
   const bool plain = !problem.force() && !exact_volume;
   const bool automatic = settings.load_steps == 0 && settings.start_load == 0;

@@ -4,8 +4,8 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/discrete/gather.h"
 #include "repose/model/tear.h"
-#include "repose/solve/gather.h"
 
 namespace repose::solve {
 namespace {
@@ -84,7 +84,7 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
     ++result.rounds;
     result.stopped = rest.path.last.stopped;
     if (result.stopped || !rest.path.complete()) break;
-    tension = gather(comm, tension.data(), tension.size());
+    tension = discrete::gather(comm, tension.data(), tension.size());
     base::on_first_rank(comm, [&] { more = rupture.take(tension); });
     MPI_Bcast(&more, 1, MPI_C_BOOL, 0, comm);
     if (more) {

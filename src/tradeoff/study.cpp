@@ -14,8 +14,8 @@
 #include "repose/base/error.h"
 #include "repose/base/scoped_option.h"
 #include "repose/base/usage.h"
+#include "repose/discrete/gather.h"
 #include "repose/model/build.h"
-#include "repose/solve/gather.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "repose/surface/remesh.h"
@@ -180,7 +180,7 @@ class Study {
     const solve::Summary summary =
         solve::find_repose(comm, made.model, settings, {}, stages,
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             run.position = solve::gather_points(comm, rows.position);
+                             run.position = discrete::gather_points(comm, rows.position);
                            });
     Measurement& m = run.measurement;
     m.seconds = base::cpu_seconds() - begin;

@@ -32,9 +32,9 @@ using paper::Contest, paper::Entry;
 const MPI_Comm comm = MPI_COMM_SELF;
 
 /// Counts the values taken without a gradient.
-class Counter : public solve::Function {
+class Counter : public discrete::Function {
  public:
-  explicit Counter(solve::Function& inner) : Function(inner.positions()), inner_(inner) {}
+  explicit Counter(discrete::Function& inner) : Function(inner.positions()), inner_(inner) {}
   int64_t values() const { return values_; }
 
  private:
@@ -42,7 +42,7 @@ class Counter : public solve::Function {
     if (!gradient) ++values_;
     return inner_.evaluate(displacement, gradient);
   }
-  solve::Function& inner_;
+  discrete::Function& inner_;
   int64_t values_ = 0;
 };
 
@@ -50,7 +50,7 @@ class Counter : public solve::Function {
 /// liblbfgs with its own defaults (m = 6, Moré and Thuente's line search), its stopping tests off.
 class Liblbfgs {
  public:
-  explicit Liblbfgs(solve::Function& function)
+  explicit Liblbfgs(discrete::Function& function)
       : function_(function),
         at_(function.positions().make_vector()),
         gradient_(function.positions().make_vector()) {}
@@ -105,7 +105,7 @@ class Liblbfgs {
     return static_cast<Liblbfgs*>(me)->thrown_ ? 1 : 0;
   }
 
-  solve::Function& function_;
+  discrete::Function& function_;
   base::VecHandle at_, gradient_;
   std::exception_ptr thrown_;
 };
@@ -242,15 +242,16 @@ class Runner {
 
   void race_polak_ribiere() {
     Line line;
-    line.entry = contest_.race("polak_ribiere", [&](solve::Function& function, Vec displacement) {
-      Counter counter(function);
-      try {
-        solve::polak_ribiere(counter, displacement);
-      } catch (...) {
-        line.values = counter.values();
-        throw;
-      }
-    });
+    line.entry =
+        contest_.race("polak_ribiere", [&](discrete::Function& function, Vec displacement) {
+          Counter counter(function);
+          try {
+            solve::polak_ribiere(counter, displacement);
+          } catch (...) {
+            line.values = counter.values();
+            throw;
+          }
+        });
     print(line);
   }
 
@@ -261,7 +262,7 @@ class Runner {
 
   void race_liblbfgs() {
 #ifdef REPOSE_LIBLBFGS
-    print({contest_.race("liblbfgs", [](solve::Function& function, Vec displacement) {
+    print({contest_.race("liblbfgs", [](discrete::Function& function, Vec displacement) {
       Liblbfgs(function).minimise(displacement);
     })});
 #else
@@ -290,8 +291,8 @@ double seconds_of(const std::function<void()>& work) {
 /// What one evaluation, one new preconditioner, and an action of the Hessian with one application
 /// of it take.
 void measure_costs(const Task& task) {
-  const solve::Part part = solve::distribute(comm, task.model);
-  solve::Positions positions(comm, part);
+  const discrete::Part part = discrete::distribute(comm, task.model);
+  discrete::Positions positions(comm, part);
   solve::Problem problem(positions, task.weights, false);
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
   double load = 0.1;

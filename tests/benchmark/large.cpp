@@ -16,11 +16,11 @@
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
 #include "repose/base/usage.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/discrete/objective.h"
 #include "repose/model/build.h"
 #include "repose/results/model_file.h"
 #include "repose/results/result_file.h"
-#include "repose/solve/natural_rows.h"
-#include "repose/solve/objective.h"
 #include "repose/surface/phantom.h"
 
 namespace {
@@ -91,14 +91,14 @@ void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
 }
 
 PetscErrorCode evaluate(Tao, Vec x, PetscReal* value, Vec gradient, void* objective) {
-  *value = static_cast<solve::Objective*>(objective)->evaluate(x, gradient);
+  *value = static_cast<discrete::Objective*>(objective)->evaluate(x, gradient);
   return 0;
 }
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
 /// Some iterations of L-BFGS; what it holds is there as long as the handle.
-TaoHandle search(solve::Objective& objective, Vec displacement) {
+TaoHandle search(discrete::Objective& objective, Vec displacement) {
   TaoHandle tao;
   check(TaoCreate(comm, tao.out()));
   check(TaoSetType(tao, TAOLMVM));
@@ -121,13 +121,13 @@ void measure(int64_t skin_vertices, const std::string& name) {
                 static_cast<long>(counts.springs));
   results::ResultFile file(comm, name, model);
   clock.end("open");
-  const solve::Part part = solve::distribute(comm, model);
+  const discrete::Part part = discrete::distribute(comm, model);
   model = {};
-  solve::Positions positions(comm, part);
-  const solve::NaturalRows natural(comm, part);
+  discrete::Positions positions(comm, part);
+  const discrete::NaturalRows natural(comm, part);
   clock.end("distribute");
   const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty, 0.5};
-  solve::Objective objective(positions, weights);
+  discrete::Objective objective(positions, weights);
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
   positions.set_load(0.1);
   clock.end("objective");

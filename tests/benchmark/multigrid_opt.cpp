@@ -39,19 +39,19 @@ double dot(Vec x, Vec y) {
 
 /// Where a search is.
 struct State {
-  explicit State(const solve::Positions& positions)
+  explicit State(const discrete::Positions& positions)
       : x(positions.make_vector()), gradient(positions.make_vector()) {}
   VecHandle x, gradient;
   double value = 0;
 };
 
-void evaluate(solve::Function& function, State& state) {
+void evaluate(discrete::Function& function, State& state) {
   state.value = function.evaluate(state.x, state.gradient);
 }
 
 /// Takes the first of the steps 1, ½, ¼ … along `direction` that lowers the function enough
 /// (Armijo), if one does, into `state`, of which `trial` is a spare one.
-bool backtrack(solve::Function& function, Vec direction, State& state, State& trial) {
+bool backtrack(discrete::Function& function, Vec direction, State& state, State& trial) {
   constexpr double enough = 1e-4, shortest = 1e-3;
   const double slope = dot(state.gradient, direction);
   if (!(slope < 0)) return false;
@@ -68,7 +68,7 @@ bool backtrack(solve::Function& function, Vec direction, State& state, State& tr
 /// The limited-memory BFGS method, whose memory outlives its runs.
 class Lbfgs {
  public:
-  explicit Lbfgs(const solve::Positions& positions)
+  explicit Lbfgs(const discrete::Positions& positions)
       : direction_(positions.make_vector()), trial_(positions) {
     PetscInt size = 0;
     check(VecGetSize(direction_, &size));
@@ -77,15 +77,15 @@ class Lbfgs {
   }
 
   /// Goes on until about so many evaluations are spent; false: it cannot.
-  bool run(solve::Function& function, State& state, int64_t evaluations) {
+  bool run(discrete::Function& function, State& state, int64_t evaluations) {
     const int64_t last = function.evaluations() + evaluations;
     while (function.evaluations() < last) {
       check(MatLMVMUpdate(inverse_, state.x, state.gradient));
       PetscInt pairs = 0;
       check(MatLMVMGetUpdateCount(inverse_, &pairs));
       check(MatSolve(inverse_, state.gradient, direction_));
-      check(
-          VecScale(direction_, pairs > 0 ? -1 : -first_stride / solve::largest_block(direction_)));
+      check(VecScale(direction_,
+                     pairs > 0 ? -1 : -first_stride / discrete::largest_block(direction_)));
       if (!backtrack(function, direction_, state, trial_)) return false;
     }
     return true;
@@ -100,9 +100,10 @@ class Lbfgs {
 };
 
 /// A function and a constant force: Φ(y) − v · y.
-class Tilted : public solve::Function {
+class Tilted : public discrete::Function {
  public:
-  Tilted(solve::Function& inner, Vec tilt) : Function(inner.positions()), inner_(inner), v_(tilt) {}
+  Tilted(discrete::Function& inner, Vec tilt)
+      : Function(inner.positions()), inner_(inner), v_(tilt) {}
 
  private:
   double value_and_gradient(Vec y, Vec gradient) override {
@@ -110,14 +111,14 @@ class Tilted : public solve::Function {
     if (gradient) check(VecAXPY(gradient, -1, v_));
     return value;
   }
-  solve::Function& inner_;
+  discrete::Function& inner_;
   Vec v_;
 };
 
 /// Values at the unknowns in the order of the model [N], and `fixed(row)` at fixed points.
 template <class Fixed>
-std::vector<Vec3> field(const solve::Positions& positions, Vec unknowns, const Fixed& fixed) {
-  const solve::Part& part = positions.part();
+std::vector<Vec3> field(const discrete::Positions& positions, Vec unknowns, const Fixed& fixed) {
+  const discrete::Part& part = positions.part();
   std::vector<Vec3> local(part.point_row.size()), all(local.size());
   positions.spread(unknowns, local);
   for (size_t i = 0; i < local.size(); ++i)
@@ -125,19 +126,19 @@ std::vector<Vec3> field(const solve::Positions& positions, Vec unknowns, const F
   return all;
 }
 
-std::vector<Vec3> increments(const solve::Positions& positions, Vec unknowns) {
+std::vector<Vec3> increments(const discrete::Positions& positions, Vec unknowns) {
   return field(positions, unknowns, [](size_t) -> Vec3 { return Vec3::Zero(); });
 }
 
-std::vector<Vec3> displacements(const solve::Positions& positions, Vec unknowns) {
+std::vector<Vec3> displacements(const discrete::Positions& positions, Vec unknowns) {
   return field(positions, unknowns, [&](size_t i) -> Vec3 {
     return positions.prescribed(static_cast<int64_t>(i), 1) -
            positions.part().model.points.position[i];
   });
 }
 
-void take(const solve::Positions& positions, const std::vector<Vec3>& all, Vec unknowns) {
-  const solve::Part& part = positions.part();
+void take(const discrete::Positions& positions, const std::vector<Vec3>& all, Vec unknowns) {
+  const discrete::Part& part = positions.part();
   std::vector<Vec3> local(part.point_row.size());
   for (size_t i = 0; i < local.size(); ++i) local[i] = all[part.point_row[i]];
   positions.keep_owned(local, unknowns);
@@ -166,11 +167,11 @@ enum class Base {
 /// takes the coarse model is a direction for a line search; smoothing again.
 class Cycles {
  public:
-  Cycles(const solve::Positions& here, const Model& fine, const Coarse& coarse,
+  Cycles(const discrete::Positions& here, const Model& fine, const Coarse& coarse,
          const mechanics::Weights& weights, Base base)
       : here_(here),
         coarse_(coarse),
-        part_(solve::distribute(comm, coarse.model)),
+        part_(discrete::distribute(comm, coarse.model)),
         there_(comm, part_),
         problem_(there_, weights, false),
         injection_(fine, coarse.model),
@@ -182,7 +183,7 @@ class Cycles {
   }
 
   /// One cycle, with about so many evaluations before and after the correction.
-  void run(solve::Function& function, State& state, int64_t smoothing) {
+  void run(discrete::Function& function, State& state, int64_t smoothing) {
     smoother_.run(function, state, smoothing);
     correct(function, state);
     smoother_.run(function, state, smoothing);
@@ -197,7 +198,7 @@ class Cycles {
   int64_t refused() const { return refused_; }  ///< those that led nowhere down
 
  private:
-  void correct(solve::Function& function, State& state) {
+  void correct(discrete::Function& function, State& state) {
     State coarse(there_);
     const VecHandle base = there_.make_vector(), tilt = there_.make_vector(),
                     direction = here_.make_vector();
@@ -212,7 +213,7 @@ class Cycles {
     solve::Minimiser(tilted, problem_.solver(), nullptr).run(coarse.x, accuracy_);
     check(VecAXPY(coarse.x, -1, base));
     take(here_, transfer_.prolong(increments(there_, coarse.x)), direction);
-    accuracy_ = std::clamp(share * solve::largest_block(direction), 1e-6, loosest);
+    accuracy_ = std::clamp(share * discrete::largest_block(direction), 1e-6, loosest);
     ++corrections_;
     if (!backtrack(function, direction, state, trial_)) ++refused_;
   }
@@ -220,10 +221,10 @@ class Cycles {
   static constexpr double loosest = 0.05;  // mm, of a coarse minimum, and
   static constexpr double share = 0.1;     // of the last correction, to which it is known
 
-  const solve::Positions& here_;
+  const discrete::Positions& here_;
   const Coarse& coarse_;
-  solve::Part part_;
-  solve::Positions there_;
+  discrete::Part part_;
+  discrete::Positions there_;
   solve::Problem problem_;
   adapt::Transfer injection_, transfer_;
   Base base_;
@@ -314,7 +315,7 @@ class Runner {
     const VecHandle start = contest.displacement_to(start_);
     if (method == "default") return print(method, contest.race_path(start), {});
     Extra extra;
-    const Entry entry = contest.race(method, [&](solve::Function& function, Vec displacement) {
+    const Entry entry = contest.race(method, [&](discrete::Function& function, Vec displacement) {
       State state(function.positions());
       check(VecCopy(start, state.x));
       evaluate(function, state);
@@ -326,8 +327,8 @@ class Runner {
 
   /// Newton's method, after another or alone, until its own estimate is below the accuracy.
   void settle(const std::string& method) const {
-    const solve::Part part = solve::distribute(comm, fine_);
-    solve::Positions positions(comm, part);
+    const discrete::Part part = discrete::distribute(comm, fine_);
+    discrete::Positions positions(comm, part);
     positions.set_load(1);
     solve::Problem problem(positions, weights_, false);
     paper::Referee referee(problem.function(), reference_,
@@ -346,13 +347,13 @@ class Runner {
     entry.assemblies = problem.assemblies();
     entry.seconds = referee.seconds();
     check(VecAXPY(state.x, -1, reference_));
-    entry.distance = solve::largest_block(state.x);
+    entry.distance = discrete::largest_block(state.x);
     print(method, entry, extra);
   }
 
   /// Cycles, or L-BFGS in bouts of as many evaluations, until the function no longer falls or,
   /// before Newton, until one moves the tissue little.
-  void minimise(const std::string& method, solve::Function& function, State& state,
+  void minimise(const std::string& method, discrete::Function& function, State& state,
                 Extra& extra) const {
     const double little = method.ends_with("_newton") ? options_.number("switch") : 0;
     const int64_t smoothing = options_.integer("smoothing");
@@ -381,7 +382,7 @@ class Runner {
         else
           lbfgs.run(function, state, 2 * smoothing);
         check(VecAXPY(moved, -1, state.x));
-        way = solve::largest_block(moved);
+        way = discrete::largest_block(moved);
       }
     } catch (const paper::RaceOver&) {
       note();

@@ -12,9 +12,9 @@
 #include "repose/base/petsc.h"
 #include "repose/base/usage.h"
 #include "repose/base/whole_file.h"
+#include "repose/discrete/tangent.h"
+#include "repose/linear/tangent_solver.h"
 #include "repose/model/build.h"
-#include "repose/solve/tangent.h"
-#include "repose/solve/tangent_solver.h"
 #include "repose/surface/phantom.h"
 
 namespace {
@@ -59,16 +59,16 @@ scene::Scene jaw_opening() {
 /// Adds the costs of the objective and of a preconditioner for its Hessian.
 void measure_solver(const model::Model& model, Cost& cost) {
   const double before = heap_bytes();
-  const solve::Part part = solve::distribute(MPI_COMM_SELF, model);
-  solve::Positions positions(MPI_COMM_SELF, part);
+  const discrete::Part part = discrete::distribute(MPI_COMM_SELF, model);
+  discrete::Positions positions(MPI_COMM_SELF, part);
   const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty,
                                    10 * model::effective_modulus(model)};
-  solve::Objective objective(positions, weights);
+  discrete::Objective objective(positions, weights);
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
   positions.set_load(0.1);
   cost.evaluation = seconds_of([&] { objective.evaluate(at, gradient); });
-  solve::Tangent tangent(objective);
-  solve::TangentSolver solver(positions, tangent);
+  discrete::Tangent tangent(objective);
+  linear::TangentSolver solver(positions, tangent);
   solver.prepare(at);
   cost.preconditioner = seconds_of([&] { solver.renew_preconditioner(); });
   cost.action = seconds_of([&] {

@@ -14,11 +14,16 @@ ROOMS = {
     "surface": {"base"},
     "model": {"base", "scene", "surface"},
     "mechanics": {"base", "model"},
-    "solve": {"base", "model", "mechanics"},
+    "discrete": {"base", "model", "mechanics"},
+    "linear": {"base", "model", "mechanics", "discrete"},
+    "check": {"base", "model", "mechanics"},
+    "solve": {"base", "model", "mechanics", "discrete", "linear"},
     "results": {"base", "model"},
-    "adapt": {"base", "scene", "surface", "model", "mechanics", "solve"},
-    "paper": {"base", "scene", "surface", "model", "mechanics", "solve", "results"},
-    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "solve", "adapt"},
+    "adapt": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve"},
+    "paper": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
+              "results"},
+    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
+                 "adapt"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

@@ -63,7 +63,7 @@ class Contest {
   /// Any search: `search` minimises the function it is given from the displacement it is given.
   /// One that does not come to the reference is followed to an energy minimum near where it ended
   /// and, if there is one, raced again to that.
-  using Search = std::function<void(solve::Function&, Vec)>;
+  using Search = std::function<void(discrete::Function&, Vec)>;
   Entry race(const std::string& method, const Search& search);
 
   /// Smallest and largest eigenvalue of the Hessian at the reference, N/mm.
@@ -77,8 +77,8 @@ class Contest {
   Entry race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement);
   bool find_own_minimum(Vec displacement);
 
-  solve::Part part_;
-  solve::Positions positions_;
+  discrete::Part part_;
+  discrete::Positions positions_;
   solve::Problem problem_;
   base::VecHandle reference_;
   Rules rules_;

@@ -1,5 +1,5 @@
 #pragma once
-#include "repose/solve/function.h"
+#include "repose/discrete/function.h"
 
 namespace repose::paper {
 
@@ -18,10 +18,10 @@ struct RaceOver {
 
 /// A function that watches the search that minimises it: throws RaceOver at the first evaluated
 /// state within the accuracy of the goal, and at the limits. Its looks are not timed.
-class Referee : public solve::Function {
+class Referee : public discrete::Function {
  public:
   /// `goal` may be null: then the limits alone count.
-  Referee(solve::Function& inner, Vec goal, const Rules& rules);
+  Referee(discrete::Function& inner, Vec goal, const Rules& rules);
 
   double closest() const { return closest_; }  ///< mm, of all states so far
   double seconds() const;                      ///< CPU time since construction
@@ -29,7 +29,7 @@ class Referee : public solve::Function {
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;
 
-  solve::Function& inner_;
+  discrete::Function& inner_;
   Vec goal_;
   Rules rules_;
   base::VecHandle difference_;

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "repose/discrete/partition.h"
 #include "repose/model/model.h"
-#include "repose/solve/partition.h"
 
 /// The part of the tissue that feels what moves. All of this is serial and for rank 0, which alone
 /// has the model.
@@ -55,7 +55,7 @@ class ActiveRegion {
   void measure(const std::vector<char>& sources);
 
   const model::Model& model_;
-  ColumnGraph graph_;
+  discrete::ColumnGraph graph_;
   std::vector<double> distance_;  // [columns], infinite where no way leads
   int64_t moved_ = 0, uneasy_ = 0;
 };

@@ -2,7 +2,7 @@
 #include <optional>
 #include <string>
 
-#include "repose/solve/objective.h"
+#include "repose/discrete/objective.h"
 #include "repose/solve/repose.h"
 
 /// The search for a rest position in the part of the tissue that feels what moves.
@@ -35,6 +35,6 @@ std::optional<Summary> find_in_region(MPI_Comm comm, const model::Model& model,
                                       base::Stages& stages, const Receiver& receive);
 
 /// The energies, forces and volumes of a step at the objective's last update. Collective.
-void measure(Objective& objective, model::StepNumbers& numbers);
+void measure(discrete::Objective& objective, model::StepNumbers& numbers);
 
 }  // namespace repose::solve

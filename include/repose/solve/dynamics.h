@@ -1,5 +1,5 @@
 #pragma once
-#include "repose/solve/function.h"
+#include "repose/discrete/function.h"
 
 /// Integration of the equations of motion (Teschner, Girod & Girod 2000, Eqs. 2–5) with unit masses
 ///     x'' = F − c x',   F = −∇Φ,
@@ -12,7 +12,7 @@ struct Damping {
 
 /// Semi-implicit Euler, v ← v + h (F − c v), x ← x + h v, at most `steps` steps of `step`. Changes
 /// `displacement` in place. Returns whether values stayed finite. One force evaluation a step.
-bool move_by_euler(Function& function, Vec displacement, Damping damping, double step,
+bool move_by_euler(discrete::Function& function, Vec displacement, Damping damping, double step,
                    int64_t steps);
 
 struct RungeKuttaSettings {
@@ -25,7 +25,7 @@ struct RungeKuttaSettings {
 /// block of e_x + h e_v, stays below the tolerance. Three force evaluations a step. Changes
 /// `displacement` in place. Returns whether it reached the end of the duration; a step that
 /// vanishes does not.
-bool move_by_runge_kutta(Function& function, Vec displacement, Damping damping,
+bool move_by_runge_kutta(discrete::Function& function, Vec displacement, Damping damping,
                          const RungeKuttaSettings& settings);
 
 }  // namespace repose::solve

@@ -1,6 +1,6 @@
 #pragma once
+#include "repose/discrete/tangent.h"
 #include "repose/solve/minimiser.h"
-#include "repose/solve/tangent.h"
 
 namespace repose::solve {
 
@@ -18,7 +18,8 @@ class ExactVolume : public RestSearch {
 
   /// `objective` has the penalty volume term, `tangent` is its Hessian, of which `solver` solves
   /// linear systems, `minimiser` minimises it.
-  ExactVolume(Objective& objective, Tangent& tangent, TangentSolver& solver, Minimiser& minimiser);
+  ExactVolume(discrete::Objective& objective, discrete::Tangent& tangent,
+              linear::TangentSolver& solver, Minimiser& minimiser);
   Outcome run(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
 
@@ -28,18 +29,14 @@ class ExactVolume : public RestSearch {
   void set_multipliers(const std::vector<double>& pressure, double weight);
   void balance(Vec displacement, Outcome& outcome);
 
-  Objective& objective_;
-  Tangent& tangent_;
-  TangentSolver& solver_;
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+  linear::TangentSolver& solver_;
   Minimiser& minimiser_;
   double first_weight_;               // κ at first, N/mm²
   double start_weight_;               // κ before the last search
   std::vector<double> start_target_;  // t before it, [prisms of the loop] mm³
   base::VecHandle before_, gradient_, correction_;
 };
-
-/// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
-/// at the last update. Not collective.
-std::vector<double> pressures(Objective& objective);
 
 }  // namespace repose::solve

@@ -1,5 +1,5 @@
 #pragma once
-#include "repose/solve/force_functional.h"
+#include "repose/discrete/force_functional.h"
 #include "repose/solve/minimiser.h"
 
 namespace repose::solve {
@@ -8,11 +8,11 @@ namespace repose::solve {
 /// towards zero. Without volume term every ε has the same minimum, F = 0.
 class ForceSearch : public RestSearch {
  public:
-  ForceSearch(ForceFunctional& functional, Minimiser& minimiser);
+  ForceSearch(discrete::ForceFunctional& functional, Minimiser& minimiser);
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
-  ForceFunctional& functional_;
+  discrete::ForceFunctional& functional_;
   Minimiser& minimiser_;
   base::VecHandle before_;
 };

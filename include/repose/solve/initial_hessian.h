@@ -1,7 +1,7 @@
 #pragma once
 #include <petsctao.h>
 
-#include "repose/solve/tangent_solver.h"
+#include "repose/linear/tangent_solver.h"
 
 namespace repose::solve {
 
@@ -31,7 +31,7 @@ class StepWear {
 class InitialHessian {
  public:
   /// Makes `tao`, of type TAOLMVM, use it. `solver` and this must outlive the solves. Collective.
-  InitialHessian(Tao tao, TangentSolver& solver);
+  InitialHessian(Tao tao, linear::TangentSolver& solver);
   InitialHessian(const InitialHessian&) = delete;
   InitialHessian& operator=(const InitialHessian&) = delete;
 
@@ -43,7 +43,7 @@ class InitialHessian {
  private:
   static PetscErrorCode apply(Mat matrix, Vec vector, Vec product);
 
-  TangentSolver& solver_;
+  linear::TangentSolver& solver_;
   base::MatHandle inverse_;  // MATSHELL whose solution is the preconditioner's
   StepWear wear_;
   int64_t renewals_ = 0;  // of the preconditioner, when last looked at
@@ -52,6 +52,6 @@ class InitialHessian {
 /// Whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial stiffness`, the
 /// default of a solid) or with the diagonal that TAO estimates (`diagonal`, that of springs).
 /// Throws InputError. Collective.
-bool begins_with_stiffness(const Positions& positions);
+bool begins_with_stiffness(const discrete::Positions& positions);
 
 }  // namespace repose::solve

@@ -37,7 +37,7 @@ class LoadPath {
  public:
   using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
 
-  LoadPath(Objective& objective, Predictor& predictor, RestSearch& search,
+  LoadPath(discrete::Objective& objective, Predictor& predictor, RestSearch& search,
            const PathSettings& settings);
 
   /// From `displacement` (changed in place, the start of a restarted run) to load 1. `on_step` is
@@ -70,7 +70,7 @@ class LoadPath {
   void leap(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
 
-  Objective& objective_;
+  discrete::Objective& objective_;
   Predictor& predictor_;
   RestSearch& search_;
   PathSettings settings_;

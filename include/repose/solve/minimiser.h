@@ -5,9 +5,9 @@
 #include <functional>
 #include <optional>
 
+#include "repose/linear/tangent_solver.h"
 #include "repose/solve/initial_hessian.h"
 #include "repose/solve/rest_search.h"
-#include "repose/solve/tangent_solver.h"
 
 namespace repose::solve {
 
@@ -16,8 +16,8 @@ using TaoHandle = base::Handle<Tao, TaoDestroy>;
 /// What tells how far a state is from rest: the Newton step of `function`, whose linear systems
 /// `solver` solves.
 struct Certificate {
-  Function& function;
-  TangentSolver& solver;
+  discrete::Function& function;
+  linear::TangentSolver& solver;
 };
 
 /// Minimises a function with TAO until the rest position is near enough, in mm. Newton by default;
@@ -31,9 +31,9 @@ class Minimiser : public RestSearch {
   using Watch = std::function<bool(const Iteration&)>;
   /// `solver` is for Newton methods; the distance to the rest position is its Newton step too, or
   /// that of another function with the same rest position.
-  Minimiser(Function& function, TangentSolver& solver, const Watch& watch);
-  Minimiser(Function& function, TangentSolver& solver, const Certificate& certificate,
-            const Watch& watch);
+  Minimiser(discrete::Function& function, linear::TangentSolver& solver, const Watch& watch);
+  Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+            const Certificate& certificate, const Watch& watch);
 
   /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
   Outcome run(Vec displacement, double accuracy) override;
@@ -61,8 +61,8 @@ class Minimiser : public RestSearch {
   std::string reason_of(const Outcome& outcome, TaoConvergedReason reason) const;
   Outcome summary(Vec displacement);
 
-  Function& function_;
-  TangentSolver& solver_;
+  discrete::Function& function_;
+  linear::TangentSolver& solver_;
   Certificate certificate_;
   Watch watch_;
   TaoHandle tao_;

@@ -1,5 +1,5 @@
 #pragma once
-#include "repose/solve/function.h"
+#include "repose/discrete/function.h"
 
 namespace repose::solve {
 
@@ -19,7 +19,7 @@ struct PolakRibiereOutcome {
 ///     h ← g + γ h,   γ = (g − g_old) · g / (g_old · g_old),   g = −∇Φ,
 /// with γ from every line's minimum, found from values of Φ alone. Every value and every value with
 /// gradient is one evaluation. Changes `displacement` in place. Collective.
-PolakRibiereOutcome polak_ribiere(Function& function, Vec displacement,
+PolakRibiereOutcome polak_ribiere(discrete::Function& function, Vec displacement,
                                   const PolakRibiereSettings& settings = {});
 
 }  // namespace repose::solve

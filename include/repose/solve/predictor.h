@@ -1,21 +1,21 @@
 #pragma once
-#include "repose/solve/objective.h"
-#include "repose/solve/tangent_solver.h"
+#include "repose/discrete/objective.h"
+#include "repose/linear/tangent_solver.h"
 
 namespace repose::solve {
 
 /// How the unknowns move, to first order, when the fixed points go on: −H⁻¹ H_sb Δx_b.
 class Predictor {
  public:
-  Predictor(Objective& objective, TangentSolver& solver);
+  Predictor(discrete::Objective& objective, linear::TangentSolver& solver);
 
   /// The increment from `displacement` at the positions' load to `load`. Returns false where the
   /// Hessian is indefinite or the linear solver comes to no end. Collective.
   bool predict(Vec displacement, double load, Vec increment);
 
  private:
-  Objective& objective_;
-  TangentSolver& solver_;
+  discrete::Objective& objective_;
+  linear::TangentSolver& solver_;
   base::VecHandle force_;
 };
 

@@ -1,9 +1,9 @@
 #pragma once
 #include <optional>
 
-#include "repose/solve/force_functional.h"
+#include "repose/discrete/force_functional.h"
+#include "repose/discrete/tangent.h"
 #include "repose/solve/minimiser.h"
-#include "repose/solve/tangent.h"
 
 namespace repose::solve {
 
@@ -11,25 +11,30 @@ namespace repose::solve {
 /// live and end together: f_e + W with a volume term, or the force functional.
 class Problem {
  public:
-  Problem(Positions& positions, const mechanics::Weights& weights, bool force);  ///< collective
+  Problem(discrete::Positions& positions, const mechanics::Weights& weights,
+          bool force);  ///< collective
 
-  Function& function();
-  TangentSolver& solver();    ///< of function()
-  Certificate certificate();  ///< whose Newton step tells the distance from rest best
+  discrete::Function& function();
+  linear::TangentSolver& solver();  ///< of function()
+  Certificate certificate();        ///< whose Newton step tells the distance from rest best
 
-  Objective& objective() { return objective_; }  ///< f_e + W alone where forces are minimised
-  Tangent& tangent() { return tangent_; }        ///< of objective()
-  TangentSolver& elastic_solver() { return elastic_solver_; }       ///< of objective()
-  ForceFunctional* force() { return force_ ? &*force_ : nullptr; }  ///< null for an energy
+  discrete::Objective& objective() {
+    return objective_;
+  }                                                  ///< f_e + W alone where forces are minimised
+  discrete::Tangent& tangent() { return tangent_; }  ///< of objective()
+  linear::TangentSolver& elastic_solver() { return elastic_solver_; }  ///< of objective()
+  discrete::ForceFunctional* force() {
+    return force_ ? &*force_ : nullptr;
+  }  ///< null for an energy
   int64_t assemblies() const;
 
  private:
-  Objective objective_;
-  Tangent tangent_;
-  TangentSolver elastic_solver_;
-  std::optional<ForceFunctional> force_;
-  std::optional<ForceHessian> force_hessian_;
-  std::optional<TangentSolver> force_solver_;
+  discrete::Objective objective_;
+  discrete::Tangent tangent_;
+  linear::TangentSolver elastic_solver_;
+  std::optional<discrete::ForceFunctional> force_;
+  std::optional<discrete::ForceHessian> force_hessian_;
+  std::optional<linear::TangentSolver> force_solver_;
 };
 
 }  // namespace repose::solve

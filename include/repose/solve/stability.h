@@ -1,7 +1,7 @@
 #pragma once
 #include <limits>
 
-#include "repose/solve/tangent_solver.h"
+#include "repose/linear/tangent_solver.h"
 
 namespace repose::solve {
 
@@ -22,7 +22,7 @@ double largest_eigenvalue(Mat hessian);
 /// Up to `direct_limit` scalar unknowns by Krylov–Schur (Stewart 2001) with shift-and-invert at a
 /// shift that MUMPS' inertia shows to be below every eigenvalue (Sylvester); above by LOBPCG
 /// (Knyazev 2001) with the preconditioner of `solver`. `-eps_…` and `-st_…` options apply.
-double smallest_eigenvalue(TangentSolver& solver, Vec displacement,
-                           int64_t direct_limit = TangentSolver::factors_limit);
+double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement,
+                           int64_t direct_limit = linear::TangentSolver::factors_limit);
 
 }  // namespace repose::solve

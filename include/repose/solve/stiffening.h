@@ -27,8 +27,8 @@ class Stiffening {
   void set_weight(double weight);
   bool stiffen(Vec displacement, double accuracy);
 
-  Objective& objective_;
-  Tangent& tangent_;
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
   Predictor& predictor_;
   RestSearch& search_;
   std::vector<double> weight_;  // of the volume term, softest first, the objective's own last

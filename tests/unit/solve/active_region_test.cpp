@@ -9,8 +9,8 @@
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
 #include "repose/base/error.h"
+#include "repose/check/recompute.h"
 #include "repose/solve/active_search.h"
-#include "repose/solve/recompute.h"
 #include "rest.h"
 
 namespace repose {
@@ -131,7 +131,7 @@ TEST(ActiveSearch, a_step_is_one_of_the_whole_model) {
   const model::Model m = strip();
   const testing::Rest found = testing::find_rest(m, wanted(Extent::region));
   ASSERT_EQ(found.rows.position.size(), m.points.position.size());
-  const solve::RecomputedStep again = solve::recompute(m, found.summary.last, found.rows);
+  const check::RecomputedStep again = check::recompute(m, found.summary.last, found.rows);
   double held = 0;
   for (size_t i = 0; i < m.points.position.size(); ++i) {
     EXPECT_LE((again.rows.residual_force[i] - found.rows.residual_force[i]).norm(), 1e-12);

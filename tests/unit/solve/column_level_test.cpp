@@ -1,4 +1,4 @@
-#include "repose/solve/column_level.h"
+#include "repose/linear/column_level.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 namespace repose {
 namespace {
 
-using solve::Lanes;
+using linear::Lanes;
 
 std::mt19937 engine(3);
 
@@ -18,13 +18,13 @@ float random_number() { return std::uniform_real_distribution<float>(-1, 1)(engi
 /// others' at random.
 struct Level {
   static constexpr int32_t points = 15;
-  solve::ColumnLevel level;
+  linear::ColumnLevel level;
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * points, 3 * points);
 
   explicit Level(mechanics::Kernels kernels)
       : level(PETSC_COMM_SELF, place(), {}, pattern(), kernels) {
     engine.seed(3);
-    solve::UpperSums sums(level);
+    linear::UpperSums sums(level);
     for (int32_t i = 0; i < points; ++i)
       for (int64_t k = level.diagonal(i); k < level.pattern().begin[i + 1]; ++k) {
         const int32_t j = level.pattern().column[k];
@@ -40,17 +40,17 @@ struct Level {
         matrix.block<3, 3>(3 * i, 3 * level.pattern().column[k]) = level.block(k).cast<double>();
   }
 
-  static std::vector<solve::Place> place() {
-    std::vector<solve::Place> all;
+  static std::vector<linear::Place> place() {
+    std::vector<linear::Place> all;
     for (int32_t i = 0; i < points; ++i) all.push_back({i / 3, i % 3});
     return all;
   }
-  static solve::BlockPattern pattern() {
+  static linear::BlockPattern pattern() {
     const auto coupled = [](int i, int j) {
       const bool near = i / 3 == j / 3 && std::abs(i - j) < 2;
       return near || (i / 3 != j / 3 && (i * j) % 4 < 2);
     };
-    solve::BlockPattern pattern;
+    linear::BlockPattern pattern;
     for (int i = 0; i < points; ++i) {
       for (int j = 0; j < points; ++j)
         if (coupled(i, j)) pattern.column.push_back(j);
@@ -123,7 +123,7 @@ TEST(PackedBlock, IsNearToWhatIsPacked) {
     for (int k = 0; k < 100; ++k) {
       const Eigen::Matrix3f exact =
           size * Eigen::Matrix3f::NullaryExpr([] { return random_number(); });
-      const auto packed = solve::PackedBlock::of(exact);
+      const auto packed = linear::PackedBlock::of(exact);
       const float most = exact.cwiseAbs().maxCoeff() / 32768;
       EXPECT_LE((packed.unpacked() - exact).cwiseAbs().maxCoeff(), most);
       EXPECT_EQ(packed.transposed().unpacked(), packed.unpacked().transpose());
@@ -133,7 +133,7 @@ TEST(PackedBlock, IsNearToWhatIsPacked) {
 TEST(PackedBlock, IsNothingWhereTheNumbersAreNone) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   for (const float number : {0.0f, 1e-42f, infinity, std::nanf("")})
-    EXPECT_EQ(solve::PackedBlock::of(Eigen::Matrix3f::Constant(number)).unpacked(),
+    EXPECT_EQ(linear::PackedBlock::of(Eigen::Matrix3f::Constant(number)).unpacked(),
               Eigen::Matrix3f::Zero());
 }
 

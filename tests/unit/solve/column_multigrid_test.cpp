@@ -1,11 +1,11 @@
-#include "repose/solve/column_multigrid.h"
+#include "repose/linear/column_multigrid.h"
 
 #include <gtest/gtest.h>
 
 #include "moved_block.h"
 #include "repose/base/agreement.h"
-#include "repose/solve/tangent.h"
-#include "repose/solve/tangent_solver.h"
+#include "repose/discrete/tangent.h"
+#include "repose/linear/tangent_solver.h"
 
 namespace repose {
 namespace {
@@ -27,9 +27,9 @@ model::Model slab(int columns) {
 }
 
 struct Preconditioned : testing::MovedBlock {
-  solve::Objective objective;
-  solve::Tangent tangent{objective};
-  solve::BlockSource blocks = [this](const solve::BlockVisitor& visit) {
+  discrete::Objective objective;
+  discrete::Tangent tangent{objective};
+  linear::BlockSource blocks = [this](const discrete::BlockVisitor& visit) {
     tangent.visit_convex(visit);
   };
   base::VecHandle at = vector(1, 0.05);
@@ -39,12 +39,12 @@ struct Preconditioned : testing::MovedBlock {
         objective(positions, {1, mechanics::VolumeTerm::penalty, 0.4}) {
     tangent.assemble(at);
   }
-  solve::ColumnMultigrid make() const { return {MPI_COMM_WORLD, part, blocks}; }
+  linear::ColumnMultigrid make() const { return {MPI_COMM_WORLD, part, blocks}; }
   /// Conjugate gradients' iterations to 1e-8 of the right-hand side, on the convex Hessian.
   int64_t iterations() {
-    solve::TangentSolver solver(positions, tangent);
+    linear::TangentSolver solver(positions, tangent);
     base::VecHandle answer = positions.make_vector();
-    solve::KspHandle krylov;
+    linear::KspHandle krylov;
     solver.prepare(at);
     tangent.renew();
     check(KSPCreate(MPI_COMM_WORLD, krylov.out()));
@@ -70,7 +70,7 @@ double product(Vec a, Vec b) {
 
 TEST(ColumnMultigrid, IsSymmetricAndPositive) {
   Preconditioned s(slab(16));
-  solve::ColumnMultigrid multigrid = s.make();
+  linear::ColumnMultigrid multigrid = s.make();
   const base::VecHandle a = s.vector(4, 1.0), b = s.vector(5, 1.0);
   base::VecHandle of_a = s.positions.make_vector(), of_b = s.positions.make_vector();
   multigrid.apply(a, of_a);
@@ -88,7 +88,7 @@ TEST(ColumnMultigrid, IterationsGrowLittleWithTheTissue) {
 
 TEST(ColumnMultigrid, SolvesColumnsThatAreNotCoupledAtOnce) {
   Preconditioned s(slab(24));  // too many points for factors
-  const solve::Part& part = s.part;
+  const discrete::Part& part = s.part;
   Mat3 link;
   link << 1, 0.3, 0, -0.2, 1.1, 0.1, 0, 0.4, 0.9;
   const auto for_each_point = [&](auto&& visit) {  // with a point below it or not
@@ -96,13 +96,13 @@ TEST(ColumnMultigrid, SolvesColumnsThatAreNotCoupledAtOnce) {
       if (part.unknown[i] >= 0)
         visit(i, part.unknown[i + 1] >= 0 && part.model.points.layer[i] < 2);
   };
-  const solve::BlockSource columns = [&](const solve::BlockVisitor& visit) {
+  const linear::BlockSource columns = [&](const discrete::BlockVisitor& visit) {
     for_each_point([&](int32_t i, bool above) {
       visit(i, i, 4 * Mat3::Identity());
       if (above) visit(i, i + 1, link);
     });
   };
-  solve::ColumnMultigrid multigrid(MPI_COMM_WORLD, part, columns);
+  linear::ColumnMultigrid multigrid(MPI_COMM_WORLD, part, columns);
   const base::VecHandle rhs = s.vector(7, 1.0);
   base::VecHandle answer = s.positions.make_vector();
   multigrid.apply(rhs, answer);
@@ -116,21 +116,21 @@ TEST(ColumnMultigrid, SolvesColumnsThatAreNotCoupledAtOnce) {
   });
   s.positions.keep_owned(left, answer);
   check(VecAXPY(answer, -1, rhs));
-  EXPECT_LT(solve::largest_block(answer), 1e-3);
+  EXPECT_LT(discrete::largest_block(answer), 1e-3);
 }
 
 TEST(ColumnMultigrid, TakesTheNumbersAnew) {
   Preconditioned s(slab(12));
-  solve::ColumnMultigrid multigrid = s.make();
+  linear::ColumnMultigrid multigrid = s.make();
   const base::VecHandle a = s.vector(4, 1.0);
   base::VecHandle before = s.positions.make_vector(), after = s.positions.make_vector();
   multigrid.apply(a, before);
-  multigrid.refill([&](const solve::BlockVisitor& visit) {
+  multigrid.refill([&](const discrete::BlockVisitor& visit) {
     s.blocks([&](int32_t p, int32_t q, const Mat3& block) { visit(p, q, 4 * block); });
   });
   multigrid.apply(a, after);
   check(VecAXPY(after, -0.25, before));
-  EXPECT_LT(solve::largest_block(after), 1e-5 * solve::largest_block(before));
+  EXPECT_LT(discrete::largest_block(after), 1e-5 * discrete::largest_block(before));
 }
 
 TEST(ColumnMultigrid, ServesGraphsWithoutLayers) {

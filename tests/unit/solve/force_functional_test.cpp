@@ -1,4 +1,4 @@
-#include "repose/solve/force_functional.h"
+#include "repose/discrete/force_functional.h"
 
 #include <gtest/gtest.h>
 
@@ -27,9 +27,9 @@ mechanics::Weights weights_of(VolumeTerm term) {
 
 /// The force functional of a block with weight, on any number of ranks.
 struct Forces : testing::MovedBlock {
-  solve::Objective elastic{positions, {}};
-  solve::Tangent tangent{elastic};
-  solve::ForceFunctional functional;
+  discrete::Objective elastic{positions, {}};
+  discrete::Tangent tangent{elastic};
+  discrete::ForceFunctional functional;
 
   explicit Forces(VolumeTerm term)
       : MovedBlock(weighty_block()), functional(elastic, weights_of(term)) {}
@@ -141,7 +141,7 @@ class Reference {
 TEST_P(ForceTerms, HessianPassesTheTaylorTest) {
   Forces f(std::get<0>(GetParam()));
   f.functional.set_epsilon(epsilon());
-  solve::ForceHessian hessian(f.functional, f.tangent);
+  discrete::ForceHessian hessian(f.functional, f.tangent);
   for (unsigned seed : {1u, 11u, 21u}) {
     const base::VecHandle direction = f.vector(seed + 1, 1.0);
     const base::VecHandle at = f.vector(seed, 0.4), product = f.positions.make_vector();
@@ -157,7 +157,7 @@ TEST_P(ForceTerms, HessianPassesTheTaylorTest) {
       f.functional.evaluate(back, behind);
       check(VecAXPY(ahead, -1, behind));
       check(VecAXPY(ahead, -2 * h, product));
-      const double rest = solve::largest_block(ahead);
+      const double rest = discrete::largest_block(ahead);
       if (halving > 0) {
         EXPECT_NEAR(std::log2(before / rest), 3, 0.2) << "h " << h;
       }
@@ -169,23 +169,23 @@ TEST_P(ForceTerms, HessianPassesTheTaylorTest) {
 TEST_P(ForceTerms, GaussNewtonIsTheForcesPart) {
   Forces f(std::get<0>(GetParam()));
   f.functional.set_epsilon(epsilon());
-  solve::ForceHessian operator_of(f.functional, f.tangent);
+  discrete::ForceHessian operator_of(f.functional, f.tangent);
   for (unsigned seed : {1u, 11u}) {
     base::VecHandle at = f.vector(seed, 0.4), direction = f.vector(seed + 1, 1.0);
     operator_of.assemble(at);
     base::VecHandle product = f.positions.make_vector();
     check(MatMult(operator_of.convex(), direction, product));
     base::VecHandle expected = Reference(f).product(at, direction);
-    const double size = solve::largest_block(expected);
+    const double size = discrete::largest_block(expected);
     check(VecAXPY(expected, -1, product));
-    EXPECT_LT(solve::largest_block(expected), 1e-8 * size);
+    EXPECT_LT(discrete::largest_block(expected), 1e-8 * size);
   }
 }
 
 TEST_P(ForceTerms, GaussNewtonIsSymmetricAndPositive) {
   Forces f(std::get<0>(GetParam()));
   f.functional.set_epsilon(epsilon());
-  solve::ForceHessian operator_of(f.functional, f.tangent);
+  discrete::ForceHessian operator_of(f.functional, f.tangent);
   base::VecHandle at = f.vector(1, 0.4);
   operator_of.assemble(at);
   base::VecHandle from_a = f.positions.make_vector(), from_b = f.positions.make_vector();
@@ -204,12 +204,12 @@ TEST_P(ForceTerms, ValueAndGradientDoNotDependOnTheRanks) {
   base::VecHandle at = f.vector(1, 0.4), gradient = f.positions.make_vector();
   const double value = f.functional.evaluate(at, gradient);
   const double norm = std::sqrt(dot(gradient, gradient));
-  const solve::Part serial = solve::distribute(MPI_COMM_SELF, f.whole);
+  const discrete::Part serial = discrete::distribute(MPI_COMM_SELF, f.whole);
   double expected[2] = {0, 0};
   if (base::rank(MPI_COMM_WORLD) == 0) {
-    solve::Positions positions(MPI_COMM_SELF, serial);
-    solve::Objective elastic(positions, {});
-    solve::ForceFunctional functional(elastic, f.functional.weights());
+    discrete::Positions positions(MPI_COMM_SELF, serial);
+    discrete::Objective elastic(positions, {});
+    discrete::ForceFunctional functional(elastic, f.functional.weights());
     functional.set_epsilon(epsilon());
     base::VecHandle same = testing::random_vector(positions, 1, 0.4);
     base::VecHandle slope = positions.make_vector();

@@ -18,9 +18,9 @@ using base::check;
 using Curve = std::array<double, 3> (*)(double x);
 
 /// The same function of every scalar unknown, summed up.
-class Sum : public solve::Function {
+class Sum : public discrete::Function {
  public:
-  Sum(solve::Positions& positions, Curve curve) : Function(positions), curve_(curve) {}
+  Sum(discrete::Positions& positions, Curve curve) : Function(positions), curve_(curve) {}
   /// What `order` of a curve's is at each unknown; returns the sum of it.
   double map(Vec displacement, int order, Vec into) const {
     const PetscScalar* x = nullptr;
@@ -47,7 +47,7 @@ class Sum : public solve::Function {
   Curve curve_;
 };
 
-class Curvatures : public solve::Hessian {
+class Curvatures : public discrete::Hessian {
  public:
   explicit Curvatures(const Sum& sum)
       : sum_(sum), at_(sum.positions().make_vector()), diagonal_(sum.positions().make_vector()) {
@@ -80,7 +80,7 @@ class Curvatures : public solve::Hessian {
 struct Search : testing::MovedBlock {
   Sum sum;
   Curvatures curvatures{sum};
-  solve::TangentSolver solver{positions, curvatures};
+  linear::TangentSolver solver{positions, curvatures};
   base::VecHandle x = positions.make_vector();
   solve::Outcome outcome;
 
@@ -99,7 +99,7 @@ TEST(Estimate, KnowsHowFarRestIsInAWellFlatAtItsBottom) {
       },
       1, 2);
   EXPECT_TRUE(s.outcome.converged);
-  EXPECT_NEAR(s.outcome.displacement_error, solve::largest_block(s.x), 1e-6);
+  EXPECT_NEAR(s.outcome.displacement_error, discrete::largest_block(s.x), 1e-6);
 }
 
 TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
@@ -114,7 +114,7 @@ TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
       },
       20.195, 20);
   EXPECT_TRUE(s.outcome.converged);
-  EXPECT_GE(s.outcome.displacement_error + std::sqrt(3) * height, solve::largest_block(s.x));
+  EXPECT_GE(s.outcome.displacement_error + std::sqrt(3) * height, discrete::largest_block(s.x));
 }
 
 }  // namespace

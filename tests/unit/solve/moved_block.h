@@ -3,13 +3,13 @@
 #include <utility>
 
 #include "models.h"
-#include "repose/solve/objective.h"
+#include "repose/discrete/objective.h"
 
 namespace repose::testing {
 
 /// Displacements (or directions) of the unknowns, random in [−size, size] but the same for every
 /// distribution: each depends on the row of the point in the model.
-inline base::VecHandle random_vector(const solve::Positions& positions, unsigned seed,
+inline base::VecHandle random_vector(const discrete::Positions& positions, unsigned seed,
                                      double size) {
   base::VecHandle v = positions.make_vector();
   const std::vector<int64_t>& row = positions.part().point_row;
@@ -32,8 +32,8 @@ inline model::Model held_block() {
 /// A model shared out over the ranks, by default a held block, whose unknowns can be moved.
 struct MovedBlock {
   model::Model whole;
-  solve::Part part = solve::distribute(MPI_COMM_WORLD, whole);
-  solve::Positions positions{MPI_COMM_WORLD, part};
+  discrete::Part part = discrete::distribute(MPI_COMM_WORLD, whole);
+  discrete::Positions positions{MPI_COMM_WORLD, part};
 
   explicit MovedBlock(model::Model model = held_block()) : whole(std::move(model)) {}
   base::VecHandle vector(unsigned seed, double size) const {

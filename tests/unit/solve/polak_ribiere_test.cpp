@@ -3,16 +3,16 @@
 #include <gtest/gtest.h>
 
 #include "quadratic.h"
+#include "repose/discrete/tangent.h"
 #include "repose/solve/minimiser.h"
-#include "repose/solve/tangent.h"
 
 namespace repose::solve {
 namespace {
 
 /// With exact line minima a quadratic of four curvatures is minimised in four iterations.
 TEST(PolakRibiere, MinimisesAQuadraticInItsNumberOfCurvatures) {
-  const Part part = distribute(MPI_COMM_WORLD, testing::resting_block());
-  Positions positions(MPI_COMM_WORLD, part);
+  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
+  discrete::Positions positions(MPI_COMM_WORLD, part);
   testing::Quadratic function(positions, 4);
   const base::VecHandle x = positions.make_vector();
   PolakRibiereSettings settings;
@@ -21,12 +21,12 @@ TEST(PolakRibiere, MinimisesAQuadraticInItsNumberOfCurvatures) {
   const PolakRibiereOutcome outcome = polak_ribiere(function, x, settings);
   EXPECT_LT(outcome.value, 1e-12);
   base::check(VecShift(x, -1));
-  EXPECT_LT(largest_block(x), 1e-6);
+  EXPECT_LT(discrete::largest_block(x), 1e-6);
 }
 
 TEST(PolakRibiere, EndsAtOnceAtAMinimum) {
-  const Part part = distribute(MPI_COMM_WORLD, testing::resting_block());
-  Positions positions(MPI_COMM_WORLD, part);
+  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
+  discrete::Positions positions(MPI_COMM_WORLD, part);
   testing::Quadratic function(positions, 4);
   const base::VecHandle x = positions.make_vector();
   base::check(VecSet(x, 1));
@@ -38,18 +38,18 @@ TEST(PolakRibiere, EndsAtOnceAtAMinimum) {
 TEST(PolakRibiere, FindsTheRestPositionOfTissue) {
   model::Model m = testing::resting_block();
   testing::aim(m, [](const Vec3& x) -> Vec3 { return x + Vec3(1, 0.5, -0.2 * x.x()); });
-  const Part part = distribute(MPI_COMM_WORLD, m);
-  Positions positions(MPI_COMM_WORLD, part);
+  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, m);
+  discrete::Positions positions(MPI_COMM_WORLD, part);
   positions.set_load(1);
-  Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 0.3});
-  Tangent tangent(objective);
-  TangentSolver solver(positions, tangent);
+  discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 0.3});
+  discrete::Tangent tangent(objective);
+  linear::TangentSolver solver(positions, tangent);
   Minimiser newton(objective, solver, nullptr);
   const base::VecHandle x = positions.make_vector(), rest = positions.make_vector();
   ASSERT_TRUE(newton.run(rest, 1e-9).converged);
   polak_ribiere(objective, x);
   base::check(VecAXPY(x, -1, rest));
-  EXPECT_LT(largest_block(x), 1e-4);
+  EXPECT_LT(discrete::largest_block(x), 1e-4);
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 #pragma once
 #include "models.h"
-#include "repose/solve/function.h"
+#include "repose/discrete/function.h"
 
 namespace repose::testing {
 
 /// ½ Σ a_i (x_i − 1)² over the scalar unknowns, a_i = 1, 2, …, `kinds` in turn.
-class Quadratic : public solve::Function {
+class Quadratic : public discrete::Function {
  public:
-  Quadratic(solve::Positions& positions, int kinds) : Function(positions), kinds_(kinds) {}
+  Quadratic(discrete::Positions& positions, int kinds) : Function(positions), kinds_(kinds) {}
   double stiffness(PetscInt i) const { return static_cast<double>(1 + i % kinds_); }
 
  private:

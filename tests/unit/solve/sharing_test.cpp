@@ -4,8 +4,8 @@
 
 #include "../../layered_patch.h"
 #include "repose/base/deal_out.h"
-#include "repose/solve/natural_rows.h"
-#include "repose/solve/partition.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/discrete/partition.h"
 #include "rest.h"
 
 namespace repose {
@@ -32,7 +32,7 @@ TEST(Sharing, ColumnsAreNeighboursWhereAnElementJoinsThem) {
   };
   for (const auto& points : m.springs.points) join(points);
   for (const auto& points : m.prisms.points) join(points);
-  const solve::ColumnGraph graph = solve::column_graph(m);
+  const discrete::ColumnGraph graph = discrete::column_graph(m);
   std::vector<std::array<int64_t, 2>> found;
   for (int64_t c = 0; c < graph.columns(); ++c)
     for (int64_t k = graph.row_begin[c]; k < graph.row_begin[c + 1]; ++k)
@@ -45,12 +45,12 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   const model::Model m = patch();
   std::vector<Vec3> moved = m.points.position;
   for (size_t i = 0; i < moved.size(); ++i) moved[i].z() += 1e-3 * static_cast<double>(i);
-  const solve::Part part = solve::distribute(MPI_COMM_WORLD, m);
-  solve::Positions positions(MPI_COMM_WORLD, part);
-  solve::Objective objective(positions, {});
+  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, m);
+  discrete::Positions positions(MPI_COMM_WORLD, part);
+  discrete::Objective objective(positions, {});
   const base::VecHandle displacement = positions.make_vector();
   for (const int64_t at_once : {7, 1000000}) {
-    const solve::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
+    const discrete::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
     natural.take(base::deal_out(MPI_COMM_WORLD, moved), positions, displacement);
     positions.update(displacement);
     const model::StepRows rows = natural.rows(objective);

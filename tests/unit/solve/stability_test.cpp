@@ -4,7 +4,7 @@
 
 #include "moved_block.h"
 #include "repose/base/agreement.h"
-#include "repose/solve/tangent.h"
+#include "repose/discrete/tangent.h"
 
 namespace repose {
 namespace {
@@ -16,14 +16,14 @@ constexpr int64_t always_direct = 1000000, never_direct = 0;
 
 /// The Hessian of a model's energy on the ranks of `comm`.
 struct Energy {
-  solve::Part part;
-  solve::Positions positions;
-  solve::Objective objective;
-  solve::Tangent tangent;
-  solve::TangentSolver solver;
+  discrete::Part part;
+  discrete::Positions positions;
+  discrete::Objective objective;
+  discrete::Tangent tangent;
+  linear::TangentSolver solver;
 
   Energy(MPI_Comm comm, const model::Model& model, const mechanics::Weights& weights = {})
-      : part(solve::distribute(comm, model)),
+      : part(discrete::distribute(comm, model)),
         positions(comm, part),
         objective(positions, weights),
         tangent(objective),

@@ -65,7 +65,7 @@ TEST(Stiffening, LeadsNearTheRestPositionAndLeavesEverythingElseAsItWas) {
   base::check(VecCopy(guess, rest));
   ASSERT_TRUE(sheared.minimiser.run(rest, 1e-6).converged);
   base::check(VecAXPY(guess, -1, rest));
-  EXPECT_LT(solve::largest_block(guess), 0.2 * solve::largest_block(rest));
+  EXPECT_LT(discrete::largest_block(guess), 0.2 * discrete::largest_block(rest));
 }
 
 TEST(Stiffening, LeadsWhereTheBonesLeadInManySteps) {

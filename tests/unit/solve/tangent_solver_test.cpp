@@ -1,12 +1,12 @@
-#include "repose/solve/tangent_solver.h"
+#include "repose/linear/tangent_solver.h"
 
 #include <gtest/gtest.h>
 
 #include "moved_block.h"
 #include "repose/base/agreement.h"
 #include "repose/base/scoped_option.h"
+#include "repose/discrete/tangent.h"
 #include "repose/solve/predictor.h"
-#include "repose/solve/tangent.h"
 
 namespace repose {
 namespace {
@@ -28,9 +28,9 @@ model::Model slab_on_moving_bone() {
 }
 
 struct Solved : testing::MovedBlock {
-  solve::Objective objective;
-  solve::Tangent tangent{objective};
-  solve::TangentSolver solver{positions, tangent};
+  discrete::Objective objective;
+  discrete::Tangent tangent{objective};
+  linear::TangentSolver solver{positions, tangent};
   base::VecHandle rhs = vector(5, 1.0), answer = positions.make_vector();
 
   explicit Solved(mechanics::VolumeTerm term = mechanics::VolumeTerm::penalty,
@@ -54,7 +54,7 @@ struct Solved : testing::MovedBlock {
     base::VecHandle left = positions.make_vector();
     check(MatMult(tangent.exact(), answer, left));
     check(VecAXPY(left, -1, rhs));
-    return solve::largest_block(left) / solve::largest_block(rhs);
+    return discrete::largest_block(left) / discrete::largest_block(rhs);
   }
 };
 
@@ -111,7 +111,7 @@ TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
   const auto by_factors_after = [](double bulk_modulus) {
     Solved s;
     s.objective.set_volume_weight(bulk_modulus);
-    solve::TangentSolver solver(s.positions, s.tangent);
+    linear::TangentSolver solver(s.positions, s.tangent);
     const base::VecHandle start = s.positions.make_vector(), next = s.vector(1, 1e-12);
     solver.solve(start, s.rhs, s.answer, 1e-6);
     EXPECT_FALSE(solver.by_factors());
@@ -127,7 +127,7 @@ TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
   const base::ScopedOption few("-ksp_max_it", "200");
   Solved s;
   s.objective.set_volume_weight(1e3);
-  solve::TangentSolver solver(s.positions, s.tangent);
+  linear::TangentSolver solver(s.positions, s.tangent);
   solver.solve(s.positions.make_vector(), s.rhs, s.answer, 1e-6);
   EXPECT_FALSE(solver.finished());
   solver.solve(s.vector(1, 1e-12), s.rhs, s.answer, 1e-6);

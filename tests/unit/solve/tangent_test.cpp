@@ -1,4 +1,4 @@
-#include "repose/solve/tangent.h"
+#include "repose/discrete/tangent.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 using base::check;
 
 struct Moved : testing::MovedBlock {
-  solve::Objective objective;
+  discrete::Objective objective;
   explicit Moved(mechanics::VolumeTerm term) : objective(positions, {0.7, term, 0.4}) {}
 };
 
@@ -20,7 +20,7 @@ class Terms : public ::testing::TestWithParam<mechanics::VolumeTerm> {};
 TEST_P(Terms, TheMatrixActsAsTheHessian) {
   Moved m(GetParam());
   base::VecHandle at = m.vector(1, 0.4), direction = m.vector(2, 1.0);
-  solve::Tangent tangent(m.objective);
+  discrete::Tangent tangent(m.objective);
   tangent.assemble(at);
   base::VecHandle product = m.positions.make_vector(), action = m.positions.make_vector();
   check(MatMult(tangent.exact(), direction, product));
@@ -28,13 +28,13 @@ TEST_P(Terms, TheMatrixActsAsTheHessian) {
   m.positions.spread(direction, local);
   m.objective.hessian_action(local, action);
   check(VecAXPY(action, -1, product));
-  EXPECT_LT(solve::largest_block(action), 1e-12 * solve::largest_block(product));
+  EXPECT_LT(discrete::largest_block(action), 1e-12 * discrete::largest_block(product));
 }
 
 TEST_P(Terms, WhatALineSearchAddsIsTakenBack) {
   Moved m(GetParam());
   base::VecHandle at = m.vector(1, 0.4), direction = m.vector(2, 1.0);
-  solve::Tangent tangent(m.objective);
+  discrete::Tangent tangent(m.objective);
   tangent.assemble(at);
   base::VecHandle before = m.positions.make_vector(), after = m.positions.make_vector();
   check(MatMult(tangent.action(), direction, before));
@@ -42,13 +42,13 @@ TEST_P(Terms, WhatALineSearchAddsIsTakenBack) {
   tangent.assemble(at);
   check(MatMult(tangent.action(), direction, after));
   check(VecAXPY(after, -1, before));
-  EXPECT_LT(solve::largest_block(after), 1e-12 * solve::largest_block(before));
+  EXPECT_LT(discrete::largest_block(after), 1e-12 * discrete::largest_block(before));
 }
 
 TEST_P(Terms, TheGradientChangesByTheMatrix) {
   Moved m(GetParam());
   base::VecHandle at = m.vector(1, 0.4), direction = m.vector(2, 1.0);
-  solve::Tangent tangent(m.objective);
+  discrete::Tangent tangent(m.objective);
   tangent.assemble(at);
   base::VecHandle product = m.positions.make_vector(), forward = m.positions.make_vector(),
                   backward = m.positions.make_vector();
@@ -60,7 +60,7 @@ TEST_P(Terms, TheGradientChangesByTheMatrix) {
   m.objective.evaluate(at, backward);
   check(VecAXPY(forward, -1, backward));
   check(VecAXPY(forward, -2 * h, product));
-  EXPECT_LT(solve::largest_block(forward) / (2 * h), 1e-7 * solve::largest_block(product));
+  EXPECT_LT(discrete::largest_block(forward) / (2 * h), 1e-7 * discrete::largest_block(product));
 }
 
 TEST_P(Terms, ValueAndGradientDoNotDependOnTheRanks) {
@@ -69,11 +69,11 @@ TEST_P(Terms, ValueAndGradientDoNotDependOnTheRanks) {
   const double value = m.objective.evaluate(at, gradient);
   PetscReal norm = 0;
   check(VecNorm(gradient, NORM_2, &norm));
-  solve::Part serial_part = solve::distribute(MPI_COMM_SELF, m.whole);
+  discrete::Part serial_part = discrete::distribute(MPI_COMM_SELF, m.whole);
   double expected[2] = {0, 0};
   if (base::rank(MPI_COMM_WORLD) == 0) {
-    solve::Positions positions(MPI_COMM_SELF, serial_part);
-    solve::Objective objective(positions, m.objective.weights());
+    discrete::Positions positions(MPI_COMM_SELF, serial_part);
+    discrete::Objective objective(positions, m.objective.weights());
     base::VecHandle same = testing::random_vector(positions, 1, 0.4);
     base::VecHandle slope = positions.make_vector();
     expected[0] = objective.evaluate(same, slope);

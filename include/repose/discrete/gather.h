@@ -1,0 +1,15 @@
+#pragma once
+#include <mpi.h>
+
+#include <vector>
+
+#include "repose/base/geometry.h"
+
+namespace repose::discrete {
+
+/// All ranks' values one after the other, on rank 0; empty on the others. Collective.
+std::vector<double> gather(MPI_Comm comm, const double* values, size_t count);
+/// The same of points.
+std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab);
+
+}  // namespace repose::discrete

@@ -1,0 +1,47 @@
+#pragma once
+#include "repose/base/petsc.h"
+#include "repose/discrete/objective.h"
+#include "repose/model/step.h"
+
+namespace repose::discrete {
+
+/// Brings what each rank knows of its points, springs and prisms into the rows of the result file:
+/// slabs (base::slab) in natural order, whatever the distribution; and back. All members
+/// collective.
+class NaturalRows {
+ public:
+  /// Carries so many rows at once: a scatter takes several times the memory of what it carries.
+  NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
+
+  /// The arrays of a step at the objective's last update.
+  model::StepRows rows(Objective& objective, bool with_pressure = false) const;
+
+  /// This rank's slab of values [at least owned points] at the points, in natural order.
+  std::vector<Vec3> natural(std::span<const Vec3> values) const;
+  /// [owned points] the values of this rank's points, of which `slab` has this rank's natural rows.
+  std::vector<Vec3> owned(const std::vector<Vec3>& slab) const;
+  /// Sets the unknowns to the displacements that take the initial positions to those of `slab`, mm.
+  void take(const std::vector<Vec3>& slab, const Positions& positions, Vec displacement) const;
+
+ private:
+  struct Rows {
+    std::span<const int64_t> row;  // natural rows of what this rank owns
+    int64_t total;
+    int block;  // numbers a row
+  };
+  /// Copies from the owned values to this rank's slab, or the other way.
+  void carry(const Rows& rows, const double* owned, const double* natural, ScatterMode mode) const;
+  void carry_at_once(const Rows& rows, const double* owned, const double* natural,
+                     ScatterMode mode) const;
+  std::vector<double> bring(const Rows& rows, const std::vector<double>& owned) const;
+  void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
+  void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
+  void add_prisms(Objective& objective, bool with_pressure, model::StepRows& rows) const;
+
+  MPI_Comm comm_;
+  const Part& part_;
+  int64_t at_once_;
+  Rows points_, springs_, prisms_;
+};
+
+}  // namespace repose::discrete

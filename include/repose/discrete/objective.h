@@ -1,0 +1,45 @@
+#pragma once
+#include "repose/discrete/function.h"
+#include "repose/mechanics/energy.h"
+
+namespace repose::discrete {
+
+/// The function that is minimised (MODEL.md Eqs. 11, 12) over the displacements of the unknowns:
+/// value, gradient and Hessian action, with gravity and external forces as a potential
+/// W = −Σ_{soft} (m g + f^ext) · (x − X). All members are collective unless said otherwise.
+class Objective : public Function {
+ public:
+  Objective(Positions& positions, const mechanics::Weights& weights);
+
+  /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
+  void hessian_action(std::span<const Vec3> direction, Vec product);
+
+  /// F_i of Eq. 6, of springs without volume term, of a solid whole; [owned points], zero outside
+  /// soft tissue (N).
+  std::vector<Vec3> residual_force();
+  /// Summed over ranks, at the last update; the solid's energy is 0 initially.
+  mechanics::Totals totals() const;
+  double potential() const;  ///< W, N·mm
+
+  const mechanics::Weights& weights() const { return weights_; }
+  void set_volume_weight(double weight) { weights_.volume_weight = weight; }
+  const mechanics::Loops& loops() const { return loops_; }
+  mechanics::PrismLoop& prisms() { return loops_.prisms; }
+
+ private:
+  double value_and_gradient(Vec displacement, Vec gradient) override;
+  void subtract_loads(double scale, std::span<Vec3> gradient) const;
+
+  mechanics::Weights weights_;
+  mechanics::Loops loops_;
+  bool loaded_ = false;           // some rank has a weight or an external force
+  std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
+  double initial_energy_;         // N·mm, this rank's share of a solid's
+  std::vector<Vec3> work_;        // [local points]
+};
+
+/// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
+/// at the last update. Not collective.
+std::vector<double> pressures(Objective& objective);
+
+}  // namespace repose::discrete

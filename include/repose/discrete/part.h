@@ -1,0 +1,34 @@
+#pragma once
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "repose/model/model.h"
+
+/// Distribution of a model over ranks: columns are the unit, nothing is ever added across ranks.
+namespace repose::discrete {
+
+/// What one rank works on. `model` is a model in local numbers: the points of its own columns come
+/// first, column after column, then ghosts; springs, edges and prisms whose first point it owns
+/// come first (they count in energies and are written here), then those that merely touch a
+/// soft-tissue point it owns. Bones that do not move rigidly appear as held points.
+struct Part {
+  model::Model model;
+  bool solid = false;  ///< the whole model is one, whatever is here
+  int64_t owned_points = 0, owned_springs = 0, owned_prisms = 0, owned_edges = 0;
+  std::vector<int64_t> point_row;   ///< [local points] row in the whole model
+  std::vector<int64_t> spring_row;  ///< [owned_springs]
+  std::vector<int64_t> prism_row;   ///< [owned_prisms]
+  std::vector<int64_t> edge_row;    ///< [owned_edges]
+  std::vector<int64_t> unknown;     ///< [local points] block number of its unknowns, −1 if fixed
+  int64_t first_unknown = 0;        ///< block number of this rank's first unknown point
+  int64_t owned_unknowns = 0;       ///< unknown points owned here
+  int64_t total_points = 0, total_springs = 0, total_prisms = 0, total_unknowns = 0;
+};
+
+/// Shares `model` (looked at on rank 0 only) out over the ranks by a graph partition of its columns
+/// (PT-Scotch through MatPartitioning). Collective.
+Part distribute(MPI_Comm comm, const model::Model& model);
+
+}  // namespace repose::discrete

@@ -1,0 +1,57 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "repose/base/petsc.h"
+#include "repose/discrete/part.h"
+#include "repose/model/motion.h"
+
+namespace repose::discrete {
+
+/// Where the points of a part are: the unknown displacements of soft-tissue points (a Vec of blocks
+/// of 3, mm), and the prescribed motion of all others at a load.
+class Positions {
+ public:
+  Positions(MPI_Comm comm, const Part& part);  ///< collective
+
+  /// Moves bone and held points to where they are at `load`. Not collective.
+  void set_load(double load);
+  double load() const { return load_; }
+  /// Where fixed point `local_row` is at a load.
+  Vec3 prescribed(int64_t local_row, double load) const;
+
+  /// Longest way of any fixed point from load 0 to 1, mm. Collective.
+  double largest_travel() const;
+
+  /// Takes in the displacement of the unknowns, ghosts included (one forward scatter). Collective.
+  void update(Vec displacement);
+  /// [local points] mm, as of the last update and load.
+  std::span<const Vec3> local() const { return local_; }
+
+  /// A zero vector of unknowns: blocks of 3, this rank's soft-tissue points in local order.
+  base::VecHandle make_vector() const;
+  /// The rows of `values` [local points] that are unknowns of this rank, into `out`.
+  void keep_owned(std::span<const Vec3> values, Vec out) const;
+  /// Ghosted copy: `out` [local points] = `in` at soft-tissue points, untouched elsewhere.
+  /// Collective.
+  void spread(Vec in, std::span<Vec3> out) const;
+
+  const Part& part() const { return part_; }
+  MPI_Comm comm() const { return comm_; }
+
+ private:
+  MPI_Comm comm_;
+  const Part& part_;
+  model::PrescribedMotion motion_;
+  std::vector<int32_t> soft_;   // local rows of soft-tissue points, ghosts included
+  std::vector<int32_t> fixed_;  // local rows of the others
+  base::VecHandle ghosted_;     // [3 soft_]
+  base::ScatterHandle scatter_;
+  std::vector<Vec3> local_;
+  double load_ = 0;
+};
+
+/// Largest Euclidean norm of the 3-vectors of `v`. Collective.
+double largest_block(Vec v);
+
+}  // namespace repose::discrete

@@ -1,0 +1,46 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "repose/discrete/tangent_entries.h"
+
+namespace repose::discrete {
+
+/// The Hessian of an objective: the exact one acts spring by spring and prism by prism, without
+/// entries (MATSHELL); the convex one, from which a positive definite preconditioner is made, is
+/// given block by block. Matrices of either are made only where they are asked for.
+class Tangent : public Hessian {
+ public:
+  explicit Tangent(Objective& objective);  ///< collective
+
+  /// Nothing is done if `displacement` is the state it is at, and nothing has changed since.
+  void assemble(Vec displacement) override;
+  /// The next assembly is done in any case: the elements have changed.
+  void forget() { at_.clear(); }
+
+  base::MatHandle make_third();  ///< a matrix for third(); collective
+  /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
+  /// update, into `matrix` of make_third(). Collective.
+  void third(std::span<const Vec3> direction, Mat matrix);
+
+  Mat exact() override;
+  Mat convex() override;
+  void renew() override;
+  Mat action() override { return action_; }
+  void visit_convex(const BlockVisitor& visit) const override;
+
+ private:
+  static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
+  void make_action();
+  const TangentEntries& entries();
+  void lift_diagonal();
+
+  Objective& objective_;
+  std::unique_ptr<TangentEntries> entries_;
+  base::MatHandle exact_, convex_, action_;
+  std::vector<Vec3> at_;                // [local points] positions of the last assembly
+  std::vector<Vec3> direction_, work_;  // [local points]
+  int64_t filled_at_ = -1;              // assemblies() when exact_ was filled
+};
+
+}  // namespace repose::discrete

@@ -1,0 +1,133 @@
+#pragma once
+#include <petscsf.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "repose/base/geometry.h"
+#include "repose/base/petsc.h"
+#include "repose/linear/packed_block.h"
+#include "repose/mechanics/runs.h"
+
+/// Matrices of layered tissue for preconditioners (column_multigrid.h).
+namespace repose::linear {
+
+struct SweptLevel;
+struct Sweeps;
+class UpperSums;
+
+/// The numbers of a point, and one of padding.
+using Lanes = float __attribute__((vector_size(16)));
+
+/// `count` floats, or as many bytes of anything, as one thing to send.
+class FloatsType {
+ public:
+  explicit FloatsType(int count);
+  ~FloatsType() { MPI_Type_free(&type_); }
+  FloatsType(const FloatsType&) = delete;
+  FloatsType& operator=(const FloatsType&) = delete;
+  operator MPI_Datatype() const { return type_; }
+
+ private:
+  MPI_Datatype type_;
+};
+
+/// Where a point is in layered tissue.
+struct Place {
+  int32_t column;  ///< any number: successive points with the same one are a column's
+  int32_t layer;
+};
+
+/// Which blocks of a matrix are not zero, in compressed rows.
+struct BlockPattern {
+  std::vector<int64_t> begin{0};  ///< [rows + 1]
+  std::vector<int32_t> column;    ///< ascending in each row
+  int32_t rows() const { return static_cast<int32_t>(begin.size() - 1); }
+};
+
+/// A symmetric positive semidefinite matrix of 3×3 blocks, this rank's rows of it, and
+/// Gauss–Seidel on it column by column: the points of a column, each coupled to those above and
+/// below it, are solved for at once. Rows and columns of blocks have local numbers: this rank's
+/// points, column by column from the top, then ghosts. Vectors are [own points + ghosts].
+class ColumnLevel {
+ public:
+  /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
+  /// pattern couples points of a column to their neighbours in it only. Collective.
+  ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
+              BlockPattern pattern, mechanics::Kernels kernels = mechanics::best_kernels());
+
+  int32_t own() const { return static_cast<int32_t>(place_.size()); }
+  int32_t ghosts() const { return static_cast<int32_t>(ghost_.size()); }
+  int64_t first() const { return first_; }  ///< global number of this rank's first point
+  int64_t total() const { return total_; }  ///< points of all ranks
+  int64_t global(int32_t number) const {    ///< of an own point or a ghost
+    return number < own() ? first_ + number : ghost_[number - own()];
+  }
+  const std::vector<Place>& place() const { return place_; }
+  const BlockPattern& pattern() const { return pattern_; }
+  /// First points of this rank's columns, and own().
+  const std::vector<int32_t>& columns() const { return chain_; }
+
+  /// The block at this place of the pattern.
+  Eigen::Matrix3f block(int64_t place) const { return block_[place].unpacked(); }
+  /// The place of the diagonal block of an own row, which those right of it follow.
+  int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
+  /// Takes all blocks anew; those left of the diagonal are mirror images. Not collective.
+  void fill(const UpperSums& sums);
+  /// Factors the columns' own blocks, after the entries have changed. Not collective.
+  void factor();
+
+  /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0. D: the columns' blocks, and what keeps
+  /// sweeps convergent although ranks sweep at once: half of the norms of the blocks of ghosts on
+  /// the diagonal (Baker, Falgout, Kolev & Yang 2011). Own points.
+  void forward(std::span<const Lanes> b, std::span<Lanes> x) const;
+  /// r = b − A x for the x of forward(), whose ghosts are up to date.
+  void residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const;
+  /// A sweep up the numbers on A x = b, ghosts fixed.
+  void backward(std::span<const Lanes> b, std::span<Lanes> x) const;
+  /// Brings the ghosts of x up to date. Collective.
+  void update_ghosts(std::span<Lanes> x) const { share(x.data(), x.data() + own(), lanes_); }
+  /// Sends each own entry to the ranks where it is a ghost; entries of type `unit`. Collective.
+  void share(const void* own_entries, void* ghost_entries, MPI_Datatype unit) const;
+
+ private:
+  using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
+  void damp();
+  SweptLevel swept() const;
+  void find_columns();
+  void connect(MPI_Comm comm);
+
+  const Sweeps* sweeps_;
+  std::vector<Place> place_;
+  std::vector<int64_t> ghost_;
+  int64_t first_ = 0, total_ = 0;
+  BlockPattern pattern_;
+  std::vector<int32_t> chain_;          // [columns + 1] first points
+  std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
+  std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
+  std::vector<PackedBlock> block_;      // [blocks + 1]
+  std::vector<float> damping_;          // [own] added to the columns' blocks
+  std::vector<float> inverse_;          // [9 own + 1] of what elimination down columns leaves
+  StarForest forest_;
+  FloatsType lanes_{4};
+};
+
+/// Sums of a level's blocks on the diagonal and right of it, from which it is filled.
+class UpperSums {
+ public:
+  explicit UpperSums(const ColumnLevel& level);
+  /// To the block of an own row and a column not left of it, which is in the pattern.
+  void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
+  /// Of a row's blocks, from the diagonal on.
+  std::span<const Eigen::Matrix3f> row(int32_t i) const {
+    return std::span(sum_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
+  }
+
+ private:
+  const ColumnLevel& level_;
+  std::vector<int64_t> begin_;  // [own + 1] in blocks
+  std::vector<Eigen::Matrix3f> sum_;
+};
+
+}  // namespace repose::linear

@@ -1,0 +1,47 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "repose/discrete/function.h"
+#include "repose/linear/column_coarsening.h"
+
+namespace repose::linear {
+
+/// Gives a visitor all blocks of a symmetric matrix that touch this rank's points.
+using BlockSource = std::function<void(const discrete::BlockVisitor&)>;
+
+/// Preconditioner for layered tissue: multigrid by semicoarsening along the skin
+/// (column_coarsening.h), one sweep of Gauss–Seidel by columns down and one up on each level
+/// (column_level.h; local to a rank), factors of the coarsest. In single precision, blocks
+/// packed (packed_block.h), and without units: the matrix is scaled to a largest diagonal of about
+/// 1. Where the model is a graph without layers, each point is its own column.
+class ColumnMultigrid {
+ public:
+  /// For the unknown points of `part`. Collective.
+  ColumnMultigrid(MPI_Comm comm, const discrete::Part& part, const BlockSource& blocks);
+  ~ColumnMultigrid();
+
+  /// Takes the numbers of the matrix anew; no block may be where there was none. Collective.
+  void refill(const BlockSource& blocks);
+  /// z ≈ A⁻¹ r, a symmetric positive definite map; both of 3 unknowns a point. Collective.
+  void apply(Vec r, Vec z);
+
+ private:
+  struct Level;
+  class Coarsest;
+  void make_fine(const discrete::Part& part, const BlockSource& blocks);
+  void fill_fine(const BlockSource& blocks);
+  void factor();
+  void cycle(size_t level);
+
+  MPI_Comm comm_;
+  std::vector<int32_t> number_;  // [local points] among unknown points, own first; −1 if fixed
+  double scale_ = 1;             // what is kept is A / scale
+  std::unique_ptr<ColumnLevel> fine_;
+  std::vector<std::unique_ptr<Coarsening>> coarsening_;
+  std::vector<Level> levels_;  // finest first
+  std::unique_ptr<Coarsest> coarsest_;
+};
+
+}  // namespace repose::linear

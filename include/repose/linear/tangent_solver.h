@@ -1,0 +1,113 @@
+#pragma once
+#include <petscksp.h>
+
+#include <limits>
+#include <memory>
+
+#include "repose/linear/column_multigrid.h"
+#include "repose/linear/tangent_wear.h"
+
+namespace repose::linear {
+
+using KspHandle = base::Handle<KSP, KSPDestroy>;
+using PcHandle = base::Handle<PC, PCDestroy>;
+
+/// Linear solves with a Hessian: conjugate gradients on the exact action, preconditioned from the
+/// convex relative, by default by multigrid on columns (`-pc_type columns`, column_multigrid.h);
+/// that which is hopelessly slow gives way to MUMPS' Cholesky factors, which also serve where
+/// multigrid does not work, up to `factors_limit` unknowns. A preconditioner made at one state
+/// serves the next ones until it is worn out (tangent_wear.h). `-ksp_…` and `-pc_…` options apply,
+/// and `-pc_renewal_price`: the iterations that a preconditioner may cost before it is renewed. All
+/// members collective.
+class TangentSolver {
+ public:
+  static constexpr int64_t factors_limit = 600000;  ///< scalar unknowns
+
+  TangentSolver(discrete::Positions& positions, discrete::Hessian& hessian);
+
+  /// Takes the Hessian to `displacement`, and renews the preconditioner there if it is worn out.
+  void prepare(Vec displacement);
+
+  /// Takes the Hessian to `displacement` and makes the preconditioner there, unless it was made
+  /// there.
+  void renew(Vec displacement);
+
+  /// Makes `other` use the preconditioner, whose wear its solves add to.
+  void lend_preconditioner(KSP other);
+
+  /// Solves H δ = rhs at `displacement` (prepared there), to a relative natural residual. Returns
+  /// whether the Hessian showed no negative curvature on the way; where it did, or iterations ran
+  /// out, δ is the iterate reached.
+  bool solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance);
+  bool finished() const { return finished_; }  ///< the latest solve, to what was asked of it
+
+  /// The Newton step −H⁻¹ ∇Φ at `displacement`, its largest block in mm: how far the rest position
+  /// is in a quadratic model. Infinite where H is not positive definite along the solve.
+  double newton_distance(Vec displacement, Vec gradient);
+
+  /// newton_distance that holds wherever stiffnesses lie far apart: conjugate gradients bound the
+  /// error e of the step in the energy norm, in which soft points hardly count; no point is off by
+  /// more than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it,
+  /// or below `slack`, mm. Infinite where that is out of reach, or a random load meets negative
+  /// curvature.
+  double sure_distance(Vec displacement, Vec gradient, double slack);
+  double unsure() const { return unsure_; }  ///< mm, of the latest, where it is not little of it
+
+  /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
+  /// yet.
+  double glance(Vec gradient);
+
+  /// How much shorter than the latest newton_distance, at `displacement`, the Newton step from its
+  /// end `trial` is, where the gradient is given: by the largest block or by the energy norm
+  /// √(∇Φᵀ H⁻¹ ∇Φ), whichever falls less. Infinite where the model that the step is of misleads: H
+  /// is not positive definite at its end, or the slope along it is not even halved there.
+  double contraction(Vec displacement, Vec trial, Vec gradient);
+
+  /// H⁻¹ ∇Φ of the last newton_distance.
+  Vec latest() const { return work_; }
+
+  discrete::Hessian& hessian() { return hessian_; }
+  PC preconditioner();
+  /// What is to be given as the matrix that the preconditioner is made from.
+  Mat preconditioner_matrix();
+  /// Makes the preconditioner anew, at the state of the Hessian's last assembly.
+  void renew_preconditioner();
+  bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
+  /// Multigrid gives way to factors at the next renewal: tissue will be nearly incompressible.
+  void give_way();
+  int64_t renewals() const { return renewals_; }  ///< of the preconditioner
+
+ private:
+  static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
+  static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
+  void choose_preconditioner();
+  bool hopeless() const;
+  double largest_compliance(Vec displacement);
+  /// Takes the residual of the latest Newton step down by a factor; whether it could be.
+  bool improve(Vec displacement, Vec gradient, double factor);
+  void renew_columns();
+
+  double unsure_ = 0;
+  static constexpr double usual_ = 0.05;  // to which Newton steps are solved for
+
+  discrete::Positions& positions_;
+  discrete::Hessian& hessian_;
+  int64_t unknowns_;  // scalar, of all ranks
+  std::unique_ptr<ColumnMultigrid> columns_;
+  PcHandle factors_;  // in the place of columns_
+  bool given_way_ = false;
+  KspHandle krylov_;
+  base::VecHandle next_;             // the Newton step at a trial
+  base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
+  double distance_ = 0;              // its length, …
+  int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
+  int64_t sure_at_ = -1;             // and at this many it is sure
+  double compliance_ = 0;            // mm/N, of the softest point, …
+  int64_t compliance_at_ = -1;       // … at this many renewals of the preconditioner
+  bool finished_ = false;
+  Wear wear_;
+  int64_t renewals_ = 0;
+  int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal
+};
+
+}  // namespace repose::linear

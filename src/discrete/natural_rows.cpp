@@ -1,0 +1,171 @@
+#include "repose/discrete/natural_rows.h"
+
+#include <algorithm>
+
+#include "repose/base/agreement.h"
+#include "repose/mechanics/prism_volume.h"
+#include "repose/mechanics/spring_law.h"
+#include "repose/mechanics/stress.h"
+
+namespace repose::discrete {
+
+using base::check;
+
+namespace {
+
+double tension(const model::Springs& springs, int64_t e, double elongation) {
+  return mechanics::with_exponent(springs.exponent[e], [&]<int p>() {
+    return mechanics::spring_tension<p>(elongation, springs.stiffness[e],
+                                        1.0 / springs.reference[e]);
+  });
+}
+
+/// [owned prisms] N/mm²; none where nothing is free to move.
+std::vector<double> owned_pressures(Objective& objective) {
+  std::vector<double> owned(objective.positions().part().owned_prisms, 0.0);
+  const std::vector<double> pressure = pressures(objective);
+  for (int64_t e = 0; e < objective.prisms().counted; ++e)
+    owned[objective.prisms().row[e]] = pressure[e];
+  return owned;
+}
+
+const double* numbers(std::span<const Vec3> points) {
+  return points.empty() ? nullptr : points.data()->data();
+}
+
+}  // namespace
+
+void NaturalRows::carry_at_once(const Rows& rows, const double* owned_values,
+                                const double* natural_values, ScatterMode mode) const {
+  const auto count = static_cast<PetscInt>(rows.row.size());
+  const auto slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
+  const auto mine = static_cast<PetscInt>(slab.rows());
+  base::VecHandle owned, natural;
+  check(VecCreateMPIWithArray(comm_, 1, rows.block * count, PETSC_DETERMINE, owned_values,
+                              owned.out()));
+  check(VecCreateMPIWithArray(comm_, 1, rows.block * mine, PETSC_DETERMINE, natural_values,
+                              natural.out()));
+  PetscInt first = 0;
+  check(VecGetOwnershipRange(owned, &first, nullptr));
+  const std::vector<PetscInt> targets(rows.row.begin(), rows.row.end());
+  base::IndexSetHandle from, to;
+  check(ISCreateStride(comm_, rows.block * count, first, 1, from.out()));
+  check(ISCreateBlock(comm_, rows.block, count, targets.data(), PETSC_COPY_VALUES, to.out()));
+  base::ScatterHandle scatter;
+  check(VecScatterCreate(owned, from, natural, to, scatter.out()));
+  const bool forward = mode == SCATTER_FORWARD;
+  const Vec source = forward ? owned : natural, target = forward ? natural : owned;
+  check(VecScatterBegin(scatter, source, target, INSERT_VALUES, mode));
+  check(VecScatterEnd(scatter, source, target, INSERT_VALUES, mode));
+}
+
+void NaturalRows::carry(const Rows& rows, const double* owned, const double* natural,
+                        ScatterMode mode) const {
+  const auto size = static_cast<int64_t>(rows.row.size());
+  int64_t longest = 0;
+  MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
+  for (int64_t begin = 0; begin < longest; begin += at_once_) {
+    const int64_t first = std::min(begin, size), count = std::min(at_once_, size - first);
+    carry_at_once({rows.row.subspan(first, count), rows.total, rows.block},
+                  owned + first * rows.block, natural, mode);
+  }
+}
+
+NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
+    : comm_(comm),
+      part_(part),
+      at_once_(at_once),
+      points_{std::span(part.point_row).first(part.owned_points), part.total_points, 3},
+      springs_{part.spring_row, part.total_springs, 1},
+      prisms_{part.prism_row, part.total_prisms, 1} {}
+
+std::vector<double> NaturalRows::bring(const Rows& rows, const std::vector<double>& owned) const {
+  const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
+  std::vector<double> natural(slab.rows());
+  carry(rows, owned.data(), natural.data(), SCATTER_FORWARD);
+  return natural;
+}
+
+void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& rows) const {
+  const model::Springs& springs = part_.model.springs;
+  std::vector<double> values(part_.owned_springs);
+  for (int64_t e = 0; e < part_.owned_springs; ++e) {
+    const auto& [p, q] = springs.points[e];
+    values[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
+  }
+  rows.elongation = bring(springs_, values);
+  for (int64_t e = 0; e < part_.owned_springs; ++e) values[e] = tension(springs, e, values[e]);
+  rows.tension = bring(springs_, values);
+}
+
+void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
+                             model::StepRows& rows) const {
+  const auto position = objective.positions().local();
+  const model::Prisms& prisms = part_.model.prisms;
+  std::vector<double> ratio(part_.owned_prisms);
+  for (int64_t e = 0; e < part_.owned_prisms; ++e) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
+    ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
+  }
+  rows.volume_ratio = bring(prisms_, ratio);
+  if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective));
+}
+
+void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
+  const model::Prisms& prisms = part_.model.prisms;
+  std::vector<double> pressure(part_.owned_prisms), von_mises(part_.owned_prisms);
+  std::vector<Vec3> stretch(part_.owned_prisms);
+  for (int64_t e = 0; e < part_.owned_prisms; ++e) {
+    std::array<Vec3, 6> before, now;
+    for (int c = 0; c < 6; ++c) {
+      before[c] = part_.model.points.position[prisms.points[e][c]];
+      now[c] = position[prisms.points[e][c]];
+    }
+    const mechanics::PrismState state =
+        mechanics::prism_state({prisms.shear_modulus[e], prisms.modulus[e], prisms.rest_volume[e],
+                                prisms.target_volume[e]},
+                               before, now);
+    pressure[e] = state.pressure;
+    von_mises[e] = state.von_mises;
+    stretch[e] = state.stretch;
+  }
+  rows.pressure = bring(prisms_, pressure);
+  rows.von_mises = bring(prisms_, von_mises);
+  const base::Slab slab = base::slab(prisms_.total, base::rank(comm_), base::size(comm_));
+  rows.stretch.resize(slab.rows());
+  carry({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch), SCATTER_FORWARD);
+}
+
+model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
+  const auto position = objective.positions().local();
+  model::StepRows rows;
+  rows.position = natural(position);
+  rows.residual_force = natural(objective.residual_force());
+  add_prisms(objective, with_pressure, rows);
+  add_springs(position, rows);
+  if (part_.solid) add_stress(position, rows);
+  return rows;
+}
+
+std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
+  const base::Slab slab = base::slab(points_.total, base::rank(comm_), base::size(comm_));
+  std::vector<Vec3> rows(slab.rows());
+  carry(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
+  return rows;
+}
+
+std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
+  std::vector<Vec3> rows(part_.owned_points);
+  carry(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
+  return rows;
+}
+
+void NaturalRows::take(const std::vector<Vec3>& slab, const Positions& positions,
+                       Vec displacement) const {
+  std::vector<Vec3> rows = owned(slab);
+  for (size_t i = 0; i < rows.size(); ++i) rows[i] -= part_.model.points.position[i];
+  positions.keep_owned(rows, displacement);
+}
+
+}  // namespace repose::discrete

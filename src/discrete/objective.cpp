@@ -1,0 +1,139 @@
+#include "repose/discrete/objective.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "repose/mechanics/prism_volume.h"
+
+namespace repose::discrete {
+
+namespace {
+
+constexpr double huge = 1e100;  // stands for an energy that overflows
+
+double sum(MPI_Comm comm, double mine) {
+  double all = 0;
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, comm);
+  return all;
+}
+
+/// Weight and external force of each local point; empty if there is none on any rank.
+std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& loaded) {
+  std::vector<Vec3> force(model.points.position.size(), Vec3::Zero());
+  int any = 0;
+  for (size_t i = 0; i < force.size(); ++i) {
+    if (model.points.set[i] != model::PointSet::soft_tissue) continue;
+    force[i] = model.points.mass[i] * model.gravity + model.points.external_force[i];
+    if (!force[i].isZero(0)) any = 1;
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm);
+  if (!any) force.clear();
+  loaded = any;
+  return force;
+}
+
+/// Replaces what is not finite by nothing and cuts blocks to a length that can still be squared.
+void make_finite(std::span<Vec3> gradient) {
+  constexpr double longest = 1e100;
+  for (Vec3& g : gradient) {
+    if (!g.allFinite()) g.setZero();
+    const double length = g.lpNorm<Eigen::Infinity>();
+    if (length > longest) g *= longest / length;
+  }
+}
+
+}  // namespace
+
+Objective::Objective(Positions& positions, const mechanics::Weights& weights)
+    : Function(positions),
+      weights_(weights),
+      loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
+                                   positions.part().owned_prisms, positions.part().owned_edges)),
+      load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
+      initial_energy_(
+          mechanics::totals(loops_, positions.part().model.points.position).solid_energy),
+      work_(positions.local().size()) {}
+
+void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
+  for (size_t i = 0; i < load_force_.size(); ++i) gradient[i] -= scale * load_force_[i];
+}
+
+double Objective::potential() const {
+  const Part& part = positions_.part();
+  double w = 0;
+  if (loaded_)
+    for (int64_t i = 0; i < part.owned_points; ++i)
+      w -= load_force_[i].dot(positions_.local()[i] - part.model.points.position[i]);
+  return sum(positions_.comm(), w);
+}
+
+double Objective::value_and_gradient(Vec displacement, Vec gradient) {
+  positions_.update(displacement);
+  std::fill(work_.begin(), work_.end(), Vec3::Zero());
+  double value = 0;
+  for (const mechanics::SpringLoop& loop : loops_.springs)
+    value += weights_.elastic *
+             mechanics::add_spring_gradient(loop, positions_.local(), weights_.elastic, work_);
+  value += weights_.elastic * mechanics::add_edge_gradient(loops_.edges, positions_.local(),
+                                                           weights_.elastic, work_) -
+           initial_energy_;
+  value += mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
+  subtract_loads(weights_.elastic, work_);
+  value = sum(positions_.comm(), value);
+  if (loaded_) value += weights_.elastic * potential();
+  if (!std::isfinite(value) || value > huge) {
+    value = huge;
+    make_finite(work_);
+  }
+  if (gradient) positions_.keep_owned(work_, gradient);
+  return value;
+}
+
+void Objective::hessian_action(std::span<const Vec3> direction, Vec product) {
+  std::fill(work_.begin(), work_.end(), Vec3::Zero());
+  mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
+  positions_.keep_owned(work_, product);
+}
+
+std::vector<Vec3> Objective::residual_force() {
+  const Part& part = positions_.part();
+  std::fill(work_.begin(), work_.end(), Vec3::Zero());
+  for (const mechanics::SpringLoop& loop : loops_.springs)
+    mechanics::add_spring_gradient(loop, positions_.local(), 1.0, work_);
+  if (loops_.solid()) {
+    mechanics::add_edge_gradient(loops_.edges, positions_.local(), 1.0, work_);
+    mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
+  }
+  subtract_loads(1.0, work_);
+  std::vector<Vec3> force(part.owned_points, Vec3::Zero());
+  for (int64_t i = 0; i < part.owned_points; ++i)
+    if (part.unknown[i] >= 0) force[i] = -work_[i];
+  return force;
+}
+
+mechanics::Totals Objective::totals() const {
+  mechanics::Totals t = mechanics::totals(loops_, positions_.local());
+  MPI_Comm comm = positions_.comm();
+  t.spring_energy = sum(comm, t.spring_energy);
+  t.solid_energy = sum(comm, t.solid_energy - initial_energy_);
+  t.volume_squares = sum(comm, t.volume_squares);
+  t.penalty_unit = sum(comm, t.penalty_unit);
+  MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);
+  MPI_Allreduce(MPI_IN_PLACE, &t.inverted, 1, MPI_INT64_T, MPI_SUM, comm);
+  return t;
+}
+
+std::vector<double> pressures(Objective& objective) {
+  const mechanics::PrismLoop& prisms = objective.prisms();
+  const auto position = objective.positions().local();
+  std::vector<double> pressure;
+  for (int64_t e = 0; e < prisms.size(); ++e) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
+    const double change = prisms.target_volume[e] - mechanics::prism_volume(corners.data());
+    pressure.push_back(objective.weights().volume_weight * change / prisms.rest_volume[e]);
+  }
+  return pressure;
+}
+
+}  // namespace repose::discrete

@@ -1,0 +1,93 @@
+#include "repose/discrete/positions.h"
+
+#include <algorithm>
+
+namespace repose::discrete {
+
+using base::check;
+
+Positions::Positions(MPI_Comm comm, const Part& part)
+    : comm_(comm), part_(part), motion_(part.model), local_(part.model.points.position) {
+  std::vector<PetscInt> blocks;
+  for (size_t i = 0; i < part.unknown.size(); ++i) {
+    if (part.unknown[i] >= 0) {
+      soft_.push_back(static_cast<int32_t>(i));
+      blocks.push_back(static_cast<PetscInt>(part.unknown[i]));
+    } else {
+      fixed_.push_back(static_cast<int32_t>(i));
+    }
+  }
+  const auto count = static_cast<PetscInt>(blocks.size());
+  check(VecCreateSeq(PETSC_COMM_SELF, 3 * count, ghosted_.out()));
+  check(VecSetBlockSize(ghosted_, 3));
+  base::IndexSetHandle from, to;
+  check(ISCreateBlock(comm, 3, count, blocks.data(), PETSC_COPY_VALUES, from.out()));
+  check(ISCreateStride(PETSC_COMM_SELF, 3 * count, 0, 1, to.out()));
+  check(VecScatterCreate(make_vector(), from, ghosted_, to, scatter_.out()));
+}
+
+base::VecHandle Positions::make_vector() const {
+  base::VecHandle v;
+  check(VecCreate(comm_, v.out()));
+  check(VecSetBlockSize(v, 3));
+  check(VecSetSizes(v, static_cast<PetscInt>(3 * part_.owned_unknowns),
+                    static_cast<PetscInt>(3 * part_.total_unknowns)));
+  check(VecSetType(v, VECSTANDARD));
+  check(VecSet(v, 0));
+  return v;
+}
+
+Vec3 Positions::prescribed(int64_t row, double load) const {
+  return motion_.at(part_.model, row, load);
+}
+
+void Positions::set_load(double load) {
+  load_ = load;
+  for (int32_t i : fixed_) local_[i] = prescribed(i, load);
+}
+
+double Positions::largest_travel() const {
+  double travel = motion_.largest_travel(part_.model);
+  MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  return travel;
+}
+
+void Positions::spread(Vec in, std::span<Vec3> out) const {
+  check(VecScatterBegin(scatter_, in, ghosted_, INSERT_VALUES, SCATTER_FORWARD));
+  check(VecScatterEnd(scatter_, in, ghosted_, INSERT_VALUES, SCATTER_FORWARD));
+  const PetscScalar* values = nullptr;
+  check(VecGetArrayRead(ghosted_, &values));
+  for (size_t k = 0; k < soft_.size(); ++k) out[soft_[k]] = Eigen::Map<const Vec3>(values + 3 * k);
+  check(VecRestoreArrayRead(ghosted_, &values));
+}
+
+void Positions::update(Vec displacement) {
+  spread(displacement, local_);
+  for (int32_t i : soft_) local_[i] += part_.model.points.position[i];
+}
+
+void Positions::keep_owned(std::span<const Vec3> values, Vec out) const {
+  PetscScalar* target = nullptr;
+  check(VecGetArrayWrite(out, &target));
+  for (int64_t i = 0; i < part_.owned_points; ++i)
+    if (part_.unknown[i] >= 0)
+      Eigen::Map<Vec3>(target + 3 * (part_.unknown[i] - part_.first_unknown)) = values[i];
+  check(VecRestoreArrayWrite(out, &target));
+}
+
+double largest_block(Vec v) {
+  PetscInt size = 0;
+  const PetscScalar* values = nullptr;
+  check(VecGetLocalSize(v, &size));
+  check(VecGetArrayRead(v, &values));
+  double largest = 0;
+  for (PetscInt k = 0; k + 2 < size; k += 3)
+    largest = std::max(largest, Eigen::Map<const Vec3>(values + k).squaredNorm());
+  check(VecRestoreArrayRead(v, &values));
+  double all = 0;
+  MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(static_cast<Vec>(v)));
+  MPI_Allreduce(&largest, &all, 1, MPI_DOUBLE, MPI_MAX, comm);
+  return std::sqrt(all);
+}
+
+}  // namespace repose::discrete

@@ -1,0 +1,136 @@
+#include "repose/discrete/tangent.h"
+
+#include <algorithm>
+
+#include "repose/base/petsc_versions.h"
+
+namespace repose::discrete {
+
+using base::check;
+using mechanics::Curvature;
+
+Tangent::Tangent(Objective& objective) : objective_(objective) { make_action(); }
+
+void Tangent::make_action() {
+  const Part& part = objective_.positions().part();
+  const auto owned = static_cast<PetscInt>(3 * part.owned_unknowns);
+  const auto total = static_cast<PetscInt>(3 * part.total_unknowns);
+  direction_.assign(part.point_row.size(), Vec3::Zero());
+  work_ = direction_;
+  check(MatCreateShell(objective_.positions().comm(), owned, owned, total, total, this,
+                       action_.out()));
+  check(MatSetBlockSize(action_, 3));
+  check(MatShellSetOperation(action_, MATOP_MULT, reinterpret_cast<void (*)()>(multiply)));
+  check(MatSetOption(action_, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(action_, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+}
+
+PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
+  Tangent* self = nullptr;
+  if (const PetscErrorCode code = MatShellGetContext(matrix, &self)) return code;
+  try {
+    const Objective& objective = self->objective_;
+    objective.positions().spread(direction, self->direction_);
+    std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
+    mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
+                                  self->direction_, self->work_);
+    objective.positions().keep_owned(self->work_, product);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
+const TangentEntries& Tangent::entries() {
+  if (!entries_) entries_ = std::make_unique<TangentEntries>(objective_);
+  return *entries_;
+}
+
+base::MatHandle Tangent::make_third() { return entries().make(); }
+
+void Tangent::third(std::span<const Vec3> direction, Mat matrix) {
+  entries().fill_third(matrix, objective_.positions().local(), direction);
+}
+
+void Tangent::lift_diagonal() {
+  constexpr double lift = 1e-9;  // keeps factors positive where the convex Hessian is singular
+  base::VecHandle diagonal = objective_.positions().make_vector();
+  check(MatGetDiagonal(convex_, diagonal));
+  PetscScalar* values = nullptr;
+  PetscInt size = 0;
+  check(VecGetLocalSize(diagonal, &size));
+  check(VecGetArray(diagonal, &values));
+  for (PetscInt i = 0; i < size; ++i) values[i] = values[i] > 0 ? values[i] * (1 + lift) : 1.0;
+  check(VecRestoreArray(diagonal, &values));
+  check(MatDiagonalSet(convex_, diagonal, INSERT_VALUES));
+}
+
+void Tangent::assemble(Vec displacement) {
+  Positions& positions = objective_.positions();
+  positions.update(displacement);
+  // Takes back the multiples of 1 that TAO's line searches add to a Hessian.
+  check(MatAssemblyBegin(action_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(action_, MAT_FINAL_ASSEMBLY));
+  const auto now = positions.local();
+  int same = at_.size() == now.size() && std::equal(now.begin(), now.end(), at_.begin());
+  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
+  if (same) return;
+  at_.assign(now.begin(), now.end());
+  ++assemblies_;
+}
+
+Mat Tangent::convex() {
+  if (convex_) return convex_;
+  convex_ = entries().make();
+  check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
+  return convex_;
+}
+
+void Tangent::renew() {
+  entries().fill(convex(), at_, Curvature::convex);
+  lift_diagonal();
+}
+
+Mat Tangent::exact() {
+  if (!exact_) exact_ = entries().make();
+  if (filled_at_ == assemblies_) return exact_;
+  entries().fill(exact_, at_, Curvature::exact);
+  filled_at_ = assemblies_;
+  return exact_;
+}
+
+void Tangent::visit_convex(const BlockVisitor& visit) const {
+  std::vector<Mat3> diagonal(at_.size(), Mat3::Zero());  // summed first: most blocks are there
+  for (const mechanics::SpringLoop& loop : objective_.loops().springs)
+    mechanics::for_each_spring_block(loop, at_, objective_.weights().elastic, Curvature::convex,
+                                     [&](int64_t e, const Mat3& block) {
+                                       const auto [p, q] = loop.points[e];
+                                       diagonal[p] += block;
+                                       diagonal[q] += block;
+                                       visit(p, q, -block);
+                                     });
+  const mechanics::EdgeLoop& edges = objective_.loops().edges;
+  for (int64_t e = 0; e < edges.size(); ++e) {
+    const auto [p, q] = edges.points[e];
+    const Mat3 block = objective_.weights().elastic * edges.weight[e] * Mat3::Identity();
+    diagonal[p] += block;
+    diagonal[q] += block;
+    visit(p, q, -block);
+  }
+  const mechanics::PrismLoop& prisms = objective_.loops().prisms;
+  mechanics::for_each_prism_block(
+      prisms, at_, objective_.weights(),
+      mechanics::semidefinite_slopes(prisms, objective_.positions().part().model.points.position,
+                                     at_),
+      [&](int64_t e, const mechanics::PrismBlocks& blocks) {
+        const auto& corners = prisms.points[e];
+        for (int i = 0; i < 6; ++i) {
+          diagonal[corners[i]] += blocks[i][i];
+          for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
+        }
+      });
+  for (size_t p = 0; p < diagonal.size(); ++p)
+    visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
+}
+
+}  // namespace repose::discrete

@@ -1,0 +1,278 @@
+#include "repose/linear/column_coarsening.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace repose::linear {
+
+namespace {
+
+constexpr int32_t none = -1;
+
+/// The column (of those of this rank) of each own point.
+std::vector<int32_t> columns_of_points(const ColumnLevel& level) {
+  std::vector<int32_t> column(level.own());
+  for (size_t c = 0; c + 1 < level.columns().size(); ++c)
+    for (int32_t i = level.columns()[c]; i < level.columns()[c + 1]; ++i)
+      column[i] = static_cast<int32_t>(c);
+  return column;
+}
+
+/// Calls visit(own column) for the columns that column `c` is coupled to, some more than once.
+template <class Visit>
+void for_each_neighbour(const ColumnLevel& level, const std::vector<int32_t>& column, size_t c,
+                        Visit&& visit) {
+  const BlockPattern& pattern = level.pattern();
+  for (int64_t k = pattern.begin[level.columns()[c]]; k < pattern.begin[level.columns()[c + 1]];
+       ++k)
+    if (const int32_t j = pattern.column[k];
+        j < level.own() && column[j] != static_cast<int32_t>(c))
+      visit(column[j]);
+}
+
+/// Columns whose neighbours are all free start an aggregate with them; what is left joins a
+/// neighbour's or stays alone.
+std::vector<int32_t> aggregate(const ColumnLevel& fine) {
+  const std::vector<int32_t> column = columns_of_points(fine);
+  const size_t columns = fine.columns().size() - 1;
+  std::vector<int32_t> group(columns, none);
+  int32_t groups = 0;
+  for (size_t c = 0; c < columns; ++c) {
+    bool free = group[c] == none;
+    for_each_neighbour(fine, column, c, [&](int32_t d) { free &= group[d] == none; });
+    if (!free) continue;
+    group[c] = groups++;
+    for_each_neighbour(fine, column, c, [&](int32_t d) { group[d] = group[c]; });
+  }
+  const std::vector<int32_t> roots = group;
+  for (size_t c = 0; c < columns; ++c)
+    if (roots[c] == none)
+      for_each_neighbour(fine, column, c, [&](int32_t d) {
+        if (group[c] == none) group[c] = roots[d];
+      });
+  for (int32_t& g : group)
+    if (g == none) g = groups++;
+  return group;
+}
+
+/// Coarse points in the order of aggregates, from the top down; `point`: that of each fine one.
+std::vector<Place> number_points(const ColumnLevel& fine, const std::vector<int32_t>& group,
+                                 std::vector<int32_t>& point) {
+  const std::vector<int32_t> column = columns_of_points(fine);
+  std::vector<Place> place;
+  for (int32_t i = 0; i < fine.own(); ++i)
+    place.push_back({group[column[i]], fine.place()[i].layer});
+  const auto order = [](const Place& a, const Place& b) {
+    return std::pair(a.column, a.layer) < std::pair(b.column, b.layer);
+  };
+  const std::vector<Place> of_fine = place;
+  std::sort(place.begin(), place.end(), order);
+  const auto same = [](const Place& a, const Place& b) {
+    return a.column == b.column && a.layer == b.layer;
+  };
+  place.erase(std::unique(place.begin(), place.end(), same), place.end());
+  for (const Place& p : of_fine)
+    point.push_back(static_cast<int32_t>(std::lower_bound(place.begin(), place.end(), p, order) -
+                                         place.begin()));
+  return place;
+}
+
+/// How strongly a block draws two points together.
+float pull(const Eigen::Matrix3f& block) { return -block.trace(); }
+
+}  // namespace
+
+Coarsening::Coarsening(MPI_Comm comm, const ColumnLevel& fine, const std::vector<Vec3>& at)
+    : fine_own_(fine.own()) {
+  const std::vector<int32_t> group = aggregate(fine);
+  std::vector<int32_t> point;
+  std::vector<Place> place = number_points(fine, group, point);
+  const auto own = static_cast<int32_t>(place.size());
+  find_centres(at, point, own);
+  smooth(fine, at, point);
+  transpose(own);
+  const std::vector<int64_t> ghost = find_ghosts(comm, fine, own);
+  BlockPattern pattern = find_pattern(fine, own, static_cast<int32_t>(ghost.size()));
+  coarse_ = std::make_unique<ColumnLevel>(comm, std::move(place), ghost, std::move(pattern));
+}
+
+void Coarsening::find_centres(const std::vector<Vec3>& at, const std::vector<int32_t>& point,
+                              int32_t own) {
+  centre_.assign(own, Vec3::Zero());
+  std::vector<int> members(own, 0);
+  for (int32_t i = 0; i < fine_own_; ++i) {
+    centre_[point[i]] += at[i];
+    ++members[point[i]];
+  }
+  for (int32_t a = 0; a < own; ++a) centre_[a] /= members[a];
+}
+
+/// Changes weights that add up to 1 as little as carries linear fields, nearly.
+void Coarsening::make_linear(const Vec3& at, std::vector<Candidate>& found) const {
+  constexpr double regularisation = 0.02;  // of the scatter: layers are flat
+  Vec3 mean = Vec3::Zero();
+  for (const Candidate& c : found) mean += c.weight * centre_[c.point];
+  Mat3 scatter = Mat3::Zero();
+  for (const Candidate& c : found) {
+    const Vec3 away = centre_[c.point] - mean;
+    scatter += c.weight * away * away.transpose();
+  }
+  const double size = scatter.trace();
+  if (!(size > 0)) return;
+  const Vec3 slope = (scatter + regularisation * size * Mat3::Identity()).ldlt().solve(at - mean);
+  for (Candidate& c : found) c.weight *= 1 + slope.dot(centre_[c.point] - mean);
+}
+
+void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
+                        const std::vector<int32_t>& point) {
+  constexpr double damping = 0.85;
+  const BlockPattern& pattern = fine.pattern();
+  weights_.resize(fine.own() + fine.ghosts());
+  std::vector<Candidate> found;
+  for (int32_t i = 0; i < fine.own(); ++i) {
+    found.assign(1, {0.0, point[i]});
+    double total = 0;
+    for (int64_t k = pattern.begin[i]; k < pattern.begin[i + 1]; ++k) {
+      const int32_t j = pattern.column[k];
+      if (j == i || j >= fine.own() || fine.place()[j].layer != fine.place()[i].layer) continue;
+      const double strength = std::max(0.0f, pull(fine.block(k)));
+      total += strength;
+      const auto same = std::find_if(found.begin(), found.end(),
+                                     [&](const Candidate& c) { return c.point == point[j]; });
+      if (same == found.end())
+        found.push_back({strength, point[j]});
+      else
+        same->weight += strength;
+    }
+    for (Candidate& c : found) c.weight *= total > 0 ? damping / total : 0.0;
+    found.front().weight += total > 0 ? 1 - damping : 1.0;
+    std::sort(found.begin(), found.end(),
+              [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
+    if (found.size() > most) found.resize(most);
+    double sum = 0;
+    for (const Candidate& c : found) sum += c.weight;
+    for (Candidate& c : found) c.weight /= sum;
+    make_linear(at[i], found);
+    Weights& weights = weights_[i];
+    for (size_t m = 0; m < most; ++m) {
+      weights.point[m] = m < found.size() ? found[m].point : point[i];
+      weights.weight[m] = m < found.size() ? static_cast<float>(found[m].weight) : 0.0f;
+    }
+  }
+}
+
+/// Gives the ghosts their weights, and the coarse points they move with numbers behind `own`.
+/// Returns the global numbers of these.
+std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own) {
+  struct Message {
+    std::array<int64_t, most> point;
+    std::array<float, most> weight;
+  };
+  int64_t first = 0;
+  const int64_t mine = own;
+  MPI_Exscan(&mine, &first, 1, MPI_INT64_T, MPI_SUM, comm);
+  std::vector<Message> sent(fine.own()), received(fine.ghosts());
+  for (int32_t i = 0; i < fine.own(); ++i)
+    for (int m = 0; m < most; ++m) {
+      sent[i].point[m] = first + weights_[i].point[m];
+      sent[i].weight[m] = weights_[i].weight[m];
+    }
+  const FloatsType unit(sizeof(Message) / sizeof(float));
+  fine.share(sent.data(), received.data(), unit);
+  std::vector<int64_t> ghost;
+  for (const Message& message : received)
+    for (int m = 0; m < most; ++m) ghost.push_back(message.point[m]);
+  std::sort(ghost.begin(), ghost.end());
+  ghost.erase(std::unique(ghost.begin(), ghost.end()), ghost.end());
+  for (size_t g = 0; g < received.size(); ++g)
+    for (int m = 0; m < most; ++m) {
+      const auto at = std::lower_bound(ghost.begin(), ghost.end(), received[g].point[m]);
+      weights_[fine.own() + g].point[m] = own + static_cast<int32_t>(at - ghost.begin());
+      weights_[fine.own() + g].weight[m] = received[g].weight[m];
+    }
+  return ghost;
+}
+
+void Coarsening::transpose(int32_t own) {
+  share_begin_.assign(own + 1, 0);
+  const auto for_each_share = [&](auto&& visit) {
+    for (int32_t i = 0; i < fine_own_; ++i)
+      weights_[i].visit([&](int32_t point, float weight) { visit(point, i, weight); });
+  };
+  for_each_share([&](int32_t point, int32_t, float) { ++share_begin_[point + 1]; });
+  for (int32_t a = 0; a < own; ++a) share_begin_[a + 1] += share_begin_[a];
+  share_.resize(share_begin_.back());
+  std::vector<int64_t> next(share_begin_.begin(), share_begin_.end() - 1);
+  for_each_share([&](int32_t point, int32_t i, float weight) {
+    share_[next[point]++] = {i, weight};
+  });
+}
+
+BlockPattern Coarsening::find_pattern(const ColumnLevel& fine, int32_t own, int32_t ghosts) const {
+  BlockPattern pattern;
+  std::vector<int32_t> seen_in(own + ghosts, none), row;
+  for (int32_t a = 0; a < own; ++a) {
+    row.clear();
+    for (int64_t s = share_begin_[a]; s < share_begin_[a + 1]; ++s) {
+      const int32_t i = share_[s].fine;
+      for (int64_t k = fine.pattern().begin[i]; k < fine.pattern().begin[i + 1]; ++k)
+        weights_[fine.pattern().column[k]].visit([&](int32_t b, float) {
+          if (seen_in[b] == a) return;
+          seen_in[b] = a;
+          row.push_back(b);
+        });
+    }
+    std::sort(row.begin(), row.end());
+    pattern.column.insert(pattern.column.end(), row.begin(), row.end());
+    pattern.begin.push_back(static_cast<int64_t>(pattern.column.size()));
+  }
+  return pattern;
+}
+
+void Coarsening::refill(const ColumnLevel& fine) {
+  UpperSums sums(*coarse_);
+  std::vector<int32_t> at(coarse_->own() + coarse_->ghosts(), none), point;
+  std::vector<Eigen::Matrix3f> row;  // of A P
+  for (int32_t i = 0; i < fine_own_; ++i) {
+    row.clear();
+    point.clear();
+    for (int64_t k = fine.pattern().begin[i]; k < fine.pattern().begin[i + 1]; ++k) {
+      const Eigen::Matrix3f block = fine.block(k);
+      weights_[fine.pattern().column[k]].visit([&](int32_t b, float weight) {
+        if (at[b] == none) {
+          at[b] = static_cast<int32_t>(point.size());
+          point.push_back(b);
+          row.push_back(weight * block);
+        } else {
+          row[at[b]] += weight * block;
+        }
+      });
+    }
+    weights_[i].visit([&](int32_t a, float weight) {
+      for (size_t k = 0; k < point.size(); ++k)
+        if (point[k] >= a) sums.add(a, point[k], weight * row[k]);
+    });
+    for (const int32_t b : point) at[b] = none;
+  }
+  coarse_->fill(sums);
+}
+
+void Coarsening::restrict_to(std::span<const Lanes> fine, std::span<Lanes> coarse) const {
+  for (int32_t a = 0; a < coarse_->own(); ++a) {
+    Lanes sum{};
+    for (int64_t s = share_begin_[a]; s < share_begin_[a + 1]; ++s)
+      sum += share_[s].weight * fine[share_[s].fine];
+    coarse[a] = sum;
+  }
+}
+
+void Coarsening::add_to(std::span<const Lanes> coarse, std::span<Lanes> fine) const {
+  for (int32_t i = 0; i < fine_own_; ++i) {
+    const Weights& w = weights_[i];
+    Lanes sum{};
+    for (int m = 0; m < most; ++m) sum += w.weight[m] * coarse[w.point[m]];
+    fine[i] += sum;
+  }
+}
+
+}  // namespace repose::linear

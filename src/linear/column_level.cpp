@@ -1,0 +1,173 @@
+#include "repose/linear/column_level.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "column_sweeps.h"
+
+namespace repose::linear {
+
+using base::check;
+
+namespace {
+
+const Sweeps& sweeps_for(mechanics::Kernels kernels) {
+#ifdef __x86_64__
+  if (kernels == mechanics::Kernels::avx512) return avx512_sweeps;
+  if (kernels == mechanics::Kernels::avx2) return avx2_sweeps;
+#endif
+  return plain_sweeps;
+}
+
+}  // namespace
+
+FloatsType::FloatsType(int count) {
+  MPI_Type_contiguous(count, MPI_FLOAT, &type_);
+  MPI_Type_commit(&type_);
+}
+
+ColumnLevel::ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
+                         BlockPattern pattern, mechanics::Kernels kernels)
+    : sweeps_(&sweeps_for(kernels)),
+      place_(std::move(place)),
+      ghost_(std::move(ghost)),
+      pattern_(std::move(pattern)),
+      block_(pattern_.column.size() + 1),
+      damping_(place_.size()),
+      inverse_(9 * place_.size() + 1) {
+  find_columns();
+  connect(comm);
+}
+
+void ColumnLevel::find_columns() {
+  const auto coupled = [&](int32_t row, int32_t column) {
+    const auto begin = pattern_.column.begin() + pattern_.begin[row];
+    return std::binary_search(begin, pattern_.column.begin() + pattern_.begin[row + 1], column);
+  };
+  for (int32_t i = 0; i < own(); ++i) {
+    const bool goes_on = i > 0 && place_[i].column == place_[i - 1].column &&
+                         place_[i].layer == place_[i - 1].layer + 1 && coupled(i, i - 1);
+    if (!goes_on) chain_.push_back(i);
+  }
+  chain_.push_back(own());
+  for (size_t c = 0; c + 1 < chain_.size(); ++c)
+    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
+      const auto begin = pattern_.column.begin() + pattern_.begin[i],
+                 end = pattern_.column.begin() + pattern_.begin[i + 1];
+      const auto first = std::lower_bound(begin, end, chain_[c]);
+      left_.push_back(static_cast<int32_t>(first - begin));
+      within_.push_back(static_cast<int32_t>(std::lower_bound(first, end, chain_[c + 1]) - first));
+      diagonal_.push_back(static_cast<int32_t>(std::lower_bound(first, end, i) - begin));
+    }
+}
+
+void ColumnLevel::connect(MPI_Comm comm) {
+  int ranks = 1;
+  MPI_Comm_size(comm, &ranks);
+  std::vector<int64_t> first(ranks + 1, 0);
+  const int64_t mine = own();
+  MPI_Allgather(&mine, 1, MPI_INT64_T, first.data() + 1, 1, MPI_INT64_T, comm);
+  for (int r = 0; r < ranks; ++r) first[r + 1] += first[r];
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  first_ = first[rank];
+  total_ = first[ranks];
+  if (ranks == 1) return;
+  std::vector<PetscSFNode> roots;
+  for (const int64_t number : ghost_) {
+    const auto owner = std::upper_bound(first.begin(), first.end(), number) - first.begin() - 1;
+    roots.push_back({static_cast<PetscInt>(owner), static_cast<PetscInt>(number - first[owner])});
+  }
+  check(PetscSFCreate(comm, forest_.out()));
+  check(PetscSFSetGraph(forest_, own(), ghosts(), nullptr, PETSC_OWN_POINTER, roots.data(),
+                        PETSC_COPY_VALUES));
+}
+
+void ColumnLevel::share(const void* own_entries, void* ghost_entries, MPI_Datatype unit) const {
+  if (!forest_) return;
+  check(PetscSFBcastBegin(forest_, unit, own_entries, ghost_entries, MPI_REPLACE));
+  check(PetscSFBcastEnd(forest_, unit, own_entries, ghost_entries, MPI_REPLACE));
+}
+
+void ColumnLevel::fill(const UpperSums& sums) {
+  std::vector<int64_t> next(pattern_.begin.begin(), pattern_.begin.end() - 1);
+  for (int32_t i = 0; i < own(); ++i) {
+    int64_t k = diagonal(i);
+    for (const Eigen::Matrix3f& sum : sums.row(i)) {
+      block_[k] = PackedBlock::of(sum);
+      const int32_t j = pattern_.column[k];
+      if (j > i && j < own()) block_[next[j]++] = block_[k].transposed();
+      ++k;
+    }
+  }
+}
+
+void ColumnLevel::damp() {
+  constexpr float lift = 1e-4f;  // of the mean diagonal: above what packing rounds off
+  for (int32_t i = 0; i < own(); ++i) {
+    const float stiffness = block(diagonal(i)).trace() / 3;
+    float beyond = 0;
+    for (int64_t k = diagonal(i); k < pattern_.begin[i + 1]; ++k)
+      if (pattern_.column[k] >= own()) beyond += block(k).norm();
+    damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
+  }
+}
+
+void ColumnLevel::factor() {
+  damp();
+  for (size_t c = 0; c + 1 < chain_.size(); ++c) {
+    Mat3 above = Mat3::Zero();  // inverse of what elimination left of the point above
+    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
+      Mat3 pivot = block(diagonal(i)).cast<double>();
+      if (i > chain_[c]) {
+        const Mat3 link = block(diagonal(i) - 1).cast<double>();
+        pivot -= link * above * link.transpose();
+      }
+      pivot += damping_[i] * Mat3::Identity();
+      above = pivot.inverse();
+      above = (0.5 * (above + above.transpose())).eval();
+      Eigen::Map<Eigen::Matrix3f>(inverse_.data() + 9 * i) = above.cast<float>();
+    }
+  }
+}
+
+SweptLevel ColumnLevel::swept() const {
+  return {own(),
+          static_cast<int64_t>(chain_.size()) - 1,
+          chain_.data(),
+          pattern_.begin.data(),
+          pattern_.column.data(),
+          left_.data(),
+          within_.data(),
+          block_.data(),
+          damping_.data(),
+          inverse_.data()};
+}
+
+void ColumnLevel::forward(std::span<const Lanes> b, std::span<Lanes> x) const {
+  sweeps_->forward(swept(), b.data(), x.data());
+}
+
+void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const {
+  sweeps_->residual_of_forward(swept(), x.data(), r.data());
+}
+
+void ColumnLevel::backward(std::span<const Lanes> b, std::span<Lanes> x) const {
+  sweeps_->backward(swept(), b.data(), x.data());
+}
+
+UpperSums::UpperSums(const ColumnLevel& level) : level_(level), begin_(level.own() + 1, 0) {
+  for (int32_t i = 0; i < level.own(); ++i)
+    begin_[i + 1] = begin_[i] + level.pattern().begin[i + 1] - level.diagonal(i);
+  sum_.assign(begin_.back(), Eigen::Matrix3f::Zero());
+}
+
+void UpperSums::add(int32_t row, int32_t column, const Eigen::Matrix3f& block) {
+  const int32_t* const columns = level_.pattern().column.data() + level_.diagonal(row);
+  const int64_t count = begin_[row + 1] - begin_[row];
+  int64_t before = 0;  // counted all the way: a search's branches take longer
+  for (int64_t k = 0; k < count; ++k) before += columns[k] < column;
+  sum_[begin_[row] + before] += block;
+}
+
+}  // namespace repose::linear

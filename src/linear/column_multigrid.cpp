@@ -1,0 +1,265 @@
+#include "repose/linear/column_multigrid.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace repose::linear {
+
+using base::check;
+
+namespace {
+
+constexpr int64_t coarse_enough = 40;  // points that are solved for by factors
+constexpr int64_t too_many = 1500;     // for factors
+constexpr double least_coarsening = 0.7;
+
+/// The unknown points of `part` by their numbers in it: own ones, then ghosts by global number.
+std::vector<int32_t> number_points(const discrete::Part& part) {
+  std::vector<int32_t> number(part.unknown.size(), -1), ghost;
+  for (size_t i = 0; i < number.size(); ++i) {
+    if (part.unknown[i] < 0) continue;
+    if (static_cast<int64_t>(i) < part.owned_points)
+      number[i] = static_cast<int32_t>(part.unknown[i] - part.first_unknown);
+    else
+      ghost.push_back(static_cast<int32_t>(i));
+  }
+  std::sort(ghost.begin(), ghost.end(),
+            [&](int32_t a, int32_t b) { return part.unknown[a] < part.unknown[b]; });
+  for (size_t g = 0; g < ghost.size(); ++g)
+    number[ghost[g]] = static_cast<int32_t>(part.owned_unknowns + static_cast<int64_t>(g));
+  return number;
+}
+
+/// What pairs of coupled points are, and how stiff the stiffest of them is.
+class Couplings {
+ public:
+  Couplings(const std::vector<int32_t>& number, const std::vector<int32_t>& layer, int32_t own)
+      : number_(number), layer_(layer), right_(own), diagonal_(own, 0.0) {}
+  void take(int32_t p, int32_t q, const Mat3& block) {
+    const auto [i, j] = std::minmax(number_[p], number_[q]);
+    if (i < 0 || i >= own()) return;
+    if (i == j) diagonal_[i] += block.trace();
+    if (std::abs(layer_[p] - layer_[q]) > 1) layered = 0;
+    auto& row = right_[i];
+    if (std::find(row.begin(), row.end(), j) == row.end()) row.push_back(j);
+  }
+  double stiffest() const {
+    return own() == 0 ? 0.0 : *std::max_element(diagonal_.begin(), diagonal_.end()) / 3;
+  }
+  /// What is right of the diagonal and on it, and its mirror image.
+  BlockPattern pattern() {
+    std::vector<int64_t> left(own(), 0);
+    for (int32_t i = 0; i < own(); ++i) {
+      if (std::find(right_[i].begin(), right_[i].end(), i) == right_[i].end())
+        right_[i].push_back(i);
+      std::sort(right_[i].begin(), right_[i].end());
+      for (const int32_t j : right_[i])
+        if (j > i && j < own()) ++left[j];
+    }
+    BlockPattern pattern;
+    for (int32_t i = 0; i < own(); ++i)
+      pattern.begin.push_back(pattern.begin[i] + left[i] + static_cast<int64_t>(right_[i].size()));
+    pattern.column.resize(pattern.begin.back());
+    std::vector<int64_t> next(pattern.begin.begin(), pattern.begin.end() - 1);
+    for (int32_t i = 0; i < own(); ++i)
+      for (const int32_t j : right_[i]) {
+        pattern.column[next[i]++] = j;
+        if (j > i && j < own()) pattern.column[next[j]++] = i;
+      }
+    return pattern;
+  }
+
+  int layered = 1;  // no coupling leaps over a layer
+
+ private:
+  int32_t own() const { return static_cast<int32_t>(right_.size()); }
+  const std::vector<int32_t>&number_, &layer_;
+  std::vector<std::vector<int32_t>> right_;
+  std::vector<double> diagonal_;
+};
+
+std::vector<Place> places(const discrete::Part& part, bool layered) {
+  std::vector<Place> place;
+  int32_t column = 0;
+  for (int64_t i = 0; i < part.owned_points; ++i) {
+    if (i > 0 && part.model.points.column[i] != part.model.points.column[i - 1]) ++column;
+    if (part.unknown[i] < 0) continue;
+    const auto own = static_cast<int32_t>(place.size());
+    place.push_back(layered ? Place{column, part.model.points.layer[i]} : Place{own, 0});
+  }
+  return place;
+}
+
+std::vector<int64_t> ghosts(const discrete::Part& part, const std::vector<int32_t>& number) {
+  std::vector<int64_t> ghost;
+  for (size_t i = 0; i < number.size(); ++i)
+    if (number[i] >= part.owned_unknowns) ghost.push_back(part.unknown[i]);
+  std::sort(ghost.begin(), ghost.end());
+  return ghost;
+}
+
+}  // namespace
+
+/// A level and its vectors.
+struct ColumnMultigrid::Level {
+  ColumnLevel* matrix;
+  std::vector<Lanes> b, x, r;  // [own + ghosts]
+  explicit Level(ColumnLevel& level)
+      : matrix(&level),
+        b(level.own() + level.ghosts()),
+        x(level.own() + level.ghosts()),
+        r(level.own() + level.ghosts()) {}
+};
+
+/// The coarsest matrix, whole on every rank.
+class ColumnMultigrid::Coarsest {
+ public:
+  Coarsest(MPI_Comm comm, const ColumnLevel& level)
+      : comm_(comm), level_(level), right_side_(3 * level.total()) {
+    int ranks = 1;
+    MPI_Comm_size(comm, &ranks);
+    count_.resize(ranks);
+    begin_.assign(ranks, 0);
+    const int own = 3 * level.own();
+    MPI_Allgather(&own, 1, MPI_INT, count_.data(), 1, MPI_INT, comm);
+    for (int r = 0; r + 1 < ranks; ++r) begin_[r + 1] = begin_[r] + count_[r];
+  }
+
+  void factor() {
+    constexpr double lift = 1e-5;  // of the largest diagonal entry: above what rounding leaves
+    const int64_t n = 3 * level_.total();
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);
+    for (int32_t i = 0; i < level_.own(); ++i)
+      for (int64_t k = level_.pattern().begin[i]; k < level_.pattern().begin[i + 1]; ++k)
+        matrix.block<3, 3>(3 * level_.global(i), 3 * level_.global(level_.pattern().column[k])) =
+            level_.block(k).cast<double>();
+    MPI_Allreduce(MPI_IN_PLACE, matrix.data(), static_cast<int>(n * n), MPI_DOUBLE, MPI_SUM, comm_);
+    const double largest = n > 0 ? matrix.diagonal().maxCoeff() : 0.0;
+    matrix.diagonal().array() += lift * (largest > 0 ? largest : 1.0);
+    factors_.compute(matrix);
+  }
+
+  void solve(std::span<const Lanes> b, std::span<Lanes> x) {
+    for (int32_t i = 0; i < level_.own(); ++i)
+      for (int d = 0; d < 3; ++d) right_side_[3 * (level_.first() + i) + d] = b[i][d];
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, right_side_.data(), count_.data(),
+                   begin_.data(), MPI_DOUBLE, comm_);
+    factors_.solveInPlace(right_side_);
+    for (int32_t i = 0; i < level_.own(); ++i)
+      for (int d = 0; d < 3; ++d)
+        x[i][d] = static_cast<float>(right_side_[3 * (level_.first() + i) + d]);
+  }
+
+ private:
+  MPI_Comm comm_;
+  const ColumnLevel& level_;
+  std::vector<int> count_, begin_;  // [ranks] scalars
+  Eigen::VectorXd right_side_;
+  Eigen::LLT<Eigen::MatrixXd> factors_;
+};
+
+ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
+                                 const BlockSource& blocks)
+    : comm_(comm), number_(number_points(part)) {
+  make_fine(part, blocks);
+  fill_fine(blocks);
+  levels_.emplace_back(*fine_);
+  std::vector<Vec3> at;
+  for (int64_t i = 0; i < part.owned_points; ++i)
+    if (part.unknown[i] >= 0) at.push_back(part.model.points.position[i]);
+  while (levels_.back().matrix->total() > coarse_enough) {
+    const ColumnLevel& above = *levels_.back().matrix;
+    auto next = std::make_unique<Coarsening>(comm_, above, at);
+    const auto total = static_cast<double>(next->coarse().total());
+    if (total > least_coarsening * static_cast<double>(above.total())) break;
+    next->refill(above);
+    at = next->centre();
+    levels_.emplace_back(next->coarse());
+    coarsening_.push_back(std::move(next));
+  }
+  const ColumnLevel& last = *levels_.back().matrix;
+  if (last.total() <= too_many) coarsest_ = std::make_unique<Coarsest>(comm_, last);
+  factor();
+}
+
+ColumnMultigrid::~ColumnMultigrid() = default;
+
+void ColumnMultigrid::make_fine(const discrete::Part& part, const BlockSource& blocks) {
+  Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.owned_unknowns));
+  blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.take(p, q, block); });
+  int layered = couplings.layered;
+  MPI_Allreduce(MPI_IN_PLACE, &layered, 1, MPI_INT, MPI_MIN, comm_);
+  double stiffest = couplings.stiffest();
+  MPI_Allreduce(MPI_IN_PLACE, &stiffest, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  if (stiffest > 0 && std::isfinite(stiffest)) scale_ = stiffest;
+  fine_ = std::make_unique<ColumnLevel>(comm_, places(part, layered), ghosts(part, number_),
+                                        couplings.pattern());
+}
+
+void ColumnMultigrid::fill_fine(const BlockSource& blocks) {
+  const int32_t own = fine_->own();
+  const double unit = 1 / scale_;
+  UpperSums sums(*fine_);
+  blocks([&](int32_t p, int32_t q, const Mat3& block) {
+    const int32_t i = number_[p], j = number_[q];
+    if (i < 0 || j < 0 || std::min(i, j) >= own) return;
+    if (i <= j)
+      sums.add(i, j, (unit * block).cast<float>());
+    else
+      sums.add(j, i, (unit * block.transpose()).cast<float>());
+  });
+  fine_->fill(sums);
+}
+
+void ColumnMultigrid::factor() {
+  for (const Level& level : levels_) level.matrix->factor();
+  if (coarsest_) coarsest_->factor();
+}
+
+void ColumnMultigrid::refill(const BlockSource& blocks) {
+  fill_fine(blocks);
+  for (size_t l = 0; l < coarsening_.size(); ++l) coarsening_[l]->refill(*levels_[l].matrix);
+  factor();
+}
+
+void ColumnMultigrid::cycle(size_t l) {
+  Level& level = levels_[l];
+  if (l == coarsening_.size() && coarsest_) {
+    coarsest_->solve(level.b, level.x);
+    return;
+  }
+  const ColumnLevel& matrix = *level.matrix;
+  matrix.forward(level.b, level.x);
+  matrix.update_ghosts(level.x);
+  if (l < coarsening_.size()) {
+    matrix.residual_of_forward(level.x, level.r);
+    Level& coarse = levels_[l + 1];
+    coarsening_[l]->restrict_to(level.r, coarse.b);
+    cycle(l + 1);
+    coarsening_[l]->add_to(coarse.x, level.x);
+    matrix.update_ghosts(level.x);
+  }
+  matrix.backward(level.b, level.x);
+}
+
+void ColumnMultigrid::apply(Vec r, Vec z) {
+  PetscReal largest = 0;
+  check(VecNorm(r, NORM_INFINITY, &largest));
+  const double unit = largest > 0 && std::isfinite(largest) ? largest : 1.0;
+  const int32_t own = fine_->own();
+  Level& finest = levels_.front();
+  const PetscScalar* from = nullptr;
+  check(VecGetArrayRead(r, &from));
+  for (int32_t i = 0; i < own; ++i)
+    for (int d = 0; d < 3; ++d) finest.b[i][d] = static_cast<float>(from[3 * i + d] / unit);
+  check(VecRestoreArrayRead(r, &from));
+  cycle(0);
+  PetscScalar* to = nullptr;
+  check(VecGetArrayWrite(z, &to));
+  for (int32_t i = 0; i < own; ++i)
+    for (int d = 0; d < 3; ++d) to[3 * i + d] = unit / scale_ * finest.x[i][d];
+  check(VecRestoreArrayWrite(z, &to));
+}
+
+}  // namespace repose::linear

@@ -1,0 +1,313 @@
+#include "repose/linear/tangent_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "repose/base/error.h"
+#include "repose/base/petsc_versions.h"
+
+extern "C" PetscErrorCode PCCreate_Shell(PC pc);  // in no public header
+
+namespace repose::linear {
+
+using base::check;
+
+namespace {
+
+constexpr const char* columns_type = "columns";
+
+void choose_factors(PC pc) {
+  check(PCSetType(pc, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+/// MUMPS sets too little memory aside for factors on many ranks.
+void give_room(PC pc) {
+  constexpr int more_memory = 14, percent = 100;  // ICNTL
+  PetscBool factors = PETSC_FALSE;
+  check(
+      PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(pc), &factors, PCCHOLESKY, PCLU, ""));
+  if (!factors) return;
+  Mat factor = nullptr;
+  MatSolverType type = nullptr;
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factor));
+  check(MatFactorGetSolverType(factor, &type));
+  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
+  check(MatMumpsSetIcntl(factor, more_memory, percent));
+}
+
+/// 1 or −1, the same for a number on any ranks (the mixing of SplitMix64: Steele, Lea & Flood
+/// 2014).
+double random_sign(uint64_t number) {
+  uint64_t bits = (number + 1) * 0x9e3779b97f4a7c15u;
+  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+  return (bits >> 63) == 0 ? 1.0 : -1.0;
+}
+
+/// In iterations: what a new preconditioner costs as much as.
+constexpr double price_of_columns = 10, price_of_factors = 20;
+
+double price_of_renewal(double usual) {
+  PetscReal price = usual;
+  check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
+  return price;
+}
+
+/// Renewals in PETSc's log (-log_view).
+PetscLogEvent renewal_event() {
+  static PetscLogEvent event = -1;
+  if (event < 0) check(PetscLogEventRegister("PCRenew", PC_CLASSID, &event));
+  return event;
+}
+
+bool is_columns(PC pc) {
+  PetscBool same = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), columns_type, &same));
+  return same;
+}
+
+}  // namespace
+
+TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& hessian)
+    : positions_(positions),
+      hessian_(hessian),
+      unknowns_(3 * positions.part().total_unknowns),
+      next_(positions.make_vector()),
+      work_(positions.make_vector()),
+      measured_(positions.make_vector()),
+      wear_(price_of_renewal(price_of_factors)) {
+  check(KSPCreate(positions.comm(), krylov_.out()));
+  check(KSPSetType(krylov_, KSPCG));
+  check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
+  check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
+  choose_preconditioner();
+  lend_preconditioner(krylov_);
+  base::check_options(KSPSetFromOptions(krylov_));
+  if (is_columns(preconditioner())) wear_ = Wear(price_of_renewal(price_of_columns));
+  check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
+}
+
+void TangentSolver::choose_preconditioner() {
+  const PC pc = preconditioner();
+  check(PCRegister(columns_type, PCCreate_Shell));
+  if (!hessian_.elliptic()) {
+    if (unknowns_ <= factors_limit)
+      choose_factors(pc);
+    else
+      check(PCSetType(pc, PCGAMG));
+    return;
+  }
+  check(PCSetType(pc, columns_type));
+  check(PCSetApplicationContext(pc, this));
+  check(PCShellSetApply(pc, apply_columns));
+}
+
+Mat TangentSolver::preconditioner_matrix() {
+  return is_columns(preconditioner()) ? hessian_.model() : hessian_.convex();
+}
+
+PC TangentSolver::preconditioner() {
+  PC pc = nullptr;
+  check(KSPGetPC(krylov_, &pc));
+  return pc;
+}
+
+void TangentSolver::lend_preconditioner(KSP other) {
+  if (other != krylov_) check(KSPSetPC(other, preconditioner()));
+  check(KSPSetResidualHistory(other, nullptr, PETSC_DECIDE, PETSC_TRUE));
+  check(KSPSetPostSolve(other, after_solve, this));
+}
+
+PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
+  try {
+    static_cast<TangentSolver*>(me)->wear_.take(krylov);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
+void TangentSolver::prepare(Vec displacement) {
+  hessian_.assemble(displacement);
+  const bool moved = hessian_.assemblies() != made_at_;
+  if (moved) wear_.move();
+  const bool renew = renewals_ == 0 || hopeless() || (moved && wear_.out());
+  check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
+  if (renew) renew_preconditioner();
+}
+
+void TangentSolver::renew(Vec displacement) {
+  hessian_.assemble(displacement);
+  if (hessian_.assemblies() == made_at_) return;
+  check(PCSetReusePreconditioner(preconditioner(), PETSC_FALSE));
+  renew_preconditioner();
+}
+
+void TangentSolver::give_way() { given_way_ = is_columns(preconditioner()); }
+
+bool TangentSolver::hopeless() const {
+  const bool slow = given_way_ || (columns_ && wear_.hopeless());
+  return slow && !factors_ && unknowns_ <= factors_limit;
+}
+
+void TangentSolver::renew_preconditioner() {
+  const PC pc = preconditioner();
+  check(PetscLogEventBegin(renewal_event(), pc, nullptr, nullptr, nullptr));
+  if (is_columns(pc)) {
+    renew_columns();
+  } else {
+    hessian_.renew();
+    give_room(pc);
+    check(PCSetUp(pc));
+  }
+  check(PetscLogEventEnd(renewal_event(), pc, nullptr, nullptr, nullptr));
+  wear_.renew();
+  made_at_ = hessian_.assemblies();
+  ++renewals_;
+}
+
+void TangentSolver::renew_columns() {
+  const BlockSource blocks = [this](const discrete::BlockVisitor& visit) {
+    hessian_.visit_convex(visit);
+  };
+  if (hopeless()) {
+    columns_.reset();
+    check(PCCreate(positions_.comm(), factors_.out()));
+    choose_factors(factors_);
+    wear_ = Wear(price_of_renewal(price_of_factors));
+  }
+  if (factors_) {
+    hessian_.renew();
+    check(PCSetOperators(factors_, hessian_.convex(), hessian_.convex()));
+    give_room(factors_);
+    check(PCSetUp(factors_));
+  } else if (columns_) {
+    columns_->refill(blocks);
+  } else {
+    columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
+  }
+}
+
+PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
+  TangentSolver* self = nullptr;
+  if (const PetscErrorCode code = PCGetApplicationContext(pc, &self)) return code;
+  if (self->factors_) return PCApply(self->factors_, r, z);
+  try {
+    self->columns_->apply(r, z);
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
+bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
+  prepare(displacement);
+  check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
+  check(KSPSetTolerances(krylov_, relative_tolerance, 0.0, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(KSPSolve(krylov_, rhs, delta));
+  KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
+  check(KSPGetConvergedReason(krylov_, &reason));
+  if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF)
+    throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
+  finished_ = reason > 0 && reason != KSP_CONVERGED_ITS;  // preonly asks for no accuracy
+  return reason != KSP_DIVERGED_INDEFINITE_MAT && reason != KSP_DIVERGED_INDEFINITE_PC;
+}
+
+double TangentSolver::glance(Vec gradient) {
+  if (renewals_ == 0) return 0;
+  measured_at_ = -1;
+  check(PCApply(preconditioner(), gradient, work_));
+  return discrete::largest_block(work_);
+}
+
+double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
+  hessian_.assemble(displacement);
+  PetscBool same = PETSC_FALSE;  // asked again at the same state
+  if (measured_at_ == hessian_.assemblies()) check(VecEqual(gradient, measured_, &same));
+  if (same) return distance_;
+  check(VecSet(work_, 0));
+  const bool convex = solve(displacement, gradient, work_, usual_);
+  distance_ = convex ? discrete::largest_block(work_) : std::numeric_limits<double>::infinity();
+  measured_at_ = hessian_.assemblies();
+  sure_at_ = -1;
+  check(VecCopy(gradient, measured_));
+  return distance_;
+}
+
+/// Of a point, mm/N, or more: what a load of random signs moves. Soft points go farthest, and take
+/// most of its energy, so that a rough solution will do. What a preconditioner serves for is alike.
+double TangentSolver::largest_compliance(Vec displacement) {
+  constexpr double rough = 0.3;
+  if (compliance_at_ == renewals_) return compliance_;
+  base::VecHandle load = positions_.make_vector();
+  PetscInt begin = 0, end = 0;
+  PetscScalar* values = nullptr;
+  check(VecGetOwnershipRange(load, &begin, &end));
+  check(VecGetArray(load, &values));
+  for (PetscInt i = begin; i < end; ++i) values[i - begin] = random_sign(static_cast<uint64_t>(i));
+  check(VecRestoreArray(load, &values));
+  check(VecSet(next_, 0));
+  const bool known = solve(displacement, load, next_, rough) && finished_;
+  compliance_ = known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
+  compliance_at_ = known ? renewals_ : -1;
+  return compliance_;
+}
+
+bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
+  base::VecHandle left = positions_.make_vector();
+  check(MatMult(hessian_.action(), work_, left));
+  check(VecAYPX(left, -1, gradient));
+  check(VecSet(next_, 0));
+  const bool convex = solve(displacement, left, next_, factor);
+  check(VecAXPY(work_, 1, next_));
+  return convex && finished_;
+}
+
+double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack) {
+  // The preconditioner's norm, which is looked at, is the energy's but roughly, and a random load
+  // does not find the largest compliance.
+  constexpr double margin = 50;
+  constexpr double finest = 1e-12;
+  const double rough = newton_distance(displacement, gradient);
+  PetscBool trusting = PETSC_FALSE;  // the preconditioner alone, by the user's wish
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(static_cast<KSP>(krylov_)), KSPPREONLY,
+                               &trusting));
+  if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_ || trusting) return rough;
+  PetscReal energy = 0;
+  check(VecDot(gradient, work_, &energy));
+  const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm
+  const double bound = std::max(rough, slack);
+  double left = usual_ * reach;
+  if (left > bound) {
+    const double wanted = bound / reach;
+    left = bound;
+    const bool sure = wanted > finest && improve(displacement, gradient, wanted / usual_);
+    distance_ = sure ? std::max(rough, discrete::largest_block(work_))
+                     : std::numeric_limits<double>::infinity();
+  }
+  unsure_ = left > rough ? 2 * left : 0;
+  sure_at_ = measured_at_;
+  return distance_;
+}
+
+double TangentSolver::contraction(Vec displacement, Vec trial, Vec gradient) {
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  constexpr double close = 0.2, most_left = 0.5;
+  PetscReal slope = 0, left = 0, next_slope = 0;
+  check(VecDot(measured_, work_, &slope));
+  check(VecDot(gradient, work_, &left));
+  if (std::abs(left) > most_left * slope) return endless;
+  check(VecSet(next_, 0));
+  const bool convex = solve(trial, gradient, next_, close);
+  hessian_.assemble(displacement);
+  if (sure_at_ == measured_at_) sure_at_ = hessian_.assemblies();
+  measured_at_ = hessian_.assemblies();  // what is known there is not lost
+  if (!convex) return endless;
+  check(VecDot(gradient, next_, &next_slope));
+  return std::max(discrete::largest_block(next_) / distance_, std::sqrt(next_slope / slope));
+}
+
+}  // namespace repose::linear
