@@ -43,6 +43,8 @@ LONGEST, USUAL, USUAL_SHARE = 60, 35, 0.9
 WORDS = re.compile(r"\b(TO" r"DO|FIX" r"ME|XX" r"X|HA" r"CK)\b"
                    r"|(?<![\w.$})~*-])/(work|home|root|tmp|mnt|Users)/")
 TEXT = {".cpp", ".h", ".py", ".sh", ".md", ".txt", ".yaml", ".json", ".cmake"}
+NAMED = re.compile(r"(?<![\w./-])(?:src|include|tests|drivers|examples|cmake|meshes|docs)/[\w./-]*"
+                   r"\.(?:cpp|h|py|sh|md|yaml|js|slurm|png|mhd|cmake|json)\b")
 
 
 def files(*suffixes):
@@ -229,3 +231,10 @@ def test_every_page_is_reached_from_the_index():
             ahead += [file for file, _, _ in links(name, all_pages[name])]
     assert "docs/index.md" in {file for file, _, _ in links("README.md", all_pages["README.md"])}
     assert not all_pages.keys() - reached - {"README.md"}
+
+
+def test_files_that_are_named_exist():
+    me = "tests/program/test_house.py"  # which makes up names
+    faults = [f"{name}: {named}" for name, text in files(*TEXT) if name != me
+              for named in sorted(set(NAMED.findall(text))) if not (PROJECT / named).exists()]
+    assert not faults, "\n".join(faults)
