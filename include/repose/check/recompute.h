@@ -12,7 +12,8 @@ struct Recomputed {
   double value = 0, scale = 0;
 };
 
-/// All of a step that follows from the model and the positions (MODEL.md, Eqs. 6 to 12).
+/// All of a step that follows from the model and the positions (docs/theory/model.md, Eqs. 6 to
+/// 12).
 struct RecomputedStep {
   model::StepRows rows;
   std::vector<Vec3> displacement;                                           ///< [N] mm

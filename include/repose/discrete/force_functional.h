@@ -5,8 +5,9 @@
 
 namespace repose::discrete {
 
-/// The force functional (MODEL.md Eqs. 7, 11): Φ = λ Σ_{i ∈ P_s} (√(|F_i|² + ε²) − ε), with
-/// (1 − λ) f_v where the volume term is the paper's. All members collective unless said otherwise.
+/// The force functional (docs/theory/model.md Eqs. 7, 11): Φ = λ Σ_{i ∈ P_s} (√(|F_i|² + ε²) − ε),
+/// with (1 − λ) f_v where the volume term is the paper's. All members collective unless said
+/// otherwise.
 class ForceFunctional : public Function {
  public:
   /// `elastic` is f_e + W alone; `weights` are λ and the volume term, none or paper.

@@ -4,9 +4,9 @@
 
 namespace repose::discrete {
 
-/// The function that is minimised (MODEL.md Eqs. 11, 12) over the displacements of the unknowns:
-/// value, gradient and Hessian action, with gravity and external forces as a potential
-/// W = −Σ_{soft} (m g + f^ext) · (x − X). All members are collective unless said otherwise.
+/// The function that is minimised (docs/theory/model.md Eqs. 11, 12) over the displacements of the
+/// unknowns: value, gradient and Hessian action, with gravity and external forces as a potential W
+/// = −Σ_{soft} (m g + f^ext) · (x − X). All members are collective unless said otherwise.
 class Objective : public Function {
  public:
   Objective(Positions& positions, const mechanics::Weights& weights);

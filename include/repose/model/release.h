@@ -7,7 +7,7 @@
 namespace repose::model {
 
 /// Sets free the deepest points within `distance` mm (0: none) of the surface of a bone piece whose
-/// motion differs from that of their own bone (MODEL.md "One rest position or many": real tissue
+/// motion differs from that of their own bone (docs/theory/load_path.md: real tissue
 /// slides there). Distances are at the initial position; `moves` is [bones].
 void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
                                const std::vector<scene::RigidMotion>& moves, double distance,

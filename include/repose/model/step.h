@@ -69,7 +69,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
 
 /// A further number or vector of every point; its name is that of the dataset.
 struct PointField {
-  std::string name;            ///< with the unit's meaning in docs/formats.md
+  std::string name;            ///< with the unit's meaning in docs/reference/formats.md
   bool vector = false;         ///< [N,3], else [N]
   std::vector<double> values;  ///< row by row
 };

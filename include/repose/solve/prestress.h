@@ -20,19 +20,20 @@ struct Recording {
   Vec3 gravity = Vec3::Zero();  ///< N/kg
 };
 
-/// The initial equilibrium (MODEL.md; the paper's sec. 3, Fig. 2): gives the skin springs (set
-/// "layer 0") the initial strain τ, l = r_0/(1+τ), and all others with a soft-tissue point
-/// the rest lengths whose tensions, smallest in the energy norm, balance skin tension and weight at
-/// the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T = K Aᵀ μ, l_j = r_j −
-/// T⁻¹(T_j). External forces are not balanced: they act. Changes the rest lengths of `model`.
-/// F is 1e-12 of the largest force before, or what the rounding of lengths leaves where that is
-/// more. Model and recording are looked at on rank 0 only. Throws InputError naming the springs
-/// where a rest length would not be positive, or the point that no spring can hold. Collective.
+/// The initial equilibrium (docs/theory/initial_equilibrium.md; the paper's sec. 3, Fig. 2): gives
+/// the skin springs (set "layer 0") the initial strain τ, l = r_0/(1+τ), and all others with a
+/// soft-tissue point the rest lengths whose tensions, smallest in the energy norm, balance skin
+/// tension and weight at the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T =
+/// K Aᵀ μ, l_j = r_j − T⁻¹(T_j). External forces are not balanced: they act. Changes the rest
+/// lengths of `model`. F is 1e-12 of the largest force before, or what the rounding of lengths
+/// leaves where that is more. Model and recording are looked at on rank 0 only. Throws InputError
+/// naming the springs where a rest length would not be positive, or the point that no spring can
+/// hold. Collective.
 ///
 /// Of a solid it is force densities q of its edges (tension over length) and pressures p of its
 /// prisms that balance skin tension and weight, those of least energy Σ q² r⁴/(Y v) + Σ p² V/K with
 /// the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift the
-/// edges' weights and the prisms' target volumes (docs/model.md "The continuum").
+/// edges' weights and the prisms' target volumes (docs/theory/continuum.md).
 Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
 
 }  // namespace repose::solve

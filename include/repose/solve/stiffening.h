@@ -9,8 +9,8 @@ namespace repose::solve {
 /// Leads to the rest position at load 1 where the volume term is stiff. A linear prediction keeps
 /// volumes to first order only; what it misses by, times a large κ, throws a search far back. So
 /// the bones are followed with a κ of 10 times the tissue's effective modulus, and κ grows from
-/// rest position to rest position, where the bones stay (docs/stiff_volume.md). All members
-/// collective.
+/// rest position to rest position, where the bones stay (docs/measurements/stiff_volume.md). All
+/// members collective.
 class Stiffening {
  public:
   Stiffening(Problem& problem, Predictor& predictor, RestSearch& search);
