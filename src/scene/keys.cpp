@@ -30,7 +30,7 @@ std::vector<Key> volume_keys(const std::string& above) {
           {above + ".border",
            choice,
            "closed",
-           "What becomes of the surface where the volume or the box ends: capped, or cut off.",
+           "How the surface ends at the border of the volume or box: capped, or open.",
            "",
            {},
            {"closed", "open"}},
@@ -39,7 +39,7 @@ std::vector<Key> volume_keys(const std::string& above) {
            Range::above(0)},
           {above + ".close_holes", number, "0", "Close gaps and holes up to twice this wide.", "mm",
            Range::between(0, 1000)},
-          {above + ".smooth", integer, "10", "Rounds of smoothing that does not shrink.", "",
+          {above + ".smooth", integer, "10", "Rounds of smoothing without shrinkage.", "",
            Range::between(0, 1000)}};
 }
 
@@ -66,10 +66,10 @@ std::vector<Key> tissue_keys() {
        Range::between(2, 64)},
       {"tissue.depths", numbers, "",
        "Where each layer lies, as fractions of the skin–bone distance: "
-       "one a layer, from 0 to 1, increasing; evenly spaced when not given.",
+       "one per layer, from 0 to 1, increasing; evenly spaced when not given.",
        "", Range::between(0, 1)},
       {"tissue.depths_mm", numbers, "",
-       "How deep the upper layers lie below the skin, 0 first, at most one a layer, increasing; "
+       "How deep the upper layers lie below the skin, 0 first, at most one per layer, increasing; "
        "the others are spread evenly below. Excludes depths. Where tissue is too thin for "
        "them, layers are spread evenly.",
        "mm", Range::at_least(0)},
@@ -89,7 +89,7 @@ std::vector<Key> tissue_keys() {
        "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
        Range::at_least(0)},
       {"tissue.unattached", list, "",
-       "Regions that touch bone but do not hold to it (lips, cheeks)."},
+       "Regions that touch bone but are not attached to it (lips, cheeks)."},
       {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
       {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
       {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
@@ -97,7 +97,7 @@ std::vector<Key> tissue_keys() {
       {"tissue.turgor", number, "0",
        "Initial strain of the skin: of its springs, or of a material's first stratum.", "",
        Range::between(0, 1)},
-      {"tissue.mass", numbers, "", "Mass of each layer, one a layer; excludes density.", "kg",
+      {"tissue.mass", numbers, "", "Mass of each layer; excludes density.", "kg",
        Range::at_least(0)},
       {"tissue.density", number, "", "Density of the tissue; excludes mass.", "kg/mm³",
        Range::above(0)}};
@@ -120,7 +120,7 @@ std::vector<Key> material_keys() {
       {"tissue.material.preset",
        choice,
        "face",
-       "Moduli from the literature (see below); the other keys change them.",
+       "Moduli from the literature; the other keys override them.",
        "",
        {},
        preset_names()},
@@ -136,7 +136,7 @@ std::vector<Key> material_keys() {
       {"tissue.material.strata[].thickness", number, "required", "Its thickness.", "mm",
        Range::above(0)},
       {"tissue.material.regions", list, "",
-       "Places of another material; a later one beats those before it."},
+       "Regions of another material; a later one overrides earlier ones."},
       {"tissue.material.regions[].sphere", map, "", "A region as a sphere."},
       {"tissue.material.regions[].sphere.center", vector, "required", "Its center.", "mm"},
       {"tissue.material.regions[].sphere.radius", number, "required", "Its radius.", "mm",
@@ -192,7 +192,8 @@ std::vector<Key> spring_keys() {
 std::vector<Key> load_keys() {
   return {{"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
           {"scan_gravity", vector, "",
-           "Gravity field when the surfaces were recorded, lying in a CT say; default: gravity.",
+           "Gravity field when the surfaces were recorded, for example lying in a CT; default: "
+           "gravity.",
            "N/kg"},
           {"boundary", map, "", "What holds the skin where it ends."},
           {"boundary.rim",
@@ -207,7 +208,7 @@ std::vector<Key> load_keys() {
           {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
           {"forces[].radius", number, "required", "Spread over the skin points within, by area.",
            "mm", Range::above(0)},
-          {"forces[].force", vector, "required", "The force in total.", "N"}};
+          {"forces[].force", vector, "required", "The total force.", "N"}};
 }
 
 /// The forms translate and rotate, below an entry of moves and below an item of a transform.
@@ -217,7 +218,7 @@ std::vector<Key> form_keys(const std::string& above) {
            "motion that fits them best (see below)."},
           {above + ".landmark.from", place, "required",
            "Where it is before all moves; earlier moves of the bone carry it along."},
-          {above + ".landmark.to", place, "required", "Where it shall be."},
+          {above + ".landmark.to", place, "required", "Where it goes."},
           {above + ".translate", vector, "", "Form: a translation.", "mm"},
           {above + ".rotate", map, "", "Form: a rotation by the right-hand rule."},
           {above + ".rotate.axis", vector, "required", "Direction of the axis, of any length."},
