@@ -16,6 +16,16 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
 SKIN, EDGES = (0.87, 0.68, 0.58), (0.15, 0.2, 0.35)
 PANEL = (400, 480)  # pixels
+MAGMA = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")  # light to dark
+
+
+def colours(largest):
+    """The colour table of 0 … largest mm, as in drivers/render.py."""
+    table = vtk.vtkColorTransferFunction()
+    for i, text in enumerate(MAGMA):
+        red, green, blue = (int(text[k:k + 2], 16) / 255 for k in (0, 2, 4))
+        table.AddRGBPoint(largest * i / (len(MAGMA) - 1), red, green, blue)
+    return table
 
 
 def read_given(file):
@@ -64,10 +74,9 @@ def panel(column, mesh, given, largest=None, edges=False):
     renderer.SetViewport(column / 4, 0, (column + 1) / 4, 1)
     renderer.AddActor(actor)
     if largest is not None:
-        mapper.SetScalarRange(0, largest)
+        mapper.SetLookupTable(colours(largest))
         bar = vtk.vtkScalarBarActor()
         bar.SetLookupTable(mapper.GetLookupTable())
-        mapper.GetLookupTable().SetHueRange(0.66, 0)
         bar.SetTitle("mm")
         bar.GetTitleTextProperty().SetColor(0, 0, 0)
         bar.GetLabelTextProperty().SetColor(0, 0, 0)
@@ -78,6 +87,7 @@ def panel(column, mesh, given, largest=None, edges=False):
         bar.SetNumberOfLabels(4)
         bar.SetLabelFormat("%.0f")
         bar.SetMaximumWidthInPixels(50)
+        bar.SetVerticalTitleSeparation(10)
         bar.SetPosition(0.02, 0.08)
         renderer.AddViewProp(bar)
     middle = np.array(given.GetCenter())
