@@ -45,7 +45,7 @@ std::string default_times(const Findings& findings, bool force) {
     if (race.functional.force != force || race.functional.volume) continue;
     text += fmt::format("{}{} ms{}", text.empty() ? "" : ", ",
                         static_cast<int64_t>(1e3 * race.own.seconds),
-                        race.own.arrived() ? "" : " without arriving");
+                        race.own.arrived() ? "" : " without convergence");
   }
   return text;
 }
@@ -53,14 +53,15 @@ std::string default_times(const Findings& findings, bool force) {
 std::string energy_or_force(const Findings& findings) {
   const Score energy = score(findings, [](const Functional& f) { return !f.force; });
   const Score force = score(findings, [](const Functional& f) { return f.force; });
-  return claim("Energy is faster and more robust than force.", energy.share() > force.share(),
-               fmt::format("Of the one-step searches {} of {} end at a minimum of the energy, {} "
-                           "of {} at one of the force\nfunctional. Our default, which follows the "
-                           "bones, needs {}\nfor the energy and {} for forces without f_v. f_f is "
-                           "stationary\nwherever its gradient −H F/|F| vanishes, which it does at "
-                           "places with F ≠ 0.",
-                           energy.arrived, energy.run, force.arrived, force.run,
-                           default_times(findings, false), default_times(findings, true)));
+  return claim(
+      "Energy is faster and more robust than force.", energy.share() > force.share(),
+      fmt::format("Of the one-step searches {} of {} reach a minimum of the energy, {} "
+                  "of {} a minimum of the force\nfunctional. Our default, which follows the "
+                  "bones, needs {}\nfor the energy and {} for forces without f_v. f_f is "
+                  "stationary\nwherever its gradient −H F/|F| vanishes, which it does at "
+                  "places with F ≠ 0.",
+                  energy.arrived, energy.run, force.arrived, force.run,
+                  default_times(findings, false), default_times(findings, true)));
 }
 
 /// Evaluations with f_v over those without, for every method that came to the same reference.
@@ -97,15 +98,15 @@ std::string volume_and_force(const Findings& findings) {
   const Score without = score(findings, of(true, false)), with = score(findings, of(true, true));
   const Score energy = score(findings, of(false, false)), both = score(findings, of(false, true));
   return claim("f_v helps force minimisation.", with.arrived > without.arrived,
-               fmt::format("One-step searches that arrive: {} of {} with f_v, {} of {} without "
-                           "it. The paper's method\ncame as near as {} with f_v and {} without it.",
+               fmt::format("One-step searches that converge: {} of {} with f_v, {} of {} without "
+                           "it. The paper's method\ncame within {} with f_v and {} without it.",
                            with.arrived, with.run, without.arrived, without.run,
                            closest(findings, true), closest(findings, false))) +
          claim(
              "f_v does not help energy minimisation.", both.other >= energy.other,
-             fmt::format("As to evaluations it does not: with f_v a method that arrives takes "
-                         "{}\nthose without. But it makes the answer one: {} of {} one-step "
-                         "searches come to another\nminimum with f_v, {} of {} without.",
+             fmt::format("Not in evaluations: with f_v a method that converges takes "
+                         "{}\nthose without. But it makes the minimum unique: {} of {} one-step "
+                         "searches reach another minimum\nwith f_v, {} of {} without.",
                          volume_ratios(findings), both.other, both.run, energy.other, energy.run));
 }
 
@@ -120,7 +121,7 @@ std::string memory(const Findings& findings) {
     most = std::max(most, each);
   }
   return claim("Memory grows linearly.", most <= 1.5 * least,
-               fmt::format("Bytes a spring, Newton's method included: {}. From 2 thousand to a "
+               fmt::format("Bytes per spring, Newton's method included: {}. From 2 thousand to a "
                            "million points:\n[scaling](scaling.md).",
                            text));
 }
@@ -134,12 +135,13 @@ std::string preprocessing(const Findings& findings) {
     text += fmt::format("{}{:.1f} ms", text.empty() ? "" : ", ", 1e3 * s.ready);
   }
   constexpr double little = 500;  // evaluations
-  return claim("No preprocessing.", most <= little,
-               fmt::format("From the model in memory to the first evaluation: {}, the time of at "
-                           "most {:.0f} evaluations\n(sharing out over ranks and laying out the "
-                           "loops). Newton's factorisations are made on the\nway and are in its "
-                           "times; nothing is condensed or factorised ahead.",
-                           text, most));
+  return claim(
+      "No preprocessing.", most <= little,
+      fmt::format("From the model in memory to the first evaluation: {}, the time of at "
+                  "most {:.0f} evaluations\n(distribution over ranks and layout of the loops). "
+                  "Newton's factorisations are made on the way\nand are included in its "
+                  "times; nothing is condensed or factorised in advance.",
+                  text, most));
 }
 
 std::string evaluations_text(const Entry& e) {
@@ -166,13 +168,13 @@ std::string motion(const Findings& findings) {
         evaluations_text(paper), newton);
   }
   return claim(
-             "Direct minimisation beats integrating the equations of motion, by the paper's "
-             "method.",
+             "By the paper's method, direct minimisation is faster than integrating the "
+             "equations of motion.",
              paper_wins,
              text +
-                 "\nEuler's figure is with the best damping and step, which follow from the "
-                 "rest position's own\nmodes; its one evaluation a step needs no line search, "
-                 "on which Brent's method spends most of\nits values.") +
+                 "\nEuler's figure is for the best damping and step, which follow from the "
+                 "modes of the\nrest position. Its one evaluation per step needs no line "
+                 "search, on which Brent's method spends most\nof its values.") +
          claim("The same, by today's direct methods.", ours_win,
                "Quasi-Newton and Newton methods need the fewest evaluations of all.");
 }

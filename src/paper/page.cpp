@@ -29,13 +29,10 @@ std::string beside_printed(int64_t ours, int layers, int Printed::*what) {
 
 std::string size_table(const Findings& findings) {
   std::string text =
-      "## Table 1: sizes\n\nIn brackets what the paper prints. Its 1748 prisms of two layers are 2 "
-      "· "
-      "874 and do not\nfit its own other rows, which are 874 for each gap between layers. Memory "
-      "is "
-      "what is held on\nthe heap: by the model, besides to evaluate energy and gradient, and "
-      "besides "
-      "for Newton's\nmethod with its preconditioner.\n\n"
+      "## Table 1: sizes\n\nIn brackets what the paper prints. Its 1748 prisms for two layers "
+      "are\n2 · 874 and do not fit its other rows, which have 874 for each gap between\nlayers. "
+      "Memory is heap memory: of the model, additionally to evaluate energy and gradient,\nand "
+      "additionally for Newton's method with its preconditioner.\n\n"
       "| layers | points | springs | prisms | model, MB | + descent, MB | + Newton, MB |\n"
       "|--:|--:|--:|--:|--:|--:|--:|\n";
   for (const Size& s : findings.sizes)
@@ -91,21 +88,21 @@ std::string race_table(const Findings& findings, bool force) {
 std::string how_raced(const Rules& rules) {
   return fmt::format(
       R"(Evaluations (with or without gradient) until the largest distance of a point from the rest
-position of the same functional is {0} mm, and CPU time over that of our default in the same
-row. That rest position is where our default ends, refined to 1e-6 mm (f_f + f_v: {1:.3g} mm);
-where it does not arrive by forces, the energy's rest position is refined. λ = 0.5 with f_v. The
-jaw goes to its place at once, from the initial state; only our default takes load steps, each
+position of the same functional is {0} mm, and CPU time relative to our default in the same row.
+That rest position is the end of our default, refined to 1e-6 mm (f_f + f_v: {1:.3g} mm);
+where it does not converge for forces, the energy's rest position is refined. λ = 0.5 with f_v. The
+jaw moves to its place in one step, from the initial state; only our default takes load steps, each
 with a linear prediction and trust-region Newton, until its own estimate is below {0} mm; in
 brackets its true distance. Forces are smoothed by ε = {2} N (our default lowers ε as it goes).
 
-- `> n (d)`: n evaluations, at most {6}, or {3} s of CPU were not enough; it came to d. Our
+- `> n (d)`: n evaluations, at most {6}, or {3} s of CPU were not enough; it ended d away. Our
   default has {4} s.
-- `stops at n (d)`: it ended by itself after n, at no minimum, d away.
-- `other minimum (d, p)`: it came to another minimum, d away, whose Φ is higher by p; evaluations
-  and time are to {5} mm of that one.
-- `–`: there is no rest position to measure from.
-- `*`: the minimum is not known to that accuracy; distances are from the state to which refining
-  the energy's rest position came.
+- `stops at n (d)`: it stopped by itself after n, not at a minimum, d away.
+- `other minimum (d, p)`: it reached another minimum, d away, whose Φ is higher by p; evaluations and
+  time are to {5} mm of that one.
+- `–`: no rest position is known.
+- `*`: the minimum is not known to that accuracy; distances are from the state that refining the
+  energy's rest position reached.
 
 )",
       rules.accuracy, 0.1 * rules.accuracy, Contest::epsilon, rules.seconds, rules.path_seconds,
@@ -123,9 +120,9 @@ std::string motion_table(const Findings& findings) {
   std::string text =
       "## Integrating the equations of motion\n\n"
       "m x'' = F − c x' (the paper's Eqs. 2–5) with unit masses and the springs alone, from the "
-      "initial\nstate with the jaw in its place, to the same accuracy. Each line is the best of a "
-      "scan over\ndampings c (1, 2, 4 times the critical one of the softest mode at rest) and, "
-      "for Euler, time\nsteps h; a person would have to find both first. One evaluation of the "
+      "initial\nstate with the jaw in its place, to the same accuracy. Each row is the best of a "
+      "scan over\ndampings c (1, 2, 4 times the critical damping of the softest mode at rest) and, "
+      "for Euler, time\nsteps h; a user would have to find both first. One evaluation of the "
       "forces counts as one.\n\n"
       "| layers | method | evaluations · time |\n|--:|---|--:|\n";
   for (const MotionRace& motion : findings.motions)
