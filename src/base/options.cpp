@@ -121,6 +121,12 @@ std::string help_line(const Option& option) {
                      notes.empty() ? "" : fmt::format(" [{}]", notes));
 }
 
+/// What PETSc asks for in PetscFinalize.
+bool read_at_the_end(const std::string& name) {
+  return name == "options_left" || name == "options_view" || name == "objects_dump" ||
+         name == "malloc_dump" || name == "mpidump";
+}
+
 /// The names in PETSc's database that nobody has asked for so far.
 std::vector<std::string> left_in_database() {
   PetscInt count = 0;
@@ -295,7 +301,8 @@ int64_t Options::integer(std::string_view name) const {
 }
 
 std::vector<std::string> Options::unused() const {
-  const std::vector<std::string> left = left_in_database();
+  std::vector<std::string> left = left_in_database();
+  std::erase_if(left, read_at_the_end);
   std::vector<std::string> result;
   for (const std::string& token : petsc_tokens_)
     if (std::find(left.begin(), left.end(), name_of(token)) != left.end()) result.push_back(token);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "repose/base/log.h"
+#include "repose/discrete/flops.h"
 #include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {
@@ -68,6 +70,8 @@ double Objective::potential() const {
 }
 
 double Objective::value_and_gradient(Vec displacement, Vec gradient) {
+  static const PetscLogEvent event = base::log_event("RpEvaluate");
+  const base::Logged logged(event, flops_of(loops_, gradient_flops));
   positions_.update(displacement);
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   double value = 0;

@@ -7,6 +7,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/base/log.h"
 #include "repose/base/pick.h"
 #include "repose/discrete/message.h"
 #include "repose/discrete/partition.h"
@@ -235,6 +236,8 @@ void hand_over(MPI_Comm comm, int to, Part& part) {
 }  // namespace
 
 Part distribute(MPI_Comm comm, const Model& model) {
+  static const PetscLogEvent event = base::log_event("RpPartition");
+  const base::Logged logged(event);
   const int ranks = base::size(comm);
   ColumnGraph graph;
   base::on_first_rank(comm, [&] { graph = column_graph(model); });

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "repose/base/log.h"
 #include "repose/base/petsc_versions.h"
+#include "repose/discrete/flops.h"
 
 namespace repose::discrete {
 
@@ -30,6 +32,8 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
   if (const PetscErrorCode code = MatShellGetContext(matrix, &self)) return code;
   try {
     const Objective& objective = self->objective_;
+    static const PetscLogEvent event = base::log_event("RpHessianAction");
+    const base::Logged logged(event, flops_of(objective.loops(), action_flops));
     objective.positions().spread(direction, self->direction_);
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "repose/base/error.h"
+#include "repose/base/log.h"
 #include "repose/base/petsc_versions.h"
 
 extern "C" PetscErrorCode PCCreate_Shell(PC pc);  // in no public header
@@ -54,13 +55,6 @@ double price_of_renewal(double usual) {
   PetscReal price = usual;
   check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
   return price;
-}
-
-/// Renewals in PETSc's log (-log_view).
-PetscLogEvent renewal_event() {
-  static PetscLogEvent event = -1;
-  if (event < 0) check(PetscLogEventRegister("PCRenew", PC_CLASSID, &event));
-  return event;
 }
 
 bool is_columns(PC pc) {
@@ -154,8 +148,9 @@ bool TangentSolver::hopeless() const {
 }
 
 void TangentSolver::renew_preconditioner() {
+  static const PetscLogEvent event = base::log_event("PCRenew");
+  const base::Logged logged(event);
   const PC pc = preconditioner();
-  check(PetscLogEventBegin(renewal_event(), pc, nullptr, nullptr, nullptr));
   if (is_columns(pc)) {
     renew_columns();
   } else {
@@ -163,7 +158,6 @@ void TangentSolver::renew_preconditioner() {
     give_room(pc);
     check(PCSetUp(pc));
   }
-  check(PetscLogEventEnd(renewal_event(), pc, nullptr, nullptr, nullptr));
   wear_.renew();
   made_at_ = hessian_.assemblies();
   ++renewals_;
@@ -196,6 +190,8 @@ PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
   if (const PetscErrorCode code = PCGetApplicationContext(pc, &self)) return code;
   if (self->factors_) return PCApply(self->factors_, r, z);
   try {
+    static const PetscLogEvent event = base::log_event("RpColumns");
+    const base::Logged logged(event);
     self->columns_->apply(r, z);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;

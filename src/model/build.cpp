@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "repose/base/error.h"
+#include "repose/base/log.h"
 #include "repose/model/attachment.h"
 #include "repose/model/bones.h"
 #include "repose/model/collision.h"
@@ -164,6 +165,8 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 }
 
 Anatomy load_anatomy(const scene::Scene& scene) {
+  static const PetscLogEvent event = base::log_event("RpSurfaces");
+  const base::Logged logged(event);
   const auto role = scene.tissue.edge ? surface::Role::raw : surface::Role::skin;
   Anatomy anatomy{scene, load_entry(scene.skin, role), {}, {}, {}};
   Bones bones = read_bones(scene);
@@ -176,6 +179,8 @@ Anatomy load_anatomy(const scene::Scene& scene) {
 }
 
 BuiltModel build_model(const Anatomy& anatomy) {
+  static const PetscLogEvent event = base::log_event("RpBuild");
+  const base::Logged logged(event);
   BuiltModel built = build_model(anatomy.scene, anatomy.skin, anatomy.bones);
   built.report.remarks.insert(built.report.remarks.begin(), anatomy.remarks.begin(),
                               anatomy.remarks.end());

@@ -9,6 +9,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/deal_out.h"
 #include "repose/base/hdf5.h"
+#include "repose/base/log.h"
 #include "repose/base/this_run.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
@@ -51,6 +52,11 @@ std::vector<Vec3> outward_normals(const model::Model& model) {
     if (const auto found = of_column.find(points.column[i]); found != of_column.end())
       normals[i] = found->second.normalized();
   return normals;
+}
+
+PetscLogEvent write_event() {
+  static const PetscLogEvent event = base::log_event("RpWrite");
+  return event;
 }
 
 struct PackNumbers {
@@ -314,6 +320,7 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
 ResultFile::~ResultFile() = default;
 
 void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows& rows) {
+  const base::Logged logged(write_event());
   State& s = *state_;
   base::together(s.comm, [&] { s.require_rows(rows); });
   base::on_first_rank(s.comm, [&] { s.unfinished->reserve(s.step_bytes()); });
@@ -329,6 +336,7 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
 }
 
 void ResultFile::commit() {
+  const base::Logged logged(write_event());
   State& s = *state_;
   s.on_disk([&] { s.file.close(); });
   base::on_first_rank(s.comm, [&] { s.publish(); });

@@ -7,6 +7,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/base/log.h"
 #include "repose/discrete/message.h"
 #include "repose/discrete/part.h"
 #include "repose/discrete/tangent.h"
@@ -324,6 +325,8 @@ Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
 }  // namespace
 
 Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
+  static const PetscLogEvent event = base::log_event("RpPrestress");
+  const base::Logged logged(event);
   MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
   bool solid = model::is_solid(model);
   MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "repose/base/agreement.h"
+#include "repose/base/log.h"
 #include "repose/base/progress.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/solve/active_search.h"
@@ -189,6 +190,7 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
     natural.take(start.position, positions, start.guess ? guess : displacement);
   stages.end("distribute");
 
+  const base::LogStage stage("Search");
   Searcher searcher(positions, settings);
   if (settings.under_way) show_states(searcher, settings, natural);
   discrete::Objective& objective = searcher.objective();

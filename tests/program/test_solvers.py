@@ -139,3 +139,21 @@ def test_the_rest_position_is_as_near_as_estimated(solved, options, accuracy):
     step = last(solved(ADVANCE, "-accuracy", accuracy, *options))
     assert apart(step, rest) <= step["displacement_error"] + ACCURACY
     assert step["displacement_error"] <= accuracy
+
+
+def test_petscs_log_tells_where_the_time_goes(run, tmp_path):
+    scene = PROJECT / "meshes" / ADVANCE
+    result = run("repose-solve", scene, "-log_view", "-options_left", "-tao_view", "-output", "face")
+    assert (result.returncode, result.stderr) == (0, "")
+    log = result.stdout[result.stdout.index("Event Stage 0: Main Stage"):]
+    before, search = log.split("Event Stage 1: Search")[:2]
+    rows = {m[1]: (int(m[2]), float(m[3])) for m in re.finditer(
+        r"^(\w+) +(\d+) \d\.\d \S+ +\S+ (\d\.\d\de\+\d\d) ", search, re.M)}
+    step = last(tmp_path / "face.h5")
+    evaluations, flops = rows["RpEvaluate"]
+    assert evaluations >= step["evaluations"] and flops > 1e5 * evaluations
+    assert rows["RpHessianAction"][1] > 0 and rows["RpColumns"][0] > 0 and rows["PCRenew"][0] > 0
+    assert rows["RpWrite"][0] == len(steps(tmp_path / "face.h5"))
+    assert all(re.search(rf"^{event} ", before, re.M) for event in (
+        "RpSurfaces", "RpBuild", "RpPartition"))
+    assert "There are no unused options" in result.stdout and "type: columns" in result.stdout
