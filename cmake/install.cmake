@@ -15,6 +15,18 @@ install(DIRECTORY meshes examples DESTINATION share/repose)
 install(DIRECTORY drivers/ DESTINATION share/repose USE_SOURCE_PERMISSIONS
   FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
 
+# Manual pages and bash completion, printed by the programs' own tables of options.
+foreach(program ${programs})
+  set(page ${PROJECT_BINARY_DIR}/manual/man1/${program}.1)
+  add_custom_command(OUTPUT ${page} DEPENDS ${program} ${PROJECT_SOURCE_DIR}/cmake/manual.cmake
+    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${program}> -DVERSION=${PROJECT_VERSION}
+      -DFOLDER=${PROJECT_BINARY_DIR}/manual -P ${PROJECT_SOURCE_DIR}/cmake/manual.cmake)
+  list(APPEND pages ${page})
+endforeach()
+add_custom_target(manual ALL DEPENDS ${pages})
+install(DIRECTORY ${PROJECT_BINARY_DIR}/manual/man1 DESTINATION share/man)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/manual/completions DESTINATION share/bash-completion)
+
 set(package lib/cmake/Repose)
 install(EXPORT Repose NAMESPACE Repose:: DESTINATION ${package} FILE ReposeTargets.cmake)
 configure_file(cmake/ReposeConfig.cmake ReposeConfig.cmake COPYONLY)

@@ -1,6 +1,7 @@
 """What cmake --install puts where, and that it works from there."""
 
 import os
+import re
 import shutil
 
 import h5py
@@ -47,6 +48,21 @@ def test_everything_is_there(prefix):
                  f"meshes/{SCENE}"):
         assert (shared / name).is_file(), name
     assert os.access(shared / "slicer/Repose", os.X_OK) and os.access(shared / "report.py", os.X_OK)
+
+
+def test_manual_pages_and_completion_hold_every_option(prefix, call):
+    for program in sorted(path.name for path in (prefix / "bin").iterdir()):
+        page = (prefix / f"share/man/man1/{program}.1").read_text(encoding="utf-8")
+        options = re.findall(r"^  (-\w+)", call(program, "-help").stdout, re.M)
+        assert re.findall(r"^\.B \\(-\w+)", page, re.M) == options and len(options) > 1
+        script = prefix / f"share/bash-completion/completions/{program}"
+        offered = call("bash", "-c", f"source {script}; COMP_WORDS=({program} -); COMP_CWORD=1; "
+                       f"_{program}; echo ${{COMPREPLY[@]}}").stdout
+        assert offered.split() == options
+    offered = call("bash", "-c", f"source {prefix}/share/bash-completion/completions/repose-solve; "
+                   "COMP_WORDS=(repose-solve -volume p); COMP_CWORD=2; _repose-solve; "
+                   "echo ${COMPREPLY[@]}").stdout
+    assert offered.split() == ["paper", "penalty"]
 
 
 def test_the_paper_finds_its_heads(call, tmp_path):
