@@ -199,6 +199,20 @@ PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
   return PETSC_SUCCESS;
 }
 
+void TangentSolver::give_up() {
+  int finite = 1;
+  hessian_.visit_convex([&](int32_t, int32_t, const Mat3& block) {
+    if (!block.allFinite()) finite = 0;
+  });
+  MPI_Allreduce(MPI_IN_PLACE, &finite, 1, MPI_INT, MPI_MIN, positions_.comm());
+  if (!finite)
+    base::refuse(
+        "stiffnesses at load {:.4g} are too large for floating-point numbers: elongations are huge "
+        "beside s_ref, or the moduli are; check the units, tissue.springs and how far bones move",
+        positions_.load());
+  throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
+}
+
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
   prepare(displacement);
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
@@ -206,10 +220,13 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov_, &reason));
-  if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF)
-    throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
+  if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF) give_up();
   finished_ = reason > 0 && reason != KSP_CONVERGED_ITS;  // preonly asks for no accuracy
-  return reason != KSP_DIVERGED_INDEFINITE_MAT && reason != KSP_DIVERGED_INDEFINITE_PC;
+  // PETSc's conjugate gradients see the curvature change its sign, not that it has the wrong one.
+  PetscReal product = 0;
+  check(VecDot(rhs, delta, &product));
+  return product >= 0 && reason != KSP_DIVERGED_INDEFINITE_MAT &&
+         reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 
 double TangentSolver::glance(Vec gradient) {
@@ -225,8 +242,8 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
   if (measured_at_ == hessian_.assemblies()) check(VecEqual(gradient, measured_, &same));
   if (same) return distance_;
   check(VecSet(work_, 0));
-  const bool convex = solve(displacement, gradient, work_, usual_);
-  distance_ = convex ? discrete::largest_block(work_) : std::numeric_limits<double>::infinity();
+  bends_ = !solve(displacement, gradient, work_, usual_);
+  distance_ = bends_ ? std::numeric_limits<double>::infinity() : discrete::largest_block(work_);
   measured_at_ = hessian_.assemblies();
   sure_at_ = -1;
   check(VecCopy(gradient, measured_));
@@ -234,10 +251,11 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
 }
 
 /// Of a point, mm/N, or more: what a load of random signs moves. Soft points go farthest, and take
-/// most of its energy, so that a rough solution will do. What a preconditioner serves for is alike.
+/// most of its energy, so that a rough solution will do. At one load what a preconditioner serves
+/// for is alike.
 double TangentSolver::largest_compliance(Vec displacement) {
-  constexpr double rough = 0.3;
-  if (compliance_at_ == renewals_) return compliance_;
+  const double load_now = positions_.load();
+  if (compliance_at_ == renewals_ && compliance_load_ == load_now) return compliance_;
   base::VecHandle load = positions_.make_vector();
   PetscInt begin = 0, end = 0;
   PetscScalar* values = nullptr;
@@ -246,10 +264,30 @@ double TangentSolver::largest_compliance(Vec displacement) {
   for (PetscInt i = begin; i < end; ++i) values[i - begin] = random_sign(static_cast<uint64_t>(i));
   check(VecRestoreArray(load, &values));
   check(VecSet(next_, 0));
-  const bool known = solve(displacement, load, next_, rough) && finished_;
+  bool known = false;
+  for (const double share : {0.3, 1e-3, 1e-6}) {
+    convex_ = solve(displacement, load, next_, share);
+    known = convex_ && finished_ && truly_smaller(load, next_);
+    if (known || !convex_) break;
+  }
   compliance_ = known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
   compliance_at_ = known ? renewals_ : -1;
+  compliance_load_ = load_now;
   return compliance_;
+}
+
+bool TangentSolver::truly_smaller(Vec rhs, Vec delta) {
+  base::VecHandle left = positions_.make_vector();
+  PetscReal before = 0, after = 0;
+  check(MatMult(hessian_.action(), delta, left));
+  check(VecAYPX(left, -1, rhs));
+  check(VecNorm(rhs, NORM_2, &before));
+  check(VecNorm(left, NORM_2, &after));
+  return after <= before;
+}
+
+bool TangentSolver::is_minimum(Vec displacement) {
+  return std::isfinite(largest_compliance(displacement)) || convex_;
 }
 
 bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {

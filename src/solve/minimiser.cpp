@@ -222,10 +222,14 @@ double Minimiser::contraction(Vec displacement) {
   return contraction_;
 }
 
+double Minimiser::at_balance(Vec displacement) {
+  return certificate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
+}
+
 bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
   if (largest_force == 0) {
-    error_ = 0;
-    return true;
+    error_ = at_balance(displacement);
+    return error_ == 0;
   }
   if (accuracy_ == 0) return false;
   // A look costs the solution of a linear system, so it is taken only where the force that went
@@ -300,8 +304,8 @@ int Minimiser::polish(Vec displacement) {
 
 double Minimiser::measure(Vec displacement, bool last) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ =
-      discrete::largest_block(gradient_) == 0 ? 0 : strict_estimate(displacement, gradient_, last);
+  error_ = discrete::largest_block(gradient_) == 0 ? at_balance(displacement)
+                                                   : strict_estimate(displacement, gradient_, last);
   return objective;
 }
 
@@ -319,7 +323,7 @@ Outcome Minimiser::summary(Vec displacement) {
   outcome.objective = function_.evaluate(displacement, gradient_);
   outcome.gradient_max = discrete::largest_block(gradient_);
   outcome.displacement_error = error_;
-  outcome.stable = std::isfinite(error_);
+  outcome.stable = std::isfinite(error_) || !certificate_.solver.negative_curvature();
   outcome.converged = error_ <= accuracy_;
   TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
   check(TaoGetConvergedReason(tao_, &reason));
@@ -328,7 +332,10 @@ Outcome Minimiser::summary(Vec displacement) {
   outcome.reason = reason_of(outcome, reason);
   if (corrections > 0)
     outcome.reason += fmt::format(", {} Newton corrections at the rounding level", corrections);
-  if (!outcome.stable) outcome.reason += ", at a point that is not a minimum";
+  if (!outcome.stable)
+    outcome.reason += ", at a point that is not a minimum";
+  else if (!std::isfinite(error_))
+    outcome.reason += ", where stiffnesses lie too far apart to tell the distance to rest";
   return outcome;
 }
 

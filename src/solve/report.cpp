@@ -49,8 +49,12 @@ std::string region_row(const RegionSummary& r) {
 std::string verdict(const Summary& s) {
   if (s.path.complete()) return "";
   return fmt::format(
-      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).\n",
-      s.path.load, s.last.displacement_error, s.last.reason);
+      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).{}\n",
+      s.path.load, s.last.displacement_error, s.last.reason,
+      s.path.last.stable || s.path.last.stopped
+          ? ""
+          : " The tissue buckles there, or is between several rest positions: move "
+            "the bones less, or give the tissue tension.");
 }
 
 }  // namespace

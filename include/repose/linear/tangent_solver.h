@@ -51,6 +51,10 @@ class TangentSolver {
   /// or below `slack`, mm. Infinite where that is out of reach, or a random load meets negative
   /// curvature.
   double sure_distance(Vec displacement, Vec gradient, double slack);
+  /// Whether a random load meets no negative curvature: what no force disturbs may be a saddle.
+  bool is_minimum(Vec displacement);
+  /// Whether the latest distance, or the random load that it was to be sure by, met any.
+  bool negative_curvature() const { return bends_ || !convex_; }
   double unsure() const { return unsure_; }  ///< mm, of the latest, where it is not little of it
 
   /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
@@ -82,7 +86,12 @@ class TangentSolver {
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
   void choose_preconditioner();
   bool hopeless() const;
+  /// Says why no linear system can be solved. Collective.
+  [[noreturn]] void give_up();
   double largest_compliance(Vec displacement);
+  /// Whether δ leaves less of rhs than nothing would: the norm that a solve ends by is that of the
+  /// preconditioner, which says little where stiffnesses lie far apart.
+  bool truly_smaller(Vec rhs, Vec delta);
   /// Takes the residual of the latest Newton step down by a factor; whether it could be.
   bool improve(Vec displacement, Vec gradient, double factor);
   void renew_columns();
@@ -104,6 +113,9 @@ class TangentSolver {
   int64_t sure_at_ = -1;             // and at this many it is sure
   double compliance_ = 0;            // mm/N, of the softest point, …
   int64_t compliance_at_ = -1;       // … at this many renewals of the preconditioner
+  double compliance_load_ = 0;       // … and at this load
+  bool convex_ = true;               // the random load met no negative curvature, …
+  bool bends_ = false;               // … the latest Newton step did
   bool finished_ = false;
   Wear wear_;
   int64_t renewals_ = 0;

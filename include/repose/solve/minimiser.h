@@ -53,6 +53,8 @@ class Minimiser : public RestSearch {
   /// misleads.
   double contraction(Vec displacement);
   bool step_was_cut() const;
+  /// Where no force is left: 0, or infinite at a saddle.
+  double at_balance(Vec displacement);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   double farthest_correction() const;  ///< mm, of a Newton step that ends a search
   bool stalled(int64_t iteration, double value);
