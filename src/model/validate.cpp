@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "repose/base/error.h"
 #include "repose/base/pick.h"
@@ -196,6 +197,40 @@ void refuse_unattached(const Model& m, const std::string& file) {
           file, i);
 }
 
+/// Points that are joined, each by the lowest of them that is found so far.
+class Parts {
+ public:
+  explicit Parts(size_t points) : above_(points) { std::iota(above_.begin(), above_.end(), 0); }
+  int64_t of(int64_t point) {
+    while (above_[point] != point) point = above_[point] = above_[above_[point]];
+    return point;
+  }
+  void join(const std::array<int64_t, 2>& ends) {
+    const int64_t one = of(ends[0]), other = of(ends[1]);
+    above_[std::max(one, other)] = std::min(one, other);
+  }
+
+ private:
+  std::vector<int64_t> above_;
+};
+
+void refuse_floating(const Model& m, const std::string& file) {
+  const size_t points = m.points.set.size();
+  Parts parts(points);
+  for (const auto& ends : m.springs.points) parts.join(ends);
+  for (const auto& ends : m.edges.points) parts.join(ends);
+  std::vector<bool> held(points, false);
+  for (size_t i = 0; i < points; ++i)
+    if (m.points.set[i] != PointSet::soft_tissue) held[parts.of(static_cast<int64_t>(i))] = true;
+  for (size_t i = 0; i < points; ++i)
+    if (!held[parts.of(static_cast<int64_t>(i))])
+      refuse(
+          "{}: /model/point: row {} at ({:.4g}, {:.4g}, {:.4g}) mm is soft tissue, and nothing "
+          "holds it or what it is joined to; make a point there a boundary point (set 1), or "
+          "remove the part",
+          file, i, m.points.position[i].x(), m.points.position[i].y(), m.points.position[i].z());
+}
+
 }  // namespace
 
 Prisms pick_prisms(const Prisms& p, const std::vector<int64_t>& rows) {
@@ -231,6 +266,7 @@ void validate(const Model& model, const std::string& file) {
   Array(file, "skin/points").all_index(model.skin, points);
   validate_bones(model, file);
   refuse_unattached(model, file);
+  refuse_floating(model, file);
 }
 
 }  // namespace repose::model

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::infinity();
 
-constexpr int most_halvings = 5;  // of a short step that fails or strays
+constexpr int most_halvings = 5;     // of a short step that fails or strays
+constexpr double most_steps = 1000;  // without halvings: a motion of kilometres is no longer path
 // Of the predicted increment, beyond which a step is halved:
 constexpr double trusted_miss = 0.5;
 constexpr double trusted_defect = 0.25;
@@ -42,7 +43,7 @@ LoadPath::LoadPath(discrete::Objective& objective, Predictor& predictor, RestSea
 double LoadPath::step_of(double stride) const {
   if (settings_.load_steps > 0) return 1.0 / settings_.load_steps;
   const double travel = objective_.positions().largest_travel();
-  return 1.0 / std::max(1.0, std::ceil(travel / stride));
+  return 1.0 / std::clamp(std::ceil(travel / stride), 1.0, most_steps);
 }
 
 double LoadPath::longest_step() const {
