@@ -170,7 +170,9 @@ std::vector<std::string> Reader::names(const std::string& path) const {
 }
 
 bool Reader::has_attribute(const std::string& object, const char* attribute) const {
-  return check_hdf5(H5Aexists_by_name(file_, object.c_str(), attribute, H5P_DEFAULT)) > 0;
+  return named(*this, attribute_place(object, attribute), [&] {
+    return check_hdf5(H5Aexists_by_name(file_, object.c_str(), attribute, H5P_DEFAULT)) > 0;
+  });
 }
 
 double Reader::number(const std::string& object, const char* attribute) const {

@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 #include "soup.h"
 
 namespace repose::surface {
@@ -135,6 +137,24 @@ void check_nifti_spacing(const std::filesystem::path& file) {
     if (spacing == 0 || !std::isfinite(spacing))
       base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
                    file.string(), "ijk"[axis], spacing);
+  }
+}
+
+void check_meta_dimensions(const std::filesystem::path& file) {
+  constexpr int64_t most = 10;
+  std::ifstream in(file, std::ios::binary);
+  for (std::string line; std::getline(in, line);) {
+    const std::string_view text = line;
+    const size_t sign = std::min(text.find('='), text.size());
+    const auto key = words(text.substr(0, sign));
+    if (key.size() != 1 || sign == text.size()) continue;
+    const auto value = words(text.substr(sign + 1));
+    if (key[0] == "ElementDataFile") return;
+    if (key[0] != "NDims") continue;
+    const auto number = value.size() == 1 ? base::parse_integer(value[0]) : std::nullopt;
+    if (!number || *number < 1 || *number > most)
+      base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
+                   base::shown(text.substr(sign + 1)), most);
   }
 }
 

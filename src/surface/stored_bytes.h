@@ -15,4 +15,8 @@ void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, i
 /// 1, or none that is finite. A file that is no NIfTI passes.
 void check_nifti_spacing(const std::filesystem::path& file);
 
+/// Throws InputError where a MetaImage's header says it has more dimensions than its library counts
+/// to in a lifetime.
+void check_meta_dimensions(const std::filesystem::path& file);
+
 }  // namespace repose::surface
