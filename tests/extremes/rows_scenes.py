@@ -1,0 +1,117 @@
+"""Extremes of whole scenes, on the head of the paper's size, of springs and of a solid."""
+
+import meshio
+
+from conftest import PROJECT
+from judge import Row
+
+MESHES = PROJECT / "meshes"
+TISSUES = {
+    "springs": "springs: {default: {modulus: 0.05, law: quartic, reference: 1.0}}",
+    "solid": "material: {preset: face}",
+}
+SLIDE = "sphere: {center: [63, -98, -10], radius: 20}, push: [-3, 4, 0], skin: slide"
+
+
+def head(tissue, moves="", more="", layers=4, in_tissue="", solve="", meshes=MESHES):
+    """A scene's text; `moves` are those of the mandible."""
+    listed = f"moves:\n  - {{bone: mandible, {moves}}}\n" if moves else ""
+    return f"""skin: {meshes}/paper_skin.ply
+bones:
+  - {{name: skull, file: {meshes}/paper_skull.ply}}
+  - {{name: mandible, file: {meshes}/paper_mandible.ply}}
+tissue:
+  layers: {layers}
+  {tissue}
+{in_tissue}{listed}{more}{solve}"""
+
+
+def turned(angle):
+    return f"rotate: {{axis: [1, 0, 0], center: [0, 0, 0], angle: {angle}}}"
+
+
+def forward(distance):
+    return f"translate: [0, {-distance}, 0]"
+
+
+def in_unit(tissue, factor):
+    """The same surfaces with coordinates in another unit of length."""
+
+    def make(folder):
+        for part in ("skin", "skull", "mandible"):
+            mesh = meshio.read(MESHES / f"paper_{part}.ply")
+            meshio.Mesh(mesh.points.astype(float) * factor, mesh.cells).write(
+                folder / f"paper_{part}.ply"
+            )
+        return head(tissue, forward(6), meshes=folder)
+
+    return make
+
+
+def everything(tissue, volume):
+    more = f"""gravity: [0, 0, -9.80665]
+scan_gravity: [0, 9.80665, 0]
+forces:
+  - {{at: [-47, -80, 8], radius: 8, force: [0, -0.05, 0]}}
+instruments:
+  - {{{SLIDE}}}
+incisions:
+  - {{path: [[47, -80, 8], [49, -75, -8]], layers: 2}}
+collision: {{mode: report}}
+"""
+    return lambda _: head(
+        tissue, turned(8), more, in_tissue="  turgor: 0.03\n  density: 1.0e-6\n", solve=volume
+    )
+
+
+HARD = "FOLDED|minimum|rounding|fails|limit"
+LIMITED = ("-time_limit", "200")
+
+
+def rows_of(kind):
+    tissue = TISSUES[kind]
+    volume = "solve: {volume: {form: penalty}}\n" if kind == "springs" else ""
+
+    def row(name, *arguments, may_end=HARD, options=(), slow=True, **more):
+        scene = head(tissue, *arguments, solve=volume, **more)
+        return Row(name, lambda _: scene, (*LIMITED, *options), may_end=may_end, slow=slow)
+
+    yield row("head: jaw 6 mm forward", forward(6), may_end="", slow=False)
+    yield row("head: jaw opened by 8°", turned(8), may_end="", slow=False)
+    yield row("head: jaw opened by 25°", turned(25))
+    yield row("head: jaw opened by 45°", turned(45))
+    yield row("head: jaw 15 mm back", forward(-15))
+    yield row("head: jaw 40 mm forward", forward(40))
+    for turgor in (0, 0.1, 1):
+        yield row(
+            f"head: turgor {turgor}, jaw 6 mm forward",
+            forward(6),
+            in_tissue=f"  turgor: {turgor}\n",
+            slow=turgor > 0,
+        )
+    yield row("head: 64 layers, jaw 2 mm forward", forward(2), layers=64)
+    for factor, unit in ((1e-3, "metres"), (1e3, "micrometres")):
+        yield Row(
+            f"head: surfaces in {unit}",
+            in_unit(tissue, factor),
+            refused="in (metres|micrometres)|20 mm|2000 mm|across",
+        )
+    yield Row(
+        "head: cut, weight, turgor, forces, sliding, contact at once",
+        everything(tissue, volume),
+        LIMITED,
+        may_end=HARD + "|SETTLED",
+        slow=True,
+    )
+    if kind == "springs":
+        for kappa in ("1e-9", "1e9"):
+            yield row(f"head: kappa {kappa}", forward(6), options=("-bulk_modulus", kappa))
+        for weight in ("1e-9", "1"):
+            yield Row(
+                f"head: volume paper, lambda {weight}",
+                lambda _: head(tissue, forward(6)),
+                (*LIMITED, "-volume", "paper", "-lambda", weight),
+                may_end=HARD,
+                slow=True,
+                judged=False,
+            )
