@@ -1,0 +1,261 @@
+"""Deliberate breaks of the program: what each is, the words in the sources that are exchanged
+(they stand
+there once), and a pattern of the tests that are to catch it."""
+
+MECHANICS, SOLVE, MODEL = r"^mechanics\.", r"^solve\.", r"^model\."
+BREAKS = [
+    # mechanics
+    ("energy of the quadratic law", "(1.0 + 0.5 * q)", "(1.0 + 0.25 * q)", MECHANICS),
+    (
+        "tangent of the quartic law",
+        "k0 * (1.0 + q) * (1.0 + 5.0 * q)",
+        "k0 * (1.0 + q) * (1.0 + 4.0 * q)",
+        MECHANICS,
+    ),
+    (
+        "curvature of the quartic law",
+        "4.0 * once * (3.0 + 5.0 * q)",
+        "4.0 * once * (3.0 + 4.0 * q)",
+        f"{MECHANICS}|{SOLVE}force_functional",
+    ),
+    (
+        "volume of a prism",
+        "volume = e.d.dot(normals) / 36.0",
+        "volume = e.d.dot(normals) / 35.0",
+        MECHANICS,
+    ),
+    (
+        "a sign in the volume's second derivatives",
+        "{{{o, p + a - g, q + a + g,",
+        "{{{o, p + a + g, q + a + g,",
+        MECHANICS,
+    ),
+    (
+        "weight of the springs' forces",
+        "const double tension = scale * spring_tension<p>(s, k0, inverse);",
+        "const double tension = spring_tension<p>(s, k0, inverse);",
+        MECHANICS,
+    ),
+    (
+        "energy of an edge",
+        "energy += 0.5 * loop.weight[e] * d.squaredNorm();",
+        "energy += 0.25 * loop.weight[e] * d.squaredNorm();",
+        MECHANICS,
+    ),
+    (
+        "sign of the pressure",
+        "state.pressure = -along.mean() - across;",
+        "state.pressure = along.mean() - across;",
+        MECHANICS,
+    ),
+    (
+        "von Mises stress",
+        "std::sqrt(1.5) * apart.norm()",
+        "std::sqrt(1.0) * apart.norm()",
+        MECHANICS,
+    ),
+    (
+        "sign of the loads",
+        "gradient[i] -= scale * load_force_[i];",
+        "gradient[i] += scale * load_force_[i];",
+        SOLVE,
+    ),
+    # the way of the bones
+    (
+        "tissue that folds passes",
+        "attempt.folded = inverted(trial_) > folded_before;",
+        "attempt.folded = false;",
+        f"{SOLVE}load_path|extremes|load_steps",
+    ),
+    (
+        "a step that misses its prediction passes",
+        "constexpr double trusted_miss = 0.5;",
+        "constexpr double trusted_miss = 1e9;",
+        f"{SOLVE}load_path|load_steps",
+    ),
+    (
+        "a long step that bends passes",
+        "constexpr double trusted_defect = 0.25;",
+        "constexpr double trusted_defect = 1e9;",
+        f"{SOLVE}load_path|load_steps",
+    ),
+    (
+        "a step that fails is not halved",
+        "if (!now.outcome.converged) return false;",
+        "",
+        f"{SOLVE}load_path|load_steps",
+    ),
+    (
+        "a guess that folds is taken",
+        "(outcome.converged && inverted(trial_) <= folded_before)",
+        "outcome.converged",
+        f"{SOLVE}load_path|nested|interrupt",
+    ),
+    ("a screw's translation", "load * along + part *", "along + part *", r"^scene\."),
+    (
+        "held points do not go",
+        "return (1 - load) * from + load * model.points.target[row];",
+        "return from;",
+        f"{MODEL}motion|instruments",
+    ),
+    # how far
+    (
+        "estimate of half a step",
+        "constexpr double safety = 2;     // the estimate",
+        "constexpr double safety = 0.5;  // the estimate",
+        f"{SOLVE}|extremes",
+    ),
+    (
+        "no margin for soft points",
+        "constexpr double margin = 50;",
+        "constexpr double margin = 0;",
+        f"{SOLVE}|extremes",
+    ),
+    (
+        "negative curvature is no matter",
+        "return product >= 0 && reason != KSP_DIVERGED_INDEFINITE_MAT &&\n         reason != KSP_DIVERGED_INDEFINITE_PC;",
+        "return true;",
+        f"{SOLVE}|extremes",
+    ),
+    (
+        "ten times the accuracy is enough",
+        "outcome.converged = error_ <= accuracy_;",
+        "outcome.converged = error_ <= 10 * accuracy_;",
+        f"{SOLVE}|extremes",
+    ),
+    (
+        "a trial step that says nothing is believed",
+        "contraction_ = found <= trusted_contraction ? found : most_contraction;",
+        "contraction_ = 0;",
+        f"{SOLVE}|extremes",
+    ),
+    # initial equilibrium
+    (
+        "sign of the force to balance",
+        "check(VecScale(force, -1));",
+        "check(VecScale(force, 1));",
+        f"{SOLVE}prestress",
+    ),
+    (
+        "rest lengths below 0",
+        "if (part.model.springs.rest_length[j] > 0) continue;",
+        "continue;",
+        f"{SOLVE}prestress|equilibrium|bad_input",
+    ),
+    (
+        "turgor",
+        "(skin[j] ? 1 + as.turgor : 1.0)",
+        "(skin[j] ? 1 + 2 * as.turgor : 1.0)",
+        f"{SOLVE}prestress|equilibrium",
+    ),
+    (
+        "a solid's skin tension",
+        "skin.young * tissue.turgor * thickness / (1 - skin.poisson)",
+        "skin.young * tissue.turgor * thickness",
+        f"{MODEL}|solid|equilibrium",
+    ),
+    # volume and stability
+    (
+        "volume kept to a hundredth",
+        "pressure[e] / weight);",
+        "0.5 * pressure[e] / weight);",
+        f"{SOLVE}exact_volume",
+    ),
+    (
+        "springs of the wrong volume",
+        "constexpr int springs_of_prism = 15;",
+        "constexpr int springs_of_prism = 9;",
+        f"{MODEL}stiffness",
+    ),
+    # contact
+    (
+        "contact found too late",
+        "return found ? -1 : contact_margin;",
+        "return found ? -1 : 0;",
+        r"^surface\.collision|^model\.collision",
+    ),
+    (
+        "distance of boxes too large",
+        "const Vec3 in_a = between.cwiseAbs() - a.half - spread * b.half;",
+        "const Vec3 in_a = between.cwiseAbs() - a.half;",
+        r"^surface\.collision|^model\.collision",
+    ),
+    # cutting
+    (
+        "a cut one layer too shallow",
+        "if (p.layer[row] >= cut_.layers ||",
+        "if (p.layer[row] + 1 >= cut_.layers ||",
+        f"{MODEL}cut",
+    ),
+    (
+        "loads at a cut go to the wrong side",
+        "points.mass[row] *= 1 - share;",
+        "points.mass[row] *= share;",
+        f"{MODEL}cut",
+    ),
+    (
+        "edges at a cut",
+        "add_to_edge(p, q, (1 - share) * beyond[j]);",
+        "add_to_edge(p, q, share * beyond[j]);",
+        f"{MODEL}cut",
+    ),
+    (
+        "springs tear at half the limit",
+        "if (!(tension[j] > *result_.limit)) continue;",
+        "if (!(tension[j] > 0.5 * *result_.limit)) continue;",
+        f"{SOLVE}tearing|program.tearing",
+    ),
+    (
+        "sliding ends too early",
+        "result.to_go <= settings.path.accuracy / 2;",
+        "result.to_go <= 20 * settings.path.accuracy;",
+        "instruments",
+    ),
+    # files
+    (
+        "a file is renamed before it is whole",
+        "if (!committed_) std::filesystem::remove(part_, ignored);",
+        "",
+        r"^results\.",
+    ),
+    ("a held name is taken", "if (!held && errno == EWOULDBLOCK) {", "if (false) {", r"^results\."),
+    (
+        "numbers that are not finite are read",
+        "if (!std::isfinite(values[i]))\n      reader.refuse(",
+        "if (false)\n      reader.refuse(",
+        r"^results\.",
+    ),
+    (
+        "springs of a point with itself",
+        "if (s.points[j][0] == s.points[j][1])",
+        "if (false)",
+        r"^results\.",
+    ),
+    (
+        "a restart of another model",
+        "if (read_model(file).points.position != model.points.position)",
+        "if (false)",
+        r"^results\.|program.load_steps|interrupt",
+    ),
+    (
+        "a restart from the first step",
+        "step >= 0 && !found.step.numbers.converged; --step)",
+        "step >= count && !found.step.numbers.converged; --step)",
+        r"^results\.",
+    ),
+    (
+        "a transform file the wrong way round",
+        "return RigidMotion::from_matrix(matrix).inverse();",
+        "return RigidMotion::from_matrix(matrix);",
+        r"^scene\.",
+    ),
+    ("a reflection is a motion", "if (rotation.determinant() < 0)", "if (false)", r"^scene\."),
+    # options
+    (
+        "the range of a number is no matter",
+        "return number && option.range.contains(*number);",
+        "return number.has_value();",
+        r"^base\.",
+    ),
+    ("unknown options are taken", "unknown_.push_back(name);\n    return is_value", "return is_value", r"^base\."),
+]

@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""Breaks the program on purpose, one break at a time, in a worktree of its own, and says which
+tests
+catch it. A break that no test catches has survived, and wants a test.
+
+    tests/mutations/mutate.py -scratch ../scratch                 # all
+    tests/mutations/mutate.py -scratch ../scratch -breaks 'sign'  # those whose names match
+    tests/mutations/mutate.py -check                              # only that each break has its
+    place
+
+The worktree is of the last commit; it is made if it is not there, and stays. Exit status 1 where a
+break
+survived or has no place.
+"""
+
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+sys.dont_write_bytecode = True
+from breaks import BREAKS  # noqa: E402
+
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+TIME_LIMIT = 600  # seconds, of the tests of one break: a search that does not end is caught, too
+
+
+def place_of(old, project):
+    """The one source that has these words, or why there is none."""
+    found = []
+    for path in sorted(
+        [*project.glob("src/**/*"), *project.glob("include/**/*"), *project.glob("drivers/*.cpp")]
+    ):
+        if path.suffix in (".h", ".cpp"):
+            found += [path] * path.read_text().count(old)
+    return found[0] if len(found) == 1 else f"{len(found)} places"
+
+
+def run(*command, cwd, **more):
+    return subprocess.run(
+        list(map(str, command)),
+        cwd=cwd,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        **more,
+    )
+
+
+def make_scratch(folder):
+    if not folder.exists():
+        run("git", "worktree", "add", "--detach", folder, "HEAD", cwd=PROJECT, check=True)
+        run("cmake", "--preset", "ci", cwd=folder, check=True)
+    head = run("git", "rev-parse", "HEAD", cwd=PROJECT, check=True).stdout.strip()
+    run("git", "checkout", "-f", "--detach", head, cwd=folder, check=True)
+
+
+def tests_of(pattern, build):
+    text = run("ctest", "-N", "-R", pattern, cwd=build).stdout
+    return [name for name in re.findall(r"Test +#\d+: (\S+)", text) if "_ranks" not in name]
+
+
+def targets_of(tests):
+    """What is to be built for tests: test_ROOM, and the programs for those that run programs."""
+    rooms = {test.split(".")[0] for test in tests}
+    programs = ["repose-solve", "repose-check", "repose-compare", "repose-osteotomy"]
+    return sorted(f"test_{room}" for room in rooms - {"program", "extremes"}) + (
+        programs if rooms & {"program", "extremes"} else []
+    )
+
+
+def caught_by(build, pattern, jobs):
+    """The first tests that fail, or why there are none."""
+    tests = tests_of(pattern, build)
+    if not tests:
+        return "", f"no test matches {pattern}"
+    built = run("cmake", "--build", ".", "-j", jobs, "--target", *targets_of(tests), cwd=build)
+    if built.returncode != 0:
+        return "", "does not compile: " + next(
+            (line for line in built.stdout.splitlines() if "error" in line), ""
+        )
+    exactly = "^(" + "|".join(map(re.escape, tests)) + ")$"
+    try:
+        tested = run(
+            "ctest",
+            "-R",
+            exactly,
+            "--stop-on-failure",
+            "--timeout",
+            120,
+            cwd=build,
+            timeout=TIME_LIMIT,
+        )
+    except subprocess.TimeoutExpired:
+        return "no end", ""
+    failed = re.findall(r"^\s*\d+ - (\S+) \(", tested.stdout, re.M)
+    return ", ".join(failed), "" if failed else f"passes {len(tests)} tests"
+
+
+def one(name, old, new, pattern, scratch, jobs):
+    path = place_of(old, scratch)
+    if isinstance(path, str):
+        return "NO PLACE", path
+    text = path.read_text()
+    try:
+        path.write_text(text.replace(old, new))
+        caught, why = caught_by(scratch / "build-ci", pattern, jobs)
+    finally:
+        path.write_text(text)
+    return ("caught", caught) if caught else ("SURVIVED", why)
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("-check", action="store_true")
+    parser.add_argument("-scratch", type=lambda name: pathlib.Path(name).resolve())
+    parser.add_argument("-breaks", default="")
+    parser.add_argument("-jobs", default="2")
+    arguments = parser.parse_args()
+    if not arguments.check and not arguments.scratch:
+        parser.error("give -scratch FOLDER or -check")
+    if arguments.scratch:
+        make_scratch(arguments.scratch)
+    faults = 0
+    print("| break | where | outcome | by |\n|---|---|---|---|")
+    for name, old, new, pattern in BREAKS:
+        if not re.search(arguments.breaks, name):
+            continue
+        path = place_of(old, PROJECT)
+        where = path if isinstance(path, str) else path.relative_to(PROJECT)
+        if arguments.check:
+            outcome, by = ("has its place", "") if where != path else ("NO PLACE", path)
+        else:
+            outcome, by = one(name, old, new, pattern, arguments.scratch, arguments.jobs)
+        faults += outcome not in ("caught", "has its place")
+        print(f"| {name} | {where} | {outcome} | {by} |", flush=True)
+    print(f"\n{faults} breaks not caught")
+    return int(faults > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
