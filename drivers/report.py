@@ -115,6 +115,10 @@ class Result:
             ("largest tension of a spring, N", "spring/tension"),
             ("largest von Mises stress, N/mm²", "prism/von_mises"),
             ("largest stretch", "prism/principal_stretch")) if name in step}
+        if "point/contact_pressure" in step:
+            pressure = np.nan_to_num(step["point/contact_pressure"][:])
+            self.strain |= {"points of tissue in contact": str(int((pressure > 0).sum())),
+                            "largest contact pressure, N/mm²": f"{pressure.max(initial=0):.3g}"}
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0

@@ -1,6 +1,7 @@
 """Pictures of a result: what they are of, and what is refused. Needs VTK ≥ 9.4 (pip install vtk)."""
 
 import importlib.util
+import shutil
 import struct
 import sys
 
@@ -58,6 +59,18 @@ def test_a_picture_has_a_column_a_way_and_a_row_a_view(render, solved, tmp_path)
     wide, high = size_of(tmp_path / "one.png")
     four_wide, two_high = size_of(tmp_path / "many.png")
     assert four_wide == 4 * wide and two_high > 1.2 * high
+
+
+def test_paraview_draws_the_same_result(solved, tmp_path, environment):
+    if not shutil.which("pvpython") or not shutil.which("xvfb-run"):
+        pytest.skip("ParaView is not installed (python3-paraview xvfb xauth)")
+    name = solved("paper_jaw_opening.yaml").with_suffix("")
+    result = finish(["xvfb-run", "-a", "-w", "10", "pvpython",
+                     str(PROJECT / "drivers/paraview_repose.py"), str(name), "look.png",
+                     "look.pvsm"], tmp_path, environment, TIME_LIMIT)
+    assert result.returncode == 0, result.stderr
+    wide, high = size_of(tmp_path / "look.png")
+    assert wide == 2.5 * high and "XdmfReader" in (tmp_path / "look.pvsm").read_text()
 
 
 def test_a_film_shows_the_load_steps(render, solved, tmp_path):

@@ -95,6 +95,19 @@ def test_numbers_are_those_of_the_result(report, opened, tmp_path):
     assert page.rows["command"][0].endswith(f"{SCENE} -allow_folded -output {opened.with_suffix('')}")
 
 
+def test_contact_is_told_where_there_is_any(report, opened, tmp_path):
+    assert "points of tissue in contact" not in page_of(report, tmp_path, opened).rows
+    shutil.copy(opened, tmp_path / "touching.h5")
+    with h5py.File(tmp_path / "touching.h5", "r+") as h5:
+        step = h5["step"][sorted(h5["step"])[-1]]
+        pressure = np.zeros(len(step["point/position"]))
+        pressure[:3] = 0.5, 0.25, np.nan
+        step["point/contact_pressure"] = pressure
+    page = page_of(report, tmp_path, tmp_path / "touching.h5")
+    assert page.rows["points of tissue in contact"] == ["2"]
+    assert page.rows["largest contact pressure, N/mm²"] == ["0.5"]
+
+
 def test_the_page_stands_alone(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened)
     assert all(link.startswith("data:image/png;base64,") for link in page.links)
