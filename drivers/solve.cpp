@@ -231,7 +231,7 @@ Job read_job(const std::filesystem::path& input) {
   bring_into_equilibrium(scene, job);
   make_incisions(job);
   if (!job.wanted.bulk_modulus && base::rank(comm) == 0)
-    job.wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, job.model);
+    job.wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, job.wanted, job.model);
   double bulk_modulus = job.wanted.bulk_modulus.value_or(0);
   MPI_Bcast(&bulk_modulus, 1, MPI_DOUBLE, 0, comm);
   job.wanted.bulk_modulus.reset();

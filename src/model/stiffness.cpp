@@ -129,12 +129,24 @@ void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, Model& mod
   }
 }
 
-double default_bulk_modulus(const scene::Tissue& tissue, const Model& model) {
-  constexpr double nearly_incompressible = 10;
-  if (!tissue.isotropic) return nearly_incompressible * effective_modulus(model);
-  const auto [young, poisson] = *tissue.isotropic;
-  const double shear = young / (2 * (1 + poisson));
-  return young / (3 * (1 - 2 * poisson)) - 5 * shear / 3;  // springs alone have ν = 1/4, K = 5/3 G
+namespace {
+
+/// K − 5/3 G, N/mm², of Poisson's ratio ν: springs alone have ν = 1/4, K = 5/3 G.
+double missing_bulk_modulus(double shear, double poisson) {
+  return shear * (2 * (1 + poisson) / (3 * (1 - 2 * poisson)) - 5.0 / 3);
+}
+
+}  // namespace
+
+double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
+                            const Model& model) {
+  constexpr double strict = 10;  // where an exact volume starts
+  if (tissue.isotropic)
+    return missing_bulk_modulus(tissue.isotropic->young / (2 * (1 + tissue.isotropic->poisson)),
+                                tissue.isotropic->poisson);
+  if (solve.volume == scene::VolumeForm::exact) return strict * effective_modulus(model);
+  constexpr double evenly = 15;  // 1/⟨u_x² u_y²⟩ over all directions u
+  return missing_bulk_modulus(effective_modulus(model) / evenly, solve.poisson);
 }
 
 double effective_modulus(const Model& model) {

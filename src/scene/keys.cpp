@@ -247,32 +247,37 @@ std::vector<Key> move_keys() {
 }
 
 std::vector<Key> solve_keys() {
-  return {{"solve", map, "", "How the rest position is found."},
-          {"solve.functional", choice, "energy", "What is minimised.", "", {}, {"energy", "force"}},
-          {"solve.volume", map, "", "How the tissue keeps its volume."},
-          {"solve.volume.form",
-           choice,
-           "",
-           "Form of the volume term; when not given penalty, and none with functional force, which "
-           "takes none or paper only.",
-           "",
-           {},
-           {"none", "paper", "penalty", "exact"}},
-          {"solve.volume.bulk_modulus", number, "",
-           "Bulk modulus κ of the penalty, and that exact starts with; 10 × the tissue's effective "
-           "modulus when not given.",
-           "N/mm²", Range::above(0)},
-          {"solve.lambda", number, "0.5",
-           "Weight λ of the volume form paper; no other form uses it.", "", Range::between(0, 1)},
-          {"solve.accuracy", number, "0.1", "Largest distance to the rest position allowed.", "mm",
-           Range::above(0)},
-          {"solve.load_steps",
-           integer,
-           "auto",
-           "Parts in which the bones are moved.",
-           "",
-           Range::between(1, 100000),
-           {"auto"}}};
+  return {
+      {"solve", map, "", "How the rest position is found."},
+      {"solve.functional", choice, "energy", "What is minimised.", "", {}, {"energy", "force"}},
+      {"solve.volume", map, "", "How the tissue keeps its volume."},
+      {"solve.volume.form",
+       choice,
+       "",
+       "Form of the volume term; when not given penalty, and none with functional force, which "
+       "takes none or paper only.",
+       "",
+       {},
+       {"none", "paper", "penalty", "exact"}},
+      {"solve.volume.bulk_modulus", number, "",
+       "Bulk modulus κ of the penalty, and that exact starts with; when not given by poisson, or "
+       "for exact 10 × the tissue's effective modulus.",
+       "N/mm²", Range::above(0)},
+      {"solve.volume.poisson", number, "0.45",
+       "Poisson's ratio that springs, whose own is 1/4, are to have by the penalty; "
+       "bulk_modulus overrides it.",
+       "", Range::between(0.25, 0.4999)},
+      {"solve.lambda", number, "0.5", "Weight λ of the volume form paper; no other form uses it.",
+       "", Range::between(0, 1)},
+      {"solve.accuracy", number, "0.1", "Largest distance to the rest position allowed.", "mm",
+       Range::above(0)},
+      {"solve.load_steps",
+       integer,
+       "auto",
+       "Parts in which the bones are moved.",
+       "",
+       Range::between(1, 100000),
+       {"auto"}}};
 }
 
 std::vector<Key> osteotomy_keys() {

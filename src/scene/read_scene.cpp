@@ -237,6 +237,7 @@ Solve read_solve(const Value& value) {
     const Map term(*volume);
     set_choice<VolumeForm>(solve.volume, term, "form");
     set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
+    set(solve.poisson, term, "poisson", &Value::number);
   }
   set(solve.lambda, map, "lambda", &Value::number);
   set(solve.accuracy, map, "accuracy", &Value::number);

@@ -75,7 +75,7 @@ std::string scene_yaml(const SceneText& scene, std::string_view stem) {
       "moves:\n"
       "{2}"
       "solve:\n"
-      "  volume: {{form: penalty}}    # the tissue keeps its volume, nearly\n",
+      "  volume: {{form: penalty, poisson: 0.4967}}   # the tissue keeps its volume, nearly\n",
       scene.title, stem, scene.move);
 }
 

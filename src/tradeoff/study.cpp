@@ -133,7 +133,7 @@ class Study {
     base::on_first_rank(comm, [&] {
       made.model = build(way);
       made.bulk_modulus = plan_.scene.solve.bulk_modulus.value_or(
-          model::default_bulk_modulus(tissue_of(way), made.model));
+          model::default_bulk_modulus(tissue_of(way), plan_.scene.solve, made.model));
     });
     MPI_Bcast(&made.bulk_modulus, 1, MPI_DOUBLE, 0, comm);
     bring_into_equilibrium(made.model);

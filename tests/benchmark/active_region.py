@@ -34,7 +34,7 @@ osteotomies:
 moves:
   - {bone: chin, translate: [0, -8, 0]}
 solve:
-  volume: {form: penalty}
+  volume: {form: penalty, poisson: 0.4967}
 """
 HEAD = ("| skin vertices | points | way | unknowns | Hessians | before the search, s | search, s | "
         "CPU of all, s | of the cropped | memory, MiB | error said, mm | from the whole, mm |\n"

@@ -63,6 +63,8 @@ tissue:
 moves:
   - {{bone: mandible, translate: [{shift}]}}
   - {{bone: mandible, rotate: {{axis: [1, 0, 0], center: [0, 0, 0], angle: {angle:.2f}}}}}
+solve:
+  volume: {{poisson: 0.4967}}
 {gravity}"""
 
 

@@ -30,7 +30,7 @@ tissue:
 moves:
   - {bone: mandible, translate: [0, -6, 0]}
 solve:
-  volume: {form: penalty}
+  volume: {form: penalty, poisson: 0.4967}
   accuracy: 0.01
 """
 HEAD = ("| skin vertices | layers | unknowns | method | load steps | iterations | evaluations | Hessians | "

@@ -17,6 +17,7 @@ tissue:
 moves:
   - {bone: mandible, MOVE}
 solve:
+  volume: {poisson: 0.4967}
   accuracy: 1.0e-6
 """
 

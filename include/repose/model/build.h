@@ -57,8 +57,11 @@ BuiltModel build_model(const scene::Scene& scene);
 /// N/mm²: of springs Σ k0 r_0² / Σ v_0, of a solid the mean of Young's modulus over its volume.
 double effective_modulus(const Model& model);
 
-/// κ (N/mm²) of the volume term where a scene of springs names none: what its isotropic solid lacks
-/// in bulk modulus, else 10 times the effective modulus.
-double default_bulk_modulus(const scene::Tissue& tissue, const Model& model);
+/// κ (N/mm²) of the volume term where a scene of springs names none: what springs lack in bulk
+/// modulus for Poisson's ratio `solve.poisson`, or that of the isotropic solid. Springs of modulus
+/// Y in all directions have the shear modulus Y/15, so that ν = 0.45 makes 8/15 Y of the effective
+/// modulus Y. An exact volume starts with 10 Y.
+double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
+                            const Model& model);
 
 }  // namespace repose::model

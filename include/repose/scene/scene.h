@@ -175,7 +175,8 @@ struct Incision {
 struct Solve {
   Functional functional = Functional::energy;
   std::optional<VolumeForm> volume;    ///< unset: penalty; with functional force none
-  std::optional<double> bulk_modulus;  ///< N/mm²; unset: 10 × the tissue's effective modulus
+  std::optional<double> bulk_modulus;  ///< N/mm²; unset: by `poisson`
+  double poisson = 0.45;               ///< of springs with a penalty
   double lambda = 0.5;
   double accuracy = 0.1;  ///< mm
   int load_steps = 0;     ///< 0: automatic
