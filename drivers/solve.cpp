@@ -107,7 +107,8 @@ std::vector<base::Option> model_options() {
        "",
        {"preview", "balanced", "exact"}},
       {"adapt", OptionKind::flag, "",
-       "Solve the coarsest model of the scene whose skin is within the accuracy."},
+       "Solve the coarsest model whose skin is within the accuracy: of springs of the scene's own "
+       "model, of a solid, which may be refined too, of the continuum."},
       {"discretisation", OptionKind::flag, "",
        "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."},
       {"nested",
@@ -582,6 +583,7 @@ std::vector<adapt::Resolution> plan_rungs(const Wish& wish, const Job& job,
   const bool leads = !job.solid && adapt::guides_pay(*job.anatomy, job.model);
   if (!wish.insisted && !wish.preview && !leads) return {};
   if (wish.compare) return adapt::halved_resolutions(*job.anatomy);
+  if (wish.adapt && job.solid) return adapt::convergence_of(*job.anatomy, job.model).rungs;
   if (wish.adapt) return adapt::compared_rungs(*job.anatomy, columns);
   if (wish.preview) return adapt::compared_rungs(*job.anatomy, preview_columns);
   std::vector<adapt::Resolution> rungs = adapt::guiding_rungs(*job.anatomy);
@@ -606,9 +608,14 @@ Coarser solve_coarser(const base::Options& options, Job& job, solve::Settings& s
   const model::Anatomy none;
   adapt::Ladder ladder = adapt::climb(comm, job.anatomy ? *job.anatomy : none, job.model, climb);
   Coarser coarser{adapt::describe_ladder(ladder), {}, {}};
-  if (ladder.near_enough || (wish.preview && ladder.rungs.size() > 1)) {
+  const bool converging = wish.adapt && job.solid;
+  if (ladder.near_enough || ((wish.preview || converging) && ladder.rungs.size() > 1)) {
     coarser.discretisation_error = ladder.rungs.back().discretisation_error;
-    coarser.told += adapt::describe_choice(ladder, settings.path.accuracy);
+    if (job.anatomy)
+      coarser.told += converging ? adapt::describe_convergence(
+                                       ladder, settings.path.accuracy,
+                                       adapt::convergence_of(*job.anatomy, job.model).limit)
+                                 : adapt::describe_choice(ladder, settings.path.accuracy);
     settings.path.accuracy = ladder.last_settings.path.accuracy;
     settings.weights = ladder.last_settings.weights;
     job.model = std::move(ladder.last.model);

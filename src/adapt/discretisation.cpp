@@ -42,6 +42,41 @@ std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy) {
   return resolutions;
 }
 
+Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
+                           int64_t most_unknowns) {
+  constexpr int finer = 2, growth = 8;  // of the unknowns
+  const scene::Tissue& tissue = anatomy.scene.tissue;
+  Convergence found{halved_resolutions(anatomy), "these are the finest that are tried"};
+  found.rungs.push_back({0, tissue.layers});
+  if (!tissue.edge) found.limit = "the skin as given is the finest mesh there is; give tissue.edge";
+  if (!layers_are_free(tissue))
+    found.limit = "the scene fixes its layers (tissue.depths, depths_mm or mass)";
+  if (!tissue.edge || !layers_are_free(tissue)) return found;
+  double edge = surface::even_edge(anatomy.skin);
+  int64_t unknowns = 3 * model::count(own).soft;
+  int gaps = tissue.layers - 1;
+  for (int k = 0; k < finer; ++k) {
+    unknowns *= growth;
+    if (unknowns > most_unknowns) {
+      found.limit = fmt::format("a finer one has about {:.2g} million unknowns",
+                                1e-6 * static_cast<double>(unknowns));
+      break;
+    }
+    found.rungs.push_back({edge /= 2, (gaps *= 2) + 1});
+  }
+  return found;
+}
+
+std::string describe_convergence(const Ladder& ladder, double wanted, const std::string& limit) {
+  const Rung& last = ladder.rungs.back();
+  const std::string why = ladder.refusal.empty() ? limit : ladder.refusal;
+  return fmt::format(
+      "  {:<22} of these, the last; mesh and layers leave its skin {:.2g} mm from the continuum at "
+      "most, by its distance from the one before{}\n",
+      "solved model", last.discretisation_error,
+      ladder.near_enough ? "" : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
+}
+
 Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
                                  const Ladder& ladder) {
   Discretisation found;

@@ -122,6 +122,7 @@ class Climber {
   /// Carries the answer of a rung to the scene's points. On rank 0.
   void take(model::BuiltModel&& built, std::vector<Vec3>&& position, Rung& rung) {
     rung.points = static_cast<int64_t>(position.size());
+    if (rung.resolution.edge == 0) rung.resolution.edge = surface::even_edge(anatomy_.skin);
     const auto moved = sum(position, built.model.points.position, -1);
     std::vector<Vec3> carried =
         sum(fine_.points.position, Transfer(built.model, fine_).carry(moved), 1);

@@ -152,3 +152,19 @@ def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
     skin = lambda f: last(f)["point/position"][model_of(f)["point/layer"] == 0]
     apart_at_skin = np.linalg.norm(skin(file) - skin(other), axis=1)
     assert apart_at_skin.mean() <= 2 * error[layer == 0].mean()
+
+
+@pytest.mark.parametrize("edge, accuracy, told, more", [
+    ("", 0.01, "MORE THAN THE 0.01 mm ASKED FOR: the skin as given is the finest", False),
+    ("", 20, "mm from the continuum at most", False),
+    ("  edge: 9\n  depths: [0, 0.3, 0.6, 1]", 0.01, "the scene fixes its layers", False),
+    ("  edge: 9", 1.5, "mm from the continuum at most", True)])
+def test_adapt_goes_towards_the_continuum_or_says_why_not(run, tmp_path, edge, accuracy, told, more):
+    text = scene(edge, JAW_OPENS, head="paper")
+    own = solve(run, tmp_path, "own", text, "-accuracy", 1)[0]
+    file, said = solve(run, tmp_path, "found", text, "-accuracy", accuracy, "-adapt")
+    assert told in said, said
+    step = last(file)
+    reached = step["discretisation_error"] <= accuracy
+    assert reached == ("MORE THAN" not in said)
+    assert (len(step["point/position"]) > len(last(own)["point/position"])) == more

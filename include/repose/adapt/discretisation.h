@@ -12,6 +12,21 @@ namespace repose::adapt {
 /// would leave fewer than 100 columns are left out. On rank 0.
 std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy);
 
+/// Resolutions towards the continuum, through a scene's own and beyond it, coarsest first: edges
+/// and gaps halve from one to the next.
+struct Convergence {
+  std::vector<Resolution> rungs;
+  std::string limit;  ///< why there is none finer
+};
+
+/// Where the scene lets both the skin's edges (tissue.edge) and the layers be any number, up to two
+/// finer than its own, of at most `most_unknowns`. On rank 0.
+Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
+                           int64_t most_unknowns = 5'000'000);
+
+/// A row about the last model of a convergence, which was solved to `wanted` mm.
+std::string describe_convergence(const Ladder& ladder, double wanted, const std::string& limit);
+
 /// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
 struct Discretisation {
   double order = 1;              ///< with which differences fall when all lengths are halved
