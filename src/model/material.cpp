@@ -9,9 +9,12 @@
 #include <numeric>
 
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
+#include "repose/surface/point_tree.h"
 #include "repose/surface/read.h"
+#include "repose/surface/vertex_values.h"
 #include "repose/surface/volume.h"
 
 namespace repose::model {
@@ -50,10 +53,15 @@ Vec3 middle_of(const std::array<Vec3, 6>& corners) {
   return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
 }
 
-using Inside = std::function<bool(const Vec3&)>;
+/// Where a prism is: its middle, and that of the skin's triangle above it.
+struct Place {
+  Vec3 middle, skin;
+};
+
+using Inside = std::function<bool(const Place&)>;
 
 Inside inside_of(const scene::SphereRegion& sphere) {
-  return [sphere](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius; };
+  return [sphere](const Place& at) { return (at.middle - sphere.center).norm() <= sphere.radius; };
 }
 
 Inside inside_of(const scene::MeshRegion& mesh) {
@@ -63,20 +71,67 @@ Inside inside_of(const scene::MeshRegion& mesh) {
     base::refuse("{}: a region of a material is the inside of a closed mesh; this one has {}",
                  mesh.file.string(), surface::describe(defects));
   const auto tree = std::make_shared<surface::DistanceTree>(read);
-  return [tree](const Vec3& x) { return tree->contains(x); };
+  return [tree](const Place& at) { return tree->contains(at.middle); };
 }
 
 Inside inside_of(const scene::LabelRegion& region) {
   const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
   const Mat3 to_voxels = surface::inverse_axes(*labels);
-  return [labels, to_voxels, label = region.label](const Vec3& x) {
-    const Vec3 at = to_voxels * (x - labels->origin);
+  return [labels, to_voxels, label = region.label](const Place& place) {
+    const Vec3 at = to_voxels * (place.middle - labels->origin);
     std::array<int64_t, 3> voxel;
     for (int axis = 0; axis < 3; ++axis) {
       voxel[axis] = std::lround(at[axis]);
       if (voxel[axis] < 0 || voxel[axis] >= labels->size[axis]) return false;
     }
     return labels->at(voxel[0], voxel[1], voxel[2]) == static_cast<float>(label);
+  };
+}
+
+/// Which vertices are painted.
+std::vector<char> painted_vertices(const scene::PaintedRegion& region,
+                                   const surface::VertexValues& mesh) {
+  constexpr double tolerance = 40;  // of 255: brushes blend at their rims
+  constexpr const char* channels[3] = {"red", "green", "blue"};
+  const auto values_of = [&](const std::string& name) -> const std::vector<double>& {
+    if (const std::vector<double>* values = mesh.find(name)) return *values;
+    base::refuse(
+        "{}: its vertices have no property {}; they have {}", region.file.string(),
+        base::shown(name),
+        mesh.names.empty() ? "x, y and z alone" : fmt::format("{}", fmt::join(mesh.names, ", ")));
+  };
+  std::vector<char> painted(mesh.points.size(), 1);
+  if (!region.property.empty()) {
+    const std::vector<double>& values = values_of(region.property);
+    for (size_t p = 0; p < painted.size(); ++p) painted[p] = values[p] >= region.at_least;
+    return painted;
+  }
+  for (int c = 0; c < 3; ++c) {
+    const std::vector<double>& values = values_of(channels[c]);
+    for (size_t p = 0; p < painted.size(); ++p)
+      painted[p] &= std::abs(values[p] - region.color[c]) <= tolerance;
+  }
+  return painted;
+}
+
+/// A prism lies in it where the painted mesh's vertex nearest to the skin above is painted.
+Inside inside_of(const scene::PaintedRegion& region) {
+  const surface::VertexValues mesh = surface::read_vertex_values(region.file);
+  const std::vector<char> painted = painted_vertices(region, mesh);
+  const auto count = std::count(painted.begin(), painted.end(), 1);
+  if (count == 0)
+    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), painted.size(),
+                 region.property.empty()
+                     ? fmt::format("({:g}, {:g}, {:g})", region.color.x(), region.color.y(),
+                                   region.color.z())
+                     : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
+  const auto tree = std::make_shared<surface::PointTree>(mesh.points);
+  const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);
+  return [=, depth = region.depth](const Place& at) {
+    constexpr double beside = 10;  // mm, where the painted mesh is another one
+    const int64_t nearest = tree->nearest(at.skin, 1).front();
+    return painted[nearest] && (at.skin - (*points)[nearest]).norm() <= beside &&
+           (at.middle - at.skin).norm() <= depth;
   };
 }
 
@@ -114,6 +169,15 @@ void give_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
   prisms.modulus[prism] = here.volume;
 }
 
+Place place_of(const Model& model, size_t m) {
+  Vec3 skin = Vec3::Zero();
+  for (int c = 0; c < 3; ++c) {
+    const int64_t p = model.prisms.points[m][c];
+    skin += model.points.position[p - model.points.layer[p]] / 3;
+  }
+  return {middle_of(corners_of(model, m)), skin};
+}
+
 void give_regions(const scene::Material& material, const std::string& file, Model& model) {
   for (size_t r = 0; r < material.regions.size(); ++r) {
     const scene::MaterialRegion& region = material.regions[r];
@@ -121,7 +185,7 @@ void give_regions(const scene::Material& material, const std::string& file, Mode
         std::visit([&](const auto& where) { return inside_of(where); }, region.where);
     int64_t found = 0;
     for (size_t m = 0; m < model.prisms.points.size(); ++m) {
-      if (!inside(middle_of(corners_of(model, m)))) continue;
+      if (!inside(place_of(model, m))) continue;
       give_moduli(moduli(region.elasticity), m, model.prisms);
       ++found;
     }

@@ -111,6 +111,21 @@ std::vector<Key> elasticity_keys(const std::string& above, const char* standard)
            "", Range::between(-0.9, 0.4999)}};
 }
 
+/// A part of the skin that is painted on a mesh.
+std::vector<Key> painted_keys(const std::string& above) {
+  return {{above, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
+          {above + ".mesh", file, "required",
+           "A PLY of the skin with colors or values at its vertices."},
+          {above + ".color", numbers, "",
+           "Red, green and blue of the paint; excludes property. Vertices within 40 of each count.",
+           "", Range::between(0, 255)},
+          {above + ".property", text, "",
+           "In place of color a property of the vertices (quality, say, or a mask)."},
+          {above + ".at_least", number, "0.5", "The least value of it that counts as painted."},
+          {above + ".depth", number, "", "How deep the region reaches; all the way when not given.",
+           "mm", Range::above(0)}};
+}
+
 std::vector<Key> material_keys() {
   std::vector<Key> rows{
       {"tissue.material", map, "",
@@ -146,6 +161,7 @@ std::vector<Key> material_keys() {
       {"tissue.material.regions[].volume", volume, "", "A label map; needs label."},
       {"tissue.material.regions[].label", integer, "", "The label that marks the region.", "",
        Range::between(1, 100000)}};
+  for (const Key& key : painted_keys("tissue.material.regions[].painted")) rows.push_back(key);
   for (const char* above :
        {"tissue.material.skin", "tissue.material.strata[]", "tissue.material.regions[]"})
     for (const Key& key : elasticity_keys(above, "required")) rows.push_back(key);

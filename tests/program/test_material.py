@@ -32,6 +32,8 @@ moves:
 {more}"""
 
 
+PAINTED = "  material: {{regions: [{{painted: {{mesh: painted.ply, {}}}, young: 0.1}}]}}"
+
 REFUSED = {
     "poisson": ("  material: {poisson: 0.5}", "", "tissue.material.poisson must be a number"),
     "young": ("  material: {young: -1}", "", "tissue.material.young must be a number"),
@@ -43,7 +45,16 @@ REFUSED = {
     "skin and strata": (
         "  material: {skin: {thickness: 1, young: 1}, strata: [{thickness: 1, young: 1}]}", "",
         "exclude each other"),
-    "region": ("  material: {regions: [{young: 1}]}", "", "needs one of sphere, mesh and volume"),
+    "region": ("  material: {regions: [{young: 1}]}", "", 
+               "needs one of sphere, mesh, volume and painted"),
+    "unpainted": (PAINTED.format("color: [0, 0, 255]"), "", "none of its 4 vertices is painted"),
+    "uncolored": (PAINTED.format("property: quality"), "", "no property \"quality\"; they have red"),
+    "two paints": (PAINTED.format("color: [0, 0, 255], property: quality"), "",
+                   "needs one of color and property"),
+    "two numbers": (PAINTED.format("color: [0, 0]"), "", "must be red, green and blue"),
+    "no PLY": (PAINTED.format("color: [0, 0, 0]").replace("painted.ply", "scene.yaml"), "",
+               "is not a PLY file"),
+    "dilatation": ("  material: {poisson: 0, dilatation: nodal}", "", "poisson must be above 0"),
     "nowhere": ("  material: {regions: [{sphere: {center: [900, 0, 0], radius: 1}, young: 1}]}", "",
                 "regions[0]: holds no prism"),
     "turgor": ("  turgor: 0.1", "", "give tissue.material.skin"),
@@ -58,9 +69,28 @@ REFUSED = {
 }
 
 
+def write_painted(file, points, triangles, painted):
+    """A PLY as MeshLab writes it: red where it is painted, else white."""
+    kinds = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"),
+                      ("blue", "u1"), ("alpha", "u1")])
+    rows = np.zeros(len(points), kinds)
+    for axis, name in enumerate("xyz"):
+        rows[name] = np.asarray(points)[:, axis]
+    rows["red"] = rows["alpha"] = 255
+    rows["green"] = rows["blue"] = np.where(painted, 30, 255)
+    faces = np.zeros(len(triangles), [("count", "u1"), ("points", "<i4", 3)])
+    faces["count"], faces["points"] = 3, triangles
+    kind = {"<f4": "float", "|u1": "uchar"}
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
+    head += [f"property {kind[kinds[name].str]} {name}" for name in kinds.names]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    file.write_bytes("\n".join(head).encode() + b"\n" + rows.tobytes() + faces.tobytes())
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_no_material_is_refused_in_one_line(run, tmp_path, case):
     tissue, more, told = REFUSED[case]
+    write_painted(tmp_path / "painted.ply", np.eye(4, 3), [[0, 1, 2]], [True, False, False, False])
     (tmp_path / "scene.yaml").write_text(scene(tissue, more=more))
     result = run("repose-solve", "scene.yaml", "-output", "out")
     assert result.returncode == 1, result
@@ -98,6 +128,38 @@ def test_every_method_finds_the_face(run, tmp_path):
     for method in ["ntr"], ["nls"], ["ntl"], ["cg"], ["lmvm", "-tao_lmvm_initial", "diagonal"]:
         other = solve(run, tmp_path, "other", text, "-accuracy", accuracy, "-tao_type", *method)[0]
         assert apart(default, last(other)) <= 2 * accuracy, method
+
+
+def test_averaged_volumes_make_one_face_on_any_ranks_and_in_a_region(run, tmp_path):
+    text, accuracy = scene("  material: {poisson: 0.49, dilatation: nodal}", JAW_OPENS), 0.001
+    options = "-accuracy", accuracy, "-active_region", "off"
+    one, told = solve(run, tmp_path, "one", text, *options, "-stability")
+    assert run("repose-check", "one.h5").returncode == 0
+    for ranks in 2, 3, 5:
+        other = solve(run, tmp_path, "other", text, *options, ranks=ranks)[0]
+        assert apart(last(one), last(other)) <= 2 * accuracy
+    region = solve(run, tmp_path, "region", text, "-accuracy", accuracy, "-active_region", "on")[0]
+    assert apart(last(one), last(region)) <= 2 * accuracy
+    plain = solve(run, tmp_path, "plain", text.replace(", dilatation: nodal", ""), *options)[0]
+    assert apart(last(one), last(plain)) > 0.01
+    assert last(one)["smallest_eigenvalue"] > 0
+
+
+def test_a_region_painted_on_the_skin(run, tmp_path):
+    file = solve(run, tmp_path, "plain", scene(head="paper"), "-accuracy", 0.1)[0]
+    model = model_of(file)
+    skin = model["point/position"][model["point/layer"] == 0]
+    column = model["point/column"][model["skin/points"]]
+    painted = np.linalg.norm(skin - skin[skin[:, 1].argmin()], axis=1) <= 15
+    write_painted(tmp_path / "painted.ply", skin, column, painted)
+    red = PAINTED.format("color: [255, 0, 0], depth: 4")
+    file = solve(run, tmp_path, "painted", scene(red, head="paper"), "-accuracy", 0.1)[0]
+    changed = model_of(file)["prism/shear_modulus"] > 0.02
+    middle = model["point/position"][model["prism/points"]].mean(1)
+    above = skin[model["point/column"][model["prism/points"][:, :3]]].mean(1)
+    near = np.linalg.norm(middle - above, axis=1) <= 4
+    nearest = painted[np.linalg.norm(above[:, None] - skin[None], axis=2).argmin(1)]
+    assert np.array_equal(changed, near & nearest) and changed.sum() > 10
 
 
 def test_what_a_move_is_not_felt_by_need_not_be_searched(run, tmp_path):

@@ -79,6 +79,15 @@ struct MeshRegion {
   std::filesystem::path file;  ///< absolute
 };
 
+/// What is painted on a mesh of the skin, and what lies below it.
+struct PaintedRegion {
+  std::filesystem::path file;  ///< absolute, a PLY
+  std::string property;        ///< of its vertices; empty: their color
+  double at_least = 0.5;       ///< of the property
+  Vec3 color = Vec3::Zero();   ///< red, green, blue, 0 … 255
+  double depth;                ///< mm below the skin, infinite for all that lies there
+};
+
 /// An isotropic elastic solid at small strains.
 struct Elasticity {
   double young;    ///< N/mm², > 0
@@ -92,7 +101,7 @@ struct Stratum {
 };
 
 struct MaterialRegion {
-  std::variant<SphereRegion, MeshRegion, LabelRegion> where;
+  std::variant<SphereRegion, MeshRegion, LabelRegion, PaintedRegion> where;
   Elasticity elasticity;
 };
 
