@@ -72,6 +72,8 @@ class Recomputation {
   void springs();
   void edges();
   void forces();
+  void nodal_volumes();
+  double volume_slope(int64_t j, double volume) const;
   void solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent);
   void stress(int64_t j, const std::array<Vec3, 6>& corners);
   void prisms();
@@ -87,6 +89,7 @@ class Recomputation {
   double elastic_ = 1;                   // weight of f
   double smooth_force_ = 0;              // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;         // [N] Σ noise of the forces there, N
+  std::vector<double> nodal_pressure_;   // [N] e/C of averaged volumes, N/mm², or empty
   std::vector<Vec3> gradient_;           // [N] of the objective
   std::vector<double> noise_;            // [N] of the gradient
   RecomputedStep step_;
@@ -156,7 +159,6 @@ void Recomputation::edges() {
   const model::Edges& edges = model_.edges;
   double uncertain = 0;
   for (size_t j = 0; j < edges.points.size(); ++j) {
-    if (!any_soft(edges.points[j])) continue;
     const auto [p, q] = edges.points[j];
     const Vec3 force = edges.weight[j] * (x_[q] - x_[p]);
     const double now = edge_energy(edges, j, x_);
@@ -168,6 +170,7 @@ void Recomputation::edges() {
     for (const int64_t end : {p, q}) at_point_[end] += force.norm();
   }
   step_.f_e.scale += uncertain / tolerance;
+  if (!model_.prisms.nodal_modulus.empty()) nodal_volumes();
   for (size_t j = 0; j < model_.prisms.modulus.size(); ++j) {
     std::array<Vec3, 6> corners;
     double extent = 0;
@@ -180,21 +183,53 @@ void Recomputation::edges() {
   step_.f_e.scale += std::abs(step_.f_e.value);
 }
 
+// φ′, N/mm².
+double Recomputation::volume_slope(int64_t j, double volume) const {
+  const model::Prisms& prisms = model_.prisms;
+  const double v0 = prisms.rest_volume[j], change = volume / v0 - 1;
+  const double at_rest = prisms.modulus[j] * (1 - prisms.target_volume[j] / v0);
+  if (nodal_pressure_.empty()) return at_rest + prisms.modulus[j] * change;
+  double averaged = 0;
+  for (const int64_t point : prisms.points[j]) averaged += nodal_pressure_[point] / 6;
+  return at_rest + (prisms.modulus[j] - prisms.nodal_modulus[j]) * change + averaged;
+}
+
+// A sixth of each prism's change of volume to each of its points, over as much of its compliance.
+void Recomputation::nodal_volumes() {
+  const model::Prisms& prisms = model_.prisms;
+  std::vector<double> change(x_.size(), 0.0), compliance(x_.size(), 0.0);
+  for (size_t j = 0; j < prisms.points.size(); ++j) {
+    std::array<Vec3, 6> corners;
+    for (int c = 0; c < 6; ++c) corners[c] = x_[prisms.points[j][c]];
+    const double v0 = prisms.rest_volume[j];
+    for (const int64_t point : prisms.points[j]) {
+      change[point] += (model::prism_volume(corners.data()) - v0) / 6;
+      compliance[point] += v0 / prisms.nodal_modulus[j] / 6;
+    }
+  }
+  for (size_t i = 0; i < x_.size(); ++i) {
+    nodal_pressure_.push_back(compliance[i] > 0 ? change[i] / compliance[i] : 0);
+    step_.f_e.value += 0.5 * nodal_pressure_[i] * change[i];
+  }
+}
+
 void Recomputation::solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent) {
   const model::Prisms& prisms = model_.prisms;
   stress(j, corners);
-  if (!any_soft(prisms.points[j])) return;
   const double stiffness = prisms.modulus[j] / prisms.rest_volume[j];
+  const double own = nodal_pressure_.empty() ? 1 : 1 - prisms.nodal_modulus[j] / prisms.modulus[j];
   const double before = prisms.rest_volume[j] - prisms.target_volume[j];
-  const double now = model::prism_volume(corners.data()) - prisms.target_volume[j];
+  const double volume = model::prism_volume(corners.data());
+  const double now = volume - prisms.target_volume[j], change = volume - prisms.rest_volume[j];
   const double uncertain = extent * extent * extent + prisms.rest_volume[j];
-  step_.f_e.value += 0.5 * stiffness * (now * now - before * before);
+  const double slope = volume_slope(j, volume);
+  step_.f_e.value += stiffness * change * (0.5 * own * change + before);
   step_.f_e.scale +=
       rounding / tolerance * stiffness * (now * now + before * before + std::abs(now) * uncertain);
   const std::array<Vec3, 6> toward = volume_gradient(corners, extent);
   for (int c = 0; c < 6; ++c) {
     const int64_t point = prisms.points[j][c];
-    if (soft(point)) step_.rows.residual_force[point] -= stiffness * now * toward[c];
+    if (soft(point)) step_.rows.residual_force[point] -= slope * toward[c];
     at_point_[point] += extent * extent * stiffness * (std::abs(now) + uncertain);
   }
 }
@@ -203,9 +238,9 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
   const model::Prisms& prisms = model_.prisms;
   std::array<Vec3, 6> before;
   for (int c = 0; c < 6; ++c) before[c] = model_.points.position[prisms.points[j][c]];
-  const mechanics::PrismState state = mechanics::prism_state(
-      {prisms.shear_modulus[j], prisms.modulus[j], prisms.rest_volume[j], prisms.target_volume[j]},
-      before, corners);
+  const mechanics::PrismState state =
+      mechanics::prism_state(prisms.shear_modulus[j],
+                             volume_slope(j, model::prism_volume(corners.data())), before, corners);
   step_.rows.pressure.push_back(state.pressure);
   step_.rows.von_mises.push_back(state.von_mises);
   step_.rows.stretch.push_back(state.stretch);

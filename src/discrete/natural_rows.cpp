@@ -114,6 +114,7 @@ void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
 
 void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Prisms& prisms = part_.model.prisms;
+  const std::vector<double> slopes = mechanics::volume_slopes(part_.model, position);
   std::vector<double> pressure(part_.owned_prisms), von_mises(part_.owned_prisms);
   std::vector<Vec3> stretch(part_.owned_prisms);
   for (int64_t e = 0; e < part_.owned_prisms; ++e) {
@@ -123,9 +124,7 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
       now[c] = position[prisms.points[e][c]];
     }
     const mechanics::PrismState state =
-        mechanics::prism_state({prisms.shear_modulus[e], prisms.modulus[e], prisms.rest_volume[e],
-                                prisms.target_volume[e]},
-                               before, now);
+        mechanics::prism_state(prisms.shear_modulus[e], slopes[e], before, now);
     pressure[e] = state.pressure;
     von_mises[e] = state.von_mises;
     stretch[e] = state.stretch;

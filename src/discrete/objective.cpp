@@ -19,6 +19,11 @@ double sum(MPI_Comm comm, double mine) {
   return all;
 }
 
+bool anywhere(MPI_Comm comm, bool here) {
+  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_C_BOOL, MPI_LOR, comm);
+  return here;
+}
+
 /// Weight and external force of each local point; empty if there is none on any rank.
 std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& loaded) {
   std::vector<Vec3> force(model.points.position.size(), Vec3::Zero());
@@ -50,10 +55,11 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
     : Function(positions),
       weights_(weights),
       loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
-                                   positions.part().owned_prisms, positions.part().owned_edges)),
+                                   positions.part().owned_prisms, positions.part().owned_edges,
+                                   positions.part().owned_points)),
+      averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
-      initial_energy_(
-          mechanics::totals(loops_, positions.part().model.points.position).solid_energy),
+      initial_(mechanics::totals(loops_, positions.part().model.points.position)),
       work_(positions.local().size()) {}
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
@@ -80,8 +86,8 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
              mechanics::add_spring_gradient(loop, positions_.local(), weights_.elastic, work_);
   value += weights_.elastic * mechanics::add_edge_gradient(loops_.edges, positions_.local(),
                                                            weights_.elastic, work_) -
-           initial_energy_;
-  value += mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
+           initial_.solid_energy;
+  value += mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
   if (loaded_) value += weights_.elastic * potential();
@@ -106,7 +112,7 @@ std::vector<Vec3> Objective::residual_force() {
     mechanics::add_spring_gradient(loop, positions_.local(), 1.0, work_);
   if (loops_.solid()) {
     mechanics::add_edge_gradient(loops_.edges, positions_.local(), 1.0, work_);
-    mechanics::add_prism_gradient(loops_.prisms, positions_.local(), weights_, work_);
+    mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
   }
   subtract_loads(1.0, work_);
   std::vector<Vec3> force(part.owned_points, Vec3::Zero());
@@ -119,7 +125,8 @@ mechanics::Totals Objective::totals() const {
   mechanics::Totals t = mechanics::totals(loops_, positions_.local());
   MPI_Comm comm = positions_.comm();
   t.spring_energy = sum(comm, t.spring_energy);
-  t.solid_energy = sum(comm, t.solid_energy - initial_energy_);
+  t.solid_energy = sum(comm, t.solid_energy - initial_.solid_energy);
+  t.fixed_energy = sum(comm, t.fixed_energy - initial_.fixed_energy);
   t.volume_squares = sum(comm, t.volume_squares);
   t.penalty_unit = sum(comm, t.penalty_unit);
   MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);

@@ -100,18 +100,31 @@ bool touches(const Plan& plan, const std::array<int64_t, n>& element, int rank) 
   });
 }
 
+/// [N] Of averaged volumes the points whose average one rank evaluates: its own, and those of the
+/// prisms at its unknowns.
+std::vector<char> averaged_points(const Plan& plan, int rank) {
+  std::vector<char> averaged(plan.owner.size(), 0);
+  for (size_t row = 0; row < averaged.size(); ++row) averaged[row] = plan.owner[row] == rank;
+  for (const auto& prism : plan.model.prisms.points)
+    if (plan.owner[prism[0]] == rank || touches(plan, prism, rank))
+      for (const int64_t row : prism) averaged[row] = 1;
+  return averaged;
+}
+
 /// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
 /// Both in blocks by where their first met point is, within a block as before: a loop then works on
 /// points that fit into the cache together.
 template <size_t n>
 std::vector<int64_t> element_rows(const Plan& plan,
                                   const std::vector<std::array<int64_t, n>>& elements, int rank,
-                                  int64_t& owned) {
+                                  int64_t& owned, const std::vector<char>& averaged = {}) {
   constexpr int64_t points_in_block = 1024;
   const int64_t blocks = static_cast<int64_t>(plan.place.size()) / points_in_block + 1;
   const auto block_of = [&](const std::array<int64_t, n>& element) {
     const bool mine = plan.owner[element[0]] == rank;
-    if (!mine && !touches(plan, element, rank)) return 2 * blocks;
+    const bool near = !averaged.empty() && std::any_of(element.begin(), element.end(),
+                                                       [&](int64_t p) { return averaged[p] != 0; });
+    if (!mine && !near && !touches(plan, element, rank)) return 2 * blocks;
     int64_t first = plan.place[element[0]];
     for (const int64_t point : element) first = std::min(first, plan.place[point]);
     return (mine ? 0 : blocks) + first / points_in_block;
@@ -171,7 +184,9 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
                         pick(model.springs.reference, rows)};
   rows.resize(part.owned_springs);
   part.spring_row = std::move(rows);
-  rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms);
+  std::vector<char> averaged;
+  if (!model.prisms.nodal_modulus.empty()) averaged = averaged_points(plan, rank);
+  rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms, averaged);
   part.model.prisms = model::pick_prisms(model.prisms, rows);
   number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);
@@ -205,7 +220,8 @@ void pass(Archive& archive, Part& part) {
   archive(m.springs.points, m.springs.set, m.springs.rest_length, m.springs.stiffness,
           m.springs.exponent, m.springs.reference);
   archive(m.prisms.points, m.prisms.rest_volume, m.prisms.shear_modulus, m.prisms.modulus,
-          m.prisms.target_volume, m.edges.points, m.edges.weight, m.bone_transform);
+          m.prisms.target_volume, m.prisms.nodal_modulus, m.edges.points, m.edges.weight,
+          m.bone_transform);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
           part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,

@@ -1,6 +1,7 @@
 #include "repose/discrete/tangent.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "repose/base/log.h"
 #include "repose/base/petsc_versions.h"
@@ -10,6 +11,17 @@ namespace repose::discrete {
 
 using base::check;
 using mechanics::Curvature;
+
+namespace {
+
+/// The most numbers in a row of them.
+PetscInt most_around(const std::vector<mechanics::NodalGradient>& rows) {
+  size_t most = 0;
+  for (const mechanics::NodalGradient& row : rows) most = std::max(most, row.points.size());
+  return static_cast<PetscInt>(3 * most);
+}
+
+}  // namespace
 
 Tangent::Tangent(Objective& objective) : objective_(objective) { make_action(); }
 
@@ -97,10 +109,44 @@ void Tangent::renew() {
 
 Mat Tangent::exact() {
   if (!exact_) exact_ = entries().make();
-  if (filled_at_ == assemblies_) return exact_;
+  const bool averaged = objective_.averages_volumes();
+  if (filled_at_ == assemblies_) return averaged ? coupled_ : exact_;
   entries().fill(exact_, at_, Curvature::exact);
   filled_at_ = assemblies_;
-  return exact_;
+  if (!averaged) return exact_;
+  coupled_ = nodal_coupling();
+  check(MatAXPY(coupled_, 1, exact_, DIFFERENT_NONZERO_PATTERN));
+  return coupled_;
+}
+
+/// Σ k g gᵀ over the points whose volumes are averaged, as GᵀG with a row of √k gᵀ for each.
+base::MatHandle Tangent::nodal_coupling() const {
+  const Part& part = objective_.positions().part();
+  const mechanics::NodalVolumes& nodal = objective_.loops().nodal;
+  const auto rows = mechanics::nodal_gradients(nodal, part.owned_points, at_);
+  const auto columns = static_cast<PetscInt>(3 * part.owned_unknowns);
+  base::MatHandle gradients, product;
+  check(MatCreateAIJ(objective_.positions().comm(), static_cast<PetscInt>(part.owned_points),
+                     columns, PETSC_DETERMINE, PETSC_DETERMINE, most_around(rows), nullptr,
+                     most_around(rows), nullptr, gradients.out()));
+  check(MatSetOption(gradients, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  PetscInt row = 0;
+  check(MatGetOwnershipRange(gradients, &row, nullptr));
+  for (int64_t p = 0; p < part.owned_points; ++p, ++row)
+    for (size_t k = 0; k < rows[p].points.size(); ++k) {
+      const auto unknown = static_cast<PetscInt>(part.unknown[rows[p].points[k]]);
+      if (unknown < 0) continue;
+      const PetscInt at[3] = {3 * unknown, 3 * unknown + 1, 3 * unknown + 2};
+      const Vec3 entries =
+          std::sqrt(nodal.stiffness[p] * objective_.weights().volume_weight) * rows[p].gradient[k];
+      check(MatSetValues(gradients, 1, &row, 3, at, entries.data(), INSERT_VALUES));
+    }
+  check(MatAssemblyBegin(gradients, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(gradients, MAT_FINAL_ASSEMBLY));
+  check(
+      MatTransposeMatMult(gradients, gradients, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
+  check(MatSetOption(product, MAT_SYMMETRIC, PETSC_TRUE));
+  return product;
 }
 
 void Tangent::visit_convex(const BlockVisitor& visit) const {
@@ -123,7 +169,7 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
   }
   const mechanics::PrismLoop& prisms = objective_.loops().prisms;
   mechanics::for_each_prism_block(
-      prisms, at_, objective_.weights(),
+      objective_.loops(), at_, objective_.weights(),
       mechanics::semidefinite_slopes(prisms, objective_.positions().part().model.points.position,
                                      at_),
       [&](int64_t e, const mechanics::PrismBlocks& blocks) {

@@ -174,7 +174,7 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at, Curvature curvat
     std::vector<double> most_slope;
     if (curvature == Curvature::convex)
       most_slope = mechanics::semidefinite_slopes(prisms, part_.model.points.position, at);
-    mechanics::for_each_prism_block(prisms, at, objective_.weights(), most_slope,
+    mechanics::for_each_prism_block(objective_.loops(), at, objective_.weights(), most_slope,
                                     [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                       for (int i = 0; i < 6; ++i)
                                         for (int j = 0; j < 6; ++j)

@@ -269,6 +269,15 @@ double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
   return value;
 }
 
+double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
+                           const Weights& weights, std::span<Vec3> gradient, Kernels kernels) {
+  double value = add_prism_gradient(loops.prisms, position, weights, gradient, kernels);
+  if (!loops.nodal.empty())
+    value += weights.volume_weight *
+             add_nodal_gradient(loops.nodal, position, weights.volume_weight, gradient);
+  return value;
+}
+
 namespace {
 
 void add_spring_action(const SpringLoop& loop, const Section<SpringRun>& section,
@@ -305,6 +314,7 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
   if (weights.volume == VolumeTerm::none) return;
   for (const auto& section : {counted(loops.prisms), others(loops.prisms)})
     add_prism_action(loops.prisms, section, position, weights, direction, product, kernels);
+  add_nodal_action(loops.nodal, position, weights.volume_weight, direction, product);
 }
 
 std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,
@@ -321,24 +331,45 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
   return slopes;
 }
 
-PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double compliance,
-                         double target_volume, const Weights& weights, double most_slope) {
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
+                         const Weights& weights, double most_slope) {
   PrismTriples<double> x;
   for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
   const PrismEdges<double> edges(x);
   const PrismSlope<double> v(edges);
-  const VolumeLaw law = volume_law(weights, v.volume, compliance, target_volume);
-  const double turning = std::clamp(law.slope, -most_slope, most_slope);
+  const VolumeLaw law = volume_law(weights, v.volume, term.compliance, term.target_volume);
+  const double slope = law.slope + weights.volume_weight * term.nodal_slope;
+  const double curvature = law.curvature + weights.volume_weight * term.nodal_curvature;
+  const double turning = std::clamp(slope, -most_slope, most_slope);
   const auto skew = prism_volume_hessian(edges);
   PrismBlocks blocks;
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) {
-      const Triple<double> bend = law.curvature * v.gradient[i], turn = turning * skew[i][j];
+      const Triple<double> bend = curvature * v.gradient[i], turn = turning * skew[i][j];
       set_block(blocks[i][j], bend, v.gradient[j], turn);
       if (i != j) set_block(blocks[j][i], v.gradient[j], bend, -turn);
     }
   return blocks;
 }
+
+namespace {
+
+double solid_energy(const EdgeLoop& edges, const PrismLoop& prisms,
+                    std::span<const Vec3> position) {
+  double energy = 0;
+  for (int64_t e = 0; e < edges.counted; ++e) {
+    const auto [i, j] = edges.points[e];
+    energy += 0.5 * edges.weight[e] * (position[j] - position[i]).squaredNorm();
+  }
+  for (int64_t e = 0; e < prisms.counted; ++e) {
+    const double v = prism_volume(corners_of(prisms, e, position).data());
+    const double beyond = v - prisms.target_volume[e];
+    energy += 0.5 * beyond * beyond / prisms.compliance[e];
+  }
+  return energy;
+}
+
+}  // namespace
 
 Totals totals(const Loops& loops, std::span<const Vec3> position) {
   Totals sum;
@@ -350,14 +381,13 @@ Totals totals(const Loops& loops, std::span<const Vec3> position) {
         sum.spring_energy += spring_energy<p>(s, loop.stiffness[e], loop.inverse_reference[e]);
       }
     });
-  for (int64_t e = 0; e < loops.edges.counted; ++e) {
-    const auto [i, j] = loops.edges.points[e];
-    sum.solid_energy += 0.5 * loops.edges.weight[e] * (position[j] - position[i]).squaredNorm();
+  if (loops.solid()) {
+    sum.solid_energy =
+        solid_energy(loops.edges, loops.prisms, position) + nodal_energy(loops.nodal, position);
+    sum.fixed_energy = solid_energy(loops.fixed_edges, loops.fixed_prisms, position);
   }
   for (int64_t e = 0; e < loops.prisms.counted; ++e) {
     const double v = prism_volume(corners_of(loops.prisms, e, position).data());
-    const double beyond = v - loops.prisms.target_volume[e];
-    if (loops.solid()) sum.solid_energy += 0.5 * beyond * beyond / loops.prisms.compliance[e];
     const double v0 = loops.prisms.rest_volume[e], change = v - v0;
     sum.volume_squares += change * change;
     sum.penalty_unit += 0.5 * change * change / v0;

@@ -19,12 +19,13 @@ struct Chosen {
   std::vector<int64_t> counted, others;
 };
 
+/// Those that touch soft tissue, or those that do not.
 template <size_t n, class Wanted>
 Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>>& elements,
-              int64_t owned, Wanted&& wanted) {
+              int64_t owned, Wanted&& wanted, bool soft = true) {
   Chosen chosen;
   for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
-    if (wanted(e) && touches_soft_tissue(part.points, elements[e]))
+    if (wanted(e) && touches_soft_tissue(part.points, elements[e]) == soft)
       (e < owned ? chosen.counted : chosen.others).push_back(e);
   return chosen;
 }
@@ -86,10 +87,11 @@ SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owne
   return loop;
 }
 
-EdgeLoop make_edge_loop(const model::Model& part, int64_t owned) {
+EdgeLoop make_edge_loop(const model::Model& part, int64_t owned, bool soft) {
   EdgeLoop loop;
   const model::Edges& edges = part.edges;
-  const Chosen chosen = choose(part, edges.points, owned, [](int64_t) { return true; });
+  const Chosen chosen = choose(
+      part, edges.points, owned, [](int64_t) { return true; }, soft);
   const auto points = static_cast<int64_t>(part.points.position.size());
   const size_t size = chosen.counted.size() + chosen.others.size();
   loop.points.reserve(size);
@@ -105,16 +107,22 @@ EdgeLoop make_edge_loop(const model::Model& part, int64_t owned) {
 void add_material(const model::Prisms& prisms, PrismLoop& loop) {
   for (size_t e = 0; e < loop.row.size(); ++e) {
     const int64_t row = loop.row[e];
-    loop.compliance[e] /= prisms.modulus[row];
+    const double averaged = prisms.nodal_modulus.empty() ? 0 : prisms.nodal_modulus[row];
+    const double own = prisms.modulus[row] - averaged, v0 = loop.rest_volume[e];
+    loop.compliance[e] /= own;
     loop.target_volume[e] = prisms.target_volume[row];
+    if (averaged > 0)  // the same pressure at rest
+      loop.target_volume[e] = v0 + (prisms.target_volume[row] - v0) * prisms.modulus[row] / own;
     loop.shear_modulus.push_back(prisms.shear_modulus[row]);
+    if (averaged > 0) loop.nodal_modulus.push_back(averaged);
   }
 }
 
-PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
+PrismLoop make_prism_loop(const model::Model& part, int64_t owned, bool soft) {
   PrismLoop loop;
   const model::Prisms& prisms = part.prisms;
-  const Chosen chosen = choose(part, prisms.points, owned, [](int64_t) { return true; });
+  const Chosen chosen = choose(
+      part, prisms.points, owned, [](int64_t) { return true; }, soft);
   const auto points = static_cast<int64_t>(part.points.position.size());
   const size_t size = chosen.counted.size() + chosen.others.size();
   loop.points.reserve(size);
@@ -136,14 +144,19 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned) {
 }  // namespace
 
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
-                 int64_t owned_edges) {
+                 int64_t owned_edges, int64_t owned_points) {
   Loops loops;
   for (int exponent = 0; exponent <= 2; ++exponent) {
     SpringLoop loop = make_spring_loop(part, exponent, owned_springs);
     if (loop.size() > 0) loops.springs.push_back(std::move(loop));
   }
-  loops.edges = make_edge_loop(part, owned_edges);
-  loops.prisms = make_prism_loop(part, owned_prisms);
+  loops.edges = make_edge_loop(part, owned_edges, true);
+  loops.prisms = make_prism_loop(part, owned_prisms, true);
+  if (model::is_solid(part)) {
+    loops.fixed_edges = make_edge_loop(part, owned_edges, false);
+    loops.fixed_prisms = make_prism_loop(part, owned_prisms, false);
+  }
+  loops.nodal = make_nodal_volumes(part, owned_points);
   return loops;
 }
 

@@ -319,6 +319,9 @@ void set_material(const scene::Tissue& tissue, const std::string& file, Model& m
   for (size_t m = 0; m < count; ++m)
     give_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
   give_regions(material, file, model);
+  if (material.dilatation == scene::Dilatation::nodal)
+    for (size_t m = 0; m < count; ++m)
+      prisms.nodal_modulus.push_back(prisms.modulus[m] - prisms.shear_modulus[m]);
   for (size_t m = 0; m < count; ++m)
     prisms.target_volume.push_back(prisms.rest_volume[m] *
                                    (1 + prisms.shear_modulus[m] / prisms.modulus[m]));

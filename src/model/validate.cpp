@@ -137,6 +137,16 @@ void refuse_wrong_volume(const Model& m, const std::string& file) {
   }
 }
 
+void validate_nodal(const Prisms& p, const std::string& file) {
+  if (p.nodal_modulus.empty()) return;
+  Array(file, "prism/nodal_modulus").has_rows(p.nodal_modulus.size(), p.points.size());
+  Array(file, "prism/nodal_modulus").is_positive(p.nodal_modulus, "N/mm²", "it is Lamé's λ");
+  for (size_t m = 0; m < p.points.size(); ++m)
+    if (!(p.nodal_modulus[m] < p.modulus[m]))
+      refuse("{}: /model/prism/nodal_modulus: row {} is {} N/mm²; must be below prism/modulus, {}",
+             file, m, p.nodal_modulus[m], p.modulus[m]);
+}
+
 /// A solid's material and edges, all of them or none.
 void validate_solid(const Model& m, const std::string& file) {
   const Prisms& p = m.prisms;
@@ -148,6 +158,7 @@ void validate_solid(const Model& m, const std::string& file) {
   Array(file, "prism/modulus").is_positive(p.modulus, "N/mm²", "κ is Lamé's λ + μ");
   Array(file, "prism/shear_modulus").is_positive(p.shear_modulus, "N/mm²", "it is Lamé's μ");
   Array(file, "prism/target_volume").is_finite(p.target_volume);
+  validate_nodal(p, file);
   Array(file, "edge/weight").has_rows(m.edges.weight.size(), m.edges.points.size());
   Array(file, "edge/points").all_index(m.edges.points, m.points.position.size());
   Array(file, "edge/weight").is_finite(m.edges.weight);
@@ -192,8 +203,9 @@ void refuse_unattached(const Model& m, const std::string& file) {
   for (size_t i = 0; i < held.size(); ++i)
     if (!held[i] && m.points.set[i] == PointSet::soft_tissue)
       refuse(
-          "{}: /model/point: row {} is soft tissue and no spring holds it; remove it, join it with "
-          "a spring or make it a boundary point (set 1)",
+          "{}: /model/point: row {} is soft tissue and no spring or edge holds it; remove it, join "
+          "it with a spring (/model/spring) or, of a solid, an edge (/model/edge), or make it a "
+          "boundary point (set 1)",
           file, i);
 }
 
@@ -238,7 +250,7 @@ Prisms pick_prisms(const Prisms& p, const std::vector<int64_t>& rows) {
     return values.empty() ? values : base::pick(values, rows);
   };
   return {base::pick(p.points, rows), base::pick(p.rest_volume, rows), of_solid(p.shear_modulus),
-          of_solid(p.modulus), of_solid(p.target_volume)};
+          of_solid(p.modulus),        of_solid(p.target_volume),       of_solid(p.nodal_modulus)};
 }
 
 Counts count(const Model& model) {

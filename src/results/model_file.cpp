@@ -58,6 +58,8 @@ model::Prisms read_prisms(const Reader& in) {
   prisms.shear_modulus = in.numbers("/model/prism/shear_modulus", {m, {}});
   prisms.modulus = in.numbers("/model/prism/modulus", {m, {}});
   prisms.target_volume = in.numbers("/model/prism/target_volume", {m, {}});
+  if (in.has("/model/prism/nodal_modulus"))
+    prisms.nodal_modulus = in.numbers("/model/prism/nodal_modulus", {m, {}});
   return prisms;
 }
 

@@ -42,6 +42,8 @@ void write_prisms(hid_t model, const model::Prisms& prisms) {
   write_array(group, "shear_modulus", {m}, prisms.shear_modulus.data());
   write_array(group, "modulus", {m}, prisms.modulus.data());
   write_array(group, "target_volume", {m}, prisms.target_volume.data());
+  if (prisms.nodal_modulus.empty()) return;
+  write_array(group, "nodal_modulus", {m}, prisms.nodal_modulus.data());
 }
 
 void write_edges(hid_t model, const model::Edges& edges) {
@@ -109,7 +111,7 @@ int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
   const size_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   const size_t bytes = descriptions + model.points.position.size() * point +
-                       model.springs.points.size() * spring + model.prisms.points.size() * 10 * 8 +
+                       model.springs.points.size() * spring + model.prisms.points.size() * 11 * 8 +
                        model.edges.points.size() * 3 * 8 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes);

@@ -55,6 +55,21 @@ MaterialRegion read_region(const Value& value, double poisson) {
   return {SphereRegion{ball.at("center").vector(), ball.at("radius").number()}, elasticity};
 }
 
+void read_dilatation(const Value& value, Material& material) {
+  material.dilatation = static_cast<Dilatation>(value.choice());
+  if (material.dilatation == Dilatation::prism) return;
+  double least = material.deep.poisson;
+  for (const Stratum& stratum : material.strata)
+    least = std::min(least, stratum.elasticity.poisson);
+  for (const MaterialRegion& region : material.regions)
+    least = std::min(least, region.elasticity.poisson);
+  if (!(least > 0))
+    value.refuse(
+        "nodal averages what resists changes of volume: every poisson must be above 0, one is {}; "
+        "raise it or remove dilatation",
+        least);
+}
+
 }  // namespace
 
 Material default_material() { return material_presets().front().material; }
@@ -79,6 +94,7 @@ Material read_material(const Value& value) {
   if (const auto regions = map.find("regions"))
     for (const Value& item : regions->items())
       material.regions.push_back(read_region(item, material.deep.poisson));
+  if (const auto dilatation = map.find("dilatation")) read_dilatation(*dilatation, material);
   return material;
 }
 

@@ -104,8 +104,7 @@ void subtract_solid_gradient(const Model& model, std::vector<Vec3>& force) {
   const auto loops = mechanics::make_loops(model, 0, 0);
   std::vector<Vec3> gradient(force.size(), Vec3::Zero());
   mechanics::add_edge_gradient(loops.edges, model.points.position, 1, gradient);
-  mechanics::add_prism_gradient(loops.prisms, model.points.position, mechanics::solid_weights,
-                                gradient);
+  mechanics::add_volume_gradient(loops, model.points.position, mechanics::solid_weights, gradient);
   for (size_t i = 0; i < force.size(); ++i) force[i] -= gradient[i];
 }
 
@@ -118,7 +117,9 @@ int64_t count(const std::vector<char>& flags) {
 Submodel submodel(const Model& whole, const std::vector<char>& unknown) {
   std::vector<char> marked = unknown;
   const std::vector<int64_t> springs = touching(whole.springs.points, unknown, marked);
-  const std::vector<int64_t> prisms = touching(whole.prisms.points, unknown, marked);
+  std::vector<int64_t> prisms = touching(whole.prisms.points, unknown, marked);
+  if (!whole.prisms.nodal_modulus.empty())  // and all prisms around their points
+    prisms = touching(whole.prisms.points, std::vector<char>(marked), marked);
   const std::vector<int64_t> edges = touching(whole.edges.points, unknown, marked);
   Submodel part;
   std::vector<int64_t> number(marked.size(), -1);

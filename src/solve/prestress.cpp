@@ -87,6 +87,7 @@ discrete::Part solid_stiffness_part(discrete::Part part) {
     model.prisms.modulus[m] = lame + 2 * shear / 3;
   }
   model.prisms.target_volume = model.prisms.rest_volume;
+  model.prisms.nodal_modulus.clear();
   model.prisms.shear_modulus.assign(model.prisms.points.size(), 0.0);
   springs.points = std::move(model.edges.points);
   model.edges = {};

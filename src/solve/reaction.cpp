@@ -4,6 +4,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
+#include "repose/mechanics/nodal_volumes.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 
@@ -72,17 +73,20 @@ double slope(const model::StepNumbers& n, double change, double rest, double pre
 void add_prisms(const model::Model& model, const std::vector<double>& x,
                 const std::vector<double>& pressure, const model::StepNumbers& n, Groups& groups) {
   const model::Prisms& prisms = model.prisms;
+  std::vector<double> of_solid;
+  if (model::is_solid(model))
+    of_solid = mechanics::volume_slopes(
+        model, {reinterpret_cast<const Vec3*>(x.data()), model.points.position.size()});
   for (size_t m = 0; m < prisms.points.size(); ++m) {
     if (!groups.touch(prisms.points[m])) continue;
     mechanics::PrismTriples<double> corners;
     for (int c = 0; c < 6; ++c)
       corners[c] = mechanics::triple(Vec3::Map(&x[3 * prisms.points[m][c]]));
     const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
-    const double by =
-        model::is_solid(model)
-            ? prisms.modulus[m] * (v.volume - prisms.target_volume[m]) / prisms.rest_volume[m]
-            : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
-                    pressure.empty() ? 0 : pressure[m]);
+    const double by = !of_solid.empty()
+                          ? of_solid[m]
+                          : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
+                                  pressure.empty() ? 0 : pressure[m]);
     for (int c = 0; c < 6; ++c)
       groups.add(prisms.points[m][c], -by * mechanics::vec3(v.gradient[c]));
   }

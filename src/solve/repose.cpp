@@ -34,7 +34,9 @@ model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& se
   n.volume = settings.volume;
   n.lambda = settings.lambda;
   measure(objective, n);
-  n.objective = settings.exact_volume ? n.f_e + n.potential : outcome.objective;
+  // What is fixed stores energy, too, that no search knows of.
+  const bool whole = settings.exact_volume || objective.positions().part().solid;
+  n.objective = whole ? n.f_e + n.potential : outcome.objective;
   n.gradient_max = outcome.gradient_max;
   n.displacement_error = outcome.displacement_error;
   n.iterations = outcome.iterations;
@@ -144,7 +146,7 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const bool solid = objective.positions().part().solid;
   if (weights.volume == mechanics::VolumeTerm::penalty && !solid)
     numbers.bulk_modulus = weights.volume_weight;
-  numbers.f_e = solid ? totals.solid_energy : totals.spring_energy;
+  numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
   numbers.potential = objective.potential();
   double force = 0;
   for (const Vec3& f : objective.residual_force()) force += f.norm();

@@ -149,8 +149,7 @@ void spring_blocks(benchmark::State& state, int64_t columns) {
 void prism_blocks(benchmark::State& state, int64_t columns) {
   Workload& work = workload(columns);
   for (auto _ : state)
-    mechanics::for_each_prism_block(work.prism_loop(), work.position, with_penalty,
-                                    Curvature::exact,
+    mechanics::for_each_prism_block(work.prisms, work.position, with_penalty, {},
                                     [](int64_t, const mechanics::PrismBlocks& blocks) {
                                       benchmark::DoNotOptimize(&blocks);
                                       benchmark::ClobberMemory();

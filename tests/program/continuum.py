@@ -110,6 +110,8 @@ class Solid:
         self.soft = np.flatnonzero(model["point/set"] == 0)
         self.kappa, self.mu = model["prism/modulus"], model["prism/shear_modulus"]
         self.target, self.volume = model["prism/target_volume"], model["prism/rest_volume"]
+        self.averaged = model.get("prism/nodal_modulus", np.zeros(len(self.prisms)))
+        self.own = self.kappa - self.averaged
         self.laplacian = self.laplacian_of(model["edge/points"], model["edge/weight"])
         self.at_rest = ((1.5 + self.mu / (2 * self.kappa)) * self.mu * self.volume).sum()
         count = len(self.rest)
@@ -117,6 +119,14 @@ class Solid:
         self.gather = sparse.csr_matrix(
             (np.ones(self.prisms.size), (self.prisms.ravel(), np.arange(self.prisms.size))),
             (count, self.prisms.size))
+        # a sixth of each prism to each of its points, and what a point's volume yields to pressure
+        self.share = sparse.csr_matrix(
+            (np.full(self.prisms.size, 1 / 6),
+             (self.prisms.ravel(), np.repeat(np.arange(len(self.prisms)), 6))),
+            (count, len(self.prisms)))
+        with np.errstate(divide="ignore"):
+            self.stiffness = np.where(self.averaged.any(),
+                                      1 / (self.share @ (self.volume / self.averaged)), 0)
 
     def laplacian_of(self, edges, weights):
         count = len(self.rest)
@@ -125,16 +135,27 @@ class Solid:
         return sparse.diags(np.asarray(off.sum(1)).ravel()) - off
 
     def excess(self, x):
-        """Pressure-like kappa (v - t)/V of each prism, N/mm², with v and ∂v/∂x."""
+        """The energy's slope by the volume of each prism, kappa (v - t)/V or of averaged volumes,
+        N/mm², with v and ∂v/∂x."""
         v, slopes = volumes(x, self.prisms)
-        return self.kappa * (v - self.target) / self.volume, v, slopes
+        by_prism = (self.own * (v - self.volume)
+                    - self.kappa * (self.target - self.volume)) / self.volume
+        return by_prism + self.share.T @ self.pressure(v), v, slopes
+
+    def pressure(self, v):
+        """Of averaged volumes at each point, N/mm²."""
+        return self.stiffness * (self.share @ (v - self.volume))
 
     def value_and_gradient(self, x):
         """Energy, N mm, of all prisms and edges, and its gradient at all points, N, [N, 3]."""
         from_rest = x - self.rest.mean(0)
         pulls = self.laplacian @ from_rest
         push, v, slopes = self.excess(x)
-        value = (from_rest * pulls).sum() / 2 + (push * (v - self.target)).sum() / 2 - self.at_rest
+        change, shift = v - self.volume, self.target - self.volume
+        energy = (self.own * change**2 / 2 - self.kappa * shift * change
+                  + self.kappa * shift**2 / 2) / self.volume
+        energy = energy.sum() + (self.pressure(v) * (self.share @ change)).sum() / 2
+        value = (from_rest * pulls).sum() / 2 + energy - self.at_rest
         return value, pulls + self.gather @ (push[:, None, None] * slopes).reshape(-1, 3)
 
     def value(self, x):
@@ -145,7 +166,7 @@ class Solid:
         derivatives (curved = False) it is positive semidefinite."""
         push, _, slopes = self.excess(x)
         flat = slopes.reshape(-1, 18)
-        blocks = (self.kappa / self.volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        blocks = (self.own / self.volume)[:, None, None] * flat[:, :, None] * flat[:, None, :]
         if curved:
             blocks += self.curvature(x, push)
         rows = (3 * self.prisms[:, :, None] + np.arange(3)).reshape(-1, 18).astype(np.int32)
@@ -153,6 +174,11 @@ class Solid:
               np.broadcast_to(rows[:, None, :], blocks.shape).ravel()]
         size = self.rest.size
         volume = sparse.coo_matrix((blocks.ravel(), at), (size, size)).tocsr()
+        if self.averaged.any():
+            change = sparse.csr_matrix((flat.ravel(), (np.repeat(np.arange(len(flat)), 18),
+                                                       rows.ravel())), (len(flat), size))
+            change = self.share @ change
+            volume += change.T @ sparse.diags(self.stiffness) @ change
         return (volume + sparse.kron(self.laplacian, sparse.identity(3))).tocsr()
 
     def curvature(self, x, push):

@@ -178,7 +178,7 @@ def test_a_point_without_a_spring_is_refused(run, solved, tmp_path):
     write_model(tmp_path / "model.h5", model)
     result = run("repose-solve", "model.h5", "-output", "out")
     assert result.returncode == 1 and len(result.stderr.splitlines()) == 1
-    assert f"row {lone} is soft tissue and no spring holds it" in result.stderr
+    assert f"row {lone} is soft tissue and no spring or edge holds it" in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
 
 

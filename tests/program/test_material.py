@@ -48,7 +48,7 @@ REFUSED = {
     "region": ("  material: {regions: [{young: 1}]}", "", 
                "needs one of sphere, mesh, volume and painted"),
     "unpainted": (PAINTED.format("color: [0, 0, 255]"), "", "none of its 4 vertices is painted"),
-    "uncolored": (PAINTED.format("property: quality"), "", "no property \"quality\"; they have red"),
+    "uncolored": (PAINTED.format("property: quality"), "", "no property 'quality'; they have red"),
     "two paints": (PAINTED.format("color: [0, 0, 255], property: quality"), "",
                    "needs one of color and property"),
     "two numbers": (PAINTED.format("color: [0, 0]"), "", "must be red, green and blue"),
@@ -114,10 +114,10 @@ def test_one_face_whatever_the_load_steps_and_the_ranks(run, tmp_path, moves, mo
     one = last(solve(run, tmp_path, "one", text, *options)[0])
     assert one["inverted_prisms"] == 0
     assert one["evaluations"] <= 80
-    for steps_wanted in 2, 5:
+    for steps_wanted in 2, 5, 10:
         other = solve(run, tmp_path, "other", text, *options, "-load_steps", steps_wanted)[0]
         assert apart(one, last(other)) <= 2 * accuracy
-    for ranks in 2, 3:
+    for ranks in 2, 3, 5:
         other = solve(run, tmp_path, "other", text, *options, ranks=ranks)[0]
         assert apart(one, last(other)) <= 2 * accuracy
 

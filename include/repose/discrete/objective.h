@@ -24,6 +24,7 @@ class Objective : public Function {
   const mechanics::Weights& weights() const { return weights_; }
   void set_volume_weight(double weight) { weights_.volume_weight = weight; }
   const mechanics::Loops& loops() const { return loops_; }
+  bool averages_volumes() const { return averages_volumes_; }  ///< on some rank
   mechanics::PrismLoop& prisms() { return loops_.prisms; }
 
  private:
@@ -32,9 +33,10 @@ class Objective : public Function {
 
   mechanics::Weights weights_;
   mechanics::Loops loops_;
+  bool averages_volumes_;
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
-  double initial_energy_;         // N·mm, this rank's share of a solid's
+  mechanics::Totals initial_;     // this rank's share
   std::vector<Vec3> work_;        // [local points]
 };
 

@@ -33,11 +33,13 @@ class Tangent : public Hessian {
   static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
   void make_action();
   const TangentEntries& entries();
+  base::MatHandle nodal_coupling() const;
   void lift_diagonal();
 
   Objective& objective_;
   std::unique_ptr<TangentEntries> entries_;
   base::MatHandle exact_, convex_, action_;
+  base::MatHandle coupled_;             // exact_ and what averaged volumes couple
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<Vec3> direction_, work_;  // [local points]
   int64_t filled_at_ = -1;              // assemblies() when exact_ was filled

@@ -25,6 +25,11 @@ double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
                           const Weights& weights, std::span<Vec3> gradient,
                           Kernels kernels = best_kernels());
 
+/// The same, and that of averaged volumes.
+double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
+                           const Weights& weights, std::span<Vec3> gradient,
+                           Kernels kernels = best_kernels());
+
 /// Value of a prism's volume term and its first two derivatives by v.
 struct VolumeLaw {
   double value, slope, curvature;
@@ -41,6 +46,7 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
 struct Totals {
   double spring_energy = 0;     ///< f_e of springs, N·mm
   double solid_energy = 0;      ///< edges' and prisms' of a solid, to a constant, N·mm
+  double fixed_energy = 0;      ///< and of those without a soft-tissue point
   double volume_squares = 0;    ///< f_v, mm⁶
   double penalty_unit = 0;      ///< Σ ½ (v−v_0)²/v_0, mm³ (times κ: N·mm)
   double volume_error_max = 0;  ///< max |v/v_0 − 1|

@@ -93,10 +93,17 @@ void for_each_spring_third(const SpringLoop& loop, std::span<const Vec3> positio
   });
 }
 
-/// The 6×6 blocks of one prism's volume term: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `most_slope`.
+/// The volume term of one prism, and what it takes from averaged volumes: φ′, and a curvature that
+/// bounds theirs.
+struct PrismTerm {
+  double compliance, target_volume;
+  double nodal_slope = 0, nodal_curvature = 0;
+};
+
+/// Its 6×6 blocks: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `most_slope`.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
-PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double compliance,
-                         double target_volume, const Weights& weights, double most_slope);
+PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
+                         const Weights& weights, double most_slope);
 
 /// [M] What |φ′| of each prism may be for the blocks to be semidefinite with the rest of the
 /// Hessian: nothing where there are springs. A solid's ½ μ |F|² + φ′ J has the curvatures μ ± φ′ σ,
@@ -105,18 +112,25 @@ PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, double compliance,
 std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,
                                         std::span<const Vec3> position);
 
-/// Calls visit(prism number, blocks) for each prism of the loop. `most_slope` [M], or empty for no
-/// limit.
+/// Calls visit(prism number, blocks) for each prism of the loops. `most_slope` [M], or empty for
+/// the exact Hessian, of which averaged volumes have more (nodal_gradients); else λ/V ∇v∇vᵀ of each
+/// prism is in their place, which is never less (Cauchy & Schwarz).
 template <class Visit>
-void for_each_prism_block(const PrismLoop& loop, std::span<const Vec3> position,
+void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
                           const Weights& weights, std::span<const double> most_slope,
                           Visit&& visit) {
   if (weights.volume == VolumeTerm::none) return;
-  for (int64_t e = 0; e < loop.size(); ++e) {
+  const PrismLoop& prisms = loops.prisms;
+  const std::vector<double> nodal = nodal_slopes(loops.nodal, position);
+  for (int64_t e = 0; e < prisms.size(); ++e) {
     std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
+    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
+    PrismTerm term{prisms.compliance[e], prisms.target_volume[e]};
+    if (!nodal.empty()) term.nodal_slope = nodal[prisms.row[e]];
+    if (!nodal.empty() && !most_slope.empty())
+      term.nodal_curvature = prisms.nodal_modulus[e] / prisms.rest_volume[e];
     const double most = most_slope.empty() ? std::numeric_limits<double>::max() : most_slope[e];
-    visit(e, prism_blocks(corners, loop.compliance[e], loop.target_volume[e], weights, most));
+    visit(e, prism_blocks(corners, term, weights, most));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "repose/mechanics/nodal_volumes.h"
 #include "repose/mechanics/runs.h"
 #include "repose/model/model.h"
 
@@ -37,9 +38,10 @@ struct PrismLoop {
   std::vector<std::array<int32_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
   std::vector<double> rest_volume;             ///< [M] v_0, mm³
   /// [M] mm³, by which the weight of a penalty is divided: v_0, and for a solid v_0 / κ with κ in
-  /// N/mm², so that its weight is 1.
+  /// N/mm², so that its weight is 1. κ without what averaged volumes resist with.
   std::vector<double> compliance;
   std::vector<double> shear_modulus;  ///< [M] μ of a solid, N/mm²; else empty
+  std::vector<double> nodal_modulus;  ///< [M] λ where volumes are averaged, N/mm²; else empty
   std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
   std::vector<int64_t> row;           ///< [M] the prism's row in the part
   int64_t counted = 0;                ///< as in SpringLoop
@@ -52,14 +54,17 @@ struct Loops {
   std::vector<SpringLoop> springs;  ///< one a law that occurs, by exponent
   EdgeLoop edges;                   ///< of a solid
   PrismLoop prisms;
-  bool solid() const { return !prisms.shear_modulus.empty(); }
+  NodalVolumes nodal;      ///< empty where no volume is averaged
+  EdgeLoop fixed_edges;    ///< of a solid, those without a soft-tissue point, …
+  PrismLoop fixed_prisms;  ///< … which only add to its energy
+  bool solid() const { return !prisms.shear_modulus.empty() || fixed_prisms.size() > 0; }
 };
 
-/// The loops over the springs, prisms and edges of `part` with a soft-tissue point. Of its rows the
-/// first `owned_…` are counted here. What lies in runs comes first, by blocks of points that fit
-/// into the cache together.
+/// The loops over the springs, prisms and edges of `part` with a soft-tissue point. Of its rows,
+/// and of its points, the first `owned_…` are counted here. What lies in runs comes first, by
+/// blocks of points that fit into the cache together.
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
-                 int64_t owned_edges = 0);
+                 int64_t owned_edges = 0, int64_t owned_points = 0);
 
 /// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:
 ///     paper    weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)

@@ -43,11 +43,11 @@ Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Ve
 /// Gives every prism of make_layers its moduli, a target volume t = V (1 + μ/κ), at which it is
 /// free of stress as it is, and the model the edges of all (C2), in place of springs. A prism takes
 /// the means of the strata that it crosses, by the share of its depth, and the material of the last
-/// region that its middle lies in. Turgor stretches the first stratum, in both directions of the
-/// skin: its tension τ_s = E τ h / (1 − ν), N/mm, adds ½ τ_s ∫ |∇x|² over the skin, which is
-/// quadratic too (cotangent weights: Pinkall & Polthier 1993). Reads the regions' meshes and
-/// volumes. Throws InputError naming `file` and the place of a prism too distorted, a region that
-/// holds no prism, or turgor without a stratum. Serial.
+/// region that its middle lies in. Where volumes are averaged, λ = κ − μ is. Turgor stretches the
+/// first stratum, in both directions of the skin: its tension τ_s = E τ h / (1 − ν), N/mm, adds ½
+/// τ_s ∫ |∇x|² over the skin, which is quadratic too (cotangent weights: Pinkall & Polthier 1993).
+/// Reads the regions' meshes and volumes. Throws InputError naming `file` and the place of a prism
+/// too distorted, a region that holds no prism, or turgor without a stratum. Serial.
 void set_material(const scene::Tissue& tissue, const std::string& file, Model& model);
 
 /// The edges anew from the prisms and their shear moduli, sorted by their points. InputError as

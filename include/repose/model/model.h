@@ -34,13 +34,16 @@ struct Springs {
   std::vector<double> reference;               ///< [S] s_ref, mm, > 0
 };
 
-/// Prisms, and of a solid its material: of tissue of springs the last three are empty.
+/// Prisms, and of a solid its material: of tissue of springs the last four are empty.
 struct Prisms {
   std::vector<std::array<int64_t, 6>> points;  ///< [M] a0 a1 a2 b0 b1 b2
   std::vector<double> rest_volume;             ///< [M] mm³, at Points::position
   std::vector<double> shear_modulus;           ///< [M] μ, N/mm², > 0
   std::vector<double> modulus;                 ///< [M] κ = λ + μ (Lamé), N/mm², > 0
   std::vector<double> target_volume;           ///< [M] t, mm³
+  /// [M] N/mm², above 0 and below κ, or empty: what of κ resists the volume averaged around points,
+  /// not the prism's own (mechanics/nodal_volumes.h).
+  std::vector<double> nodal_modulus;
 };
 
 /// The part of a solid's energy that is quadratic in the positions: ½ Σ w |x_i − x_j|²

@@ -105,11 +105,15 @@ struct MaterialRegion {
   Elasticity elasticity;
 };
 
+/// Of what the volume ratio in a solid's energy is the mean.
+enum class Dilatation { prism, nodal };
+
 /// Tissue as a neo-Hookean solid (docs/theory/continuum.md).
 struct Material {
   Elasticity deep;                      ///< below all strata
   std::vector<Stratum> strata;          ///< from the skin down
   std::vector<MaterialRegion> regions;  ///< beat the strata, and each the ones before it
+  Dilatation dilatation = Dilatation::prism;
 };
 
 struct Tissue {

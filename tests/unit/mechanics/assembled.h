@@ -34,9 +34,23 @@ inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics:
                     mechanics::add_spring_gradient(loop, x, weights.elastic, gradient, kernels);
   result.value += weights.elastic *
                   mechanics::add_edge_gradient(loops.edges, x, weights.elastic, gradient, kernels);
-  result.value += mechanics::add_prism_gradient(loops.prisms, x, weights, gradient, kernels);
+  result.value += mechanics::add_volume_gradient(loops, x, weights, gradient, kernels);
   result.gradient = flattened(gradient);
   return result;
+}
+
+/// What averaged volumes couple beyond prisms: Σ k g gᵀ.
+inline void add_nodal_coupling(const mechanics::NodalVolumes& nodal,
+                               const mechanics::Weights& weights, const std::vector<Vec3>& x,
+                               Eigen::MatrixXd& matrix) {
+  const auto points = static_cast<int64_t>(x.size());
+  const auto rows = mechanics::nodal_gradients(nodal, points, x);
+  for (int64_t p = 0; p < points; ++p) {
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(3 * points);
+    for (size_t k = 0; k < rows[p].points.size(); ++k)
+      g.segment<3>(3 * rows[p].points[k]) += rows[p].gradient[k];
+    matrix += weights.volume_weight * nodal.stiffness[p] * g * g.transpose();
+  }
 }
 
 /// The dense Hessian from the 3×3 blocks.
@@ -68,8 +82,8 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
     add(i, j, -block);
     add(j, i, -block);
   }
-  mechanics::for_each_prism_block(loops.prisms, x, weights,
-                                  exact ? std::span<const double>() : most_slope,
+  if (exact && !loops.nodal.empty()) add_nodal_coupling(loops.nodal, weights, x, matrix);
+  mechanics::for_each_prism_block(loops, x, weights, exact ? std::span<const double>() : most_slope,
                                   [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                     const auto& corner = loops.prisms.points[e];
                                     for (int i = 0; i < 6; ++i)

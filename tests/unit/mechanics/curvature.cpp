@@ -34,7 +34,7 @@ TEST(ConvexCurvature, BlocksArePositiveSemidefiniteInEveryState) {
       for (const SpringLoop& loop : loops.springs)
         for_each_spring_block(loop, x, 0.7, Curvature::convex,
                               [](int64_t, const Mat3& block) { expect_semidefinite(block); });
-      for_each_prism_block(loops.prisms, x, {0.7, volume, 1.3},
+      for_each_prism_block(loops, x, {0.7, volume, 1.3},
                            std::vector<double>(loops.prisms.size(), 0.0),
                            [](int64_t, const PrismBlocks& blocks) {
                              Eigen::Matrix<double, 18, 18> matrix;
@@ -94,8 +94,9 @@ void expect_finite(int exponent, double length, double rest) {
     for_each_spring_block(loop, x, 1.0, curvature,
                           [](int64_t, const Mat3& block) { EXPECT_TRUE(block.allFinite()); });
   std::vector<Vec3> product(2, Vec3::Zero());
-  add_hessian_action({{loop}, {}, {}}, x, {}, std::vector<Vec3>{Vec3(1, 2, 3), Vec3::Zero()},
-                     product);
+  Loops alone;
+  alone.springs = {loop};
+  add_hessian_action(alone, x, {}, std::vector<Vec3>{Vec3(1, 2, 3), Vec3::Zero()}, product);
   EXPECT_TRUE(product[0].allFinite() && product[1].allFinite());
 }
 

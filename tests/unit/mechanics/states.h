@@ -55,6 +55,15 @@ inline model::Model uneven_solid() {
   return model;
 }
 
+/// The same with its volumes averaged around points.
+inline model::Model averaged_solid() {
+  model::Model model = uneven_solid();
+  Random random(9);
+  for (const double modulus : model.prisms.modulus)
+    model.prisms.nodal_modulus.push_back(modulus * (0.6 + 0.3 * random()));
+  return model;
+}
+
 enum class State { mild, compressed, stretched, inverted, flat, far, nearly_coincident };
 
 struct StateInfo {

@@ -308,7 +308,7 @@ INSTANTIATE_TEST_SUITE_P(
                 f.replace(std::string("/model/spring/") + path, H5T_NATIVE_INT8, {0});
               f.replace("/model/spring/points", H5T_NATIVE_INT8, {0, 2});
             },
-            "/model/point: row 4 is soft tissue and no spring holds it"}),
+            "/model/point: row 4 is soft tissue and no spring or edge holds it"}),
     name_of);
 
 class Acceptable : public ::testing::TestWithParam<Defect> {};

@@ -4,6 +4,7 @@
 
 #include "models.h"
 #include "repose/discrete/objective.h"
+#include "repose/model/material.h"
 
 namespace repose::testing {
 
@@ -27,6 +28,22 @@ inline model::Model held_block() {
   return block(9, 8, 4, 2, [](int i, int j, int a) {
     return i == 0 || j == 7 || a == 3 ? model::PointSet::bone : model::PointSet::soft_tissue;
   });
+}
+
+/// The same as a solid of two materials whose volumes are averaged around points.
+inline model::Model averaged_block() {
+  model::Model m = held_block();
+  m.springs = {};
+  model::Prisms& prisms = m.prisms;
+  for (size_t p = 0; p < prisms.points.size(); ++p) {
+    const model::Moduli moduli = model::moduli({p % 5 < 2 ? 0.03 : 0.015, 0.49});
+    prisms.shear_modulus.push_back(moduli.shear);
+    prisms.modulus.push_back(moduli.volume);
+    prisms.nodal_modulus.push_back(moduli.volume - moduli.shear);
+    prisms.target_volume.push_back(prisms.rest_volume[p] * (1 + moduli.shear / moduli.volume));
+  }
+  model::assemble_edges("block", m);
+  return m;
 }
 
 /// A model shared out over the ranks, by default a held block, whose unknowns can be moved.

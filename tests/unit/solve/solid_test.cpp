@@ -109,6 +109,50 @@ TEST(Solid, AnyNumberOfLoadStepsLeadsToOneRestPosition) {
   }
 }
 
+model::Model averaged(model::Model m) {
+  for (size_t p = 0; p < m.prisms.points.size(); ++p)
+    m.prisms.nodal_modulus.push_back(m.prisms.modulus[p] - m.prisms.shear_modulus[p]);
+  return m;
+}
+
+TEST(Solid, AveragedVolumesLeadToOneRestPositionToo) {
+  const model::Model m = averaged(twisted_block(0.49));
+  const Rest one = testing::find_rest(m, settings(1e-6, 1));
+  EXPECT_TRUE(one.summary.path.complete()) << one.summary.last.reason;
+  const Rest five = testing::find_rest(m, settings(1e-6, 5));
+  const Rest plain = testing::find_rest(twisted_block(0.49), settings(1e-6));
+  double apart = 0;
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    EXPECT_LE((one.rows.position[i] - five.rows.position[i]).norm(), 2e-6);
+    apart = std::max(apart, (one.rows.position[i] - plain.rows.position[i]).norm());
+  }
+  EXPECT_GT(apart, 0.01);
+}
+
+TEST(Solid, AveragedVolumesPassThePatchTest) {
+  const auto inner = [](int i, int j, int a) {
+    return i > 0 && i < 6 && j > 0 && j < 5 && a > 0 && a < 4;
+  };
+  model::Model m = averaged(solid_block(7, 6, 5, 0.49, 0.6, [&](int i, int j, int a) {
+    return inner(i, j, a) ? PointSet::soft_tissue : PointSet::held;
+  }));
+  Mat3 f;
+  f << 1.2, 0.1, 0, -0.05, 0.9, 0.15, 0.1, 0, 1.1;
+  testing::aim(m, [&](const Vec3& x) -> Vec3 { return f * x; });
+  const Rest rest = testing::find_rest(m, settings(1e-10));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    EXPECT_LE((rest.rows.position[i] - f * m.points.position[i]).norm(), 1e-9);
+}
+
+TEST(Solid, NoMinimumIsInfinitelyFarAway) {
+  model::Model m = twisted_block(0.45);
+  for (double& weight : m.edges.weight) weight = -weight;
+  const Rest rest = testing::find_rest(m, settings(0.01));
+  EXPECT_FALSE(rest.summary.last.converged);
+  EXPECT_TRUE(std::isinf(rest.summary.last.displacement_error)) << rest.summary.last.reason;
+}
+
 TEST(Solid, TakesFewEvaluations) {
   const Rest rest = testing::find_rest(twisted_block(0.45), settings(0.01));
   EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
