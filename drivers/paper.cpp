@@ -11,13 +11,13 @@
 #include <filesystem>
 #include <sstream>
 
+#include "paper/figures.h"
+#include "paper/page.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/shipped.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
-#include "repose/paper/figures.h"
-#include "repose/paper/page.h"
 
 namespace {
 

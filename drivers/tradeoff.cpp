@@ -20,7 +20,7 @@
 #include "repose/base/progress.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
-#include "repose/tradeoff/study.h"
+#include "tradeoff/study.h"
 
 namespace {
 

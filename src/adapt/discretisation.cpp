@@ -47,7 +47,7 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
   constexpr int finer = 2, growth = 8;  // of the unknowns
   const scene::Tissue& tissue = anatomy.scene.tissue;
   Convergence found{halved_resolutions(anatomy), "these are the finest that are tried"};
-  found.rungs.push_back({0, tissue.layers});
+  found.resolutions.push_back({0, tissue.layers});
   if (!tissue.edge) found.limit = "the skin as given is the finest mesh there is; give tissue.edge";
   if (!layers_are_free(tissue))
     found.limit = "the scene fixes its layers (tissue.depths, depths_mm or mass)";
@@ -62,28 +62,28 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
                                 1e-6 * static_cast<double>(unknowns));
       break;
     }
-    found.rungs.push_back({edge /= 2, (gaps *= 2) + 1});
+    found.resolutions.push_back({edge /= 2, (gaps *= 2) + 1});
   }
   return found;
 }
 
-std::string describe_convergence(const Ladder& ladder, double wanted, const std::string& limit) {
-  const Rung& last = ladder.rungs.back();
-  const std::string why = ladder.refusal.empty() ? limit : ladder.refusal;
+std::string describe_convergence(const GridSequence& sequence, double wanted, const std::string& limit) {
+  const Level& last = sequence.levels.back();
+  const std::string why = sequence.refusal.empty() ? limit : sequence.refusal;
   return fmt::format(
       "  {:<22} of these, the last; mesh and layers leave its skin {:.2g} mm from the continuum at "
       "most, by its distance from the one before{}\n",
       "solved model", last.discretisation_error,
-      ladder.near_enough ? "" : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
+      sequence.near_enough ? "" : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
 }
 
 Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
-                                 const Ladder& ladder) {
+                                 const GridSequence& sequence) {
   Discretisation found;
   found.at_point.assign(position.size(), 0.0);
-  if (!ladder.before.empty()) {
-    const double last = mean_difference(fine, position, position, ladder.position);
-    const double before = mean_difference(fine, position, ladder.position, ladder.before);
+  if (!sequence.before.empty()) {
+    const double last = mean_difference(fine, position, position, sequence.position);
+    const double before = mean_difference(fine, position, sequence.position, sequence.before);
     found.observed = last > 0 && before > last;
     if (found.observed) found.order = std::clamp(std::log2(before / last), 0.5, 2.0);
   }
@@ -91,7 +91,7 @@ Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec
   std::vector<double> moving;
   for (size_t i = 0; i < position.size(); ++i) {
     if (fine.points.layer[i] > 0) continue;
-    found.at_point[i] = share * (position[i] - ladder.position[i]).norm();
+    found.at_point[i] = share * (position[i] - sequence.position[i]).norm();
     if ((position[i] - fine.points.position[i]).norm() >= still)
       moving.push_back(found.at_point[i]);
   }

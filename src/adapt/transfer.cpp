@@ -47,10 +47,7 @@ std::vector<double> depths_of(const Model& model) {
 }  // namespace
 
 Transfer::Transfer(const Model& from, const Model& to)
-    : to_(to),
-      from_points_(from.points.position.size()),
-      from_depths_(depths_of(from)),
-      to_depths_(depths_of(to)) {
+    : to_(to), from_depths_(depths_of(from)), to_depths_(depths_of(to)) {
   const surface::Surface skin = skin_of(from, layers_of(from));
   const surface::DistanceTree tree(skin);
   for (size_t i = 0; i < to.points.position.size(); i += to_depths_.size()) {
@@ -83,19 +80,18 @@ bool Transfer::fixed(size_t point) const {
   return to_.points.set[point] != model::PointSet::soft_tissue;
 }
 
-std::vector<Vec3> Transfer::interpolate(const std::vector<Vec3>& field, bool follow_targets) const {
+std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
   const model::Points& points = to_.points;
   std::vector<Vec3> found(points.position.size());
   const size_t layers = to_depths_.size();
   const auto at = [&](const Place& place, double depth) {
     const Stencil from = stencil(place, depth);
     Vec3 sum = Vec3::Zero();
-    for (size_t k = 0; k < from.point.size(); ++k) sum += from.weight[k] * field[from.point[k]];
+    for (size_t k = 0; k < from.point.size(); ++k)
+      sum += from.weight[k] * displacement[from.point[k]];
     return sum;
   };
-  const auto taken = [&](size_t i) -> Vec3 {
-    return follow_targets ? Vec3(points.target[i] - points.position[i]) : Vec3::Zero();
-  };
+  const auto taken = [&](size_t i) -> Vec3 { return points.target[i] - points.position[i]; };
   for (size_t c = 0; c < places_.size(); ++c) {
     const size_t deepest = (c + 1) * layers - 1;
     Vec3 short_of = Vec3::Zero();
@@ -107,35 +103,6 @@ std::vector<Vec3> Transfer::interpolate(const std::vector<Vec3>& field, bool fol
     }
   }
   return found;
-}
-
-std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
-  return interpolate(displacement, true);
-}
-
-std::vector<Vec3> Transfer::prolong(const std::vector<Vec3>& increment) const {
-  return interpolate(increment, false);
-}
-
-std::vector<Vec3> Transfer::restrict_gradient(const std::vector<Vec3>& gradient) const {
-  std::vector<Vec3> restricted(from_points_, Vec3::Zero());
-  const size_t layers = to_depths_.size();
-  const auto add = [&](const Vec3& value, const Place& place, double depth) {
-    const Stencil from = stencil(place, depth);
-    for (size_t k = 0; k < from.point.size(); ++k)
-      restricted[from.point[k]] += from.weight[k] * value;
-  };
-  for (size_t c = 0; c < places_.size(); ++c) {
-    Vec3 of_deepest = Vec3::Zero();
-    for (size_t l = 0; l < layers; ++l) {
-      const size_t i = c * layers + l;
-      if (fixed(i)) continue;
-      add(gradient[i], places_[c], to_depths_[l]);
-      of_deepest -= to_depths_[l] * gradient[i];
-    }
-    if (fixed((c + 1) * layers - 1)) add(of_deepest, places_[c], 1);
-  }
-  return restricted;
 }
 
 }  // namespace repose::adapt

@@ -72,7 +72,7 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
       next_(positions.make_vector()),
       work_(positions.make_vector()),
       measured_(positions.make_vector()),
-      wear_(price_of_renewal(price_of_factors)) {
+      lag_(price_of_renewal(price_of_factors)) {
   check(KSPCreate(positions.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
@@ -80,7 +80,7 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
   choose_preconditioner();
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
-  if (is_columns(preconditioner())) wear_ = Wear(price_of_renewal(price_of_columns));
+  if (is_columns(preconditioner())) lag_ = LagPolicy(price_of_renewal(price_of_columns));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
 }
 
@@ -117,7 +117,7 @@ void TangentSolver::lend_preconditioner(KSP other) {
 
 PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
   try {
-    static_cast<TangentSolver*>(me)->wear_.take(krylov);
+    static_cast<TangentSolver*>(me)->lag_.take(krylov);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;
   }
@@ -127,8 +127,8 @@ PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
 void TangentSolver::prepare(Vec displacement) {
   hessian_.assemble(displacement);
   const bool moved = hessian_.assemblies() != made_at_;
-  if (moved) wear_.move();
-  const bool renew = renewals_ == 0 || hopeless() || (moved && wear_.out());
+  if (moved) lag_.move();
+  const bool renew = renewals_ == 0 || hopeless() || (moved && lag_.out());
   check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
   if (renew) renew_preconditioner();
 }
@@ -143,7 +143,7 @@ void TangentSolver::renew(Vec displacement) {
 void TangentSolver::give_way() { given_way_ = is_columns(preconditioner()); }
 
 bool TangentSolver::hopeless() const {
-  const bool slow = given_way_ || (columns_ && wear_.hopeless());
+  const bool slow = given_way_ || (columns_ && lag_.hopeless());
   return slow && !factors_ && unknowns_ <= factors_limit;
 }
 
@@ -158,7 +158,7 @@ void TangentSolver::renew_preconditioner() {
     give_room(pc);
     check(PCSetUp(pc));
   }
-  wear_.renew();
+  lag_.renew();
   made_at_ = hessian_.assemblies();
   ++renewals_;
 }
@@ -171,7 +171,7 @@ void TangentSolver::renew_columns() {
     columns_.reset();
     check(PCCreate(positions_.comm(), factors_.out()));
     choose_factors(factors_);
-    wear_ = Wear(price_of_renewal(price_of_factors));
+    lag_ = LagPolicy(price_of_renewal(price_of_factors));
   }
   if (factors_) {
     hessian_.renew();
@@ -229,7 +229,7 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
          reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 
-double TangentSolver::glance(Vec gradient) {
+double TangentSolver::preconditioned_step(Vec gradient) {
   if (renewals_ == 0) return 0;
   measured_at_ = -1;
   check(PCApply(preconditioner(), gradient, work_));

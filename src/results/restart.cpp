@@ -1,8 +1,8 @@
 #include "repose/results/restart.h"
 
 #include "repose/base/agreement.h"
-#include "repose/base/deal_out.h"
 #include "repose/base/error.h"
+#include "repose/base/scatter.h"
 #include "repose/results/model_file.h"
 
 namespace repose::results {
@@ -51,7 +51,7 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
   });
   MPI_Bcast(&restart.guess, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&restart.load, 1, MPI_DOUBLE, 0, comm);
-  restart.position = base::deal_out(comm, all);
+  restart.position = base::scatter(comm, all);
   return restart;
 }
 

@@ -7,9 +7,9 @@
 #include <unordered_map>
 
 #include "repose/base/agreement.h"
-#include "repose/base/deal_out.h"
 #include "repose/base/hdf5.h"
 #include "repose/base/log.h"
+#include "repose/base/scatter.h"
 #include "repose/base/this_run.h"
 #include "repose/results/model_write.h"
 #include "repose/results/unfinished_file.h"
@@ -312,8 +312,8 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
   base::on_first_rank(comm, [&] { s.create(model, kind); });
   base::share(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
-  s.initial = base::deal_out(comm, model.points.position);
-  s.outward = base::deal_out(comm, outward_normals(model));
+  s.initial = base::scatter(comm, model.points.position);
+  s.outward = base::scatter(comm, outward_normals(model));
   s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
 }
 

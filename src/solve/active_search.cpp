@@ -1,13 +1,15 @@
 #include "repose/solve/active_search.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "repose/base/agreement.h"
-#include "repose/base/deal_out.h"
 #include "repose/base/error.h"
 #include "repose/base/pick.h"
+#include "repose/base/scatter.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/model/motion.h"
@@ -64,12 +66,12 @@ struct Shared {
     std::vector<Vec3> all(flags.size());
     for (size_t i = 0; i < flags.size(); ++i) all[i] = Vec3::Constant(flags[i] ? 1 : 0);
     base::VecHandle v = positions.make_vector();
-    positions.keep_owned(natural.owned(base::deal_out(positions.comm(), all)), v);
+    positions.keep_owned(natural.owned(base::scatter(positions.comm(), all)), v);
     return v;
   }
   /// Goes to `position` [N] on rank 0, at a load.
   void go_to(const std::vector<Vec3>& position, double load) {
-    natural.take(base::deal_out(positions.comm(), position), positions, displacement);
+    natural.take(base::scatter(positions.comm(), position), positions, displacement);
     positions.set_load(load);
   }
 };
@@ -107,6 +109,7 @@ class RegionSearch {
       : comm_(comm), model_(model), settings_(settings), receive_(receive) {}
 
   bool pays();
+  const std::string& why() const { return why_; }  // it pays or does not, on rank 0
   Summary run(const Start& start, base::Stages& stages);
 
  private:
@@ -131,6 +134,7 @@ class RegionSearch {
   const Receiver& receive_;
 
   Plan plan_;
+  std::string why_;
   std::optional<ActiveRegion> region_;  // on rank 0
   std::optional<Shared> whole_;
   std::optional<discrete::Objective> objective_;  // of the whole
@@ -153,8 +157,10 @@ Plan RegionSearch::make_plan() {
   const int64_t soft = model::count(model_).soft;
   const bool asked = settings_.extent == Extent::region;
   Plan plan;
+  why_ = fmt::format("fewer than {} points of soft tissue", fewest_points);
   if (!asked && soft < fewest_points) return plan;
   region_.emplace(model_, initial_forces(model_));
+  why_ = "nothing moves and all is at rest";
   if (region_->moved() + region_->uneasy() == 0) return plan;
   const double uneasy_share =
       static_cast<double>(region_->uneasy()) / static_cast<double>(region_->columns());
@@ -170,6 +176,7 @@ Plan RegionSearch::make_plan() {
   plan.columns = region_->columns();
   const std::vector<char> active = region_->points(0, plan.reach);
   const auto unknown = std::count(active.begin(), active.end(), 1);
+  why_ = fmt::format("{} of {} points of soft tissue feel what moves", unknown, soft);
   plan.go = asked || static_cast<double>(unknown) <= largest_share * static_cast<double>(soft);
   return plan;
 }
@@ -193,7 +200,7 @@ Settings RegionSearch::settings_inside() const {
 Start RegionSearch::restricted(const Start& start) const {
   if (!start.guess) return {};
   const std::vector<Vec3> all = discrete::gather_points(comm_, start.position);
-  return {base::deal_out(comm_, first() ? pick(all, part_.point_row) : all), start.guess};
+  return {base::scatter(comm_, first() ? pick(all, part_.point_row) : all), start.guess};
 }
 
 /// Finds the rest position of the region of a reach, from `start` or, later, the present state.
@@ -211,7 +218,7 @@ void RegionSearch::rest(double reach, const Start& start) {
   if (pending_) {
     settings.path.start_load = 1;
     settings.path.accuracy *= finer;
-    from = {base::deal_out(comm_, first() ? pick(position_, part_.point_row) : position_)};
+    from = {base::scatter(comm_, first() ? pick(position_, part_.point_row) : position_)};
   }
   base::Stages unused(comm_);
   const Summary found =
@@ -370,18 +377,18 @@ Summary RegionSearch::run(const Start& start, base::Stages& stages) {
 
 }  // namespace
 
-std::string obstacle_to_region(const Settings& settings) {
-  if (settings.path.start_load > 0) return "the run goes on from another result";
-  if (settings.force) return "the functional is force";
-  if (settings.exact_volume) return "the volume term is exact";
-  if (settings.stability) return "the stability of the whole is asked for";
-  return "";
+RegionChoice choose_region(MPI_Comm comm, const model::Model& model, const Settings& settings) {
+  if (settings.extent == Extent::whole) return {false, "no part of it is to be left out"};
+  const Receiver unheard;
+  RegionSearch search(comm, model, settings, unheard);
+  const bool part = search.pays();
+  return {part, search.why()};
 }
 
 std::optional<Summary> find_in_region(MPI_Comm comm, const model::Model& model,
                                       const Settings& settings, const Start& start,
                                       base::Stages& stages, const Receiver& receive) {
-  if (settings.extent == Extent::whole || !obstacle_to_region(settings).empty()) return {};
+  if (settings.extent == Extent::whole) return {};
   RegionSearch search(comm, model, settings, receive);
   if (!search.pays()) return {};
   return search.run(start, stages);

@@ -61,7 +61,7 @@ bool StepWear::take(double force, double length) {
 }
 
 InitialHessian::InitialHessian(Tao tao, linear::TangentSolver& solver)
-    : solver_(solver), wear_(wanted_by_options(comm_of(solver.hessian().action())).price) {
+    : solver_(solver), lag_(wanted_by_options(comm_of(solver.hessian().action())).price) {
   const Mat action = solver.hessian().action();
   PetscInt rows = 0, all_rows = 0;
   check(MatGetLocalSize(action, &rows, nullptr));
@@ -81,13 +81,13 @@ PetscErrorCode InitialHessian::apply(Mat matrix, Vec vector, Vec product) {
 void InitialHessian::renew(Vec displacement) {
   solver_.renew(displacement);
   renewals_ = solver_.renewals();
-  wear_.renew();
+  lag_.renew();
 }
 
 bool InitialHessian::worn_out(double force, double length) {
-  if (renewals_ != solver_.renewals()) wear_.renew();  // by a look at the distance from rest
+  if (renewals_ != solver_.renewals()) lag_.renew();  // by a look at the distance from rest
   renewals_ = solver_.renewals();
-  return wear_.take(force, length);
+  return lag_.take(force, length);
 }
 
 bool begins_with_stiffness(const discrete::Positions& positions) {

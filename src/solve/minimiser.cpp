@@ -131,15 +131,15 @@ Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver
     : Minimiser(function, solver, {function, solver}, watch) {}
 
 Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver,
-                     const Certificate& certificate, const Watch& watch)
+                     const ErrorEstimate& estimate, const Watch& watch)
     : function_(function),
       solver_(solver),
-      certificate_(certificate),
+      estimate_(estimate),
       watch_(watch),
       gradient_(function.positions().make_vector()),
       saved_(function.positions().make_vector()),
       trial_(function.positions().make_vector()),
-      certified_gradient_(function.positions().make_vector()) {
+      estimate_gradient_(function.positions().make_vector()) {
   make_tao();
 }
 
@@ -192,15 +192,15 @@ bool Minimiser::step_was_cut() const {
 }
 
 double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
-  if (&certificate_.function != &function_) {
-    certificate_.function.evaluate(displacement, certified_gradient_);
-    gradient = certified_gradient_;
+  if (&estimate_.function != &function_) {
+    estimate_.function.evaluate(displacement, estimate_gradient_);
+    gradient = estimate_gradient_;
   }
-  double step = certificate_.solver.newton_distance(displacement, gradient);
+  double step = estimate_.solver.newton_distance(displacement, gradient);
   double unsure = 0;
   if (last || safety * step <= accuracy_) {
-    step = certificate_.solver.sure_distance(displacement, gradient, sure_share * accuracy_);
-    unsure = certificate_.solver.unsure();
+    step = estimate_.solver.sure_distance(displacement, gradient, sure_share * accuracy_);
+    unsure = estimate_.solver.unsure();
   }
   const double estimate = safety * step + unsure;
   const bool curved = estimate > linear && estimate <= accuracy_;
@@ -212,11 +212,11 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
 }
 
 double Minimiser::contraction(Vec displacement) {
-  linear::TangentSolver& solver = certificate_.solver;
+  linear::TangentSolver& solver = estimate_.solver;
   if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
   check(VecWAXPY(trial_, -1.0, solver.latest(), displacement));
-  certificate_.function.evaluate(trial_, certified_gradient_);
-  const double found = solver.contraction(displacement, trial_, certified_gradient_);
+  estimate_.function.evaluate(trial_, estimate_gradient_);
+  const double found = solver.contraction(displacement, trial_, estimate_gradient_);
   contraction_ = found <= trusted_contraction ? found : most_contraction;
   contracted_at_ = solver.hessian().assemblies();
   return contraction_;
@@ -244,15 +244,15 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     error_ = largest_force / softest_;
     return false;
   }
-  if (quick && &certificate_.function == &function_) {
-    const double glance = certificate_.solver.glance(gradient);
+  if (quick && &estimate_.function == &function_) {
+    const double step = estimate_.solver.preconditioned_step(gradient);
     const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
-    if (glance > (may_close_ ? near : accuracy_)) {
-      error_ = safety * glance;
+    if (step > (may_close_ ? near : accuracy_)) {
+      error_ = safety * step;
       return false;
     }
-    if (closes_ && glance < negligible * accuracy_) {
-      error_ = safety * glance;
+    if (closes_ && step < negligible * accuracy_) {
+      error_ = safety * step;
       return true;
     }
   }
@@ -288,8 +288,8 @@ int Minimiser::polish(Vec displacement) {
   while (corrections < most && error_ > accuracy_ && error_ <= farthest_correction()) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
-    check(VecAXPY(displacement, -1.0, certificate_.solver.latest()));
-    taken_ = discrete::largest_block(certificate_.solver.latest());
+    check(VecAXPY(displacement, -1.0, estimate_.solver.latest()));
+    taken_ = discrete::largest_block(estimate_.solver.latest());
     measure(displacement, true);
     taken_ = 0;
     if (error_ > 0.5 * before) {

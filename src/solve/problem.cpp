@@ -21,7 +21,7 @@ linear::TangentSolver& Problem::solver() {
   return force_solver_ ? *force_solver_ : elastic_solver_;
 }
 
-Certificate Problem::certificate() {
+ErrorEstimate Problem::error_estimate() {
   // Without volume term rest is F = 0, of which the energy's Newton step knows more.
   if (force_ && !force_->volume()) return {objective_, elastic_solver_};
   return {function(), solver()};

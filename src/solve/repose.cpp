@@ -18,7 +18,6 @@
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
-#include "repose/solve/stiffening.h"
 
 namespace repose::solve {
 
@@ -109,7 +108,7 @@ class Searcher {
   Searcher(discrete::Positions& positions, const Settings& settings)
       : problem_(positions, settings.weights, settings.force),
         watcher_(positions.comm(), settings),
-        minimiser_(problem_.function(), problem_.solver(), problem_.certificate(),
+        minimiser_(problem_.function(), problem_.solver(), problem_.error_estimate(),
                    std::ref(watcher_)) {
     if (settings.force) force_search_.emplace(*problem_.force(), minimiser_);
     if (settings.exact_volume)
@@ -198,28 +197,28 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
   discrete::Objective& objective = searcher.objective();
   Summary summary;
   int64_t evaluations_before = 0;
+  LoadPath path(searcher.problem(), searcher.search(), settings.path);
   summary.path =
-      follow_bones(searcher.problem(), searcher.search(), settings.exact_volume, settings.path,
-                   displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
-                     summary.last = numbers_of(objective, settings, outcome, load);
-                     summary.last.epsilon = searcher.epsilon();
-                     const bool start = load == 0 && settings.initial_equilibrium;
-                     const bool end = load == 1 || !outcome.converged;
-                     if (settings.stability && (start || end)) {
-                       linear::TangentSolver& solver = searcher.elastic_solver();
-                       Spectrum spectrum;
-                       spectrum.smallest = smallest_eigenvalue(solver, displacement);
-                       spectrum.largest = largest_eigenvalue(solver.hessian().exact());
-                       if (start) summary.initial_spectrum = spectrum;
-                       if (end) summary.final_spectrum = spectrum;
-                       summary.last.smallest_eigenvalue = spectrum.smallest;
-                       summary.last.largest_eigenvalue = spectrum.largest;
-                     }
-                     summary.last.seconds = seconds;
-                     summary.last.evaluations = searcher.evaluations() - evaluations_before;
-                     evaluations_before = searcher.evaluations();
-                     receive(summary.last, natural.rows(objective, settings.exact_volume));
-                   });
+      path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
+        summary.last = numbers_of(objective, settings, outcome, load);
+        summary.last.epsilon = searcher.epsilon();
+        const bool start = load == 0 && settings.initial_equilibrium;
+        const bool end = load == 1 || !outcome.converged;
+        if (settings.stability && (start || end)) {
+          linear::TangentSolver& solver = searcher.elastic_solver();
+          Spectrum spectrum;
+          spectrum.smallest = smallest_eigenvalue(solver, displacement);
+          spectrum.largest = largest_eigenvalue(solver.hessian().exact());
+          if (start) summary.initial_spectrum = spectrum;
+          if (end) summary.final_spectrum = spectrum;
+          summary.last.smallest_eigenvalue = spectrum.smallest;
+          summary.last.largest_eigenvalue = spectrum.largest;
+        }
+        summary.last.seconds = seconds;
+        summary.last.evaluations = searcher.evaluations() - evaluations_before;
+        evaluations_before = searcher.evaluations();
+        receive(summary.last, natural.rows(objective, settings.exact_volume));
+      });
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

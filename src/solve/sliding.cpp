@@ -31,6 +31,7 @@ class Rests {
                            })
                    .path;
     settings_.path.start_load = 1;
+    settings_.extent = Extent::whole;
   }
   std::vector<Vec3> forces(const model::Model& model,
                            const std::vector<std::vector<int64_t>>& points) const {

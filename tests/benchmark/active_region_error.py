@@ -38,7 +38,7 @@ HEAD = ("| case | accuracy, mm | active columns | rounds | error said, mm | true
 
 def solve(program, folder, name, *options):
     """The steps of a solve by their loads, and the words of its row about the region."""
-    solved = run([program, "scene.yaml", "-nested", "off", "-output", name, *options], folder,
+    solved = run([program, "scene.yaml", "-output", name, *options], folder,
                  ends=[0])
     found = {step["load"]: step for step in steps(folder / f"{name}.h5")}
     return found, solved.said.get("active region", "").split()

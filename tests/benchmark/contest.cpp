@@ -9,15 +9,14 @@
 #include <functional>
 #include <map>
 
-#include "repose/adapt/ladder.h"
+#include "paper/contest.h"
+#include "paper/motion_race.h"
+#include "paper/polak_ribiere.h"
 #include "repose/base/program.h"
 #include "repose/base/scoped_option.h"
 #include "repose/base/usage.h"
-#include "repose/paper/contest.h"
-#include "repose/paper/motion_race.h"
 #include "repose/results/model_file.h"
 #include "repose/scene/scene.h"
-#include "repose/solve/polak_ribiere.h"
 
 #ifdef REPOSE_LIBLBFGS
 #include <lbfgs.h>
@@ -146,9 +145,7 @@ Task read_task(const std::string& file) {
 /// An entry with what only some methods have.
 struct Line {
   Entry entry;
-  int64_t values = 0;              // of the evaluations, those without gradient
-  int64_t coarse_evaluations = 0;  // on coarser models
-  int64_t coarse_assemblies = 0;
+  int64_t values = 0;  // of the evaluations, those without gradient
 };
 
 void print(const Line& line) {
@@ -158,12 +155,11 @@ void print(const Line& line) {
       "%s\n",
       fmt::format("{{\"method\": \"{}\", \"end\": \"{}\", \"evaluations\": {}, \"values\": {}, "
                   "\"assemblies\": {}, \"renewals\": {}, \"actions\": {}, "
-                  "\"applications\": {}, \"coarse_evaluations\": {}, "
-                  "\"coarse_assemblies\": {}, \"seconds\": {}, \"distance\": {}, "
+                  "\"applications\": {}, \"seconds\": {}, \"distance\": {}, "
                   "\"excess\": {}}}",
                   e.method, ends[static_cast<size_t>(e.end)], e.evaluations, line.values,
-                  e.assemblies, e.renewals, e.actions, e.applications, line.coarse_evaluations,
-                  line.coarse_assemblies, e.seconds, e.distance, e.excess)
+                  e.assemblies, e.renewals, e.actions, e.applications, e.seconds, e.distance,
+                  e.excess)
           .c_str());
 }
 
@@ -194,40 +190,17 @@ class Runner {
             .seconds = seconds};
   }
 
-  /// What coarser models lead to, and what they took; nothing where repose-solve would not.
-  adapt::Ladder climb_coarser_models() {
-    if (!options_.has("scene")) return {};
-    const model::Anatomy anatomy = model::load_anatomy(scene::read_scene(options_.text("scene")));
-    if (!adapt::guides_pay(anatomy, task_.model)) return {};
-    adapt::Climb wanted{adapt::guiding_rungs(anatomy), {}, {}};
-    wanted.settings.weights = task_.weights;
-    wanted.settings.volume = task_.volume;
-    wanted.settings.lambda = task_.lambda;
-    wanted.settings.path.accuracy = options_.number("accuracy");
-    return adapt::climb(comm, anatomy, task_.model, wanted);
-  }
-
   /// As repose-solve does it, until the rest position is near or, `default_end`, until it says so.
   void race_default(const std::string& method) {
-    const double begin = base::cpu_seconds();
-    const adapt::Ladder ladder = climb_coarser_models();
-    const double climbed = base::cpu_seconds() - begin;
-    base::VecHandle guess;
-    if (!ladder.rungs.empty()) guess = contest_.displacement_to(ladder.position);
     Line line;
     if (method != "default_end") {
-      line.entry = contest_.race_path(guess);
+      line.entry = contest_.race_path();
     } else {
       const base::VecHandle rest = contest_.copy_of_reference();
-      line.entry = contest_.follow_path(guess);
+      line.entry = contest_.follow_path();
       line.entry.distance = contest_.distance(rest);
     }
     line.entry.method = method;
-    line.entry.seconds += climbed;
-    for (const adapt::Rung& rung : ladder.rungs) {
-      line.coarse_evaluations += rung.evaluations;
-      line.coarse_assemblies += rung.assemblies;
-    }
     print(line);
   }
 
@@ -235,7 +208,7 @@ class Runner {
   void race_stiffness(const std::string& method) {
     const base::ScopedOption type("-tao_type", "lmvm"), initial("-tao_lmvm_initial", "stiffness");
     if (method == "stiffness") return race_default(method);
-    Line line{contest_.race_path(nullptr, 1)};
+    Line line{contest_.race_path(1)};
     line.entry.method = method;
     print(line);
   }
@@ -246,7 +219,7 @@ class Runner {
         contest_.race("polak_ribiere", [&](discrete::Function& function, Vec displacement) {
           Counter counter(function);
           try {
-            solve::polak_ribiere(counter, displacement);
+            paper::polak_ribiere(counter, displacement);
           } catch (...) {
             line.values = counter.values();
             throw;

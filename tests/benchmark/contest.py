@@ -307,16 +307,12 @@ def row(contest, method, entry):
     unit = contest.entries["default", 0]["seconds"]
     name = METHODS[method] if method != "motion" else entry["method"]
     count = ("" if entry["end"] in ("reached", "own_minimum") else "> ") + str(entry["evaluations"])
-    if entry.get("coarse_evaluations"):
-        count += f" and {entry['coarse_evaluations']} coarse"
     if entry["values"]:
         count += f" ({entry['evaluations'] - entry['values']} with gradient)"
     hessians = "–"
     if entry["assemblies"]:
         hessians = ", ".join(str(entry[what]) for what in ("assemblies", "renewals", "actions",
                                                            "applications"))
-        if entry.get("coarse_assemblies"):
-            hessians += f" and {entry['coarse_assemblies']} coarse"
     return (f"| {name} | {count} | {hessians} | {entry['seconds'] / unit:.2g}× | "
             f"{ending(entry)} |\n")
 
@@ -331,7 +327,7 @@ def table(contest):
     own = contest.entries["default", 0]
     spent = own["renewals"] * cost["renewal"] + own["actions"] * cost["action"]
     text += (f". The default takes {own['seconds']:.2g} s of CPU,\nof which its linear systems "
-             f"{'on this model ' * bool(own['coarse_evaluations'])}are about "
+             f"are about "
              f"{100 * spent / own['seconds']:.0f} %.\n\n"
              "| method | evaluations | Hessians, preconditioners, products, applications | time | distance |\n"
              "|---|--:|--:|--:|---|\n")
@@ -412,8 +408,7 @@ Made by `{" ".join(["tests/benchmark/contest.py", *words])}` in one run, on
 Every method starts from the initial positions, with the bones at once in their final places, on the same
 model file. It is stopped at the first state it evaluates that is within {accuracy} (largest distance
 of a point) of the rest position, which repose-solve found to {REFERENCE} mm. Only the default and
-L-BFGS from the stiffness take load steps (and, where the skin is large enough, solve a coarser model
-first); this cost is included. An evaluation is one of the value, or of value and gradient, which cost
+L-BFGS from the stiffness take load steps; this cost is included. An evaluation is one of the value, or of value and gradient, which cost
 the same in Repose's kernel. Hessians, new preconditioners, products with the Hessian and applications
 of preconditioners are counted separately; their time is included. Times are CPU times relative to
 the default, the least of {chosen.rounds} rounds, or of fewer where they take over {LONG} s. Set-up

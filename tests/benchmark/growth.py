@@ -2,7 +2,7 @@
 """How the work of a whole solve grows with the mesh: a table.
 
     tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm,stiffness]
-                              [-layers 4,…] [-turgor 0] [-nested auto] [-ranks 1]
+                              [-layers 4,…] [-turgor 0] [-ranks 1]
                               [-output docs/measurements/growth.md] [-mark measured]
 
 Synthetic heads of the given numbers of skin vertices, each with its number of layers, springs by
@@ -62,7 +62,7 @@ def rows_of(size, layers, chosen):
                                                                     f"turgor: {chosen.turgor}")
     with synthetic(chosen.bin, size, scene) as folder:
         first = None
-        command = [chosen.bin / "repose-solve", "-nested", chosen.nested]
+        command = [chosen.bin / "repose-solve"]
         for method in chosen.methods.split(","):
             found, position = measure(command, folder, method, chosen.ranks)
             first = position if first is None else first
@@ -76,7 +76,7 @@ def rows_of(size, layers, chosen):
 
 def main():
     chosen = option_parser(__doc__, sizes="500,2500,12500", methods="ntr,lmvm,stiffness",
-                           layers="4", turgor=0.0, nested="auto", ranks=1,
+                           layers="4", turgor=0.0, ranks=1,
                            mark="measured").parse_args()
     sizes = chosen.sizes.split(",")
     layers = chosen.layers.split(",")

@@ -2,10 +2,10 @@
 """What each way to solve the linear systems costs a whole solve: a table.
 
     tests/benchmark/linear_solver.py [-bin build/bin] [-sizes 3000,12500] [-solvers NAME;…]
-                                     [-ranks 1] [-nested off] [-seconds 600]
+                                     [-ranks 1] [-seconds 600]
                                      [-output docs/measurements/linear_solver.md]
 
-Synthetic heads as in growth.py, by default without nested iteration, so that each solver does the
+Synthetic heads as in growth.py, so that each solver does the
 same work; each solve may take -seconds. Counts are PETSc's: preconditioners made, applications of them, seconds in both.
 Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
@@ -34,7 +34,7 @@ SOLVERS = {
 def measure(folder, name, chosen):
     """One solve by one linear solver: a row of the table."""
     solved = run([chosen.bin / "repose-solve", "scene.yaml", "-output", "result", "-log_view", ":log",
-                  "-nested", chosen.nested, *SOLVERS[name], "-time_limit", chosen.seconds], folder,
+                  *SOLVERS[name], "-time_limit", chosen.seconds], folder,
                  chosen.ranks, ends=None)
     if solved.status == 1:
         return f"| {name} | – | – | – | – | – | – | {solved.error.strip().splitlines()[-1]} | |"
@@ -54,7 +54,7 @@ def rows_of(size, chosen):
 
 def main():
     chosen = option_parser(__doc__, sizes="3000,12500", solvers=";".join(SOLVERS), ranks=1,
-                           nested="off", seconds=600.0).parse_args()
+                           seconds=600.0).parse_args()
     print_table(HEAD, (row for size in chosen.sizes.split(",") for row in rows_of(size, chosen)),
                 chosen.output)
 

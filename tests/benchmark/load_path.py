@@ -38,7 +38,7 @@ class Way:
 
 def solve(tools, folder, scene, volume, *options):
     """What was run and the last step; nothing where it did not come to rest in time."""
-    command = [tools / "repose-solve", scene, "-volume", volume, "-nested", "off", "-output", "run",
+    command = [tools / "repose-solve", scene, "-volume", volume, "-output", "run",
                *options]
     try:
         done = measure.run(command, folder, timeout=PATIENCE)

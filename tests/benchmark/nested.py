@@ -3,8 +3,7 @@
 
     tests/benchmark/nested.py [-bin build/bin] [-output docs/measurements/nested.md] SCENE …
 
-Solves each scene to 0.01 mm along the load path and with nested iteration, and with -adapt and as a
-preview; says what each took, on all levels, in evaluations on the scene's own mesh, and how far its
+Solves each scene to 0.01 mm along the load path, and with -adapt and as a preview; says what each took, on all levels, in evaluations on the scene's own mesh, and how far its
 skin is from that of the first, over the vertices of the scene's skin.
 Needs: apt-get install --no-install-recommends python3-h5py python3-scipy
 """
@@ -20,8 +19,7 @@ from measure import run
 from page import option_parser, print_table
 from tissue import last, model_of
 
-WAYS = [["-nested", "off", "-accuracy", "0.01"], ["-accuracy", "0.01"], ["-adapt", "-accuracy", "3"],
-        ["-profile", "preview"]]
+WAYS = [["-accuracy", "0.01"], ["-adapt", "-accuracy", "3"], ["-profile", "preview"]]
 HEAD = ("| scene | points | options | coarse models, points | evaluations | Hessians | time | "
         "estimate for the skin, mm | skin from the first, mm: largest, 95 % |\n|---|--:|---|---"
         + "|--:" * 5 + "|")

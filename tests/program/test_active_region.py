@@ -9,7 +9,6 @@ from conftest import PROJECT
 from tissue import apart, last, model_of, steps
 
 CHIN = "head_genioplasty.yaml"
-SOLVE = ["-nested", "off"]
 
 
 def number(text, name):
@@ -18,7 +17,7 @@ def number(text, name):
 
 @pytest.mark.parametrize("accuracy", ["0.5", "0.1"])
 def test_the_answer_is_as_near_as_it_says(solved, accuracy):
-    path = [*SOLVE, "-load_steps", 3]
+    path = ["-load_steps", 3]
     exact = solved(CHIN, *path, "-accuracy", "1e-5", "-active_region", "off")
     file = solved(CHIN, *path, "-accuracy", accuracy, "-active_region", "on")
     assert 0 < apart(last(file), last(exact)) <= last(file)["displacement_error"] <= float(accuracy)
@@ -29,7 +28,7 @@ def test_the_answer_is_as_near_as_it_says(solved, accuracy):
 
 
 def test_what_is_left_out_stays_and_is_held(solved, run):
-    file = solved(CHIN, *SOLVE, "-accuracy", "0.5", "-active_region", "on")
+    file = solved(CHIN, "-accuracy", "0.5", "-active_region", "on")
     model, found = model_of(file), last(file)
     still = (model["point/set"] == 0) & (found["point/displacement"] == 0).all(axis=1)
     assert 0.1 < still.mean() < 0.9
@@ -43,7 +42,7 @@ def test_what_is_left_out_stays_and_is_held(solved, run):
 def test_fewer_unknowns(run):
     counts = {}
     for choice in ("on", "off"):
-        said = run("repose-solve", PROJECT / "meshes" / CHIN, *SOLVE, "-accuracy", "0.5",
+        said = run("repose-solve", PROJECT / "meshes" / CHIN, "-accuracy", "0.5",
                    "-active_region", choice)
         assert (said.returncode, said.stderr) == (0, "")
         counts[choice] = number(said.stdout, "unknowns")
@@ -52,7 +51,7 @@ def test_fewer_unknowns(run):
 
 
 def test_same_on_any_number_of_ranks(solved):
-    options = [CHIN, *SOLVE, "-accuracy", "0.01", "-active_region", "on"]
+    options = [CHIN, "-accuracy", "0.01", "-active_region", "on"]
     one, three = last(solved(*options)), last(solved(*options, ranks=3))
     assert apart(one, three) <= one["displacement_error"] + three["displacement_error"]
     assert one["objective"] == pytest.approx(three["objective"], rel=1e-6)
@@ -72,7 +71,7 @@ def test_refused_where_it_cannot_be(run, options, word):
 
 
 def test_refused_in_a_restart(solved, run):
-    file = solved(CHIN, *SOLVE, "-accuracy", "0.5", "-active_region", "on")
+    file = solved(CHIN, "-accuracy", "0.5", "-active_region", "on")
     options = [PROJECT / "meshes" / CHIN, "-restart", file, "-output", "again"]
     said = run("repose-solve", *options, "-active_region", "on")
     assert said.returncode == 1 and "-active_region on" in said.stderr

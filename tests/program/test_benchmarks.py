@@ -100,35 +100,3 @@ def test_the_picture_is_there(estimate):
     if not importlib.util.find_spec("matplotlib"):
         pytest.skip("matplotlib is not installed")
     assert (estimate / "estimate.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.fixture(scope="module")
-def multigrid(tmp_path_factory, environment):
-    """Cells of the rows of the smallest races of nonlinear multigrid, by the method's name."""
-    pytest.importorskip("h5py")
-    folder = tmp_path_factory.mktemp("multigrid")
-    result = run_script("multigrid_opt.py", folder, environment, "-sizes", "", "-accuracy", 0.05,
-                        PROJECT / "meshes/paper_jaw_advance.yaml")
-    assert (result.returncode, result.stderr) == (0, ""), result
-    rows = [[cell.strip() for cell in line.strip("|").split("|")]
-            for line in result.stdout.splitlines()[2:]]
-    return {row[2]: row[3:] for row in rows}
-
-
-def test_coarse_corrections_lead_down_from_the_coarse_rest_position(multigrid):
-    share = {}
-    for name in ("MG/OPT", "MG/OPT, injected"):
-        corrections, refused = map(int, multigrid[name][4].split(","))
-        assert 0 <= refused <= corrections > 1
-        share[name] = refused / corrections
-    # How many it takes, and so the shares, is the linear algebra's of a release.
-    assert share["MG/OPT"] < 0.1 and share["MG/OPT, injected"] > 0.25
-
-
-def test_cycles_come_to_the_rest_position(multigrid):
-    assert all(multigrid[name][-1] == "there" for name in ("default", "L-BFGS", "MG/OPT"))
-    hessians = {name: int(row[2]) for name, row in multigrid.items()}
-    assert hessians["MG/OPT"] == 0
-    ends = [hessians[f"{name}, to its{own} estimate"]
-            for name, own in (("default", " own"), ("MG/OPT, then the default", ""))]
-    assert ends[0] > ends[1] > 0

@@ -20,10 +20,8 @@ ROOMS = {
     "solve": {"base", "model", "mechanics", "discrete", "linear"},
     "results": {"base", "model"},
     "adapt": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve"},
-    "paper": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
-              "results"},
-    "tradeoff": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
-                 "adapt"},
+    "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
+            "results", "adapt"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

@@ -1,4 +1,6 @@
-"""Coarser models of a scene, solved first to lead to its answer or in its place."""
+"""Coarser models of a scene, solved in its place or to be compared with it."""
+
+import re
 
 import h5py
 import pytest
@@ -50,36 +52,6 @@ def head(tmp_path_factory, environment):
     return solve
 
 
-def actions(log):
-    """Of the Hessian, on all models: what most of the time goes into."""
-    return next(int(line.split()[1]) for line in log.read_text().splitlines()
-                if line.startswith("MatMult "))
-
-
-def test_a_long_way_is_led_with_fewer_actions(head):
-    along, _ = head("-nested", "off", "-log_view", ":along.txt", jaw="open")
-    nested, said = head("-log_view", ":nested.txt", jaw="open")
-    assert said.count("coarse model") == 1 and len(steps(nested)) == 2
-    same_face(along, nested, 2e-6)
-    folder = nested.parent
-    assert actions(folder / "nested.txt") < 0.5 * actions(folder / "along.txt")
-
-
-def test_a_way_of_one_long_step_is_not_led(head):
-    along, said = head()
-    nested, led = head("-nested", "on")
-    assert said.count("coarse model") == 0 and led.count("coarse model") == 1
-    same_face(along, nested, 2e-6)
-
-
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_ranks_find_the_same(head, ranks):
-    one, _ = head()
-    more, said = head("-nested", "on", ranks=ranks)
-    assert said.count("coarse model") == 1
-    same_face(one, more, 2e-6)
-
-
 def at_skin(file):
     """Initial positions and displacements of the skin's points."""
     with h5py.File(file) as h5:
@@ -129,16 +101,10 @@ def test_adapt_on_two_ranks(head):
                                            + last(two)["displacement_error"])
 
 
-def test_exact_follows_the_load_path_to_a_millionth(head):
-    exact, said = head("-profile", "exact")
-    assert "1e-06 mm asked for" in said and "coarse model" not in said
-    assert len(steps(exact)) == len(steps(head("-nested", "off")[0]))
-
-
 @pytest.mark.parametrize("options, words", [
-    (["-adapt", "-nested", "off"], "-adapt solves coarser models"),
+    (["-adapt", "-profile", "exact"], "-adapt solves coarser models"),
     (["-adapt", "-load_steps", 3], "load_steps are asked for"),
-    (["-nested", "on", "-functional", "force"], "the functional is force"),
+    (["-adapt", "-functional", "force", "-volume", "none"], "the functional is force"),
     (["-profile", "quick"], "preview, balanced, exact"),
 ])
 def test_what_cannot_be_is_refused_in_a_line(head, options, words):
@@ -148,5 +114,21 @@ def test_what_cannot_be_is_refused_in_a_line(head, options, words):
 
 
 def test_a_model_file_has_no_coarser_models(head):
-    refused = head.run("repose-solve", head()[0], "-nested", "on", "-output", "refused")
+    refused = head.run("repose-solve", head()[0], "-adapt", "-output", "refused")
     assert refused.returncode == 1 and "what it was made from" in refused.stderr
+
+
+def test_a_dry_run_says_what_would_be_done_and_why(head):
+    def strategy(*options):
+        said = head.run("repose-solve", "forward.yaml", "-dry_run", *options)
+        assert (said.returncode, said.stderr) == (0, ""), said
+        return dict(re.findall(r"^  (\S[\w ]{0,20}\S) {2,}(.*)$", said.stdout, re.M))
+
+    usual, steps_given = strategy(), strategy("-load_steps", 3, "-profile", "preview")
+    assert usual["minimises"] == "the energy of springs, volume term penalty, to 1e-06 mm"
+    assert usual["coarser models"] == "none: no option asks for any"
+    assert usual["searches"].startswith("the whole: ") and "feel what moves" in usual["searches"]
+    assert "active region" in strategy("-active_region", "on")["searches"]
+    assert strategy("-stability")["searches"] == "the whole: the stability of the whole is asked for"
+    assert steps_given["coarser models"] == "none: load_steps are asked for"
+    assert "because of -profile preview" in strategy("-profile", "preview")["coarser models"]

@@ -140,7 +140,7 @@ def wait_for(process, words):
     pytest.fail(f"the run ended before it said '{words}'")
 
 
-LONG = ["-load_steps", 1, "-tao_type", "cg", "-nested", "off", "-accuracy", 1e-9]
+LONG = ["-load_steps", 1, "-tao_type", "cg", "-accuracy", 1e-9]
 
 
 def test_a_run_killed_in_a_long_step_goes_on_from_its_checkpoint(run, face, environment, tmp_path):

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "repose/adapt/ladder.h"
+#include "repose/adapt/grid_sequence.h"
 
 /// How far a model's own mesh and layers leave the skin from the continuum that it stands for.
 namespace repose::adapt {
@@ -15,7 +15,7 @@ std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy);
 /// Resolutions towards the continuum, through a scene's own and beyond it, coarsest first: edges
 /// and gaps halve from one to the next.
 struct Convergence {
-  std::vector<Resolution> rungs;
+  std::vector<Resolution> resolutions;
   std::string limit;  ///< why there is none finer
 };
 
@@ -25,7 +25,7 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
                            int64_t most_unknowns = 5'000'000);
 
 /// A row about the last model of a convergence, which was solved to `wanted` mm.
-std::string describe_convergence(const Ladder& ladder, double wanted, const std::string& limit);
+std::string describe_convergence(const GridSequence& sequence, double wanted, const std::string& limit);
 
 /// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
 struct Discretisation {
@@ -37,11 +37,11 @@ struct Discretisation {
 };
 
 /// Richardson's extrapolation (1911): where differences between resolutions fall with the order p,
-/// |u_h − u_2h| / (2^p − 1) is left. p is observed where `ladder` has two resolutions, and is kept
-/// within 1/2 and 2. `position` [N] is the rest position of `fine`, the scene's own model. On rank
-/// 0.
+/// |u_h − u_2h| / (2^p − 1) is left. p is observed where `sequence` has two resolutions, and is
+/// kept within 1/2 and 2. `position` [N] is the rest position of `fine`, the scene's own model. On
+/// rank 0.
 Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
-                                 const Ladder& ladder);
+                                 const GridSequence& sequence);
 
 /// One row for a person.
 std::string describe_discretisation(const Discretisation& found);

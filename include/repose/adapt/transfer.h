@@ -19,15 +19,6 @@ class Transfer {
   /// Displacements [N of `to`] at full load from `displacement` [N of `from`], mm.
   std::vector<Vec3> carry(const std::vector<Vec3>& displacement) const;
 
-  /// P: what an `increment` [N of `from`] of displacements adds to those carried, [N of `to`];
-  /// linear, fixed points of `to` at zero.
-  std::vector<Vec3> prolong(const std::vector<Vec3>& increment) const;
-
-  /// Pᵀ: the gradient [N of `from`] by increments of a function of what they add, from its gradient
-  /// [N of `to`], of which fixed points have no part. Rows of fixed points of `from`, whose
-  /// increments are zero, mean nothing.
-  std::vector<Vec3> restrict_gradient(const std::vector<Vec3>& gradient) const;
-
  private:
   struct Place {
     std::array<int64_t, 3> column;  // of `from`
@@ -39,10 +30,8 @@ class Transfer {
   };
   Stencil stencil(const Place& place, double depth) const;
   bool fixed(size_t point) const;  // of `to`
-  std::vector<Vec3> interpolate(const std::vector<Vec3>& field, bool follow_targets) const;
 
   const model::Model& to_;
-  size_t from_points_;
   std::vector<double> from_depths_, to_depths_;  // of the layers, fractions of the thickness
   std::vector<Place> places_;                    // [columns of `to`]
 };

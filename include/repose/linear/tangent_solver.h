@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "repose/linear/column_multigrid.h"
-#include "repose/linear/tangent_wear.h"
+#include "repose/linear/lag_policy.h"
 
 namespace repose::linear {
 
@@ -16,7 +16,7 @@ using PcHandle = base::Handle<PC, PCDestroy>;
 /// convex relative, by default by multigrid on columns (`-pc_type columns`, column_multigrid.h);
 /// that which is hopelessly slow gives way to MUMPS' Cholesky factors, which also serve where
 /// multigrid does not work, up to `factors_limit` unknowns. A preconditioner made at one state
-/// serves the next ones until it is worn out (tangent_wear.h). `-ksp_…` and `-pc_…` options apply,
+/// serves the next ones until it is worn out (lag_policy.h). `-ksp_…` and `-pc_…` options apply,
 /// and `-pc_renewal_price`: the iterations that a preconditioner may cost before it is renewed. All
 /// members collective.
 class TangentSolver {
@@ -59,7 +59,7 @@ class TangentSolver {
 
   /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
   /// yet.
-  double glance(Vec gradient);
+  double preconditioned_step(Vec gradient);
 
   /// How much shorter than the latest newton_distance, at `displacement`, the Newton step from its
   /// end `trial` is, where the gradient is given: by the largest block or by the energy norm
@@ -117,7 +117,7 @@ class TangentSolver {
   bool convex_ = true;               // the random load met no negative curvature, …
   bool bends_ = false;               // … the latest Newton step did
   bool finished_ = false;
-  Wear wear_;
+  LagPolicy lag_;
   int64_t renewals_ = 0;
   int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal
 };

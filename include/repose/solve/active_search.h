@@ -8,8 +8,14 @@
 /// The search for a rest position in the part of the tissue that feels what moves.
 namespace repose::solve {
 
-/// Why a search in a part of the tissue is out of the question, or nothing.
-std::string obstacle_to_region(const Settings& settings);
+/// Whether a part of the tissue is searched, and why.
+struct RegionChoice {
+  bool part = false;
+  std::string why;  ///< on rank 0
+};
+
+/// What find_in_region does under the settings' extent. `model` on rank 0 only. Collective.
+RegionChoice choose_region(MPI_Comm comm, const model::Model& model, const Settings& settings);
 
 /// find_repose, but only columns of an active region are unknowns: at first those nearer to what
 /// moves than displacements are expected to be felt. The region grows, and the rest position is
@@ -27,8 +33,8 @@ std::string obstacle_to_region(const Settings& settings);
 /// that is the initial state's rounding.
 ///
 /// Points left out are at their initial positions in all steps, with the forces that hold them.
-/// Returns nothing where the settings' extent is the whole, there is an obstacle, nothing moves, or
-/// (automatic) it would not pay. Throws InputError where extent `region` is impossible because most
+/// Returns nothing where the settings' extent is the whole, nothing moves, or (automatic) it would
+/// not pay. Throws InputError where extent `region` is impossible because most
 /// of the tissue is not at rest initially. Collective.
 std::optional<Summary> find_in_region(MPI_Comm comm, const model::Model& model,
                                       const Settings& settings, const Start& start,

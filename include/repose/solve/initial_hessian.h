@@ -8,7 +8,7 @@ namespace repose::solve {
 /// How much slower a quasi-Newton search has become since its initial Hessian was made, in
 /// iterations: what the line searches cut off the full steps, and what went beyond the iterations
 /// that the same reduction of the force takes at the best rate seen since. Renewed when that
-/// exceeds the price of a new one, as Wear (tangent_wear.h).
+/// exceeds the price of a new one, as LagPolicy (lag_policy.h).
 class StepWear {
  public:
   explicit StepWear(double price) : price_(price) {}  ///< of a renewal, in iterations
@@ -45,7 +45,7 @@ class InitialHessian {
 
   linear::TangentSolver& solver_;
   base::MatHandle inverse_;  // MATSHELL whose solution is the preconditioner's
-  StepWear wear_;
+  StepWear lag_;
   int64_t renewals_ = 0;  // of the preconditioner, when last looked at
 };
 

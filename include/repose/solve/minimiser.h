@@ -15,7 +15,7 @@ using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
 /// What tells how far a state is from rest: the Newton step of `function`, whose linear systems
 /// `solver` solves.
-struct Certificate {
+struct ErrorEstimate {
   discrete::Function& function;
   linear::TangentSolver& solver;
 };
@@ -33,7 +33,7 @@ class Minimiser : public RestSearch {
   /// that of another function with the same rest position.
   Minimiser(discrete::Function& function, linear::TangentSolver& solver, const Watch& watch);
   Minimiser(discrete::Function& function, linear::TangentSolver& solver,
-            const Certificate& certificate, const Watch& watch);
+            const ErrorEstimate& estimate, const Watch& watch);
 
   /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
   Outcome run(Vec displacement, double accuracy) override;
@@ -65,7 +65,7 @@ class Minimiser : public RestSearch {
 
   discrete::Function& function_;
   linear::TangentSolver& solver_;
-  Certificate certificate_;
+  ErrorEstimate estimate_;
   Watch watch_;
   TaoHandle tao_;
   std::optional<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
@@ -89,7 +89,7 @@ class Minimiser : public RestSearch {
   double taken_ = 0;                    // mm, the Newton step that led here, or 0
   double contraction_ = 0;              // of the latest Newton step, …
   int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian
-  base::VecHandle gradient_, saved_, trial_, certified_gradient_;
+  base::VecHandle gradient_, saved_, trial_, estimate_gradient_;
   std::exception_ptr thrown_;
 };
 

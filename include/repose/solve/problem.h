@@ -16,7 +16,7 @@ class Problem {
 
   discrete::Function& function();
   linear::TangentSolver& solver();  ///< of function()
-  Certificate certificate();        ///< whose Newton step tells the distance from rest best
+  ErrorEstimate error_estimate();   ///< whose Newton step tells the distance from rest best
 
   discrete::Objective& objective() {
     return objective_;

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "repose/adapt/ladder.h"
+#include "repose/adapt/grid_sequence.h"
 #include "repose/surface/remesh.h"
 
 namespace repose::adapt {
@@ -53,11 +53,10 @@ TEST(CoarseModel, at_the_resolution_of_the_scene_is_its_model) {
 
 TEST(Rungs, get_coarser_to_a_least_number_of_columns) {
   const model::Anatomy anatomy = head();
-  EXPECT_TRUE(guiding_rungs(anatomy).empty());  // a ninth of 2000 columns is too few
-  const std::vector<Resolution> rungs = compared_rungs(anatomy, 100000);
-  ASSERT_EQ(rungs.size(), 1U);
-  EXPECT_EQ(rungs[0].layers, anatomy.scene.tissue.layers - 1);
-  EXPECT_TRUE(compared_rungs(anatomy, 400).empty());
+  const std::vector<Resolution> levels = compared_resolutions(anatomy, 100000);
+  ASSERT_EQ(levels.size(), 1U);
+  EXPECT_EQ(levels[0].layers, anatomy.scene.tissue.layers - 1);
+  EXPECT_TRUE(compared_resolutions(anatomy, 400).empty());
 }
 
 TEST(Remesh, by_the_even_edge_keeps_the_number_of_triangles) {

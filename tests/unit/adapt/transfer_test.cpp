@@ -55,55 +55,5 @@ TEST(Transfer, takes_fixed_points_where_they_go_and_what_is_above_in_proportion)
     EXPECT_NEAR(carried[i].z(), to.points.layer[i] / 2.0, 1e-12) << i;
 }
 
-std::vector<Vec3> random_field(const model::Model& model, unsigned seed) {
-  std::mt19937 generator(seed);
-  std::normal_distribution<double> number;
-  std::vector<Vec3> field(model.points.position.size());
-  for (Vec3& v : field) v = {number(generator), number(generator), number(generator)};
-  return field;
-}
-
-double product(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
-  return sum;
-}
-
-/// Models of one patch with some of their deepest points free, as where a bone lets go.
-std::array<model::Model, 2> partly_free_patches() {
-  const auto up = [](const Vec3&) -> Vec3 { return {0, 0, 1}; };
-  std::array<model::Model, 2> models{patch(1, 3, up), patch(3, 5, up)};
-  for (model::Model& model : models)
-    for (size_t i = 0; i < model.points.set.size(); ++i)
-      if (model.points.position[i].x() > 7) model.points.set[i] = model::PointSet::soft_tissue;
-  return models;
-}
-
-TEST(Transfer, prolongs_what_an_increment_adds) {
-  const auto [coarse, fine] = partly_free_patches();
-  const Transfer transfer(coarse, fine);
-  const std::vector<Vec3> given = random_field(coarse, 1), increment = random_field(coarse, 2);
-  std::vector<Vec3> both = given;
-  for (size_t i = 0; i < both.size(); ++i) both[i] += increment[i];
-  const std::vector<Vec3> before = transfer.carry(given), after = transfer.carry(both),
-                          added = transfer.prolong(increment);
-  for (size_t i = 0; i < added.size(); ++i) {
-    ASSERT_LT((after[i] - before[i] - added[i]).norm(), 1e-13) << i;
-    const bool fixed = fine.points.set[i] != model::PointSet::soft_tissue;
-    ASSERT_TRUE(!fixed || added[i].isZero(0)) << i;
-  }
-}
-
-TEST(Transfer, restricts_gradients_by_the_transpose) {
-  const auto [coarse, fine] = partly_free_patches();
-  for (const auto& [from, to] : {std::pair(&coarse, &fine), std::pair(&fine, &coarse)}) {
-    const Transfer transfer(*from, *to);
-    const std::vector<Vec3> increment = random_field(*from, 3), gradient = random_field(*to, 4);
-    const double there = product(transfer.prolong(increment), gradient);
-    EXPECT_NEAR(product(increment, transfer.restrict_gradient(gradient)), there,
-                1e-12 * std::abs(there));
-  }
-}
-
 }  // namespace
 }  // namespace repose::adapt

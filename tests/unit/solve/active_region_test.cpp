@@ -7,8 +7,8 @@
 
 #include "models.h"
 #include "repose/base/agreement.h"
-#include "repose/base/deal_out.h"
 #include "repose/base/error.h"
+#include "repose/base/scatter.h"
 #include "repose/check/recompute.h"
 #include "repose/solve/active_search.h"
 #include "rest.h"
@@ -158,7 +158,7 @@ TEST(ActiveSearch, takes_up_a_guess) {
   const model::Model m = strip();
   const testing::Rest exact = testing::find_rest(m, wanted(Extent::whole, 1e-6));
   base::Stages stages(MPI_COMM_WORLD);
-  const solve::Start start{base::deal_out(MPI_COMM_WORLD, exact.rows.position), true};
+  const solve::Start start{base::scatter(MPI_COMM_WORLD, exact.rows.position), true};
   const solve::Summary summary =
       solve::find_repose(MPI_COMM_WORLD, m, wanted(Extent::region), start, stages,
                          [](const model::StepNumbers&, const model::StepRows&) {});
@@ -182,20 +182,13 @@ TEST(ActiveSearch, refuses_tissue_that_is_not_at_rest) {
   EXPECT_THROW(testing::find_rest(m, wanted(Extent::region)), base::InputError);
 }
 
-TEST(ActiveSearch, names_what_stands_in_its_way) {
-  solve::Settings settings = wanted(Extent::region);
-  EXPECT_EQ(solve::obstacle_to_region(settings), "");
-  settings.path.start_load = 0.5;
-  EXPECT_NE(solve::obstacle_to_region(settings), "");
-  settings = wanted(Extent::region);
-  settings.force = true;
-  EXPECT_NE(solve::obstacle_to_region(settings), "");
-  settings = wanted(Extent::region);
-  settings.exact_volume = true;
-  EXPECT_NE(solve::obstacle_to_region(settings), "");
-  settings = wanted(Extent::region);
-  settings.stability = true;
-  EXPECT_NE(solve::obstacle_to_region(settings), "");
+TEST(ActiveSearch, says_what_it_does_and_why) {
+  const auto chosen = [](Extent extent) {
+    return solve::choose_region(PETSC_COMM_WORLD, strip(), wanted(extent));
+  };
+  EXPECT_FALSE(chosen(Extent::whole).part);
+  EXPECT_FALSE(chosen(Extent::automatic).part);  // a small model
+  EXPECT_TRUE(chosen(Extent::region).part);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "../../layered_patch.h"
-#include "repose/base/deal_out.h"
+#include "repose/base/scatter.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/partition.h"
 #include "rest.h"
@@ -51,7 +51,7 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   const base::VecHandle displacement = positions.make_vector();
   for (const int64_t at_once : {7, 1000000}) {
     const discrete::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
-    natural.take(base::deal_out(MPI_COMM_WORLD, moved), positions, displacement);
+    natural.take(base::scatter(MPI_COMM_WORLD, moved), positions, displacement);
     positions.update(displacement);
     const model::StepRows rows = natural.rows(objective);
     const std::vector<Vec3> position = testing::gather(rows.position);

@@ -1,0 +1,37 @@
+#include <fmt/format.h>
+
+#include "label.h"
+#include "study.h"
+
+namespace repose::tradeoff {
+
+std::string table(const std::vector<Measurement>& measurements) {
+  std::string text =
+      "study,method,accuracy_mm,volume,load_steps,layers,edge_mm,points,unknowns,converged,"
+      "cpu_s,evaluations,hessians,iterations,estimate_mm,error_mm,skin_rms_mm,skin_95_mm,"
+      "skin_max_mm,reason\n";
+  for (const Measurement& m : measurements) {
+    const Way& w = m.way;
+    text += fmt::format("{},{},{:g},{},{},{},{:g},{},{},{},", w.study, w.method, w.accuracy,
+                        w.volume, w.load_steps > 0 ? std::to_string(w.load_steps) : "auto",
+                        w.layers, w.edge, m.points, m.unknowns, m.converged ? 1 : 0);
+    text += fmt::format("{:.4g},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},\"{}\"\n", m.seconds,
+                        m.evaluations, m.assemblies, m.iterations, m.estimate, m.error, m.skin_rms,
+                        m.skin_95, m.skin_max, m.reason);
+  }
+  return text;
+}
+
+std::string map_table(const Map& map) {
+  std::string text = "x,y,z";
+  for (const Way& way : map.ways) text += fmt::format(",\"{}: {}\"", way.study, label(way));
+  text += "\n";
+  for (size_t v = 0; v < map.rest.size(); ++v) {
+    text += fmt::format("{:.4f},{:.4f},{:.4f}", map.rest[v].x(), map.rest[v].y(), map.rest[v].z());
+    for (const auto& error : map.error) text += fmt::format(",{:.4g}", error[v]);
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace repose::tradeoff

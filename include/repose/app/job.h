@@ -1,0 +1,35 @@
+#pragma once
+#include <mpi.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "repose/model/build.h"
+#include "repose/solve/prestress.h"
+
+namespace repose::app {
+
+/// A scene or a model, read and built: what is to be solved.
+struct Job {
+  model::Model model;                         ///< on rank 0
+  scene::Solve wanted;                        ///< the scene's, bulk modulus set; on all ranks
+  std::optional<model::Anatomy> anatomy;      ///< of a scene, on rank 0
+  std::optional<solve::Recording> recording;  ///< of an initial equilibrium, on all ranks
+  bool solid = false;                         ///< the tissue is one, on all ranks
+  bool initial_equilibrium = false;           ///< before the bones move, on all ranks
+  bool remeshed = false;                      ///< the skin is not the given one, on all ranks
+  std::string building;                       ///< what the builder has to say, on rank 0
+  std::vector<std::vector<int64_t>> held;     ///< points of each instrument, on rank 0
+  std::vector<model::Slider> sliders;         ///< on rank 0
+  std::vector<model::Cut> cuts;               ///< on rank 0
+  std::optional<double> tearing;              ///< N, on rank 0
+};
+
+/// Reads a scene (.yaml) or a model (.h5), builds the scene's model with its initial equilibrium
+/// and makes its incisions. Where no tissue fits, the places of the skin to look at are written to
+/// NAME_refused.ply. Throws InputError. Collective.
+Job read_job(MPI_Comm comm, const std::filesystem::path& input);
+
+}  // namespace repose::app

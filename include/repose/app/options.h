@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "repose/base/options.h"
+#include "repose/scene/scene.h"
+
+/// The options of repose-solve, and what they change of a scene.
+namespace repose::app {
+
+/// In the order of scene::VolumeForm.
+inline const std::vector<std::string> volume_words = {"none", "paper", "penalty", "exact"};
+
+std::vector<base::Option> solve_options();
+
+/// The command line beats the scene, and an option of its own the profile.
+void override_by(const base::Options& options, scene::Solve& wanted);
+
+}  // namespace repose::app

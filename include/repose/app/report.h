@@ -1,0 +1,57 @@
+#pragma once
+#include <string>
+
+#include "repose/adapt/grid_sequence.h"
+#include "repose/model/build.h"
+#include "repose/solve/prestress.h"
+#include "repose/solve/repose.h"
+#include "repose/solve/sliding.h"
+#include "repose/solve/tearing.h"
+
+/// What a person reads when a run ends.
+namespace repose::app {
+
+/// A name and what is said of it, in a line.
+std::string report_row(const std::string& name, const std::string& value);
+
+/// Points, springs and prisms of a model, by set. Lines ending in a newline.
+std::string describe_model(const model::Model& model);
+
+/// What the builder did: columns, thickness, attachment, remarks.
+std::string describe_build(const model::BuildReport& report);
+/// An incision and how many points it doubled.
+std::string describe_cut(const model::Cut& cut, int64_t doubled);
+
+/// The initial equilibrium in one row.
+std::string describe_prestress(const solve::Prestress& prestress);
+
+/// How many points each instrument holds, and the force (N) with which the tissue pushes on it.
+std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
+                               const std::vector<Vec3>& forces);
+
+/// One row, or nothing where no point slides.
+std::string describe_sliding(const solve::Sliding& sliding);
+
+/// What tore and where, in two rows; nothing where no limit was asked for.
+std::string describe_tearing(const solve::Tearing& tearing);
+
+/// How many prisms have volume ratios [M] ≤ 0 and where the worst one was at first, in a line that
+/// says what can be done; nothing where there is none.
+std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio);
+
+/// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
+std::string describe_stages(const base::Stages& stages);
+
+/// How it ended: load, accuracy, reason, work, inverted prisms, and time and memory of each stage.
+/// An answer that is not converged, or folds tissue, says so first and loudly.
+std::string describe_run(const solve::Summary& summary, const solve::Settings& settings, int ranks,
+                         const base::Stages& stages);
+
+/// Lines of the closing table about a nested iteration; only rank 0 has them.
+std::string describe_sequence(const adapt::GridSequence& sequence);
+
+/// A line about the last coarse model where it was solved in place of the scene's own, to `wanted`
+/// mm; only rank 0 has it.
+std::string describe_choice(const adapt::GridSequence& sequence, double wanted);
+
+}  // namespace repose::app

@@ -1,0 +1,183 @@
+#include "repose/adapt/grid_sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "repose/adapt/transfer.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/base/scatter.h"
+#include "repose/base/scoped_option.h"
+#include "repose/discrete/gather.h"
+#include "repose/model/motion.h"
+#include "repose/surface/remesh.h"
+
+namespace repose::adapt {
+
+namespace {
+
+using model::Model;
+
+constexpr double loosest_guide = 0.1;  // mm, accuracy of a level that only leads on
+constexpr double search_share = 0.2;  // of what is enough, for the search of a level that may be it
+// A level is this many times as far from the scene's own model as from the level before: errors
+// that shrink with the first power of the edge give 1, those that shrink with the second 1/3.
+constexpr double safety = 1.5;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double mean_volume(const Model& model) {
+  double sum = 0;
+  for (const double v : model.prisms.rest_volume) sum += v;
+  return sum / static_cast<double>(model.prisms.rest_volume.size());
+}
+
+std::vector<Vec3> sum(const std::vector<Vec3>& a, const std::vector<Vec3>& b, double sign) {
+  std::vector<Vec3> result(a.size());
+  for (size_t i = 0; i < a.size(); ++i) result[i] = a[i] + sign * b[i];
+  return result;
+}
+
+class SequenceSolver {
+ public:
+  SequenceSolver(MPI_Comm comm, const model::Anatomy& anatomy, const Model& fine,
+                 const SequencePlan& wanted)
+      : comm_(comm), anatomy_(anatomy), fine_(fine), wanted_(wanted) {}
+
+  GridSequence run() {
+    const base::ScopedOption method("-tao_type", "ntr");
+    for (const Resolution& resolution : wanted_.levels) {
+      bool done = false;
+      try {
+        done = step_up(resolution);
+      } catch (const base::InputError& refusal) {
+        sequence_.refusal = refusal.what();
+      }
+      if (!done || sequence_.near_enough) break;
+    }
+    return std::move(sequence_);
+  }
+
+ private:
+  /// Solves the model of one resolution; returns whether it came to rest.
+  bool step_up(const Resolution& resolution) {
+    Level level;
+    level.resolution = resolution;
+    const double begin = MPI_Wtime();
+    model::BuiltModel built;
+    base::on_first_rank(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
+    if (wanted_.recording) solve::prestress(comm_, built.model, *wanted_.recording);
+    base::Stages unused(comm_);
+    std::vector<Vec3> position;
+    const solve::Settings settings = settings_for(built.model);
+    const solve::Summary summary =
+        solve::find_repose(comm_, built.model, settings, start_for(built.model), unused,
+                           [&](const model::StepNumbers&, const model::StepRows& rows) {
+                             position = discrete::gather_points(comm_, rows.position);
+                           });
+    if (!summary.path.complete()) {
+      sequence_.refusal =
+          fmt::format("a coarse model did not come to rest: {}", summary.last.reason);
+      return false;
+    }
+    level.unknowns = summary.unknowns;
+    level.evaluations = summary.evaluations;
+    level.assemblies = summary.assemblies;
+    base::on_first_rank(comm_, [&] { take(std::move(built), std::move(position), level); });
+    MPI_Bcast(&level.discretisation_error, 1, MPI_DOUBLE, 0, comm_);
+    level.seconds = MPI_Wtime() - begin;
+    sequence_.levels.push_back(level);
+    sequence_.last_settings = settings;
+    const double error = level.discretisation_error + summary.last.displacement_error;
+    sequence_.near_enough = wanted_.enough > 0 && error <= wanted_.enough;
+    return true;
+  }
+
+  solve::Settings settings_for(const Model& model) const {
+    solve::Settings settings = wanted_.settings;
+    settings.path.accuracy = wanted_.enough > 0 ? search_share * wanted_.enough
+                                                : std::max(settings.path.accuracy, loosest_guide);
+    settings.monitor = settings.stability = false;
+    double volume_ratio = 1;  // f_v of a strain grows with the volume of the prisms
+    if (base::rank(comm_) == 0 && settings.weights.volume == mechanics::VolumeTerm::paper)
+      volume_ratio = mean_volume(fine_) / mean_volume(model);
+    MPI_Bcast(&volume_ratio, 1, MPI_DOUBLE, 0, comm_);
+    settings.weights.volume_weight *= volume_ratio;
+    return settings;
+  }
+
+  solve::Start start_for(const Model& model) const {
+    if (sequence_.levels.empty()) return {};
+    std::vector<Vec3> all;
+    if (base::rank(comm_) == 0) {
+      const Model& before = sequence_.last.model;
+      const auto moved = sum(sequence_.last_position, before.points.position, -1);
+      all = sum(model.points.position, Transfer(before, model).carry(moved), 1);
+    }
+    return {base::scatter(comm_, all), true};
+  }
+
+  /// Carries the answer of a level to the scene's points. On rank 0.
+  void take(model::BuiltModel&& built, std::vector<Vec3>&& position, Level& level) {
+    level.points = static_cast<int64_t>(position.size());
+    if (level.resolution.edge == 0) level.resolution.edge = surface::even_edge(anatomy_.skin);
+    const auto moved = sum(position, built.model.points.position, -1);
+    std::vector<Vec3> carried =
+        sum(fine_.points.position, Transfer(built.model, fine_).carry(moved), 1);
+    level.skin_change = sequence_.levels.empty() ? infinity : 0;
+    for (size_t i = 0; i < sequence_.position.size(); ++i)
+      if (fine_.points.layer[i] == 0)
+        level.skin_change =
+            std::max(level.skin_change, (carried[i] - sequence_.position[i]).norm());
+    level.discretisation_error = safety * level.skin_change;
+    sequence_.last = std::move(built);
+    sequence_.last_position = std::move(position);
+    sequence_.before = std::exchange(sequence_.position, std::move(carried));
+  }
+
+  MPI_Comm comm_;
+  const model::Anatomy& anatomy_;
+  const Model& fine_;
+  const SequencePlan& wanted_;
+  GridSequence sequence_;
+};
+
+/// Resolutions with edges `coarsening` times as long from level to level, down to `fewest` columns,
+/// and, where the scene lets them be any number, one layer fewer.
+std::vector<Resolution> resolutions_by(double coarsening, double fewest,
+                                       const model::Anatomy& anatomy) {
+  const scene::Tissue& tissue = anatomy.scene.tissue;
+  const int fewest_layers = std::min(3, tissue.layers);  // two are too stiff across to lead
+  const bool free = layers_are_free(tissue);
+  auto columns = static_cast<double>(anatomy.skin.points.size());
+  Resolution resolution{surface::even_edge(anatomy.skin), tissue.layers};
+  std::vector<Resolution> levels;
+  while ((columns /= coarsening * coarsening) >= fewest) {
+    resolution.edge *= coarsening;
+    if (free) resolution.layers = std::max(fewest_layers, resolution.layers - 1);
+    levels.push_back(resolution);
+  }
+  std::reverse(levels.begin(), levels.end());
+  return levels;
+}
+
+}  // namespace
+
+std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t most_columns) {
+  std::vector<Resolution> levels = resolutions_by(2, 150, anatomy);
+  const double finest =
+      surface::even_edge(anatomy.skin) * std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
+                                                   static_cast<double>(most_columns));
+  std::erase_if(levels, [&](const Resolution& r) { return r.edge < finest; });
+  return levels;
+}
+
+GridSequence solve_sequence(MPI_Comm comm, const model::Anatomy& anatomy, const Model& fine,
+                            const SequencePlan& wanted) {
+  return SequenceSolver(comm, anatomy, fine, wanted).run();
+}
+
+}  // namespace repose::adapt

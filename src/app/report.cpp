@@ -1,0 +1,207 @@
+#include "repose/app/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace repose::app {
+
+std::string report_row(const std::string& name, const std::string& value) {
+  return fmt::format("  {:<22} {}\n", name, value);
+}
+
+namespace {
+
+/// How rounds that must settle ended.
+std::string ending(bool settled, bool stopped, const std::string& unsettled) {
+  if (settled) return "settled";
+  return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");
+}
+
+std::string work_rows(const solve::Summary& s) {
+  return report_row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
+         report_row("iterations", fmt::format("{}", s.path.iterations)) +
+         report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
+                                               s.evaluations, s.assemblies));
+}
+
+std::string stability(const solve::Spectrum& s) {
+  if (std::isnan(s.smallest)) return "stability not known: the eigenvalue solver did not converge";
+  std::string text = fmt::format("{}: smallest eigenvalue {:.4g} N/mm",
+                                 s.smallest > 0 ? "stable" : "NOT STABLE", s.smallest);
+  if (s.smallest > 0 && s.largest > 0)
+    text += fmt::format(", condition number {:.2g}", s.largest / s.smallest);
+  return text;
+}
+
+std::string region_row(const solve::RegionSummary& r) {
+  return report_row(
+      "active region",
+      fmt::format("{} of {} columns in {} rounds; up to {:.3g} N hold its border, which is "
+                  "{:.3g} mm of the accuracy",
+                  r.active, r.columns, r.rounds, r.force, r.error));
+}
+
+std::string verdict(const solve::Summary& s) {
+  if (s.path.complete()) return "";
+  return fmt::format(
+      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).{}\n",
+      s.path.load, s.last.displacement_error, s.last.reason,
+      s.path.last.stable || s.path.last.stopped
+          ? ""
+          : " The tissue buckles there, or is between several rest positions: move "
+            "the bones less, or give the tissue tension.");
+}
+
+}  // namespace
+
+std::string describe_model(const model::Model& model) {
+  const model::Counts c = model::count(model);
+  return report_row("points", fmt::format("{} ({} soft tissue, {} boundary, {} bone, {} held)",
+                                          c.points, c.soft, c.boundary, c.bone, c.held)) +
+         (c.edges > 0 ? report_row("edges", fmt::format("{}", c.edges))
+                      : report_row("springs", fmt::format("{}", c.springs))) +
+         report_row("prisms", fmt::format("{}", c.prisms));
+}
+
+std::string describe_build(const model::BuildReport& r) {
+  std::string text =
+      report_row("skin", fmt::format("{} vertices, {} edges, {} triangles", r.skin_vertices,
+                                     r.skin_edges, r.skin_triangles)) +
+      report_row("columns", fmt::format("{} end in bone, {} end free ({} released), {} shortened",
+                                        r.attached, r.free_deep, r.released, r.shortened)) +
+      report_row("thickness", fmt::format("{:.3g} … {:.3g} mm, median {:.3g} mm", r.thickness_min,
+                                          r.thickness_max, r.thickness_median)) +
+      report_row("effective modulus", fmt::format("{:.4g} N/mm²", r.effective_modulus));
+  for (const std::string& remark : r.remarks) text += report_row("remark", remark);
+  return text;
+}
+
+std::string describe_cut(const model::Cut& cut, int64_t doubled) {
+  return report_row("incision",
+                    fmt::format("along {} edges of the skin, {} points doubled in {} layers",
+                                cut.columns.size() - 1, doubled, cut.layers));
+}
+
+std::string describe_prestress(const solve::Prestress& p) {
+  if (p.solid)
+    return report_row("initial equilibrium",
+                      fmt::format("{:.3g} N left of {:.3g} N; pressures up to {:.3g} N/mm²",
+                                  p.residual, p.largest_force, p.largest_pressure));
+  return report_row(
+      "initial equilibrium",
+      fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
+                  p.residual, p.largest_force, p.least_rest_ratio));
+}
+
+std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
+                               const std::vector<Vec3>& forces) {
+  std::string text;
+  for (size_t k = 0; k < held.size(); ++k)
+    text += report_row(
+        fmt::format("instrument {}", k),
+        fmt::format("holds {} points; the tissue pushes on it with ({:.4g}, {:.4g}, {:.4g}) "
+                    "N, {:.4g} N",
+                    held[k].size(), forces[k].x(), forces[k].y(), forces[k].z(), forces[k].norm()));
+  return text;
+}
+
+std::string describe_sliding(const solve::Sliding& sliding) {
+  if (sliding.rounds == 0) return "";
+  return report_row("sliding", fmt::format("{} in {} rounds, {:.2g} mm to go",
+                                           ending(sliding.settled, sliding.stopped, "NOT SETTLED"),
+                                           sliding.rounds, sliding.to_go));
+}
+
+std::string describe_tearing(const solve::Tearing& t) {
+  if (!t.limit) return "";
+  std::string text = report_row(
+      "tearing",
+      fmt::format("{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
+                  "{:.4g} N",
+                  ending(t.settled, t.stopped, "NOT SETTLED, MORE MAY TEAR"), t.rounds, *t.limit,
+                  t.largest));
+  if (t.springs == 0) return text + report_row("torn", "nothing");
+  return text +
+         report_row("torn", fmt::format("springs {}, with them prisms {} and triangles of the "
+                                        "skin {}; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",
+                                        t.springs, t.prisms, t.triangles, t.length, t.middle.x(),
+                                        t.middle.y(), t.middle.z()));
+}
+
+std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio) {
+  const auto worst = std::min_element(volume_ratio.begin(), volume_ratio.end());
+  if (worst == volume_ratio.end() || *worst > 0) return "";
+  const auto count = std::count_if(volume_ratio.begin(), volume_ratio.end(),
+                                   [](double ratio) { return ratio <= 0; });
+  const auto& points = model.prisms.points[worst - volume_ratio.begin()];
+  const Vec3& at = model.points.position[points[0]];
+  return fmt::format(
+      "FOLDED: {} prisms of tissue are inside out, the worst one about ({:.1f}, {:.1f}, {:.1f}) "
+      "mm: "
+      "release more of it there (tissue.release, tissue.unattached), let the rim be auto, or move "
+      "less; -allow_folded takes it as it is.\n",
+      count, at.x(), at.y(), at.z());
+}
+
+std::string describe_stages(const base::Stages& stages) {
+  std::string text;
+  for (const auto& stage : stages.list())
+    text += report_row("time, memory", fmt::format("{:<12} {:>9.3f} s {:>9.0f} MiB so far",
+                                                   stage.name, stage.seconds, stage.mebibytes));
+  return text;
+}
+
+std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,
+                         const base::Stages& stages) {
+  std::string text = verdict(s);
+  text += report_row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
+  text += report_row("accuracy", fmt::format("{:.3g} mm reached, {:.3g} mm asked for",
+                                             s.last.displacement_error, settings.path.accuracy));
+  text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
+                                                         : "NOT A MINIMUM: negative curvature");
+  if (s.initial_spectrum) text += report_row("at the start", stability(*s.initial_spectrum));
+  if (s.final_spectrum) text += report_row("where it ended", stability(*s.final_spectrum));
+  text += report_row("objective",
+                     fmt::format("{:.12g} {}", s.last.objective, settings.force ? "N" : "N mm"));
+  text += report_row("inverted prisms",
+                     fmt::format("{}{}", s.last.inverted_prisms,
+                                 s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));
+  text += report_row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
+  text += report_row("unknowns",
+                     fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
+  if (s.region) text += region_row(*s.region);
+  text += work_rows(s);
+  return text + describe_stages(stages);
+}
+
+std::string describe_choice(const adapt::GridSequence& sequence, double wanted) {
+  const adapt::Level& chosen = sequence.levels.back();
+  return fmt::format(
+      "  {:<22} of these, the last; its skin is {:.2g} mm from the scene's own at most, by its "
+      "distance from the one before{}\n",
+      "solved model", chosen.discretisation_error,
+      chosen.discretisation_error > wanted
+          ? fmt::format(": MORE THAN THE {:g} mm ASKED FOR", wanted)
+          : "");
+}
+
+std::string describe_sequence(const adapt::GridSequence& sequence) {
+  std::string text;
+  for (const adapt::Level& r : sequence.levels) {
+    text += fmt::format(
+        "  {:<22} {} points, edges {:.3g} mm, {} layers: {} evaluations, {} of the "
+        "Hessian, {:.2f} s",
+        "coarse model", r.points, r.resolution.edge, r.resolution.layers, r.evaluations,
+        r.assemblies, r.seconds);
+    if (std::isfinite(r.skin_change))
+      text += fmt::format("; skin {:.2g} mm from the one before", r.skin_change);
+    text += "\n";
+  }
+  if (!sequence.refusal.empty())
+    text += fmt::format("  {:<22} {}\n", "no finer coarse model", sequence.refusal);
+  return text;
+}
+
+}  // namespace repose::app

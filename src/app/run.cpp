@@ -1,0 +1,240 @@
+#include "repose/app/run.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <optional>
+
+#include "repose/adapt/given_skin.h"
+#include "repose/app/report.h"
+#include "repose/app/strategy.h"
+#include "repose/base/agreement.h"
+#include "repose/base/interrupt.h"
+#include "repose/base/scatter.h"
+#include "repose/results/model_file.h"
+#include "repose/results/name_lock.h"
+#include "repose/results/restart.h"
+#include "repose/surface/write.h"
+#include "writer.h"
+
+namespace repose::app {
+
+namespace {
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+
+void say(const std::string& text) {
+  if (base::rank(comm) == 0) std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+/// Path of the result without ending; never that of the input, which is read first: what is wrong
+/// with it is to be said first.
+std::string result_name(const base::Options& options, const std::filesystem::path& input) {
+  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  std::error_code missing;
+  if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
+  read_job(comm, input);
+  base::refuse("{}: the result would replace the input; give another -output", input.string());
+}
+
+/// Sliding points find their places and springs tear, in rounds of searches.
+struct Rounds {
+  solve::Sliding sliding;
+  solve::Tearing tearing;
+  /// Why the result is not to be trusted as an end, or nothing.
+  std::string unsettled() const {
+    const std::string who =
+        sliding.stopped || tearing.stopped ? "a signal or the time limit: " : "";
+    if (!sliding.settled) return who + "points that slide have not found their places";
+    return tearing.settled ? "" : who + "more may tear";
+  }
+};
+
+/// One run of a job by a strategy, under one deadline.
+class Run {
+ public:
+  Run(Job& job, Strategy strategy, std::string name, base::Stages& stages, double deadline)
+      : job_(job),
+        strategy_(std::move(strategy)),
+        name_(std::move(name)),
+        stages_(stages),
+        interrupt_(comm, deadline, true) {
+    strategy_.settings.interrupt = &interrupt_;
+  }
+
+  /// Begins where another run left off.
+  void restart(const std::filesystem::path& file) {
+    const results::Restart from = results::read_restart(comm, file, job_.model);
+    start_ = {from.position, from.guess};
+    strategy_.settings.path.start_load = from.load;
+  }
+  base::Exit solve(double checkpoint_interval, bool folds_allowed);
+
+ private:
+  void start_from(double load, const std::vector<Vec3>& position);
+  Rounds go_through_rounds();
+  Coarser solve_coarser();
+  solve::Summary search(Writer& writer);
+  std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
+  std::string write_given_skin(const Writer& writer) const;
+
+  Job& job_;
+  Strategy strategy_;
+  std::string name_;
+  base::Stages& stages_;
+  base::Interrupt interrupt_;
+  solve::Start start_;
+};
+
+/// The search begins with a state that the rounds left.
+void Run::start_from(double load, const std::vector<Vec3>& position) {
+  solve::Settings& settings = strategy_.settings;
+  start_ = {position, false};
+  settings.path.start_load = load;
+  if (load == 0) return;
+  settings.initial_equilibrium = false;
+  settings.extent = solve::Extent::whole;
+}
+
+Rounds Run::go_through_rounds() {
+  Rounds rounds;
+  const solve::Settings& settings = strategy_.settings;
+  rounds.sliding = solve::slide(comm, job_.model, job_.sliders, settings, start_.position);
+  if (rounds.sliding.rounds > 0) stages_.end("slide");
+  if (rounds.sliding.stopped) start_from(rounds.sliding.load, rounds.sliding.position);
+  rounds.tearing = solve::tear(comm, job_.model, job_.tearing, settings, start_.position);
+  if (rounds.tearing.rounds > 0) stages_.end("tear");
+  if (rounds.tearing.torn) start_from(1, rounds.tearing.position);
+  return rounds;
+}
+
+/// Solves the strategy's coarser models; their answer is then the guess for the scene's own model
+/// or for the coarse one that takes its place in the job.
+Coarser Run::solve_coarser() {
+  if (strategy_.coarse == Strategy::Coarse::none) return {};
+  solve::Settings& settings = strategy_.settings;
+  const bool compare = strategy_.coarse == Strategy::Coarse::compare;
+  const adapt::SequencePlan wanted{strategy_.resolutions, job_.recording, settings,
+                                   compare ? 0 : settings.path.accuracy};
+  const model::Anatomy none;
+  adapt::GridSequence sequence =
+      adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none, job_.model, wanted);
+  Coarser coarser{describe_sequence(sequence), {}, {}};
+  const bool converging = !compare && !strategy_.preview && job_.solid;
+  const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
+  if (sequence.near_enough || last) {
+    coarser.discretisation_error = sequence.levels.back().discretisation_error;
+    const double accuracy = settings.path.accuracy;
+    coarser.told += converging
+                        ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
+                        : describe_choice(sequence, accuracy);
+    settings.path.accuracy = sequence.last_settings.path.accuracy;
+    settings.weights = sequence.last_settings.weights;
+    job_.model = std::move(sequence.last.model);
+    job_.held = std::move(sequence.last.held);
+    start_ = {base::scatter(comm, sequence.last_position), true};
+  } else if (!sequence.levels.empty()) {
+    start_ = {base::scatter(comm, sequence.position), true};
+  }
+  stages_.end("coarser models");
+  if (compare && !sequence.levels.empty()) coarser.compared = std::move(sequence);
+  return coarser;
+}
+
+/// Finds the rest position of the job's model, which rank 0 lets go of where only the search needs
+/// it: of a large model it is a fifth of the memory.
+solve::Summary Run::search(Writer& writer) {
+  solve::Settings settings = strategy_.settings;
+  if (writer.makes_checkpoints())
+    settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
+  const bool needed = writer.makes_checkpoints() || writer.compares() || !job_.held.empty();
+  solve::Summary summary =
+      needed ? solve::find_repose(comm, job_.model, settings, start_, stages_, std::ref(writer))
+             : solve::find_repose(comm, std::move(job_.model), settings, start_, stages_,
+                                  std::ref(writer));
+  if (summary.path.complete() && !writer.unsettled().empty()) {
+    summary.path.last.converged = false;
+    summary.last.reason += "; " + writer.unsettled();
+  }
+  return summary;
+}
+
+/// What is said of tissue that is inside out at the end. Collective.
+std::string Run::describe_folds(const model::StepNumbers& last, const Writer& writer) const {
+  if (last.inverted_prisms == 0) return "";
+  const std::vector<double> ratios = writer.volume_ratios();
+  std::string text;
+  base::on_first_rank(
+      comm, [&] { text = app::describe_folds(results::read_model(name_ + ".h5"), ratios); });
+  return text;
+}
+
+/// Writes the displacement of the given skin, in the place of which another was solved, to
+/// NAME_given_skin.vtp. Collective.
+std::string Run::write_given_skin(const Writer& writer) const {
+  if (!job_.remeshed || !job_.cuts.empty()) return "";
+  const std::vector<Vec3> position = writer.positions();
+  const std::string file = name_ + "_given_skin.vtp";
+  base::on_first_rank(comm, [&] {
+    const model::Model model = results::read_model(name_ + ".h5");
+    std::vector<Vec3> displacement(position.size());
+    for (size_t i = 0; i < position.size(); ++i)
+      displacement[i] = position[i] - model.points.position[i];
+    const surface::Surface& given = *job_.anatomy->given_skin;
+    surface::write_surface(file, given, adapt::displacement_of_given(given, model, displacement));
+  });
+  return report_row("given skin", file + ": its vertices, with displacement");
+}
+
+base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
+  const Rounds rounds = go_through_rounds();
+  const Coarser coarser = solve_coarser();
+  Writer writer(comm, name_, job_.model, coarser, checkpoint_interval, rounds.unsettled());
+  const solve::Summary summary = search(writer);
+  writer.commit();
+  const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
+  say(folded ? describe_folds(summary.last, writer) : "");
+  const std::string given = write_given_skin(writer);
+  stages_.end("write");
+  say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
+  say(coarser.told + writer.comparison() + describe_sliding(rounds.sliding) +
+      describe_tearing(rounds.tearing));
+  say(writer.reactions(job_.held));
+  say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
+  say(given);
+  return summary.path.complete() && !folded ? base::Exit::done : base::Exit::not_converged;
+}
+
+}  // namespace
+
+base::Exit run(const base::Options& options) {
+  base::Stages stages(comm);
+  const std::filesystem::path input = options.arguments()[0];
+  const bool dry = options.flag("dry_run");
+  const std::string name = dry ? "" : result_name(options, input);
+  std::optional<results::NameLock> lock;
+  base::on_first_rank(comm, [&] {
+    if (!dry) lock.emplace(name);
+  });
+  Job job = read_job(comm, input);
+  Strategy strategy = make_strategy(comm, options, job);
+  stages.end("build");
+  if (base::rank(comm) == 0) say(job.building + describe_model(job.model) + strategy.explanation);
+  if (dry) {
+    say(describe_stages(stages));
+    return base::Exit::done;
+  }
+  const auto number = [&](const char* name, double otherwise) {
+    return options.has(name) ? options.number(name) : otherwise;
+  };
+  Run run(job, std::move(strategy), name, stages,
+          number("time_limit", std::numeric_limits<double>::infinity()));
+  if (options.has("restart")) run.restart(options.text("restart"));
+  return run.solve(number("checkpoint_interval", 0), options.flag("allow_folded"));
+}
+
+}  // namespace repose::app

@@ -1,0 +1,170 @@
+#include "repose/app/strategy.h"
+
+#include <fmt/format.h>
+
+#include "repose/adapt/discretisation.h"
+#include "repose/app/options.h"
+#include "repose/app/report.h"
+#include "repose/app/settings.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/solve/active_search.h"
+
+namespace repose::app {
+
+namespace {
+
+using Coarse = Strategy::Coarse;
+
+/// Why parts of a strategy cannot go with what a job or its options hold.
+struct Obstacle {
+  bool given;
+  bool to_region;  ///< solving a part of the tissue only
+  bool to_coarse;  ///< solving coarser models
+  const char* what;
+};
+
+std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
+  return {
+      {s.settings.force, true, true, "the functional is force"},
+      {s.settings.exact_volume, true, true, "the volume term is exact"},
+      {options.has("restart"), true, true, "the run goes on from another result"},
+      {options.flag("stability"), true, false, "the stability of the whole is asked for"},
+      {!job.anatomy, false, true,
+       "the input is a model, which does not tell what it was made from"},
+      {s.settings.path.load_steps > 0, false, true, "load_steps are asked for"},
+      {!job.cuts.empty(), false, true, "the scene has incisions"},
+      {s.slides, false, true, "an instrument slides"},
+      {s.tears, false, true, "the tissue may tear"},
+  };
+}
+
+/// The first obstacle, or nothing.
+std::string first_obstacle(const std::vector<Obstacle>& obstacles, bool Obstacle::*to) {
+  for (const Obstacle& o : obstacles)
+    if (o.given && o.*to) return o.what;
+  return "";
+}
+
+/// What the options want of coarser models; the scene alone never asks for any.
+struct Wish {
+  Coarse coarse = Coarse::none;
+  const char* option = "";
+  bool insisted = false;  // not to be passed over where it cannot be
+};
+
+Wish wish_of(const base::Options& options) {
+  const bool adapt = options.flag("adapt"), compare = options.flag("discretisation");
+  const std::string profile = options.text("profile");
+  if (adapt && compare)
+    base::refuse(
+        "-adapt and -discretisation solve coarser models for different ends; leave one out");
+  for (const char* name : {"adapt", "discretisation"})
+    if (options.flag(name) && profile == "exact")
+      base::refuse("-{} solves coarser models; leave -profile exact out", name);
+  if (compare) return {Coarse::compare, "-discretisation", true};
+  if (adapt) return {Coarse::instead, "-adapt", true};
+  if (profile == "preview") return {Coarse::instead, "-profile preview", false};
+  return {};
+}
+
+std::vector<adapt::Resolution> resolutions_for(const Wish& wish, const model::Anatomy& anatomy) {
+  constexpr int64_t preview_columns = 4000;
+  if (wish.coarse == Coarse::compare) return adapt::halved_resolutions(anatomy);
+  const auto columns = static_cast<int64_t>(anatomy.skin.points.size());
+  return adapt::compared_resolutions(anatomy, wish.insisted ? columns : preview_columns);
+}
+
+/// On rank 0.
+void choose_coarse(const Wish& wish, const std::string& obstacle, const Job& job, Strategy& s) {
+  if (wish.coarse == Coarse::none) return;
+  if (obstacle.empty()) {
+    s.preview = wish.coarse == Coarse::instead && !wish.insisted;
+    if (wish.coarse == Coarse::instead && wish.insisted && job.solid) {
+      adapt::Convergence convergence = adapt::convergence_of(*job.anatomy, job.model);
+      s.resolutions = std::move(convergence.resolutions);
+      s.limit = std::move(convergence.limit);
+    } else {
+      s.resolutions = resolutions_for(wish, *job.anatomy);
+    }
+  } else if (wish.insisted) {
+    base::refuse("{}: {}; leave the option out", wish.option, obstacle);
+  }
+  if (!s.resolutions.empty()) s.coarse = wish.coarse;
+}
+
+void choose_region(const base::Options& options, const std::string& obstacle, Strategy& s) {
+  const std::string wanted = options.text("active_region");
+  if (wanted == "on" && !obstacle.empty())
+    base::refuse("-active_region on: {}; leave the option out", obstacle);
+  if (wanted == "off" || !obstacle.empty()) return;
+  s.settings.extent = wanted == "on" ? solve::Extent::region : solve::Extent::automatic;
+}
+
+std::string describe_minimum(const Strategy& s, const Job& job) {
+  const std::string minimised =
+      job.solid ? "the energy of a solid"
+                : fmt::format("the {} of springs, volume term {}",
+                              s.settings.force ? "forces" : "energy", s.settings.volume);
+  return fmt::format("{}, to {:g} mm", minimised, s.settings.path.accuracy);
+}
+
+std::string describe_steps(const Strategy& s) {
+  const int steps = s.settings.path.load_steps;
+  return steps > 0 ? fmt::format("{} equal ones, as asked for; halved where one fails", steps)
+                   : "as long as the prediction holds; halved where one fails";
+}
+
+std::string describe_coarse(const Wish& wish, const std::string& obstacle, const Strategy& s) {
+  if (wish.coarse == Coarse::none) return "none: no option asks for any";
+  if (!obstacle.empty()) return fmt::format("none: {}", obstacle);
+  if (s.resolutions.empty()) return "none: the skin has too few vertices";
+  return fmt::format("{}, {}, because of {}", s.resolutions.size(),
+                     s.coarse == Coarse::compare ? "to compare the scene's own with"
+                                                 : "the first that is near enough in its place",
+                     wish.option);
+}
+
+/// A row for each choice.
+std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Job& job,
+                    const solve::RegionChoice& region, const Strategy& s) {
+  const std::string to_region = first_obstacle(all, &Obstacle::to_region);
+  std::string text =
+      report_row("minimises", describe_minimum(s, job)) +
+      report_row("load steps", describe_steps(s)) +
+      report_row("searches", region.part          ? "the active region: " + region.why
+                             : !to_region.empty() ? "the whole: " + to_region
+                                                  : "the whole: " + region.why) +
+      report_row("coarser models",
+                 describe_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), s));
+  if (s.slides) text += report_row("sliding", "in rounds: points held, then moved by their forces");
+  if (s.tears) text += report_row("tearing", "in rounds: at rest, then springs above the limit go");
+  return text;
+}
+
+}  // namespace
+
+Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
+  scene::Solve wanted = job.wanted;
+  override_by(options, wanted);
+  Strategy s;
+  s.settings = settings_of(wanted, job.solid);
+  s.settings.stability = options.flag("stability");
+  s.settings.monitor = options.flag("monitor_mm");
+  s.settings.initial_equilibrium = job.initial_equilibrium;
+  s.slides = !job.sliders.empty();
+  s.tears = job.tearing.has_value();
+  const Wish wish = wish_of(options);
+  const std::vector<Obstacle> all = obstacles(options, job, s);
+  choose_region(options, first_obstacle(all, &Obstacle::to_region), s);
+  base::on_first_rank(
+      comm, [&] { choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s); });
+  MPI_Bcast(&s.coarse, sizeof s.coarse, MPI_BYTE, 0, comm);
+  MPI_Bcast(&s.preview, 1, MPI_C_BOOL, 0, comm);
+  if (!options.flag("dry_run")) return s;
+  const auto region = solve::choose_region(comm, job.model, s.settings);
+  if (base::rank(comm) == 0) s.explanation = explain(wish, all, job, region, s);
+  return s;
+}
+
+}  // namespace repose::app

@@ -1,0 +1,94 @@
+#include "writer.h"
+
+#include "repose/adapt/discretisation.h"
+#include "repose/app/report.h"
+#include "repose/base/agreement.h"
+#include "repose/base/scatter.h"
+#include "repose/discrete/gather.h"
+#include "repose/solve/reaction.h"
+
+namespace repose::app {
+
+Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+               const Coarser& coarser, double interval, std::string unsettled)
+    : comm_(comm),
+      name_(name),
+      model_(model),
+      coarser_(coarser),
+      unsettled_(std::move(unsettled)),
+      file_(comm, name, model),
+      interval_(interval) {}
+
+void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
+  if (numbers.load == 1 && coarser_.discretisation_error)
+    numbers.discretisation_error = *coarser_.discretisation_error;
+  if (coarser_.compared) compare(numbers, rows);
+  if (numbers.load == 1 && !unsettled_.empty()) {
+    numbers.converged = false;
+    numbers.reason += "; " + unsettled_;
+  }
+  file_.append(numbers, rows);
+  last_.numbers = numbers;
+  last_.rows.position = rows.position;
+  last_.rows.pressure = rows.pressure;
+  last_.rows.volume_ratio = rows.volume_ratio;
+  if (!makes_checkpoints() || !numbers.converged) return;
+  reached_ = {numbers, rows};
+  saved_ = false;
+  if (due()) write_checkpoint(nullptr);
+}
+
+void Writer::look_in(double load, const solve::Look& look) {
+  const bool news = !saved_ || (look && load == 1);
+  if (reached_ && news && due()) write_checkpoint(load == 1 ? look : nullptr);
+}
+
+std::vector<Vec3> Writer::positions() const {
+  return discrete::gather_points(comm_, last_.rows.position);
+}
+
+std::vector<double> Writer::volume_ratios() const {
+  const std::vector<double>& ratio = last_.rows.volume_ratio;
+  return discrete::gather(comm_, ratio.data(), ratio.size());
+}
+
+std::string Writer::reactions(const std::vector<std::vector<int64_t>>& held) const {
+  const auto forces = solve::reactions(comm_, model_, held, last_.numbers, last_.rows);
+  return forces.empty() ? "" : describe_reactions(held, forces);
+}
+
+void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
+  rows.discretisation_error.assign(rows.position.size(), 0.0);
+  if (numbers.load < 1) return;
+  const std::vector<Vec3> position = discrete::gather_points(comm_, rows.position);
+  std::vector<Vec3> at_point(position.size());
+  base::on_first_rank(comm_, [&] {
+    const auto found = adapt::discretisation_of(model_, position, *coarser_.compared);
+    numbers.discretisation_error = found.largest;
+    comparison_ = adapt::describe_discretisation(found);
+    for (size_t i = 0; i < at_point.size(); ++i) at_point[i].x() = found.at_point[i];
+  });
+  const std::vector<Vec3> mine = base::scatter(comm_, at_point);
+  for (size_t i = 0; i < mine.size(); ++i) rows.discretisation_error[i] = mine[i].x();
+}
+
+bool Writer::due() const {
+  int due = MPI_Wtime() - last_saved_ > interval_;
+  MPI_Bcast(&due, 1, MPI_INT, 0, comm_);
+  return due != 0;
+}
+
+/// The last rest position reached and, of a search at load 1, the state it is at: with both a run
+/// can go on from there or, should that lead astray, along the path.
+void Writer::write_checkpoint(const solve::Look& look) {
+  results::ResultFile file(comm_, name_.string() + "_checkpoint", model_,
+                           results::Kind::checkpoint);
+  file.append(reached_->numbers, reached_->rows);
+  if (look && reached_->numbers.load < 1)
+    look([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });
+  file.commit();
+  saved_ = true;
+  last_saved_ = MPI_Wtime();
+}
+
+}  // namespace repose::app

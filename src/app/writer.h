@@ -1,0 +1,66 @@
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "repose/adapt/grid_sequence.h"
+#include "repose/results/result_file.h"
+#include "repose/solve/repose.h"
+
+namespace repose::app {
+
+/// What coarser models gave.
+struct Coarser {
+  std::string told;                             ///< on rank 0
+  std::optional<adapt::GridSequence> compared;  ///< with the scene's own model, where asked for
+  std::optional<double> discretisation_error;   ///< mm, of the model that was chosen, if one was
+};
+
+/// Writes every step to the result, and from time to time what was reached to a checkpoint. All
+/// members that write or gather are collective.
+class Writer {
+ public:
+  /// `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a rest position at
+  /// load 1 is the end, or empty.
+  Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+         const Coarser& coarser, double interval, std::string unsettled);
+
+  void operator()(model::StepNumbers numbers, model::StepRows rows);
+  /// At an iteration of a search.
+  void look_in(double load, const solve::Look& look);
+  void commit() { file_.commit(); }
+
+  bool makes_checkpoints() const { return interval_ > 0; }
+  bool compares() const { return coarser_.compared.has_value(); }
+  const std::string& unsettled() const { return unsettled_; }
+  /// How far the mesh and the layers leave the skin from the continuum, on rank 0.
+  const std::string& comparison() const { return comparison_; }
+  /// [N] and [prisms] of the last step, on rank 0.
+  std::vector<Vec3> positions() const;
+  std::vector<double> volume_ratios() const;
+  /// What the tissue does to the instruments in the last step, on rank 0.
+  std::string reactions(const std::vector<std::vector<int64_t>>& held) const;
+
+ private:
+  struct Step {
+    model::StepNumbers numbers;
+    model::StepRows rows;
+  };
+  void compare(model::StepNumbers& numbers, model::StepRows& rows);
+  bool due() const;
+  void write_checkpoint(const solve::Look& look);
+
+  MPI_Comm comm_;
+  std::filesystem::path name_;
+  const model::Model& model_;
+  const Coarser& coarser_;
+  std::string comparison_, unsettled_;
+  results::ResultFile file_;
+  Step last_;                    // the rows that reactions and those above need
+  std::optional<Step> reached_;  // where checkpoints are made: the last rest position, …
+  bool saved_ = false;           // … and whether a checkpoint has it
+  double interval_, last_saved_ = MPI_Wtime();
+};
+
+}  // namespace repose::app
