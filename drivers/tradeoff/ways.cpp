@@ -11,11 +11,11 @@ namespace repose::tradeoff {
 std::string volume_word(const scene::Scene& scene) {
   if (scene.tissue.material) return "material";
   const auto form = scene.solve.volume.value_or(scene::VolumeForm::penalty);
-  return app::volume_words[static_cast<size_t>(form)];
+  return app::volume_words()[static_cast<size_t>(form)];
 }
 
 std::optional<scene::VolumeForm> volume_form(const std::string& word) {
-  const auto& words = app::volume_words;
+  const auto& words = app::volume_words();
   const auto found = std::find(words.begin(), words.end(), word);
   if (found == words.end()) return {};
   return static_cast<scene::VolumeForm>(found - words.begin());

@@ -3,48 +3,42 @@
 #include <algorithm>
 #include <optional>
 
+#include "repose/scene/keys.h"
+
 namespace repose::app {
 
 namespace {
 
 using base::OptionKind;
 
-// In the order of scene::Functional.
-const std::vector<std::string> functional_words = {"energy", "force"};
+/// An option in the place of a key of the scene, which is where its range, unit, words and sentence
+/// stand.
+base::Option from_key(const char* name, const char* path) {
+  const scene::Key& key = scene::find_key(path);
+  const OptionKind kind = key.kind == scene::KeyKind::choice    ? OptionKind::choice
+                          : key.kind == scene::KeyKind::integer ? OptionKind::integer
+                                                                : OptionKind::number;
+  return {.name = name,
+          .kind = kind,
+          .default_text = "",
+          .help = key.sentence,
+          .range = key.range,
+          .unit = key.unit,
+          .choices = key.choices};
+}
 
 /// What is computed, and how near.
 std::vector<base::Option> method_options() {
-  return {
-      {"output", OptionKind::path, "",
-       "Path of the result without ending; default: the input's name here."},
-      {"accuracy",
-       OptionKind::number,
-       "",
-       "Stop when the rest position is this near (default 0.1).",
-       {1e-12, 100},
-       "mm"},
-      {"functional", OptionKind::choice, "", "What is minimised.", {}, "", functional_words},
-      {"volume",
-       OptionKind::choice,
-       "",
-       "Volume term (force: none or paper).",
-       {},
-       "",
-       volume_words},
-      {"lambda",
-       OptionKind::number,
-       "",
-       "Weight of the energy, with volume term paper.",
-       {.min = 0, .max = 1, .min_excluded = true}},
-      {"bulk_modulus", OptionKind::number, "", "Of the penalty volume term.", {0, 1e9}, "N/mm²"},
-      {"load_steps",
-       OptionKind::integer,
-       "",
-       "Equal steps of the bones' motion, or auto.",
-       {1, 100000},
-       "",
-       {"auto"}},
-  };
+  return {{.name = "output",
+           .kind = OptionKind::path,
+           .default_text = "",
+           .help = "Path of the result without ending; default: the input's name here."},
+          from_key("accuracy", "solve.accuracy"),
+          from_key("functional", "solve.functional"),
+          from_key("volume", "solve.volume.form"),
+          from_key("lambda", "solve.lambda"),
+          from_key("bulk_modulus", "solve.volume.bulk_modulus"),
+          from_key("load_steps", "solve.load_steps")};
 }
 
 /// On which models.
@@ -99,12 +93,13 @@ std::vector<base::Option> run_options() {
   };
 }
 
+/// The place of an option's word among those of its key, whose order is the enumeration's.
 template <class Choice, class Target>
-void choose(const base::Options& options, const char* name, const std::vector<std::string>& words,
-            Target& value) {
+void choose(const base::Options& options, const char* name, const char* path, Target& value) {
   if (!options.has(name)) return;
-  const auto place = std::find(words.begin(), words.end(), options.text(name));
-  value = static_cast<Choice>(place - words.begin());
+  const std::vector<std::string>& words = scene::find_key(path).choices;
+  value = static_cast<Choice>(std::find(words.begin(), words.end(), options.text(name)) -
+                              words.begin());
 }
 
 /// mm that a profile asks for, if it does.
@@ -116,6 +111,10 @@ std::optional<double> accuracy_of(const std::string& profile) {
 
 }  // namespace
 
+const std::vector<std::string>& volume_words() {
+  return scene::find_key("solve.volume.form").choices;
+}
+
 std::vector<base::Option> solve_options() {
   std::vector<base::Option> table = method_options();
   for (const auto& more : {model_options(), run_options()})
@@ -124,8 +123,8 @@ std::vector<base::Option> solve_options() {
 }
 
 void override_by(const base::Options& options, scene::Solve& wanted) {
-  choose<scene::Functional>(options, "functional", functional_words, wanted.functional);
-  choose<scene::VolumeForm>(options, "volume", volume_words, wanted.volume);
+  choose<scene::Functional>(options, "functional", "solve.functional", wanted.functional);
+  choose<scene::VolumeForm>(options, "volume", "solve.volume.form", wanted.volume);
   wanted.accuracy = accuracy_of(options.text("profile")).value_or(wanted.accuracy);
   if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
   if (options.has("lambda")) wanted.lambda = options.number("lambda");

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "repose/adapt/discretisation.h"
 #include "repose/adapt/given_skin.h"
 #include "repose/app/report.h"
 #include "repose/app/strategy.h"

@@ -28,7 +28,7 @@ solve::Settings spring_settings(const scene::Solve& wanted) {
   settings.force = wanted.functional == scene::Functional::force;
   const VolumeForm form =
       wanted.volume.value_or(settings.force ? VolumeForm::none : VolumeForm::penalty);
-  settings.volume = volume_words[static_cast<size_t>(form)];
+  settings.volume = volume_words()[static_cast<size_t>(form)];
   if (settings.force && form != VolumeForm::none && form != VolumeForm::paper)
     base::refuse(
         "functional force takes volume none or paper, not {}: a penalty or a constraint belongs to "

@@ -160,6 +160,9 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   base::on_first_rank(
       comm, [&] { choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s); });
   MPI_Bcast(&s.coarse, sizeof s.coarse, MPI_BYTE, 0, comm);
+  auto models = static_cast<int>(s.resolutions.size());
+  MPI_Bcast(&models, 1, MPI_INT, 0, comm);
+  s.resolutions.resize(models);
   MPI_Bcast(&s.preview, 1, MPI_C_BOOL, 0, comm);
   if (!options.flag("dry_run")) return s;
   const auto region = solve::choose_region(comm, job.model, s.settings);

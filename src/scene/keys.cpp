@@ -286,15 +286,15 @@ std::vector<Key> solve_keys() {
       {"solve.volume.bulk_modulus", number, "",
        "Bulk modulus κ of the penalty, and that exact starts with; when not given by poisson, or "
        "for exact 10 × the tissue's effective modulus.",
-       "N/mm²", Range::above(0)},
+       "N/mm²", Range{.min = 0, .max = 1e9, .min_excluded = true}},
       {"solve.volume.poisson", number, "0.45",
        "Poisson's ratio that springs, whose own is 1/4, are to have by the penalty; "
        "bulk_modulus overrides it.",
        "", Range::between(0.25, 0.4999)},
       {"solve.lambda", number, "0.5", "Weight λ of the volume form paper; no other form uses it.",
-       "", Range::between(0, 1)},
+       "", Range{.min = 0, .max = 1, .min_excluded = true}},
       {"solve.accuracy", number, "0.1", "Largest distance to the rest position allowed.", "mm",
-       Range::above(0)},
+       Range::between(1e-12, 100)},
       {"solve.load_steps",
        integer,
        "auto",

@@ -16,7 +16,7 @@ constexpr double trusted_miss = 0.5;  // of the predicted increment; beyond, a s
 
 // The way of the fastest point in an automatic step, mm, at most: longer steps may jump between the
 // rest positions that springs have; a solid's searches end at one from as far.
-constexpr double spring_stride = 10, solid_stride = 20;
+constexpr double spring_stride = 5, solid_stride = 20;
 constexpr double most_steps = 1000;  // without halvings: a motion of kilometres is no longer path
 
 class Stopwatch {

@@ -223,7 +223,7 @@ double Minimiser::contraction(Vec displacement) {
 }
 
 double Minimiser::at_balance(Vec displacement) {
-  return certificate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
+  return estimate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
 }
 
 bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
@@ -323,7 +323,7 @@ Outcome Minimiser::summary(Vec displacement) {
   outcome.objective = function_.evaluate(displacement, gradient_);
   outcome.gradient_max = discrete::largest_block(gradient_);
   outcome.displacement_error = error_;
-  outcome.stable = std::isfinite(error_) || !certificate_.solver.negative_curvature();
+  outcome.stable = std::isfinite(error_) || !estimate_.solver.negative_curvature();
   outcome.converged = error_ <= accuracy_;
   TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
   check(TaoGetConvergedReason(tao_, &reason));

@@ -74,12 +74,6 @@ BREAKS = [
         f"{SOLVE}load_path|load_steps",
     ),
     (
-        "a long step that bends passes",
-        "constexpr double trusted_defect = 0.25;",
-        "constexpr double trusted_defect = 1e9;",
-        f"{SOLVE}load_path|load_steps",
-    ),
-    (
         "a step that fails is not halved",
         "if (!now.outcome.converged) return false;",
         "",

@@ -8,8 +8,8 @@
 /// The options of repose-solve, and what they change of a scene.
 namespace repose::app {
 
-/// In the order of scene::VolumeForm.
-inline const std::vector<std::string> volume_words = {"none", "paper", "penalty", "exact"};
+/// Of the volume term's forms, in the order of scene::VolumeForm.
+const std::vector<std::string>& volume_words();
 
 std::vector<base::Option> solve_options();
 

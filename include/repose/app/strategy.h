@@ -18,7 +18,7 @@ struct Strategy {
   };
   solve::Settings settings;                    ///< of the scene's own model
   Coarse coarse = Coarse::none;                ///< on all ranks
-  std::vector<adapt::Resolution> resolutions;  ///< coarsest first, on rank 0
+  std::vector<adapt::Resolution> resolutions;  ///< coarsest first, their number on all ranks
   std::string limit;                           ///< why a solid's go no finer, on rank 0
   bool preview = false;                        ///< the last of them is taken in any case
   bool slides = false, tears = false;          ///< in rounds of searches
