@@ -6,16 +6,22 @@ namespace repose::base {
 
 PetscLogEvent log_event(const char* name) {
   PetscLogEvent event = -1;
+  PetscBool runs = PETSC_FALSE;  // a program may use the library's serial parts without PETSc
+  check(PetscInitialized(&runs));
+  if (!runs) return event;
   check(PetscLogEventRegister(name, PETSC_OBJECT_CLASSID, &event));
   return event;
 }
 
 Logged::Logged(PetscLogEvent event, double flops) : event_(event) {
+  if (event_ < 0) return;
   check(PetscLogEventBegin(event_, nullptr, nullptr, nullptr, nullptr));
   if (flops > 0) check(PetscLogFlops(flops));
 }
 
-Logged::~Logged() { PetscLogEventEnd(event_, nullptr, nullptr, nullptr, nullptr); }
+Logged::~Logged() {
+  if (event_ >= 0) PetscLogEventEnd(event_, nullptr, nullptr, nullptr, nullptr);
+}
 
 LogStage::LogStage(const char* name) {
   PetscLogStage stage = -1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "repose/check/check_contact.h"
 #include "repose/check/recompute.h"
 #include "repose/model/prism_geometry.h"
 
@@ -84,6 +85,7 @@ void check_step(const model::Model& model, const model::PrescribedMotion& motion
     comparison.array("prism/principal_stretch", flat(rows.stretch), flat(again.rows.stretch),
                      again.stretch_scale);
   }
+  check_contact(model, motion, numbers, rows, comparison);
   if (model::is_solid(model)) return;
   comparison.array("spring/elongation", rows.elongation, again.rows.elongation,
                    again.elongation_scale);

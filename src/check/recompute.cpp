@@ -45,13 +45,18 @@ class Recomputation {
  public:
   Recomputation(const model::Model& model, const model::StepNumbers& claimed,
                 const model::StepRows& rows)
-      : model_(model), claimed_(claimed), x_(rows.position), pressure_(rows.pressure) {}
+      : model_(model),
+        claimed_(claimed),
+        x_(rows.position),
+        pressure_(rows.pressure),
+        fields_(rows.point_fields) {}
 
   RecomputedStep run() {
     elastic_ = claimed_.volume == "paper" ? claimed_.lambda : 1.0;
     points();
     springs();
     edges();
+    contact();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
     noise_.assign(x_.size(), 0.0);
@@ -71,6 +76,7 @@ class Recomputation {
   void points();
   void springs();
   void edges();
+  void contact();
   void forces();
   void nodal_volumes();
   double volume_slope(int64_t j, double volume) const;
@@ -86,6 +92,7 @@ class Recomputation {
   const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
   const std::vector<double>& pressure_;  // [M] or empty
+  const std::vector<model::PointField>& fields_;
   double elastic_ = 1;                   // weight of f
   double smooth_force_ = 0;              // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;         // [N] Σ noise of the forces there, N
@@ -251,6 +258,18 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
   step_.stretch_scale = std::max(step_.stretch_scale, state.stretch[0]);
 }
 
+// The forces are checked by themselves (check_contact.h).
+void Recomputation::contact() {
+  for (const model::PointField& field : fields_) {
+    if (field.name != "contact_force") continue;
+    for (size_t i = 0; i < x_.size(); ++i) {
+      const Vec3 force = Vec3::Map(field.values.data() + 3 * i);
+      if (soft(i)) step_.rows.residual_force[i] += force;
+      at_point_[i] += force.norm();
+    }
+  }
+}
+
 void Recomputation::forces() {
   double uncertain_force = 0, uncertain_work = 0, largest = 0;
   for (size_t i = 0; i < x_.size(); ++i) {
@@ -326,6 +345,10 @@ void Recomputation::objective() {
   const double volume_weight = claimed_.volume == "paper" ? 1 - elastic_ : 0;
   step_.objective.value += volume_weight * step_.f_v.value;
   step_.objective.scale += volume_weight * step_.f_v.scale;
+  if (std::isfinite(claimed_.contact_energy)) {
+    step_.objective.value += elastic_ * claimed_.contact_energy;
+    step_.objective.scale += std::abs(claimed_.contact_energy);
+  }
   if (claimed_.volume != "penalty") return;
   step_.objective.value += step_.penalty.value;
   step_.objective.scale += step_.penalty.scale;

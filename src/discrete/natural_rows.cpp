@@ -136,6 +136,16 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
   carry({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch), SCATTER_FORWARD);
 }
 
+void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const {
+  const Rows points{points_.row, points_.total, 1};
+  const ContactState state = contact_state(objective);
+  rows.point_fields.push_back({"contact_gap", false, bring(points, state.gap)});
+  rows.point_fields.push_back({"contact_pressure", false, bring(points, state.pressure)});
+  const std::vector<Vec3> force = natural(state.force);
+  const double* first = numbers(force);
+  rows.point_fields.push_back({"contact_force", true, {first, first + 3 * force.size()}});
+}
+
 model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
   const auto position = objective.positions().local();
   model::StepRows rows;
@@ -144,6 +154,7 @@ model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) cons
   add_prisms(objective, with_pressure, rows);
   add_springs(position, rows);
   if (part_.solid) add_stress(position, rows);
+  if (part_.contact) add_contact(objective, rows);
   return rows;
 }
 

@@ -58,9 +58,49 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
                                    positions.part().owned_prisms, positions.part().owned_edges,
                                    positions.part().owned_points)),
       averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
+      touches_(positions.part().model.contact.touches, positions.part().model.contact.stiffness,
+               positions.part().bodies),
+      walls_(positions.part().model.contact.walls, positions.part().model.contact.stiffness),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
       initial_(mechanics::totals(loops_, positions.part().model.points.position)),
       work_(positions.local().size()) {}
+
+void Objective::place_bodies() {
+  if (placed_at_ == positions_.load()) return;
+  placed_at_ = positions_.load();
+  mechanics::place_bodies(
+      placed_at_, [&](int32_t bone) { return positions_.bone_matrix(bone); }, touches_.bodies());
+}
+
+double Objective::add_contact(double scale, std::span<Vec3> gradient) {
+  if (!positions_.part().contact) return 0;
+  place_bodies();
+  return touches_.add_gradient(positions_.local(), scale, gradient) +
+         walls_.add_gradient(positions_.local(), scale, gradient);
+}
+
+double Objective::contact_value() { return sum(positions_.comm(), add_contact(0.0, work_)); }
+
+std::vector<Vec3> Objective::contact_force() {
+  std::fill(work_.begin(), work_.end(), Vec3::Zero());
+  add_contact(-1.0, work_);
+  return {work_.begin(), work_.begin() + positions_.part().owned_points};
+}
+
+std::vector<Objective::ContactBlock> Objective::contact_blocks(bool exact) {
+  std::vector<ContactBlock> blocks;
+  if (!positions_.part().contact) return blocks;
+  place_bodies();
+  touches_.look(positions_.local());
+  touches_.for_each_block(exact, [&](int64_t point, const Mat3& block) {
+    const auto p = static_cast<int32_t>(point);
+    blocks.push_back({p, p, weights_.elastic * block});
+  });
+  walls_.for_each_block(positions_.local(), [&](int32_t p, int32_t q, const Mat3& block) {
+    blocks.push_back({p, q, weights_.elastic * block});
+  });
+  return blocks;
+}
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
   for (size_t i = 0; i < load_force_.size(); ++i) gradient[i] -= scale * load_force_[i];
@@ -88,6 +128,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
                                                            weights_.elastic, work_) -
            initial_.solid_energy;
   value += mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
+  value += weights_.elastic * add_contact(weights_.elastic, work_);
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
   if (loaded_) value += weights_.elastic * potential();
@@ -99,9 +140,18 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   return value;
 }
 
+void Objective::add_blocks(std::span<const ContactBlock> blocks, std::span<const Vec3> direction,
+                           std::span<Vec3> product) {
+  for (const auto& [p, q, block] : blocks) {
+    product[p] += block * direction[q];
+    if (p != q) product[q] += block.transpose() * direction[p];
+  }
+}
+
 void Objective::hessian_action(std::span<const Vec3> direction, Vec product) {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
+  add_blocks(contact_blocks(true), direction, work_);
   positions_.keep_owned(work_, product);
 }
 
@@ -114,6 +164,7 @@ std::vector<Vec3> Objective::residual_force() {
     mechanics::add_edge_gradient(loops_.edges, positions_.local(), 1.0, work_);
     mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
   }
+  add_contact(1.0, work_);
   subtract_loads(1.0, work_);
   std::vector<Vec3> force(part.owned_points, Vec3::Zero());
   for (int64_t i = 0; i < part.owned_points; ++i)
@@ -145,6 +196,29 @@ std::vector<double> pressures(Objective& objective) {
     pressure.push_back(objective.weights().volume_weight * change / prisms.rest_volume[e]);
   }
   return pressure;
+}
+
+ContactState contact_state(Objective& objective) {
+  constexpr double looked_at = 6;  // mm
+  const auto points = static_cast<size_t>(objective.positions().part().owned_points);
+  ContactState state{std::vector<double>(points, looked_at), std::vector<double>(points, 0.0),
+                     objective.contact_force()};
+  const auto add = [&](int64_t point, double gap, double pressure) {
+    state.gap[point] = std::min(state.gap[point], gap);
+    state.pressure[point] += pressure;
+  };
+  mechanics::TouchLoop& touches = objective.touches();
+  touches.look_at_all(objective.positions().local());
+  for (size_t c = 0; c < touches.gaps().size(); ++c)
+    add(touches.touches().point[c], touches.gaps()[c], touches.pressure(c));
+  const mechanics::WallLoop& walls = objective.walls();
+  for (const mechanics::WallPair& pair : walls.pairs()) {
+    if (pair.area == 0) continue;
+    const double gap = pair.gap(objective.positions().local());
+    add(pair.points[0], gap,
+        mechanics::press(gap, pair.multiplier, walls.stiffness(), false).pressure);
+  }
+  return state;
 }
 
 }  // namespace repose::discrete

@@ -32,6 +32,8 @@ struct Plan {
   std::vector<int64_t> unknown_begin;  // [ranks + 1]
   std::vector<PointSet> set;           // [N] with points of non-rigid bones as held
   std::vector<Mat4> bone_transform;    // [bones]
+  std::vector<mechanics::RigidBody> bodies;
+  std::vector<double> touch_offset;  // [touches] mm
 };
 
 void number_points(Plan& plan, const ColumnGraph& graph, int ranks) {
@@ -70,6 +72,27 @@ void plan_motion(Plan& plan) {
   for (size_t p = 0; p < plan.set.size(); ++p)
     if (plan.set[p] == PointSet::bone && motion.straight(model.points.bone[p]))
       plan.set[p] = PointSet::held;
+}
+
+/// The columns along cuts whose sides may meet go to one rank.
+void keep_cuts_whole(const ColumnGraph& graph, Plan& plan) {
+  const model::Walls& walls = plan.model.contact.walls;
+  if (walls.point.empty()) return;
+  const int owner = plan.owner[walls.point.front()];
+  std::vector<char> moves(graph.columns(), 0);
+  const auto mark = [&](int64_t point) { moves[graph.column_of_point[point]] = 1; };
+  for (const int64_t point : walls.point) mark(point);
+  for (const auto& triangle : walls.triangles)
+    for (const int64_t point : triangle) mark(point);
+  for (size_t p = 0; p < plan.owner.size(); ++p)
+    if (moves[graph.column_of_point[p]]) plan.owner[p] = owner;
+}
+
+void plan_contact(Plan& plan, const ColumnGraph& graph) {
+  if (plan.model.contact.empty()) return;
+  keep_cuts_whole(graph, plan);
+  plan.bodies = mechanics::make_bodies(plan.model);
+  plan.touch_offset = mechanics::touch_offsets(plan.model, plan.bodies);
 }
 
 /// Gives local numbers to rows as they are met, owned points first.
@@ -169,6 +192,34 @@ void pick_points(const Plan& plan, Part& part) {
   part.unknown = pick(plan.unknown, part.point_row);
 }
 
+/// The constraints of the points that a rank owns.
+model::Contact pick_contact(const Plan& plan, LocalNumbers& local, int rank) {
+  const model::Contact& all = plan.model.contact;
+  const auto mine = [&](const std::vector<int64_t>& points) {
+    std::vector<int64_t> rows;
+    for (size_t c = 0; c < points.size(); ++c)
+      if (plan.owner[points[c]] == rank && plan.unknown[points[c]] >= 0)
+        rows.push_back(static_cast<int64_t>(c));
+    return rows;
+  };
+  const auto number_all = [&](std::vector<int64_t>& points) {
+    for (int64_t& point : points) point = local.of(point);
+  };
+  model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
+  std::vector<int64_t> rows = mine(all.touches.point);
+  part.touches = {pick(all.touches.point, rows), pick(all.touches.body, rows),
+                  pick(all.touches.binding, rows), pick(all.touches.area, rows),
+                  pick(plan.touch_offset, rows)};
+  number_all(part.touches.point);
+  rows = mine(all.walls.point);
+  if (rows.empty()) return part;
+  part.walls = {pick(all.walls.point, rows), pick(all.walls.area, rows), pick(all.walls.cut, rows),
+                all.walls.triangles, all.walls.triangle_cut};
+  number_all(part.walls.point);
+  number(part.walls.triangles, local);
+  return part;
+}
+
 Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   const Model& model = plan.model;
   Part part;
@@ -196,6 +247,9 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
                       pick(model.edges.weight, rows)};
   rows.resize(part.owned_edges);
   part.edge_row = std::move(rows);
+  part.model.contact = pick_contact(plan, local, rank);
+  part.contact = !model.contact.empty();
+  part.bodies = plan.bodies;
   part.point_row = local.take();
   pick_points(plan, part);
   part.solid = model::is_solid(model);
@@ -211,6 +265,52 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   return part;
 }
 
+void pass_bodies(Sender& archive, std::vector<mechanics::RigidBody>& bodies) {
+  archive(static_cast<int64_t>(bodies.size()));
+  for (const mechanics::RigidBody& body : bodies) {
+    archive(body.bone(), body.push(), static_cast<int64_t>(body.shape().index()));
+    auto shape = body.shape();
+    std::visit(
+        [&](auto& of) {
+          if constexpr (requires { of.pass(archive); })
+            of.pass(archive);
+          else
+            archive(of);
+        },
+        shape);
+  }
+}
+
+/// One of the kind that is to be received.
+mechanics::RigidBody::Shape empty_shape(int64_t index) {
+  const Vec3 zero = Vec3::Zero();
+  if (index == 0) return scene::Sphere{zero, 0};
+  if (index == 1) return scene::Capsule{zero, zero, 0};
+  if (index == 2) return scene::Box{zero, zero};
+  if (index == 3) return scene::HalfSpace{zero, zero};
+  return surface::DistanceField{};
+}
+
+void pass_bodies(Receiver& archive, std::vector<mechanics::RigidBody>& bodies) {
+  int64_t count = 0, index = 0;
+  archive(count);
+  for (int64_t k = 0; k < count; ++k) {
+    int32_t bone = -1;
+    Vec3 push = Vec3::Zero();
+    archive(bone, push, index);
+    auto shape = empty_shape(index);
+    std::visit(
+        [&](auto& of) {
+          if constexpr (requires { of.pass(archive); })
+            of.pass(archive);
+          else
+            archive(of);
+        },
+        shape);
+    bodies.emplace_back(std::move(shape), bone, push);
+  }
+}
+
 /// Sends or receives a part: `archive` decides which.
 template <class Archive>
 void pass(Archive& archive, Part& part) {
@@ -222,6 +322,11 @@ void pass(Archive& archive, Part& part) {
   archive(m.prisms.points, m.prisms.rest_volume, m.prisms.shear_modulus, m.prisms.modulus,
           m.prisms.target_volume, m.prisms.nodal_modulus, m.edges.points, m.edges.weight,
           m.bone_transform);
+  model::Contact& c = m.contact;
+  archive(c.stiffness, c.spacing, c.touches.point, c.touches.body, c.touches.binding,
+          c.touches.area, c.touches.offset, c.walls.point, c.walls.area, c.walls.cut,
+          c.walls.triangles, c.walls.triangle_cut, part.contact);
+  pass_bodies(archive, part.bodies);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
           part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
@@ -230,8 +335,9 @@ void pass(Archive& archive, Part& part) {
 
 Plan make_plan(const Model& model, const ColumnGraph& graph, const std::vector<int>& column_owner,
                int ranks) {
-  Plan plan{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {}, {}, {}};
+  Plan plan{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {}, {}, {}, {}, {}};
   plan_motion(plan);
+  plan_contact(plan, graph);
   number_points(plan, graph, ranks);
   return plan;
 }

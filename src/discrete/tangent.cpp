@@ -50,6 +50,7 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
                                   self->direction_, self->work_);
+    Objective::add_blocks(self->contact_, self->direction_, self->work_);
     objective.positions().keep_owned(self->work_, product);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;
@@ -92,6 +93,8 @@ void Tangent::assemble(Vec displacement) {
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
   if (same) return;
   at_.assign(now.begin(), now.end());
+  contact_ = objective_.contact_blocks(true);
+  convex_contact_ = objective_.contact_blocks(false);
   ++assemblies_;
 }
 
@@ -103,7 +106,7 @@ Mat Tangent::convex() {
 }
 
 void Tangent::renew() {
-  entries().fill(convex(), at_, Curvature::convex);
+  entries().fill(convex(), at_, convex_contact_, Curvature::convex);
   lift_diagonal();
 }
 
@@ -111,7 +114,7 @@ Mat Tangent::exact() {
   if (!exact_) exact_ = entries().make();
   const bool averaged = objective_.averages_volumes();
   if (filled_at_ == assemblies_) return averaged ? coupled_ : exact_;
-  entries().fill(exact_, at_, Curvature::exact);
+  entries().fill(exact_, at_, contact_, Curvature::exact);
   filled_at_ = assemblies_;
   if (!averaged) return exact_;
   coupled_ = nodal_coupling();
@@ -179,6 +182,13 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
           for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
         }
       });
+  for (const auto& [p, q, block] : convex_contact_) {
+    const auto& layer = objective_.positions().part().model.points.layer;
+    if (p == q)
+      diagonal[p] += block;
+    else if (std::abs(layer[p] - layer[q]) <= 1)  // what leaps over a layer is not multigrid's
+      visit(p, q, block);
+  }
   for (size_t p = 0; p < diagonal.size(); ++p)
     visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
 }

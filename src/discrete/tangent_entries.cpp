@@ -20,6 +20,23 @@ bool TangentEntries::owns(int32_t point) const {
   return part_.unknown[point] >= 0 && point < part_.owned_points;
 }
 
+namespace {
+
+/// Calls link(p, q) and link(q, p) for points of two sides of a cut, whichever may come to face.
+template <class Link>
+void for_each_facing_pair(const model::Walls& walls, Link&& link) {
+  for (size_t w = 0; w < walls.point.size(); ++w)
+    for (size_t t = 0; t < walls.triangles.size(); ++t) {
+      if (walls.triangle_cut[t] != walls.cut[w]) continue;
+      for (const int64_t corner : walls.triangles[t]) {
+        const auto p = static_cast<int32_t>(walls.point[w]), q = static_cast<int32_t>(corner);
+        link(p, q), link(q, p);
+      }
+    }
+}
+
+}  // namespace
+
 void TangentEntries::make_pattern() {
   std::vector<std::vector<int32_t>> neighbours(part_.owned_unknowns);
   const auto link = [&](int32_t p, int32_t q) {
@@ -36,6 +53,7 @@ void TangentEntries::make_pattern() {
     for (const auto& corners : objective_.loops().prisms.points)
       for (int32_t p : corners)
         for (int32_t q : corners) link(p, q);
+  for_each_facing_pair(part_.model.contact.walls, link);
   const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
   for (BlockRows& rows : rows_) rows.begin.push_back(0);
   for (auto& row : neighbours) {
@@ -160,7 +178,9 @@ void TangentEntries::refill(Mat matrix, Work&& add_blocks) const {
   check(MatAssemblyEnd(matrix, MAT_FINAL_ASSEMBLY));
 }
 
-void TangentEntries::fill(Mat matrix, std::span<const Vec3> at, Curvature curvature) const {
+void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
+                          std::span<const Objective::ContactBlock> contact,
+                          Curvature curvature) const {
   refill(matrix, [&](double* const values[2]) {
     for (size_t l = 0; l < spring_slots_.size(); ++l)
       mechanics::for_each_spring_block(
@@ -181,6 +201,10 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at, Curvature curvat
                                           add(values, prism_slots_[e][6 * i + j],
                                               prisms.points[e][i], blocks[i][j]);
                                     });
+    for (const auto& [p, q, block] : contact) {
+      add(values, find(p, q), p, block);
+      if (p != q) add(values, find(q, p), q, block.transpose());
+    }
   });
 }
 

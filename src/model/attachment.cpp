@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+
+#include "repose/base/error.h"
+#include "repose/model/region.h"
 
 namespace repose::model {
 namespace {
@@ -10,29 +14,50 @@ namespace {
 constexpr double gap = 1.5;            // mm
 constexpr double gap_per_depth = 0.5;  // of the column's thickness
 
-bool in_region(const scene::SphereRegion& region, const Vec3& point) {
-  return (point - region.center).norm() <= region.radius;
-}
-
-void let_go(const Columns& columns, const scene::Tissue& tissue, Attachment& attachment) {
-  for (size_t k = 0; k < tissue.unattached.size(); ++k) {
+/// What each column is to do, by region.
+std::vector<scene::Attach> wishes(const Columns& columns, const scene::Tissue& tissue,
+                                  Attachment& attachment) {
+  constexpr double near = 2;  // mm: columns end on the surface of what is segmented
+  constexpr std::array words = {"hold to it", "slide along it", "touch it", "do not know of it"};
+  std::vector<scene::Attach> wish(columns.deep.size(), tissue.attach);
+  for (size_t k = 0; k < tissue.attach_regions.size(); ++k) {
+    const auto& [where, how] = tissue.attach_regions[k];
+    const bool drawn = std::holds_alternative<scene::SphereRegion>(where) ||
+                       std::holds_alternative<scene::CurveRegion>(where);
+    const Inside inside = inside_of(where, drawn ? 0 : near);
     int64_t met = 0;
     for (size_t v = 0; v < columns.deep.size(); ++v) {
-      if (attachment.bone[v] < 0 || !in_region(tissue.unattached[k], columns.deep[v])) continue;
-      attachment.bone[v] = -1;
+      if (attachment.bone[v] < 0 || !inside(columns.deep[v])) continue;
+      wish[v] = how;
       ++met;
     }
-    attachment.remarks.push_back(fmt::format(
-        "unattached region {}: {} columns end at bone there and do not hold to it", k, met));
+    if (met == 0 && how == scene::Attach::slide)
+      base::refuse(
+          "region {} of tissue that slides on bone or teeth holds no column that ends at bone; "
+          "move it to where tissue meets bone, or make it larger",
+          k);
+    attachment.remarks.push_back(
+        fmt::format("attach region {}: {} columns end at bone there and {}", k, met,
+                    words[static_cast<size_t>(how)]));
   }
+  return wish;
 }
 
 }  // namespace
+
+void Attachment::settle(size_t column, scene::Attach how) {
+  if (how == scene::Attach::fixed) return;
+  if (how == scene::Attach::slide) slides_on[column] = bone[column];
+  if (how == scene::Attach::free) free[column] = 1;
+  bone[column] = -1;
+}
 
 Attachment attach_columns(const Columns& columns, const BoneField& bones,
                           const scene::Tissue& tissue) {
   Attachment attachment;
   attachment.bone.assign(columns.deep.size(), -1);
+  attachment.slides_on.assign(columns.deep.size(), -1);
+  attachment.free.assign(columns.deep.size(), 0);
   attachment.reached.assign(bones.size(), 0);
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     if (!columns.holds[v]) continue;
@@ -42,7 +67,9 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];
   }
-  let_go(columns, tissue, attachment);
+  const std::vector<scene::Attach> wish = wishes(columns, tissue, attachment);
+  for (size_t v = 0; v < wish.size(); ++v)
+    if (attachment.bone[v] >= 0) attachment.settle(v, wish[v]);
   return attachment;
 }
 

@@ -4,6 +4,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/log.h"
+#include "repose/model/add_contact.h"
 #include "repose/model/attachment.h"
 #include "repose/model/bones.h"
 #include "repose/model/collision.h"
@@ -43,6 +44,7 @@ SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin
   if (scene.incisions.empty()) return mesh;
   surface::Surface refined = skin;
   cuts = insert_paths(scene.incisions, scene.file.string(), refined);
+  for (Cut& cut : cuts) cut.meets = scene.contact && scene.contact->cuts;
   return make_skin_mesh(refined);
 }
 
@@ -53,10 +55,11 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
   std::vector<char> rim = rim_columns(mesh, scene.rim != scene::Rim::free);
   const auto let_go = [&] {
     for (size_t c = 0; c < rim.size(); ++c)
-      if (rim[c]) attachment.bone[c] = -1;
+      if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
   };
   if (scene.rim == scene::Rim::fixed) let_go();
-  release_near_other_pieces(columns.deep, field, scene.moves, scene.tissue.release, attachment);
+  release_near_other_pieces(columns.deep, field, scene.moves,
+                            {scene.tissue.release, scene.tissue.released}, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
   for (size_t c = 0; c < rim.size(); ++c) {
     const int32_t bone = attachment.bone[c];
@@ -149,16 +152,17 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   const Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
   Attachment attachment = attach_columns(columns, field, scene.tissue);
   const std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
-  release_near_rim(columns.deep, rim, scene.moves, scene.tissue.release, attachment);
+  release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
+                   attachment);
 
   built.model = make_layers(mesh, columns.deep, depths, scene.tissue.depths_mm,
                             scene.tissue.material ? Elements::solid : Elements::springs);
   set_points(rim, attachment, scene.moves, built.model);
   built.held = hold_by_instruments(scene, built.model);
   require_free_cuts(scene, built.cuts, built.model);
-  built.sliders = sliders(scene, built.held);
   require_held(scene, mesh, field, built.model, attachment);
   complete(scene, mesh, bones, built.model);
+  add_contact(scene, mesh, attachment, built.model);
   report_columns(columns, attachment, built.report);
   report_model(mesh, rim, built.model, built.report);
   return built;

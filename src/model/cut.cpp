@@ -4,6 +4,7 @@
 #include <map>
 
 #include "cut_sides.h"
+#include "repose/model/add_contact.h"
 #include "repose/model/material.h"
 
 namespace repose::model {
@@ -202,7 +203,10 @@ class Knife {
 }  // namespace
 
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model) {
-  return Knife(cut, model).run();
+  std::vector<std::array<int64_t, 2>> pairs = Knife(cut, model).run();
+  share_touches(pairs, model);
+  if (cut.meets) add_walls(cut, pairs, model);
+  return pairs;
 }
 
 }  // namespace repose::model

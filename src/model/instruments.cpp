@@ -109,6 +109,8 @@ Foot foot_on(const scene::HalfSpace& half, const Vec3& p) {
   return {p - (p - half.point).dot(normal) * normal, normal};
 }
 
+}  // namespace
+
 surface::Surface read_body(const scene::ClosedMesh& mesh) {
   surface::Surface body = surface::weld_and_orient(surface::read_surface(mesh.file));
   if (const surface::Defects d = surface::inspect(body, false); !d.outward)
@@ -116,8 +118,6 @@ surface::Surface read_body(const scene::ClosedMesh& mesh) {
                  surface::describe(d));
   return body;
 }
-
-}  // namespace
 
 struct PushedShape::Body {
   scene::Instrument instrument;
@@ -223,7 +223,7 @@ std::vector<std::vector<int64_t>> hold_by_instruments(const scene::Scene& scene,
   std::vector<std::vector<int64_t>> held;
   for (const scene::Instrument& instrument : scene.instruments) {
     try {
-      held.push_back(hold(instrument, model.points));
+      held.push_back(instrument.slide ? std::vector<int64_t>{} : hold(instrument, model.points));
     } catch (const base::InputError& error) {
       base::refuse("{}: instruments[{}]: {}", scene.file.string(), held.size(), error.what());
     }

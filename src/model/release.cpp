@@ -22,35 +22,36 @@ std::vector<std::vector<int32_t>> others(const std::vector<scene::RigidMotion>& 
 }  // namespace
 
 void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
-                               const std::vector<scene::RigidMotion>& moves, double distance,
+                               const std::vector<scene::RigidMotion>& moves, const Release& release,
                                Attachment& attachment) {
-  if (!(distance > 0)) return;
+  if (!(release.distance > 0)) return;
   const std::vector<std::vector<int32_t>> differing = others(moves);
   for (size_t v = 0; v < deep.size(); ++v) {
     if (attachment.bone[v] < 0) continue;
     const std::vector<int32_t>& pieces = differing[attachment.bone[v]];
-    if (std::none_of(pieces.begin(), pieces.end(),
-                     [&](int32_t piece) { return bones.distance(piece, deep[v]) <= distance; }))
+    if (std::none_of(pieces.begin(), pieces.end(), [&](int32_t piece) {
+          return bones.distance(piece, deep[v]) <= release.distance;
+        }))
       continue;
-    attachment.bone[v] = -1;
+    attachment.settle(v, release.how);
     ++attachment.released;
   }
 }
 
 void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
-                      const std::vector<scene::RigidMotion>& moves, double distance,
+                      const std::vector<scene::RigidMotion>& moves, const Release& release,
                       Attachment& attachment) {
-  if (!(distance > 0)) return;
+  if (!(release.distance > 0)) return;
   std::vector<Vec3> fixed;
   for (size_t v = 0; v < deep.size(); ++v)
     if (rim[v]) fixed.push_back(deep[v]);
-  const double reach = distance * distance;
+  const double reach = release.distance * release.distance;
   for (size_t v = 0; v < deep.size(); ++v) {
     if (attachment.bone[v] < 0 || moves[attachment.bone[v]].is_identity()) continue;
     if (std::none_of(fixed.begin(), fixed.end(),
                      [&](const Vec3& p) { return (p - deep[v]).squaredNorm() <= reach; }))
       continue;
-    attachment.bone[v] = -1;
+    attachment.settle(v, release.how);
     ++attachment.released;
   }
 }

@@ -71,6 +71,55 @@ model::Edges read_edges(const Reader& in) {
   return edges;
 }
 
+model::Body::Shape read_shape(const Reader& in, int64_t k, int8_t kind, const double* of) {
+  const auto vector = [&](int first) { return Vec3(of[first], of[first + 1], of[first + 2]); };
+  if (kind == 1) return scene::Sphere{vector(0), of[3]};
+  if (kind == 2) return scene::Capsule{vector(0), vector(3), of[6]};
+  if (kind == 3) return scene::Box{vector(0), vector(3)};
+  if (kind == 4) return scene::HalfSpace{vector(0), vector(3)};
+  surface::Surface mesh;
+  if (kind == 0) return mesh;
+  const std::string group = fmt::format("/model/contact/body_mesh/{}", k);
+  mesh.name = group;
+  mesh.points = in.vectors(group + "/points", Shape::any);
+  mesh.triangles = in.tuples<3>(group + "/triangles", Shape::any);
+  return mesh;
+}
+
+model::Contact read_contact(const Reader& in) {
+  const std::string group = "/model/contact";
+  model::Contact contact;
+  contact.stiffness = in.number(group, "stiffness");
+  contact.spacing = in.number(group, "grid");
+  const std::vector<std::string> names = in.names(group + "/body");
+  const auto bodies = static_cast<int64_t>(names.size());
+  const auto bone = in.integers<int32_t>(group + "/body_bone", bodies);
+  const auto kind = in.integers<int8_t>(group + "/body_kind", bodies);
+  const auto push = in.vectors(group + "/body_push", bodies);
+  const auto shape = in.numbers(group + "/body_shape", {bodies, {model::shape_numbers}});
+  for (int64_t k = 0; k < bodies; ++k)
+    contact.bodies.push_back({names[k], bone[k],
+                              read_shape(in, k, kind[k], shape.data() + model::shape_numbers * k),
+                              push[k]});
+  model::Touches& touches = contact.touches;
+  touches.point = in.integers<int64_t>(group + "/point", Shape::any);
+  const auto c = static_cast<int64_t>(touches.point.size());
+  touches.body = in.integers<int32_t>(group + "/body_row", c);
+  for (const int8_t binding : in.integers<int8_t>(group + "/binding", c))
+    touches.binding.push_back(static_cast<model::Binding>(binding));
+  touches.area = in.numbers(group + "/area", {c, {}});
+  if (!in.has(group + "/wall")) return contact;
+  model::Walls& walls = contact.walls;
+  walls.point = in.integers<int64_t>(group + "/wall/point", Shape::any);
+  const auto w = static_cast<int64_t>(walls.point.size());
+  walls.area = in.numbers(group + "/wall/area", {w, {}});
+  walls.cut = in.integers<int32_t>(group + "/wall/cut", w);
+  walls.triangles = in.tuples<3>(group + "/wall/triangles", Shape::any);
+  walls.triangle_cut = in.integers<int32_t>(group + "/wall/triangle_cut",
+                                            static_cast<int64_t>(walls.triangles.size()));
+  return contact;
+}
+
 std::vector<Mat4> read_transforms(const Reader& in, int64_t bones) {
   const std::vector<double> flat = in.numbers("/model/bone_transform", {bones, {4, 4}});
   std::vector<Mat4> transforms(bones);
@@ -112,6 +161,7 @@ model::Model read_model(const std::filesystem::path& file) {
   if (in.has("/model/bone_transform"))
     model.bone_transform = read_transforms(in, static_cast<int64_t>(model.bones.size()));
   if (in.has("/model/bone_surface")) model.bone_surfaces = read_bone_surfaces(in, model.bones);
+  if (in.has("/model/contact")) model.contact = read_contact(in);
   model::validate(model, file.string());
   return model;
 }
@@ -171,6 +221,12 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   stored.rows.position = in.vectors(group + "/point/position", counts.points);
   stored.displacement = in.vectors(group + "/point/displacement", counts.points);
   stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);
+  for (const std::string name : {"contact_gap", "contact_pressure"})
+    if (const std::string path = group + "/point/" + name; in.has(path))
+      stored.rows.point_fields.push_back({name, false, in.numbers(path, {counts.points, {}})});
+  if (const std::string path = group + "/point/contact_force"; in.has(path))
+    stored.rows.point_fields.push_back(
+        {"contact_force", true, in.numbers(path, {counts.points, {3}})});
   if (in.has(group + "/spring") || counts.springs > 0) {
     stored.rows.elongation = in.numbers(group + "/spring/elongation", {counts.springs, {}});
     stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});

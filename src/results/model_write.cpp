@@ -54,6 +54,74 @@ void write_edges(hid_t model, const model::Edges& edges) {
   write_array(group, "weight", {e}, edges.weight.data());
 }
 
+/// What a shape is made of, in a row of model::shape_numbers.
+std::vector<double> numbers_of(const model::Body::Shape& shape) {
+  std::vector<double> row;
+  const auto put = [&](const Vec3& v) { row.insert(row.end(), {v.x(), v.y(), v.z()}); };
+  if (const auto* ball = std::get_if<scene::Sphere>(&shape))
+    put(ball->center), row.push_back(ball->radius);
+  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
+    put(capsule->from), put(capsule->to), row.push_back(capsule->radius);
+  if (const auto* box = std::get_if<scene::Box>(&shape)) put(box->center), put(box->size);
+  if (const auto* half = std::get_if<scene::HalfSpace>(&shape)) put(half->point), put(half->normal);
+  row.resize(model::shape_numbers, 0.0);
+  return row;
+}
+
+void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
+  const hsize_t count = bodies.size();
+  std::vector<std::string> names;
+  std::vector<int32_t> bone;
+  std::vector<int8_t> kind;
+  std::vector<Vec3> push;
+  std::vector<double> shape;
+  const base::Hdf5Group meshes = base::create_hdf5_group(group, "body_mesh");
+  for (size_t k = 0; k < bodies.size(); ++k) {
+    const model::Body& body = bodies[k];
+    names.push_back(body.name);
+    bone.push_back(body.bone);
+    kind.push_back(body.bone >= 0 ? 0 : static_cast<int8_t>(1 + body.shape.index()));
+    push.push_back(body.push);
+    const std::vector<double> row = numbers_of(body.shape);
+    shape.insert(shape.end(), row.begin(), row.end());
+    const auto* mesh = std::get_if<surface::Surface>(&body.shape);
+    if (!mesh || body.bone >= 0) continue;
+    const base::Hdf5Group own = base::create_hdf5_group(meshes, std::to_string(k).c_str());
+    write_array(own, "points", {mesh->points.size(), 3}, flat(mesh->points));
+    write_array(own, "triangles", {mesh->triangles.size(), 3}, flat(mesh->triangles));
+  }
+  write_strings(group, "body", names);
+  write_array(group, "body_bone", {count}, bone.data());
+  write_array(group, "body_kind", {count}, kind.data());
+  write_array(group, "body_push", {count, 3}, flat(push));
+  write_array(group, "body_shape", {count, model::shape_numbers}, shape.data());
+}
+
+void write_contact(hid_t model, const model::Contact& contact) {
+  if (contact.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "contact");
+  write_attribute(group, "stiffness", contact.stiffness);
+  write_attribute(group, "grid", contact.spacing);
+  write_bodies(group, contact.bodies);
+  const model::Touches& touches = contact.touches;
+  const hsize_t c = touches.point.size();
+  std::vector<int8_t> binding;
+  for (const model::Binding value : touches.binding) binding.push_back(static_cast<int8_t>(value));
+  write_array(group, "point", {c}, touches.point.data());
+  write_array(group, "body_row", {c}, touches.body.data());
+  write_array(group, "binding", {c}, binding.data());
+  write_array(group, "area", {c}, touches.area.data());
+  const model::Walls& walls = contact.walls;
+  if (walls.point.empty()) return;
+  const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
+  const hsize_t w = walls.point.size(), t = walls.triangles.size();
+  write_array(wall, "point", {w}, walls.point.data());
+  write_array(wall, "area", {w}, walls.area.data());
+  write_array(wall, "cut", {w}, walls.cut.data());
+  write_array(wall, "triangles", {t, 3}, flat(walls.triangles));
+  write_array(wall, "triangle_cut", {t}, walls.triangle_cut.data());
+}
+
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {
   if (skin.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "skin");
@@ -99,6 +167,7 @@ void write_model(const base::Hdf5File& file, const model::Model& model, const Me
   write_springs(group, model.springs);
   write_prisms(group, model.prisms);
   write_edges(group, model.edges);
+  write_contact(group, model.contact);
   write_skin(group, model.skin);
   write_strings(group, "spring_set", model.spring_sets);
   write_strings(group, "bone", model.bones);
@@ -112,7 +181,8 @@ int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   const size_t bytes = descriptions + model.points.position.size() * point +
                        model.springs.points.size() * spring + model.prisms.points.size() * 11 * 8 +
-                       model.edges.points.size() * 3 * 8 + model.skin.size() * 3 * 8 +
+                       model.edges.points.size() * 3 * 8 + model.contact.touches.point.size() * 21 +
+                       model.contact.walls.point.size() * 50 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes);
 }

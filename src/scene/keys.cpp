@@ -88,8 +88,32 @@ std::vector<Key> tissue_keys() {
       {"tissue.release", number, "10",
        "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
        Range::at_least(0)},
+      {"tissue.released",
+       choice,
+       "contact",
+       "What such tissue does then: as attach.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}},
+      {"tissue.attach",
+       choice,
+       "fixed",
+       "What tissue that ends at bone does: move with it, slide along it at its distance, touch it "
+       "(lift off, never pass), or not know of it.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}},
+      {"tissue.attach_regions", list, "",
+       "Where tissue that ends at bone does otherwise; later ones beat earlier ones."},
+      {"tissue.attach_regions[].attach",
+       choice,
+       "required",
+       "As tissue.attach.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}},
       {"tissue.unattached", list, "",
-       "Regions that touch bone but are not attached to it (lips, cheeks)."},
+       "Regions that touch bone but do not hold to it (lips, cheeks): attach_regions of contact."},
       {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
       {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
       {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
@@ -101,6 +125,53 @@ std::vector<Key> tissue_keys() {
        Range::at_least(0)},
       {"tissue.density", number, "", "Density of the tissue; excludes mass.", "kg/mm³",
        Range::above(0)}};
+}
+
+/// The keys of a part of space, below the item of a list.
+std::vector<Key> region_keys(const std::string& item) {
+  return {{item + ".sphere", map, "", "The region as a sphere, or"},
+          {item + ".sphere.center", vector, "required", "Its center.", "mm"},
+          {item + ".sphere.radius", number, "required", "Its radius.", "mm", Range::above(0)},
+          {item + ".mesh", file, "", "as the inside of a closed triangle mesh, or"},
+          {item + ".volume", volume, "", "as the voxels of a label map that have"},
+          {item + ".label", integer, "", "this label, or", "", Range::between(1, 100000)},
+          {item + ".curve", curve, "", "as what is near a curve: its points, or a file of them."},
+          {item + ".curve[]", vector, "", "One of the points.", "mm"},
+          {item + ".radius", number, "", "How near to the curve.", "mm", Range::above(0)}};
+}
+
+std::vector<Key> contact_keys() {
+  std::vector<Key> rows{
+      {"contact", map, "", "Tissue against bones and itself; without it as for a material."},
+      {"contact.bones",
+       choice,
+       "on",
+       "Free tissue stays out of bones, if it began outside; on for a material, off for springs.",
+       "",
+       {},
+       {"on", "off"}},
+      {"contact.cuts",
+       choice,
+       "on",
+       "The sides of incisions and of the mouth do not pass each other; likewise.",
+       "",
+       {},
+       {"on", "off"}},
+      {"contact.grid", number, "",
+       "Spacing of the grids from which distances to meshes are read, which round edges of bones "
+       "by some tenths of it; 0.75 of the skin's mean edge when not given.",
+       "mm", Range::between(0.1, 10)},
+      {"contact.stiffness", number, "",
+       "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",
+       Range::between(1e-9, 1e9)},
+      {"teeth", list, "", "Regions where mucosa slides on teeth: attach_regions of slide."},
+      {"mouth", map, "", "Parts the lips, through all layers, so that they open and meet."},
+      {"mouth.path", curve, "required",
+       "From one corner of the mouth to the other: points near the skin, or a file of them."},
+      {"mouth.path[]", vector, "", "One of the points.", "mm"}};
+  for (const std::string item : {"teeth[]", "tissue.attach_regions[]"})
+    for (Key& row : region_keys(item)) rows.push_back(std::move(row));
+  return rows;
 }
 
 /// Young's modulus and Poisson's ratio, below `above`.
@@ -393,9 +464,10 @@ std::vector<Key> incision_keys() {
 const std::vector<Key>& all_keys() {
   static const std::vector<Key> table = [] {
     std::vector<Key> rows;
-    for (const auto& part : {surface_keys(), tissue_keys(), material_keys(), spring_keys(),
-                             load_keys(), osteotomy_keys(), move_keys(), collision_keys(),
-                             instrument_keys(), incision_keys(), tearing_keys(), solve_keys()})
+    for (const auto& part :
+         {surface_keys(), tissue_keys(), material_keys(), spring_keys(), load_keys(),
+          osteotomy_keys(), move_keys(), collision_keys(), instrument_keys(), contact_keys(),
+          incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

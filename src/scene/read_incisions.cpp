@@ -3,7 +3,6 @@
 #include "repose/scene/landmarks.h"
 
 namespace repose::scene {
-namespace {
 
 std::vector<Vec3> read_path(const Value& value) {
   std::vector<Vec3> path;
@@ -12,10 +11,16 @@ std::vector<Vec3> read_path(const Value& value) {
   else
     for (const Landmark& point : read_landmarks(value.file())) path.push_back(point.position);
   if (path.size() < 2)
-    value.refuse("must have two points at least, it has {}; give where the cut begins and ends",
+    value.refuse("must have two points at least, it has {}; give where it begins and ends",
                  path.size());
   return path;
 }
+
+Incision read_mouth(const Value& value, int layers) {
+  return {read_path(Map(value).at("path")), layers};
+}
+
+namespace {
 
 Incision read_incision(const Map& map, int layers) {
   const Value depth = map.at("layers");

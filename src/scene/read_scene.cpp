@@ -2,6 +2,7 @@
 #include <map>
 
 #include "bone_names.h"
+#include "read_contact.h"
 #include "read_incisions.h"
 #include "read_instruments.h"
 #include "read_material.h"
@@ -198,7 +199,14 @@ Tissue read_tissue(const Value& value) {
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);
-  if (const auto regions = map.find("unattached")) tissue.unattached = read_regions(*regions);
+  set_choice<Attach>(tissue.attach, map, "attach");
+  set_choice<Attach>(tissue.released, map, "released");
+  if (const auto regions = map.find("unattached"))
+    for (const SphereRegion& region : read_regions(*regions))
+      tissue.attach_regions.push_back({region, Attach::contact});
+  if (const auto regions = map.find("attach_regions"))
+    for (AttachRegion& region : read_attach_regions(*regions))
+      tissue.attach_regions.push_back(std::move(region));
   const auto springs = map.find("springs"), material = map.find("material");
   if (springs && material)
     material->refuse("and tissue.springs exclude each other; remove one of them");
@@ -275,6 +283,15 @@ void read_surroundings(Scene& scene, const Map& map) {
   if (const auto bodies = map.find("instruments")) scene.instruments = read_instruments(*bodies);
   if (const auto cuts = map.find("incisions"))
     scene.incisions = read_incisions(*cuts, scene.tissue.layers);
+  if (const auto mouth = map.find("mouth"))
+    scene.incisions.push_back(read_mouth(*mouth, scene.tissue.layers));
+  if (const auto teeth = map.find("teeth"))
+    for (AttachRegion& region : read_teeth(*teeth))
+      scene.tissue.attach_regions.push_back(std::move(region));
+  if (const auto contact = map.find("contact"))
+    scene.contact = read_contact(*contact);
+  else if (scene.tissue.material)
+    scene.contact.emplace();
   if (const auto forces = map.find("forces")) scene.forces = read_forces(*forces);
   if (const auto tearing = map.find("tearing")) scene.tearing = read_tearing(*tearing, scene);
 }

@@ -72,7 +72,9 @@ LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
 
 bool LoadPath::follows(const Attempt& now, const std::optional<Attempt>& coarser) const {
   if (!now.outcome.converged) return false;
-  const bool near = now.miss <= trusted_miss * now.expected + settings_.accuracy;
+  // No prediction knows what will be touched.
+  const bool touching = objective_.positions().part().contact;
+  const bool near = touching || now.miss <= trusted_miss * now.expected + settings_.accuracy;
   if (near && !now.folded) return true;
   // Halving shrinks what a smooth path misses by four. What it does not shrink, a jump of the rest
   // position itself or a fold, is the path's own.

@@ -240,12 +240,16 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
   const bool far = largest_force > hopeful * softest_ * accuracy_;
   const bool quick = newton_ || initial_;
   const bool soon = !quick && function_.evaluations() - looked_at_ < seldom;
-  if (softest_ > 0 && (far || soon || cut_)) {
+  if (softest_ > 0 && !rough_ && (far || soon || cut_)) {
     error_ = largest_force / softest_;
     return false;
   }
   if (quick && &estimate_.function == &function_) {
     const double step = estimate_.solver.preconditioned_step(gradient);
+    if (rough_) {
+      error_ = safety * step;
+      return step <= accuracy_;
+    }
     const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
     if (step > (may_close_ ? near : accuracy_)) {
       error_ = safety * step;
@@ -361,6 +365,26 @@ void Minimiser::search(Vec displacement) {
     check(TaoGetIterationNumber(tao_, &iterations));
     iterations_ += iterations;
   } while (worth_going_on(iterations));
+}
+
+Outcome Minimiser::approach(Vec displacement, double distance) {
+  if (!initial_) return run(displacement, distance);
+  accuracy_ = distance;
+  thrown_ = nullptr;
+  stopped_ = false;
+  check(TaoSetSolution(tao_, displacement));
+  rough_ = true;
+  search(displacement);
+  rough_ = false;
+  Outcome outcome;
+  outcome.iterations = iterations_;
+  outcome.stopped = stopped_;
+  outcome.converged = !stopped_;
+  outcome.displacement_error = std::numeric_limits<double>::infinity();
+  TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
+  check(TaoGetConvergedReason(tao_, &reason));
+  outcome.reason = reason_of(outcome, reason);
+  return outcome;
 }
 
 Outcome Minimiser::run(Vec displacement, double accuracy) {

@@ -14,6 +14,7 @@
 #include "repose/base/progress.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/solve/active_search.h"
+#include "repose/solve/contact_search.h"
 #include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
@@ -111,6 +112,8 @@ class Searcher {
         minimiser_(problem_.function(), problem_.solver(), problem_.error_estimate(),
                    std::ref(watcher_)) {
     if (settings.force) force_search_.emplace(*problem_.force(), minimiser_);
+    if (positions.part().contact)
+      contact_.emplace(problem_.objective(), problem_.tangent(), minimiser_);
     if (settings.exact_volume)
       exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                             minimiser_);
@@ -119,6 +122,7 @@ class Searcher {
   RestSearch& search() {
     if (force_search_) return *force_search_;
     if (exact_volume_) return *exact_volume_;
+    if (contact_) return *contact_;
     return minimiser_;
   }
   discrete::Objective& objective() { return problem_.objective(); }
@@ -135,6 +139,7 @@ class Searcher {
   Minimiser minimiser_;
   std::optional<ForceSearch> force_search_;
   std::optional<ExactVolume> exact_volume_;
+  std::optional<ContactSearch> contact_;
 };
 
 }  // namespace
@@ -154,6 +159,10 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
   numbers.volume_error_max = totals.volume_error_max;
   numbers.inverted_prisms = totals.inverted;
+  if (objective.positions().part().contact) {
+    numbers.penetration = penetration(objective);
+    numbers.contact_energy = objective.contact_value();
+  }
 }
 
 namespace {

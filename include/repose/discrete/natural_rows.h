@@ -36,6 +36,7 @@ class NaturalRows {
   std::vector<double> bring(const Rows& rows, const std::vector<double>& owned) const;
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
+  void add_contact(Objective& objective, model::StepRows& rows) const;
   void add_prisms(Objective& objective, bool with_pressure, model::StepRows& rows) const;
 
   MPI_Comm comm_;

@@ -1,5 +1,6 @@
 #pragma once
 #include "repose/discrete/function.h"
+#include "repose/mechanics/contact.h"
 #include "repose/mechanics/energy.h"
 
 namespace repose::discrete {
@@ -13,6 +14,23 @@ class Objective : public Function {
 
   /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
   void hessian_action(std::span<const Vec3> direction, Vec product);
+
+  /// A block of contact's Hessian between two local points; where they differ, its transpose is
+  /// that of the second and the first.
+  struct ContactBlock {
+    int32_t p, q;
+    Mat3 block;
+  };
+  /// Those at the last update, exact or of a semidefinite relative. Not collective.
+  std::vector<ContactBlock> contact_blocks(bool exact);
+  static void add_blocks(std::span<const ContactBlock> blocks, std::span<const Vec3> direction,
+                         std::span<Vec3> product);
+  mechanics::TouchLoop& touches() { return touches_; }
+  mechanics::WallLoop& walls() { return walls_; }
+  /// Contact's value, at the last update, summed over ranks, N·mm.
+  double contact_value();
+  /// N, of what is touched on each owned point, at the last update. Not collective.
+  std::vector<Vec3> contact_force();
 
   /// F_i of Eq. 6, of springs without volume term, of a solid whole; [owned points], zero outside
   /// soft tissue (N).
@@ -30,10 +48,15 @@ class Objective : public Function {
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;
   void subtract_loads(double scale, std::span<Vec3> gradient) const;
+  void place_bodies();
+  double add_contact(double scale, std::span<Vec3> gradient);
 
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool averages_volumes_;
+  mechanics::TouchLoop touches_;
+  mechanics::WallLoop walls_;
+  double placed_at_ = 0;          // load at which the bodies are
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   mechanics::Totals initial_;     // this rank's share
@@ -43,5 +66,13 @@ class Objective : public Function {
 /// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
 /// at the last update. Not collective.
 std::vector<double> pressures(Objective& objective);
+
+/// What points touch at the objective's last update, [owned points].
+struct ContactState {
+  std::vector<double> gap;       ///< mm, the smallest; what is looked at at most where none is
+  std::vector<double> pressure;  ///< N/mm², the sum
+  std::vector<Vec3> force;       ///< N
+};
+ContactState contact_state(Objective& objective);
 
 }  // namespace repose::discrete

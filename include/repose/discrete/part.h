@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "repose/mechanics/rigid_body.h"
 #include "repose/model/model.h"
 
 /// Distribution of a model over ranks: columns are the unit, nothing is ever added across ranks.
@@ -17,6 +18,10 @@ namespace repose::discrete {
 struct Part {
   model::Model model;
   bool solid = false;  ///< the whole model is one, whatever is here
+  /// The whole model has contact. What `model` has of it are points that this rank owns; the sides
+  /// of cuts are all on one rank.
+  bool contact = false;
+  std::vector<mechanics::RigidBody> bodies;  ///< [model.contact.bodies], on every rank
   int64_t owned_points = 0, owned_springs = 0, owned_prisms = 0, owned_edges = 0;
   std::vector<int64_t> point_row;   ///< [local points] row in the whole model
   std::vector<int64_t> spring_row;  ///< [owned_springs]

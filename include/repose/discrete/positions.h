@@ -20,6 +20,9 @@ class Positions {
   /// Where fixed point `local_row` is at a load.
   Vec3 prescribed(int64_t local_row, double load) const;
 
+  /// 4×4 matrix that takes a bone from load 0 to the load.
+  Mat4 bone_matrix(int32_t bone) const { return motion_.bone_matrix(bone, load_); }
+
   /// Longest way of any fixed point from load 0 to 1, mm. Collective.
   double largest_travel() const;
 

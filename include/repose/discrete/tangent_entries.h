@@ -15,8 +15,9 @@ class TangentEntries {
   explicit TangentEntries(const Objective& objective);  ///< collective; O(elements) memory
 
   base::MatHandle make() const;  ///< a matrix of zeros; collective
-  /// The Hessian with `position` [local points], mm. Collective.
-  void fill(Mat matrix, std::span<const Vec3> position, mechanics::Curvature curvature) const;
+  /// The Hessian with `position` [local points], mm, and these blocks of contact. Collective.
+  void fill(Mat matrix, std::span<const Vec3> position,
+            std::span<const Objective::ContactBlock> contact, mechanics::Curvature curvature) const;
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x. Collective.
   void fill_third(Mat matrix, std::span<const Vec3> position,
                   std::span<const Vec3> direction) const;

@@ -12,6 +12,7 @@ struct Cut {
   std::vector<int64_t> columns;  ///< skin vertices along it, neighbours joined by edges; tips first
                                  ///< and last
   int layers;                    ///< point layers that it parts, from the skin down
+  bool meets = false;            ///< its sides touch and do not pass each other
 };
 
 /// Makes the paths of incisions edges of the skin: triangles and edges that a path crosses are

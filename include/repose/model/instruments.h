@@ -9,6 +9,9 @@
 /// Rigid bodies pushed into the skin.
 namespace repose::model {
 
+/// Reads the mesh of an instrument. Throws InputError for one that is not closed.
+surface::Surface read_body(const scene::ClosedMesh& mesh);
+
 /// A part of a line p + t d, in mm along d.
 struct Stretch {
   double enter, leave;
@@ -48,7 +51,8 @@ struct Slider {
 std::vector<Slider> sliders(const scene::Scene& scene,
                             const std::vector<std::vector<int64_t>>& held);
 
-/// Makes held points of the free skin points that an instrument sweeps over or ends on: their
+/// Makes held points of the free skin points that an instrument to which the skin sticks sweeps
+/// over or ends on: their
 /// target is where the push takes them, on the surface of the instrument at the end of its push. A
 /// point goes with the first instrument of the scene that reaches it. Returns the rows of the
 /// points that each holds. Throws InputError naming the scene and an instrument that reaches none.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "repose/base/geometry.h"
+#include "repose/model/contact.h"
 #include "repose/surface/surface.h"
 
 /// The discrete model as flat arrays, exactly /model of the result file.
@@ -58,7 +59,8 @@ struct Model {
   Points points;
   Springs springs;
   Prisms prisms;
-  Edges edges;                 ///< of a solid
+  Edges edges;  ///< of a solid
+  Contact contact;
   std::vector<Triangle> skin;  ///< [K] for drawing, may be empty
   std::vector<std::string> spring_sets;
   std::vector<std::string> bones;

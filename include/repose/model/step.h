@@ -31,11 +31,17 @@ struct StepNumbers {
   double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
   /// mm, estimate for the skin of a model coarser than the scene asks for; NaN for the scene's own.
   double discretisation_error = std::numeric_limits<double>::quiet_NaN();
+  /// mm, the deepest that anything passes what it touches; NaN where nothing is touched.
+  double penetration = std::numeric_limits<double>::quiet_NaN();
+  /// N mm, what contact adds to the objective, which vanishes as multipliers become exact;
+  /// likewise.
+  double contact_energy = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// A number of a step that a file may do without; it is NaN then.
 inline bool is_optional(std::string_view name) {
-  return name.ends_with("_eigenvalue") || name == "discretisation_error";
+  return name.ends_with("_eigenvalue") || name == "discretisation_error" || name == "penetration" ||
+         name == "contact_energy";
 }
 
 /// Calls visit(name, member) for every number of a step, in the order of the file.
@@ -65,6 +71,8 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("smallest_eigenvalue", numbers.smallest_eigenvalue);
   visit("largest_eigenvalue", numbers.largest_eigenvalue);
   visit("discretisation_error", numbers.discretisation_error);
+  visit("penetration", numbers.penetration);
+  visit("contact_energy", numbers.contact_energy);
 }
 
 /// A further number or vector of every point; its name is that of the dataset.

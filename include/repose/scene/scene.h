@@ -100,6 +100,23 @@ struct Stratum {
   Elasticity elasticity;
 };
 
+/// What is near a line of points.
+struct CurveRegion {
+  std::vector<Vec3> path;  ///< mm
+  double radius;           ///< mm
+};
+
+using Region = std::variant<SphereRegion, MeshRegion, LabelRegion, CurveRegion>;
+
+/// What tissue that ends at bone does: it moves with it; it keeps its distance and slides along; it
+/// may lift off but never passes; it does not know of it.
+enum class Attach { fixed, slide, contact, free };
+
+struct AttachRegion {
+  Region where;
+  Attach attach;
+};
+
 struct MaterialRegion {
   std::variant<SphereRegion, MeshRegion, LabelRegion, PaintedRegion> where;
   Elasticity elasticity;
@@ -122,11 +139,13 @@ struct Tissue {
   std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
   /// mm below the skin of the upper layers, the skin's 0 first, increasing; empty: by `depths`.
   std::vector<double> depths_mm;
-  double attach_within = 30;   ///< mm
-  double free_thickness = 12;  ///< mm
-  double release = 10;         ///< mm
-  std::vector<SphereRegion> unattached;
-  std::optional<Material> material;     ///< unset: springs
+  double attach_within = 30;                 ///< mm
+  double free_thickness = 12;                ///< mm
+  Attach attach = Attach::fixed;             ///< outside all regions
+  std::vector<AttachRegion> attach_regions;  ///< each beats the ones before it
+  double release = 10;                       ///< mm
+  Attach released = Attach::contact;         ///< what becomes of tissue that lets go
+  std::optional<Material> material;          ///< unset: springs
   std::optional<Elasticity> isotropic;  ///< of springs: moduli by set that resemble such a solid
   std::map<std::string, SpringRule> springs;  ///< "default", "layer", "layer 0", "connecting 1", …
   double turgor = 0;  ///< initial strain of the skin: of its springs, or of the first stratum
@@ -179,6 +198,13 @@ struct Instrument {
   bool slide = false;  ///< the skin slides on it without friction instead of sticking to it
 };
 
+/// Tissue against bones and the sides of cuts against each other.
+struct Contact {
+  bool bones = true, cuts = true;
+  std::optional<double> grid;       ///< mm, of the distances to bones; unset: by the skin's mesh
+  std::optional<double> stiffness;  ///< N/mm³ of the penalty; unset: by the tissue
+};
+
 /// A cut in the skin.
 struct Incision {
   std::vector<Vec3> path;  ///< mm, at least two points on or near the skin
@@ -215,6 +241,7 @@ struct Scene {
   Rim rim = Rim::fixed;
   std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
+  std::optional<Contact> contact;  ///< unset: what is free is not kept out of bones
   std::vector<Instrument> instruments;
   std::vector<Incision> incisions;
   std::vector<Force> forces;

@@ -35,6 +35,10 @@ class Minimiser : public RestSearch {
   Minimiser(discrete::Function& function, linear::TangentSolver& solver,
             const ErrorEstimate& estimate, const Watch& watch);
 
+  /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
+  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
+  Outcome approach(Vec displacement, double distance);
+
   /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
   Outcome run(Vec displacement, double accuracy) override;
 
@@ -85,6 +89,7 @@ class Minimiser : public RestSearch {
   double lowest_ = 0;                   // value, of the run under way
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long
+  bool rough_ = false;                  // the search under way is an approach
   bool stopped_ = false;                // the watcher did not want to go on
   double taken_ = 0;                    // mm, the Newton step that led here, or 0
   double contraction_ = 0;              // of the latest Newton step, …

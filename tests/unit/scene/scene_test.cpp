@@ -118,9 +118,11 @@ TEST(Scene, FullTissue) {
   EXPECT_EQ(tissue.attach_within, 25);
   EXPECT_EQ(tissue.free_thickness, 11);
   EXPECT_EQ(tissue.release, 0);
-  ASSERT_EQ(tissue.unattached.size(), 1u);
-  EXPECT_EQ(tissue.unattached[0].center, Vec3(0, 80, -30));
-  EXPECT_EQ(tissue.unattached[0].radius, 20);
+  ASSERT_EQ(tissue.attach_regions.size(), 1u);
+  EXPECT_EQ(tissue.attach_regions[0].attach, Attach::contact);
+  const auto& ball = std::get<SphereRegion>(tissue.attach_regions[0].where);
+  EXPECT_EQ(ball.center, Vec3(0, 80, -30));
+  EXPECT_EQ(ball.radius, 20);
   EXPECT_EQ(tissue.turgor, 0.05);
   EXPECT_EQ(tissue.mass, (std::vector<double>{0.05, 0.1, 0.1, 0}));
   EXPECT_FALSE(tissue.density);

@@ -46,6 +46,9 @@ inline Rest find_rest(const model::Model& model, const solve::Settings& settings
     rest.rows.pressure = gather(slabs.pressure);
     rest.rows.elongation = gather(slabs.elongation);
     rest.rows.tension = gather(slabs.tension);
+    rest.rows.point_fields.clear();
+    for (const model::PointField& field : slabs.point_fields)
+      rest.rows.point_fields.push_back({field.name, field.vector, gather(field.values)});
   };
   rest.summary = solve::find_repose(MPI_COMM_WORLD, model, settings, {}, stages, keep);
   return rest;

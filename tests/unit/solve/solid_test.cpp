@@ -1,10 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <random>
-
-#include "models.h"
-#include "repose/model/material.h"
 #include "rest.h"
+#include "solid_block.h"
 
 /// The neo-Hookean solid solved: closed forms, and the same answer on any way to it.
 namespace repose {
@@ -12,41 +9,8 @@ namespace {
 
 using model::PointSet;
 using testing::Rest;
-
-solve::Settings settings(double accuracy, int load_steps = 0) {
-  solve::Settings s;
-  s.weights = {1, mechanics::VolumeTerm::penalty, 1};
-  s.volume = "material";
-  s.path.accuracy = accuracy;
-  s.path.load_steps = load_steps;
-  return s;
-}
-
-/// The block as a solid; its inner points are moved by up to `uneven` mm.
-model::Model solid_block(int columns, int rows, int layers, double poisson, double uneven,
-                         const std::function<PointSet(int, int, int)>& set) {
-  model::Model m = testing::block(columns, rows, layers, 0, set);
-  m.springs = {};
-  m.spring_sets.clear();
-  std::mt19937 random(5);
-  for (size_t i = 0; i < m.points.position.size(); ++i)
-    for (double& x : m.points.position[i]) {
-      const double noise = uneven * (random() / 2147483648.0 - 1.0);
-      if (m.points.set[i] == PointSet::soft_tissue) x += noise;
-    }
-  m.points.target = m.points.position;
-  const model::Moduli moduli = model::moduli({0.015, poisson});
-  for (size_t p = 0; p < m.prisms.points.size(); ++p) {
-    Vec3 corners[6];
-    for (int c = 0; c < 6; ++c) corners[c] = m.points.position[m.prisms.points[p][c]];
-    m.prisms.rest_volume[p] = model::prism_volume(corners);
-    m.prisms.shear_modulus.push_back(moduli.shear);
-    m.prisms.modulus.push_back(moduli.volume);
-    m.prisms.target_volume.push_back(m.prisms.rest_volume[p] * (1 + moduli.shear / moduli.volume));
-  }
-  model::assemble_edges("block", m);
-  return m;
-}
+using testing::settings;
+using testing::solid_block;
 
 TEST(Solid, PatchTestIsExactOnIrregularPrisms) {
   const auto inner = [](int i, int j, int a) {

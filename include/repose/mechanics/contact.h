@@ -1,0 +1,125 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "repose/mechanics/rigid_body.h"
+
+/// Frictionless contact as an augmented Lagrangian (docs/model.md "Contact"), on plain arrays like
+/// the other terms: for each constraint of gap g, area a, multiplier p (N/mm²)
+///     a/(2k) (max(0, p − k g)² − p²),
+/// without the max where a point slides.
+namespace repose::mechanics {
+
+/// Of a constraint, per area: value (N/mm), pressure p − k g where it acts, and −d(pressure)/dg.
+struct Pressing {
+  double value, pressure, stiffness;
+};
+inline Pressing press(double gap, double multiplier, double stiffness, bool slides) {
+  const double pressure = multiplier - stiffness * gap;
+  const double before = multiplier * multiplier;
+  if (!slides && !(pressure > 0)) return {-before / (2 * stiffness), 0, 0};
+  return {(pressure * pressure - before) / (2 * stiffness), pressure, stiffness};
+}
+
+/// Points against rigid bodies. A distance changes by no more than its point moves, so that a
+/// constraint is looked at again only where that can make it act.
+class TouchLoop {
+ public:
+  TouchLoop() = default;
+  /// `touches` with local point numbers.
+  TouchLoop(const model::Touches& touches, double stiffness, std::vector<RigidBody> bodies);
+
+  bool empty() const { return touches_.point.empty(); }
+  const model::Touches& touches() const { return touches_; }
+  std::span<const double> multipliers() const { return multiplier_; }
+  void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }
+  std::vector<RigidBody>& bodies() { return bodies_; }
+  double stiffness() const { return stiffness_; }
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }
+
+  /// Adds scale · gradient; returns the value, N·mm, unscaled.
+  double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
+  /// Takes the distances where the points are, for all functions below.
+  void look(std::span<const Vec3> position);
+  /// The same for all, even those that cannot act.
+  void look_at_all(std::span<const Vec3> position);
+  /// Calls visit(point, block): the Hessian at the latest look, or a semidefinite relative.
+  template <class Visit>
+  void for_each_block(bool exact, Visit&& visit) const {
+    for (const size_t c : acting_) visit(touches_.point[c], block(c, exact));
+  }
+  /// Gaps (mm; where they cannot act a lower bound) and pressures p − k g (N/mm²) at the latest
+  /// look, [C].
+  std::span<const double> gaps() const { return gap_; }
+  double pressure(size_t c) const {
+    return press(gap_[c], multiplier_[c], stiffness_, slides(c)).pressure;
+  }
+  const Vec3& normal(size_t c) const { return normal_[c]; }
+
+ private:
+  bool slides(size_t c) const { return touches_.binding[c] == model::Binding::slides; }
+  double least_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
+  Mat3 block(size_t c, bool exact) const;
+
+  model::Touches touches_;
+  double stiffness_ = 1;
+  std::vector<RigidBody> bodies_;
+  std::vector<double> multiplier_;  // [C] N/mm²
+  std::vector<Vec3> seen_;          // [C] where the point was beside its body when last looked at
+  std::vector<double> distance_;    // [C] mm, then
+  std::vector<double> gap_;         // [C] at the latest look
+  std::vector<Vec3> normal_;        // [C] of those that act
+  std::vector<Mat3> curvature_;     // [acting]
+  std::vector<size_t> acting_;      // at the latest look
+};
+
+/// A point of one side of a cut against a point of the other: the gap is normal · (x_0 − Σ share_j
+/// x_j), with normal and shares from when they were paired.
+struct WallPair {
+  std::array<int32_t, 4> points;  ///< the point, and the other side's triangle
+  std::array<double, 4> share;    ///< 1, and minus the weights of the triangle's corners
+  Vec3 normal;                    ///< out of the other side
+  double area, multiplier;        ///< mm², N/mm²
+  double gap(std::span<const Vec3> x) const {
+    double g = 0;
+    for (int k = 0; k < 4; ++k) g += share[k] * normal.dot(x[points[k]]);
+    return g;
+  }
+};
+
+/// The sides of cuts against one another.
+class WallLoop {
+ public:
+  WallLoop() = default;
+  WallLoop(const model::Walls& walls, double stiffness);  ///< with local point numbers
+  bool empty() const { return walls_.point.empty(); }
+  double stiffness() const { return stiffness_; }
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }
+  const std::vector<WallPair>& pairs() const { return pairs_; }  ///< [W]; area 0: of no use
+  std::vector<WallPair>& pairs() { return pairs_; }
+
+  /// Finds for each point its place on the other side; multipliers stay. Normals are this much
+  /// those of now, the rest as they were.
+  void pair(std::span<const Vec3> position, double anew = 1);
+  double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient) const;
+  /// Calls visit(p, q, block) for every two points of each pair, in its order; 0 where it does not
+  /// act.
+  template <class Visit>
+  void for_each_block(std::span<const Vec3> position, Visit&& visit) const {
+    for (const WallPair& pair : pairs_) {
+      if (pair.area == 0) continue;
+      const double k = press(pair.gap(position), pair.multiplier, stiffness_, false).stiffness;
+      const Mat3 outer = pair.area * k * pair.normal * pair.normal.transpose();
+      for (int i = 0; i < 4; ++i)
+        for (int j = i; j < 4; ++j)
+          visit(pair.points[i], pair.points[j], pair.share[i] * pair.share[j] * outer);
+    }
+  }
+
+ private:
+  model::Walls walls_;
+  double stiffness_ = 1;
+  std::vector<WallPair> pairs_;
+};
+
+}  // namespace repose::mechanics

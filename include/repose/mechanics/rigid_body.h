@@ -1,0 +1,70 @@
+#pragma once
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "repose/model/model.h"
+#include "repose/surface/distance_field.h"
+
+namespace repose::mechanics {
+
+/// Signed distance of `point` to a shape, negative inside, with its derivatives where it has any.
+surface::Distance distance_to(const scene::Sphere& ball, const Vec3& point);
+surface::Distance distance_to(const scene::Capsule& capsule, const Vec3& point);
+surface::Distance distance_to(const scene::Box& box, const Vec3& point);
+surface::Distance distance_to(const scene::HalfSpace& half, const Vec3& point);
+inline surface::Distance distance_to(const surface::DistanceField& field, const Vec3& point) {
+  return field.sample(point);
+}
+
+/// A body of a model, at the place that a load has given it.
+class RigidBody {
+ public:
+  using Shape = std::variant<scene::Sphere, scene::Capsule, scene::Box, scene::HalfSpace,
+                             surface::DistanceField>;
+  RigidBody(Shape shape, int32_t bone, const Vec3& push)
+      : shape_(std::make_shared<const Shape>(std::move(shape))), bone_(bone), push_(push) {}
+
+  int32_t bone() const { return bone_; }  ///< −1 for one that is pushed
+  const Vec3& push() const { return push_; }
+  const Shape& shape() const { return *shape_; }
+  void place(const Mat3& rotation, const Vec3& shift) {
+    rotation_ = rotation;
+    shift_ = shift;
+  }
+  /// Where a point in space is beside the body as it was at load 0.
+  Vec3 beside(const Vec3& point) const { return rotation_.transpose() * (point - shift_); }
+  /// Distance to a point given by beside(); the derivatives are those in space.
+  surface::Distance distance(const Vec3& beside) const;
+  /// Up to this the distance is known, mm.
+  double reach() const;
+
+ private:
+  std::shared_ptr<const Shape> shape_;
+  int32_t bone_;
+  Vec3 push_;
+  Mat3 rotation_ = Mat3::Identity();
+  Vec3 shift_ = Vec3::Zero();
+};
+
+/// The bodies of a model's contact at load 0. The distances to meshes are known as far as points
+/// and bodies move, and 6 mm and 4 spacings outside them at least.
+std::vector<RigidBody> make_bodies(const model::Model& model);
+
+/// Takes bodies to where they are at a load: `bone_matrix` gives that of a bone.
+template <class BoneMatrix>
+void place_bodies(double load, BoneMatrix&& bone_matrix, std::vector<RigidBody>& bodies) {
+  for (RigidBody& body : bodies) {
+    Mat4 pose = Mat4::Identity();
+    if (body.bone() >= 0)
+      pose = bone_matrix(body.bone());
+    else
+      pose.topRightCorner<3, 1>() = load * body.push();
+    body.place(pose.topLeftCorner<3, 3>(), pose.topRightCorner<3, 1>());
+  }
+}
+
+/// [C] mm, Touches::offset of the contact of a model, whose bodies are at load 0.
+std::vector<double> touch_offsets(const model::Model& model, const std::vector<RigidBody>& bodies);
+
+}  // namespace repose::mechanics

@@ -1,0 +1,59 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "repose/scene/scene.h"
+#include "repose/surface/surface.h"
+
+namespace repose::model {
+
+/// A rigid body that tissue touches: a bone, with which it moves, or a shape that is pushed.
+struct Body {
+  using Shape =
+      std::variant<scene::Sphere, scene::Capsule, scene::Box, scene::HalfSpace, surface::Surface>;
+  std::string name;
+  int32_t bone = -1;         ///< row of Model::bones, whose surface it has; −1: `shape`
+  Shape shape = {};          ///< at load 0, of one that is no bone
+  Vec3 push = Vec3::Zero();  ///< mm from load 0 to load 1, of one that is no bone
+};
+
+/// Numbers that say what a closed form is, at most: from, to, radius of a capsule.
+inline constexpr int shape_numbers = 7;
+
+/// How a point is bound to a body (values as in the file): it may lift off but never passes, or it
+/// keeps its distance and slides along.
+enum class Binding : int8_t { touches = 0, slides = 1 };
+
+/// Points that touch bodies, frictionless (docs/model.md "Contact").
+struct Touches {
+  std::vector<int64_t> point;    ///< [C]
+  std::vector<int32_t> body;     ///< [C] row of Contact::bodies
+  std::vector<Binding> binding;  ///< [C]
+  std::vector<double> area;      ///< [C] mm², of tissue that the point stands for
+  /// [C] mm, or empty: the gap is the distance to the body less this, which is the initial one of
+  /// a point that slides, and of one that touches if it began inside. Not in a file.
+  std::vector<double> offset = {};
+};
+
+/// The two sides of cuts, which do not pass one another: points of one, the other as triangles.
+struct Walls {
+  std::vector<int64_t> point;                     ///< [W]
+  std::vector<double> area;                       ///< [W] mm²
+  std::vector<int32_t> cut;                       ///< [W] which cut the point is of
+  std::vector<std::array<int64_t, 3>> triangles;  ///< [T] seen counter-clockwise from the points
+  std::vector<int32_t> triangle_cut;              ///< [T] which cut the triangle is of
+};
+
+struct Contact {
+  double stiffness = 0;  ///< N/mm³, of the penalty that multipliers make exact
+  double spacing = 1;    ///< mm, of the grids of distances to meshes
+  std::vector<Body> bodies;
+  Touches touches;
+  Walls walls;
+  bool empty() const { return touches.point.empty() && walls.point.empty(); }
+};
+
+}  // namespace repose::model

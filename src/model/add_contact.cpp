@@ -1,0 +1,250 @@
+#include "repose/model/add_contact.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <type_traits>
+
+#include "repose/base/error.h"
+#include "repose/model/bone_field.h"
+#include "repose/model/build.h"
+#include "repose/model/instruments.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double margin = 2;  // mm, beyond what points and bones may come nearer
+
+/// mm², what each point of a layered model stands for in its layer.
+std::vector<double> layer_areas(const SkinMesh& mesh, const Model& model) {
+  const size_t layers = model.points.position.size() / mesh.points.size();
+  std::vector<double> area(model.points.position.size(), 0.0);
+  const auto& x = model.points.position;
+  for (const Triangle& t : mesh.triangles)
+    for (size_t l = 0; l < layers; ++l) {
+      const size_t a = t[0] * layers + l, b = t[1] * layers + l, c = t[2] * layers + l;
+      const double share = (x[b] - x[a]).cross(x[c] - x[a]).norm() / 6;
+      for (const size_t p : {a, b, c}) area[p] += share;
+    }
+  return area;
+}
+
+/// mm, the farthest that a body's points go.
+double travel(const surface::Surface& body, const scene::RigidMotion& move) {
+  double most = 0;
+  for (const Vec3& x : body.points) most = std::max(most, (move.apply(x) - x).norm());
+  return most;
+}
+
+void add(int64_t point, int32_t body, Binding binding, double area, Touches& touches) {
+  touches.point.push_back(point);
+  touches.body.push_back(body);
+  touches.binding.push_back(binding);
+  touches.area.push_back(area);
+}
+
+/// Free points against the bones that they may come to.
+void touch_bones(const scene::Scene& scene, const Attachment& attachment,
+                 const std::vector<double>& area, Model& model) {
+  const bool touching = scene.contact && scene.contact->bones;
+  const BoneField field(model.bone_surfaces);
+  std::vector<double> way;
+  for (size_t b = 0; b < model.bones.size(); ++b)
+    way.push_back(travel(model.bone_surfaces[b], scene.moves[b]));
+  const double farthest = way.empty() ? 0 : *std::max_element(way.begin(), way.end());
+  const size_t layers = area.size() / attachment.bone.size();
+  for (size_t p = 0; p < area.size(); ++p) {
+    if (model.points.set[p] != PointSet::soft_tissue) continue;
+    const size_t column = p / layers;
+    const int32_t slides_on = p % layers == layers - 1 ? attachment.slides_on[column] : -1;
+    for (int32_t b = 0; b < field.size(); ++b) {
+      const auto row = static_cast<int64_t>(p);
+      if (b == slides_on)
+        add(row, b, Binding::slides, area[p], model.contact.touches);
+      else if (touching && !attachment.free[column] &&
+               field.distance(b, model.points.position[p]) <= way[b] + farthest + margin)
+        add(row, b, Binding::touches, area[p], model.contact.touches);
+    }
+  }
+}
+
+Body::Shape shape_of(const scene::Instrument& instrument) {
+  return std::visit(
+      [](const auto& shape) -> Body::Shape {
+        if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, scene::ClosedMesh>)
+          return read_body(shape);
+        else
+          return shape;
+      },
+      instrument.shape);
+}
+
+/// Free points of the skin against an instrument that they slide on.
+void touch_instrument(const scene::Scene& scene, size_t number, const std::vector<double>& area,
+                      Model& model) {
+  const scene::Instrument& instrument = scene.instruments[number];
+  const auto body = static_cast<int32_t>(model.contact.bodies.size());
+  model.contact.bodies.push_back(
+      {fmt::format("instruments[{}]", number), -1, shape_of(instrument), instrument.push});
+  const PushedShape pushed(instrument);
+  bool met = false;
+  for (size_t p = 0; p < area.size(); ++p) {
+    if (model.points.layer[p] != 0 || model.points.set[p] != PointSet::soft_tissue) continue;
+    add(static_cast<int64_t>(p), body, Binding::touches, area[p], model.contact.touches);
+    const auto part = pushed.along(model.points.position[p]);
+    met = met || (part && part->enter <= instrument.push.norm() && part->leave > 0);
+  }
+  if (!met)
+    base::refuse(
+        "{}: instruments[{}]: it reaches no free point of the skin; move it or push it "
+        "farther",
+        scene.file.string(), number);
+}
+
+/// Finer than the tissue can follow, teeth and edges catch single points.
+double spacing(const scene::Scene& scene, const SkinMesh& mesh) {
+  constexpr double share = 0.75;  // of the mean edge
+  if (scene.contact && scene.contact->grid) return *scene.contact->grid;
+  double sum = 0;
+  for (size_t e = 0; e < mesh.edges.size(); ++e) sum += mesh.edge_length(static_cast<int64_t>(e));
+  return share * sum / static_cast<double>(mesh.edges.size());
+}
+
+double penalty(const scene::Scene& scene, const Model& model, size_t columns) {
+  constexpr double times = 25;  // the tissue's own stiffness
+  if (scene.contact && scene.contact->stiffness) return *scene.contact->stiffness;
+  const size_t layers = model.points.position.size() / columns;
+  std::vector<double> thickness;
+  for (size_t c = 0; c < columns; ++c)
+    thickness.push_back(
+        (model.points.position[(c + 1) * layers - 1] - model.points.position[c * layers]).norm());
+  std::nth_element(thickness.begin(), thickness.begin() + columns / 2, thickness.end());
+  return times * effective_modulus(model) / thickness[columns / 2];
+}
+
+}  // namespace
+
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model) {
+  Contact& contact = model.contact;
+  const std::vector<double> area = layer_areas(mesh, model);
+  for (size_t b = 0; b < model.bones.size(); ++b)
+    contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
+  touch_bones(scene, attachment, area, model);
+  for (size_t i = 0; i < scene.instruments.size(); ++i)
+    if (scene.instruments[i].slide) touch_instrument(scene, i, area, model);
+  if (contact.touches.point.empty()) contact.bodies.clear();
+  contact.spacing = spacing(scene, mesh);
+  contact.stiffness = penalty(scene, model, mesh.points.size());
+}
+
+namespace {
+
+/// The doubled part of a cut as a grid of points, path columns by layers.
+class Wall {
+ public:
+  Wall(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, const Model& model)
+      : cut_(cut), model_(model), first_twin_(std::numeric_limits<int64_t>::max()) {
+    for (const auto& [row, twin] : pairs) {
+      twin_of_[row] = twin;
+      first_twin_ = std::min(first_twin_, twin);
+    }
+    for (size_t p = 0; p < model.points.position.size(); ++p)
+      if (!is_twin(static_cast<int64_t>(p)))
+        row_of_[{model.points.column[p], model.points.layer[p]}] = static_cast<int64_t>(p);
+  }
+
+  /// Triangles of the doubles' side and, for each doubled point, a third of the area around it.
+  void build(Walls& walls) const {
+    const int32_t number =
+        walls.cut.empty() ? 0 : 1 + *std::max_element(walls.cut.begin(), walls.cut.end());
+    std::vector<std::array<int64_t, 3>> triangles;
+    std::map<int64_t, double> area;
+    for (size_t i = 0; i + 1 < cut_.columns.size(); ++i)
+      for (int l = 0; l < cut_.layers; ++l) add_quad(i, l, triangles, area);
+    if (faces_away(triangles))
+      for (auto& t : triangles) std::swap(t[1], t[2]);
+    for (const auto& [row, twin] : twin_of_) {
+      walls.point.push_back(row);
+      walls.area.push_back(area.at(twin));
+      walls.cut.push_back(number);
+    }
+    walls.triangles.insert(walls.triangles.end(), triangles.begin(), triangles.end());
+    walls.triangle_cut.resize(walls.triangles.size(), number);
+  }
+
+ private:
+  bool is_twin(int64_t row) const { return row >= first_twin_; }
+  /// The point of the doubles' side, −1 beneath the tissue.
+  int64_t node(size_t i, int layer) const {
+    const auto found = row_of_.find({cut_.columns[i], layer});
+    if (found == row_of_.end()) return -1;
+    const auto twin = twin_of_.find(found->second);
+    return twin == twin_of_.end() ? found->second : twin->second;
+  }
+  void add_quad(size_t i, int l, std::vector<std::array<int64_t, 3>>& triangles,
+                std::map<int64_t, double>& area) const {
+    const std::array<int64_t, 4> q{node(i, l), node(i + 1, l), node(i + 1, l + 1), node(i, l + 1)};
+    if (std::find(q.begin(), q.end(), -1) != q.end()) return;
+    if (std::none_of(q.begin(), q.end(), [&](int64_t p) { return is_twin(p); })) return;
+    for (const std::array<int64_t, 3>& t :
+         {std::array<int64_t, 3>{q[0], q[1], q[2]}, std::array<int64_t, 3>{q[0], q[2], q[3]}}) {
+      const auto& x = model_.points.position;
+      const double share = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).norm() / 6;
+      for (const int64_t p : t) area[p] += share;
+      triangles.push_back(t);
+    }
+  }
+  /// Whether the triangles' normals point into the tissue of the doubles.
+  bool faces_away(const std::vector<std::array<int64_t, 3>>& triangles) const {
+    const auto& x = model_.points.position;
+    std::map<int64_t, std::pair<Vec3, int>> middle;  // of the doubles' prisms
+    for (const auto& prism : model_.prisms.points) {
+      Vec3 mean = Vec3::Zero();
+      for (const int64_t p : prism) mean += x[p] / 6;
+      for (const int64_t p : prism)
+        if (is_twin(p)) {
+          auto& [sum, count] = middle.try_emplace(p, Vec3::Zero(), 0).first->second;
+          sum += mean;
+          ++count;
+        }
+    }
+    double outwards = 0;
+    for (const auto& t : triangles)
+      for (const int64_t p : t)
+        if (const auto found = middle.find(p); found != middle.end()) {
+          const auto& [sum, count] = found->second;
+          outwards += (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[p] - sum / count);
+        }
+    return outwards < 0;
+  }
+
+  const Cut& cut_;
+  const Model& model_;
+  int64_t first_twin_;  // they are the last points
+  std::map<int64_t, int64_t> twin_of_;
+  std::map<std::array<int64_t, 2>, int64_t> row_of_;  // column, layer
+};
+
+}  // namespace
+
+void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
+  Touches& touches = model.contact.touches;
+  std::map<int64_t, int64_t> twin_of;
+  for (const auto& [row, twin] : pairs) twin_of[row] = twin;
+  const size_t before = touches.point.size();
+  for (size_t c = 0; c < before; ++c) {
+    const auto twin = twin_of.find(touches.point[c]);
+    if (twin == twin_of.end()) continue;
+    touches.area[c] /= 2;
+    add(twin->second, touches.body[c], touches.binding[c], touches.area[c], touches);
+  }
+}
+
+void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
+  Wall(cut, pairs, model).build(model.contact.walls);
+}
+
+}  // namespace repose::model

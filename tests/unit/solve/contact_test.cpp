@@ -1,0 +1,196 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "repose/model/add_contact.h"
+#include "repose/model/cut.h"
+#include "rest.h"
+#include "solid_block.h"
+
+/// Contact solved: closed forms.
+namespace repose {
+namespace {
+
+using model::Binding;
+using model::PointSet;
+using testing::Rest;
+using testing::settings;
+using testing::solid_block;
+
+constexpr double young = 0.015, poisson = 0.45;  // of solid_block
+
+const std::vector<double>& field(const Rest& rest, const std::string& name) {
+  for (const model::PointField& field : rest.rows.point_fields)
+    if (field.name == name) return field.values;
+  throw std::runtime_error(name + " is missing");
+}
+
+/// The area that each point of a block stands for on the face whose points lie in a plane.
+std::vector<double> face_areas(const model::Model& m, const Vec3& normal, double offset) {
+  std::vector<double> area(m.points.position.size(), 0.0);
+  for (const auto& prism : m.prisms.points) {
+    std::vector<std::vector<int>> faces = {{0, 1, 2}, {3, 4, 5}};
+    for (int k = 0; k < 3; ++k) faces.push_back({k, (k + 1) % 3, 3 + (k + 1) % 3, 3 + k});
+    for (const auto& face : faces) {
+      std::vector<Vec3> x;
+      for (const int c : face) x.push_back(m.points.position[prism[c]]);
+      bool on = true;
+      for (const Vec3& at : x) on = on && std::abs(at.dot(normal) - offset) < 1e-9;
+      if (!on) continue;
+      const double whole = face.size() == 3 ? (x[1] - x[0]).cross(x[2] - x[0]).norm() / 2
+                                            : (x[1] - x[0]).cross(x[3] - x[0]).norm();
+      for (const int c : face) area[prism[c]] += whole / static_cast<double>(face.size());
+    }
+  }
+  return area;
+}
+
+/// Binds the points of a face to a body.
+void bind_face(model::Model& m, model::Body body, Binding binding,
+               const std::vector<double>& area) {
+  const auto row = static_cast<int32_t>(m.contact.bodies.size());
+  m.contact.bodies.push_back(std::move(body));
+  for (size_t i = 0; i < area.size(); ++i) {
+    if (area[i] == 0 || m.points.set[i] != PointSet::soft_tissue) continue;
+    m.contact.touches.point.push_back(static_cast<int64_t>(i));
+    m.contact.touches.body.push_back(row);
+    m.contact.touches.binding.push_back(binding);
+    m.contact.touches.area.push_back(area[i]);
+  }
+  m.contact.stiffness = 0.05;
+}
+
+model::Body plane(const Vec3& point, const Vec3& normal, const Vec3& push = Vec3::Zero()) {
+  return {"plane", -1, scene::HalfSpace{point, normal}, push};
+}
+
+TEST(Contact, APlateThatPressesAConfinedBlockMeetsTheSamePressureEverywhere) {
+  model::Model m = solid_block(5, 4, 4, poisson, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  const auto wall = [&](const Vec3& normal, double at, Binding binding, const Vec3& push) {
+    bind_face(m, plane(at * normal, -normal, push), binding, face_areas(m, normal, at));
+  };
+  wall(-x, 0, Binding::slides, Vec3::Zero());
+  wall(x, 20, Binding::slides, Vec3::Zero());
+  wall(-y, 0, Binding::slides, Vec3::Zero());
+  wall(y, 15, Binding::slides, Vec3::Zero());
+  wall(z, 0, Binding::touches, {0, 0, -1.8});
+  const Rest rest = testing::find_rest(m, settings(1e-6));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  const model::Moduli moduli = model::moduli({young, poisson});
+  const double stretch = 1 - 1.8 / 9;
+  const double pressure = (moduli.shear + moduli.volume) * (1 - stretch);
+  const std::vector<double> top = face_areas(m, z, 0);
+  const std::vector<double>& force = field(rest, "contact_force");
+  double whole = 0;
+  for (size_t i = 0; i < top.size(); ++i) {
+    const Vec3 at = m.points.position[i];
+    EXPECT_LE((rest.rows.position[i] - Vec3(at.x(), at.y(), at.z() - (1 - stretch) * (at.z() + 9)))
+                  .norm(),
+              2e-6);
+    if (top[i] == 0) continue;
+    EXPECT_NEAR(-force[3 * i + 2] / top[i], pressure, 1e-5 * pressure);
+    whole -= force[3 * i + 2];
+  }
+  EXPECT_NEAR(whole, pressure * 300, 1e-5 * pressure * 300);
+  EXPECT_LE(rest.summary.last.penetration, 1e-6);
+}
+
+TEST(Contact, ABlockThatSlidesAlongAPlaneMeetsNoResistance) {
+  model::Model m = solid_block(6, 5, 4, poisson, 0, [](int, int, int a) {
+    return a == 0 ? PointSet::held : PointSet::soft_tissue;
+  });
+  testing::aim(m, [](const Vec3& x) -> Vec3 { return x + Vec3(4, 3, 0); });
+  bind_face(m, plane({0, 0, -9}, {0, 0, 1}), Binding::slides, face_areas(m, Vec3::UnitZ(), -9));
+  const Rest rest = testing::find_rest(m, settings(1e-6));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    EXPECT_LE((rest.rows.position[i] - m.points.position[i] - Vec3(4, 3, 0)).norm(), 2e-6);
+}
+
+/// What the bottom of a layer of thickness h adds to Hertz's force, with χ = √(R δ)/h (Dimitriadis,
+/// Horkay, Maresca, Kachar & Chadwick 2002, Biophysical Journal 82, Eq. 12, bonded).
+double thin_layer(double chi) {
+  constexpr double nu = poisson, pi = std::numbers::pi;
+  const double a = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1 - nu),
+               b = (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1 - nu);
+  return 1 - 2 * a / pi * chi + 4 * a * a / (pi * pi) * chi * chi -
+         8 / std::pow(pi, 3) * (a * a * a + 4 * pi * pi / 15 * b) * std::pow(chi, 3) +
+         16 * a / std::pow(pi, 4) * (a * a * a + 3 * pi * pi / 5 * b) * std::pow(chi, 4);
+}
+
+/// The force on a ball of radius R pressed by δ into a layer, over that of Hertz for it.
+double over_hertz(int columns, int layers) {
+  constexpr double radius = 100, depth = 1;
+  model::Model m = solid_block(columns, columns, layers, poisson, 0, [&](int i, int j, int a) {
+    const bool rim = i == 0 || j == 0 || i + 1 == columns || j + 1 == columns || a + 1 == layers;
+    return rim ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  const double middle = 5.0 * (columns - 1) / 2;
+  bind_face(m, {"ball", -1, scene::Sphere{{middle, middle, radius}, radius}, Vec3(0, 0, -depth)},
+            Binding::touches, face_areas(m, Vec3::UnitZ(), 0));
+  const Rest rest = testing::find_rest(m, settings(1e-4));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  const std::vector<double>& force = field(rest, "contact_force");
+  double whole = 0;
+  for (size_t i = 2; i < force.size(); i += 3) whole -= force[i];
+  const double modulus = young / (1 - poisson * poisson);
+  const double chi = std::sqrt(radius * depth) / (3.0 * (layers - 1));
+  return whole / (4.0 / 3 * modulus * std::sqrt(radius) * std::pow(depth, 1.5) * thin_layer(chi));
+}
+
+TEST(Contact, ABallPressedIntoALayerMeetsHertzsForce) { EXPECT_NEAR(over_hertz(25, 16), 1, 0.05); }
+
+/// A block of 30 × 40 × 9 mm whose ends and bottom are held, cut along its middle but for its ends.
+model::Model cut_block(bool cut) {
+  model::Model m = solid_block(7, 9, 4, poisson, 0, [](int, int j, int a) {
+    return j == 0 || j == 8 || a == 3 ? PointSet::held : PointSet::soft_tissue;
+  });
+  for (const auto& prism : m.prisms.points)
+    for (const auto& t : {std::array{prism[0], prism[1], prism[2]}})
+      if (m.points.layer[t[0]] == 0) m.skin.push_back({t[0], t[1], t[2]});
+  if (!cut) return m;
+  m.contact.stiffness = 0.05;
+  model::Cut path{{}, 4, true};
+  for (int i = 0; i < 7; ++i) path.columns.push_back(4 * 7 + i);
+  model::cut_along(path, m);
+  return m;
+}
+
+// The triangles beside the cut are no mirror images, so that the whole block carries some shear
+// there, which sides without friction do not.
+TEST(Contact, TheSidesOfACutThatIsPressedTogetherCarryWhatTheWholeBlockCarries) {
+  model::Model whole = cut_block(false), parted = cut_block(true);
+  const auto press = [](const Vec3& x) -> Vec3 { return {x.x(), 0.9 * x.y() + 2, x.z()}; };
+  testing::aim(whole, press);
+  testing::aim(parted, press);
+  const Rest one = testing::find_rest(whole, settings(1e-5));
+  const Rest two = testing::find_rest(parted, settings(1e-3));
+  EXPECT_TRUE(two.summary.path.complete()) << two.summary.last.reason;
+  for (size_t i = 0; i < whole.points.position.size(); ++i)
+    EXPECT_LE((one.rows.position[i] - two.rows.position[i]).norm(), 0.05);  // of 2 mm
+  EXPECT_LE(two.summary.last.penetration, 1e-3);
+  const std::vector<double>& force = field(two, "contact_force");
+  Vec3 sum = Vec3::Zero();
+  double pressed = 0;
+  for (size_t i = 0; i < force.size(); i += 3) {
+    sum += Vec3(force[i], force[i + 1], force[i + 2]);
+    pressed += std::abs(force[i + 1]) / 2;
+  }
+  EXPECT_GT(pressed, 0.1);
+  EXPECT_LE(sum.norm(), 1e-12 * pressed);
+}
+
+TEST(Contact, TheSidesOfACutThatIsPulledApartLetGo) {
+  model::Model parted = cut_block(true);
+  testing::aim(parted, [](const Vec3& x) -> Vec3 { return {x.x(), 1.1 * x.y() - 2, x.z()}; });
+  const Rest rest = testing::find_rest(parted, settings(1e-3));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  for (const double p : field(rest, "contact_pressure")) EXPECT_EQ(p, 0);
+}
+
+}  // namespace
+}  // namespace repose
