@@ -35,7 +35,6 @@ void read(const std::filesystem::path& input, Job& job) {
   model::BuiltModel built = build(*job.anatomy, input);
   job.model = std::move(built.model);
   job.held = std::move(built.held);
-  job.sliders = std::move(built.sliders);
   job.cuts = std::move(built.cuts);
   job.tearing = scene.tearing;
   job.building = describe_build(built.report);
@@ -67,8 +66,10 @@ void bring_into_equilibrium(MPI_Comm comm, Job& job) {
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
   job.solid = model::is_solid(job.model);
+  job.touches = !job.model.contact.empty();
+  for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
   MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);
-  for (bool* flag : {&job.solid, &job.remeshed, &job.initial_equilibrium})
+  for (bool* flag : {&job.solid, &job.touches, &job.remeshed, &job.initial_equilibrium})
     MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
 }
 

@@ -99,19 +99,29 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
                                const std::vector<Vec3>& forces) {
   std::string text;
   for (size_t k = 0; k < held.size(); ++k)
-    text += report_row(
-        fmt::format("instrument {}", k),
-        fmt::format("holds {} points; the tissue pushes on it with ({:.4g}, {:.4g}, {:.4g}) "
-                    "N, {:.4g} N",
-                    held[k].size(), forces[k].x(), forces[k].y(), forces[k].z(), forces[k].norm()));
+    if (!held[k].empty())
+      text += report_row(
+          fmt::format("instrument {}", k),
+          fmt::format("holds {} points; the tissue pushes on it with ({:.4g}, {:.4g}, {:.4g}) "
+                      "N, {:.4g} N",
+                      held[k].size(), forces[k].x(), forces[k].y(), forces[k].z(),
+                      forces[k].norm()));
   return text;
 }
 
-std::string describe_sliding(const solve::Sliding& sliding) {
-  if (sliding.rounds == 0) return "";
-  return report_row("sliding", fmt::format("{} in {} rounds, {:.2g} mm to go",
-                                           ending(sliding.settled, sliding.stopped, "NOT SETTLED"),
-                                           sliding.rounds, sliding.to_go));
+std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s) {
+  std::string text;
+  for (size_t k = 0; k < s.contacts.size(); ++k) {
+    const solve::BodyContact& on = s.contacts[k];
+    if (on.points == 0) continue;
+    text += report_row(
+        "contact", fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N",
+                               on.points, k < bodies.size() ? bodies[k] : "the sides of cuts",
+                               on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
+  }
+  if (std::isfinite(s.last.penetration))
+    text += report_row("penetration", fmt::format("{:.2g} mm at most", s.last.penetration));
+  return text;
 }
 
 std::string describe_tearing(const solve::Tearing& t) {

@@ -42,18 +42,11 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   base::refuse("{}: the result would replace the input; give another -output", input.string());
 }
 
-/// Sliding points find their places and springs tear, in rounds of searches.
-struct Rounds {
-  solve::Sliding sliding;
-  solve::Tearing tearing;
-  /// Why the result is not to be trusted as an end, or nothing.
-  std::string unsettled() const {
-    const std::string who =
-        sliding.stopped || tearing.stopped ? "a signal or the time limit: " : "";
-    if (!sliding.settled) return who + "points that slide have not found their places";
-    return tearing.settled ? "" : who + "more may tear";
-  }
-};
+/// Why a result is not to be trusted as an end, or nothing.
+std::string unsettled(const solve::Tearing& tearing) {
+  if (tearing.settled) return "";
+  return tearing.stopped ? "a signal or the time limit: more may tear" : "more may tear";
+}
 
 /// One run of a job by a strategy, under one deadline.
 class Run {
@@ -77,7 +70,7 @@ class Run {
 
  private:
   void start_from(double load, const std::vector<Vec3>& position);
-  Rounds go_through_rounds();
+  solve::Tearing tear();
   Coarser solve_coarser();
   solve::Summary search(Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
@@ -101,16 +94,13 @@ void Run::start_from(double load, const std::vector<Vec3>& position) {
   settings.extent = solve::Extent::whole;
 }
 
-Rounds Run::go_through_rounds() {
-  Rounds rounds;
-  const solve::Settings& settings = strategy_.settings;
-  rounds.sliding = solve::slide(comm, job_.model, job_.sliders, settings, start_.position);
-  if (rounds.sliding.rounds > 0) stages_.end("slide");
-  if (rounds.sliding.stopped) start_from(rounds.sliding.load, rounds.sliding.position);
-  rounds.tearing = solve::tear(comm, job_.model, job_.tearing, settings, start_.position);
-  if (rounds.tearing.rounds > 0) stages_.end("tear");
-  if (rounds.tearing.torn) start_from(1, rounds.tearing.position);
-  return rounds;
+/// Springs tear, in rounds of searches.
+solve::Tearing Run::tear() {
+  const solve::Tearing tearing =
+      solve::tear(comm, job_.model, job_.tearing, strategy_.settings, start_.position);
+  if (tearing.rounds > 0) stages_.end("tear");
+  if (tearing.torn) start_from(1, tearing.position);
+  return tearing;
 }
 
 /// Solves the strategy's coarser models; their answer is then the guess for the scene's own model
@@ -130,9 +120,8 @@ Coarser Run::solve_coarser() {
   if (sequence.near_enough || last) {
     coarser.discretisation_error = sequence.levels.back().discretisation_error;
     const double accuracy = settings.path.accuracy;
-    coarser.told += converging
-                        ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
-                        : describe_choice(sequence, accuracy);
+    coarser.told += converging ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
+                               : describe_choice(sequence, accuracy);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
     settings.weights = sequence.last_settings.weights;
     job_.model = std::move(sequence.last.model);
@@ -192,9 +181,9 @@ std::string Run::write_given_skin(const Writer& writer) const {
 }
 
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
-  const Rounds rounds = go_through_rounds();
+  const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  Writer writer(comm, name_, job_.model, coarser, checkpoint_interval, rounds.unsettled());
+  Writer writer(comm, name_, job_.model, coarser, checkpoint_interval, unsettled(tearing));
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
@@ -202,9 +191,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const std::string given = write_given_skin(writer);
   stages_.end("write");
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
-  say(coarser.told + writer.comparison() + describe_sliding(rounds.sliding) +
-      describe_tearing(rounds.tearing));
-  say(writer.reactions(job_.held));
+  say(coarser.told + writer.comparison() + describe_tearing(tearing));
+  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);
   return summary.path.complete() && !folded ? base::Exit::done : base::Exit::not_converged;

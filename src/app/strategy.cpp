@@ -34,7 +34,7 @@ std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, co
        "the input is a model, which does not tell what it was made from"},
       {s.settings.path.load_steps > 0, false, true, "load_steps are asked for"},
       {!job.cuts.empty(), false, true, "the scene has incisions"},
-      {s.slides, false, true, "an instrument slides"},
+      {job.touches, true, false, "tissue touches bone, instruments or itself"},
       {s.tears, false, true, "the tissue may tear"},
   };
 }
@@ -137,7 +137,6 @@ std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Jo
                                                   : "the whole: " + region.why) +
       report_row("coarser models",
                  describe_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), s));
-  if (s.slides) text += report_row("sliding", "in rounds: points held, then moved by their forces");
   if (s.tears) text += report_row("tearing", "in rounds: at rest, then springs above the limit go");
   return text;
 }
@@ -152,7 +151,6 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.settings.stability = options.flag("stability");
   s.settings.monitor = options.flag("monitor_mm");
   s.settings.initial_equilibrium = job.initial_equilibrium;
-  s.slides = !job.sliders.empty();
   s.tears = job.tearing.has_value();
   const Wish wish = wish_of(options);
   const std::vector<Obstacle> all = obstacles(options, job, s);

@@ -80,35 +80,6 @@ std::optional<Stretch> line_and(const scene::HalfSpace& half, const Vec3& p, con
   return Stretch{-infinite, -height / rise};
 }
 
-using Foot = PushedShape::Foot;
-
-Foot foot_on(const scene::Sphere& ball, const Vec3& p) {
-  const Vec3 from = p - ball.center;
-  const Vec3 normal = from.norm() > 0 ? Vec3(from.normalized()) : Vec3::UnitX();
-  return {ball.center + ball.radius * normal, normal};
-}
-
-Foot foot_on(const scene::Capsule& capsule, const Vec3& p) {
-  const Vec3 axis = capsule.to - capsule.from;
-  const double square = axis.squaredNorm();
-  const double along = square > 0 ? std::clamp((p - capsule.from).dot(axis) / square, 0.0, 1.0) : 0;
-  return foot_on(scene::Sphere{capsule.from + along * axis, capsule.radius}, p);
-}
-
-Foot foot_on(const scene::Box& box, const Vec3& p) {
-  const Vec3 from = p - box.center, half = box.size / 2;
-  Vec3 foot = from.cwiseMax(-half).cwiseMin(half);
-  int axis;
-  (from.cwiseAbs() - half).maxCoeff(&axis);
-  foot[axis] = from[axis] < 0 ? -half[axis] : half[axis];
-  return {box.center + foot, Vec3::Unit(axis)};
-}
-
-Foot foot_on(const scene::HalfSpace& half, const Vec3& p) {
-  const Vec3 normal = half.normal.normalized();
-  return {p - (p - half.point).dot(normal) * normal, normal};
-}
-
 }  // namespace
 
 surface::Surface read_body(const scene::ClosedMesh& mesh) {
@@ -123,7 +94,6 @@ struct PushedShape::Body {
   scene::Instrument instrument;
   Vec3 direction;
   std::optional<surface::DistanceTree> mesh;
-  surface::Surface triangles;  // of the mesh
 
   /// First part of the line in the mesh, no farther than the push before p.
   std::optional<Stretch> in_mesh(const Vec3& p) const {
@@ -138,22 +108,12 @@ struct PushedShape::Body {
     if (!exit) return {};
     return Stretch{enter, beyond + exit->distance};
   }
-
-  Foot on_mesh(const Vec3& p) const {
-    const auto found = mesh->nearest(p);
-    const Triangle& t = triangles.triangles[found.triangle];
-    const auto& x = triangles.points;
-    return {found.point, (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).normalized()};
-  }
 };
 
 PushedShape::PushedShape(const scene::Instrument& instrument)
-    : body_(std::make_unique<Body>(
-          Body{instrument, instrument.push.normalized(), std::nullopt, {}})) {
-  if (const auto* mesh = std::get_if<scene::ClosedMesh>(&instrument.shape)) {
-    body_->triangles = read_body(*mesh);
-    body_->mesh.emplace(body_->triangles);
-  }
+    : body_(std::make_unique<Body>(Body{instrument, instrument.push.normalized(), std::nullopt})) {
+  if (const auto* mesh = std::get_if<scene::ClosedMesh>(&instrument.shape))
+    body_->mesh.emplace(read_body(*mesh));
   if (const auto* half = std::get_if<scene::HalfSpace>(&instrument.shape))
     if (!(half->normal.dot(instrument.push) > 0))
       base::refuse("a half-space must be pushed to the side of its normal; turn one of them round");
@@ -172,30 +132,6 @@ std::optional<Stretch> PushedShape::along(const Vec3& p) const {
           return line_and(shape, before, body_->direction);
       },
       body_->instrument.shape);
-}
-
-PushedShape::Foot PushedShape::nearest(const Vec3& p) const {
-  const Vec3& push = body_->instrument.push;
-  const auto foot = [&]() -> Foot {
-    if (body_->mesh) return body_->on_mesh(p - push);
-    return std::visit(
-        [&](const auto& shape) -> Foot {
-          if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, scene::ClosedMesh>)
-            return {};
-          else
-            return foot_on(shape, p - push);
-        },
-        body_->instrument.shape);
-  }();
-  return {foot.point + push, foot.normal};
-}
-
-std::vector<Slider> sliders(const scene::Scene& scene,
-                            const std::vector<std::vector<int64_t>>& held) {
-  std::vector<Slider> result;
-  for (size_t k = 0; k < held.size(); ++k)
-    if (scene.instruments[k].slide) result.push_back({PushedShape(scene.instruments[k]), held[k]});
-  return result;
 }
 
 namespace {

@@ -187,6 +187,37 @@ void show_states(Searcher& searcher, const Settings& settings,
   });
 }
 
+/// At the objective's last update. Collective.
+std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
+  const discrete::Part& part = objective.positions().part();
+  if (!part.contact) return {};
+  std::vector<BodyContact> contacts(part.bodies.size() + 1);
+  mechanics::TouchLoop& touches = objective.touches();
+  touches.look(objective.positions().local());
+  for (size_t c = 0; c < touches.gaps().size(); ++c) {
+    const double pressure = touches.pressure(c);
+    if (pressure == 0) continue;
+    BodyContact& on = contacts[touches.touches().body[c]];
+    ++on.points;
+    on.force -= pressure * touches.touches().area[c] * touches.normal(c);
+  }
+  const mechanics::WallLoop& walls = objective.walls();
+  for (const mechanics::WallPair& pair : walls.pairs()) {
+    const double gap = pair.gap(objective.positions().local());
+    const double pressure =
+        mechanics::press(gap, pair.multiplier, walls.stiffness(), false).pressure;
+    if (pressure == 0 || pair.area == 0) continue;
+    ++contacts.back().points;
+    contacts.back().force -= pressure * pair.area * pair.normal;
+  }
+  for (BodyContact& on : contacts) {
+    const MPI_Comm comm = objective.positions().comm();
+    MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
+    MPI_Allreduce(MPI_IN_PLACE, on.force.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
+  }
+  return contacts;
+}
+
 Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
                       const Start& start, base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
@@ -228,6 +259,7 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
         evaluations_before = searcher.evaluations();
         receive(summary.last, natural.rows(objective, settings.exact_volume));
       });
+  summary.contacts = contacts_of(objective);
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

@@ -22,7 +22,8 @@ struct Job {
   bool remeshed = false;                      ///< the skin is not the given one, on all ranks
   std::string building;                       ///< what the builder has to say, on rank 0
   std::vector<std::vector<int64_t>> held;     ///< points of each instrument, on rank 0
-  std::vector<model::Slider> sliders;         ///< on rank 0
+  std::vector<std::string> bodies;            ///< that the tissue may touch, on rank 0
+  bool touches = false;                       ///< it touches bodies or itself, on all ranks
   std::vector<model::Cut> cuts;               ///< on rank 0
   std::optional<double> tearing;              ///< N, on rank 0
 };

@@ -5,7 +5,6 @@
 #include "repose/model/build.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
-#include "repose/solve/sliding.h"
 #include "repose/solve/tearing.h"
 
 /// What a person reads when a run ends.
@@ -29,8 +28,9 @@ std::string describe_prestress(const solve::Prestress& prestress);
 std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
                                const std::vector<Vec3>& forces);
 
-/// One row, or nothing where no point slides.
-std::string describe_sliding(const solve::Sliding& sliding);
+/// What the tissue presses on in the end, a row a body of those names, and how deep anything
+/// passes.
+std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s);
 
 /// What tore and where, in two rows; nothing where no limit was asked for.
 std::string describe_tearing(const solve::Tearing& tearing);

@@ -27,7 +27,6 @@ struct BuiltModel {
   Model model;
   BuildReport report;
   std::vector<std::vector<int64_t>> held;  ///< [instruments] rows of the points that each holds
-  std::vector<Slider> sliders;             ///< those on which the skin slides
   std::vector<Cut> cuts;  ///< the incisions, not made yet: cut_along after the prestress (cut.h)
 };
 

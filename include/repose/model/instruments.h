@@ -30,26 +30,10 @@ class PushedShape {
 
   std::optional<Stretch> along(const Vec3& p) const;
 
-  /// The point of the surface nearest to `p`, and the unit normal there (either way).
-  struct Foot {
-    Vec3 point, normal;
-  };
-  Foot nearest(const Vec3& p) const;
-
  private:
   struct Body;
   std::unique_ptr<Body> body_;
 };
-
-/// Held points that slide on an instrument.
-struct Slider {
-  PushedShape shape;
-  std::vector<int64_t> points;  ///< rows
-};
-
-/// The instruments of the scene on which skin slides, with the points that they hold.
-std::vector<Slider> sliders(const scene::Scene& scene,
-                            const std::vector<std::vector<int64_t>>& held);
 
 /// Makes held points of the free skin points that an instrument to which the skin sticks sweeps
 /// over or ends on: their

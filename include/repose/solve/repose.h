@@ -47,6 +47,12 @@ struct RegionSummary {
   double error = 0;                 ///< mm, its share of the displacement error
 };
 
+/// What the tissue presses on.
+struct BodyContact {
+  int64_t points = 0;         ///< that press
+  Vec3 force = Vec3::Zero();  ///< N, of the tissue on the body; of cuts' sides, of one on the other
+};
+
 /// What a run came to, for the closing table.
 struct Summary {
   PathOutcome path;
@@ -56,7 +62,9 @@ struct Summary {
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
-  std::optional<RegionSummary> region;       ///< where not the whole was searched
+  std::vector<BodyContact>
+      contacts;  ///< a row a body of the model's contact, then the sides of cuts
+  std::optional<RegionSummary> region;  ///< where not the whole was searched
 };
 
 /// Where a search begins.
