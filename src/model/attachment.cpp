@@ -24,7 +24,7 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Tissue& t
     const auto& [where, how] = tissue.attach_regions[k];
     const bool drawn = std::holds_alternative<scene::SphereRegion>(where) ||
                        std::holds_alternative<scene::CurveRegion>(where);
-    const Inside inside = inside_of(where, drawn ? 0 : near);
+    const Contains inside = contains_of(where, drawn ? 0 : near);
     int64_t met = 0;
     for (size_t v = 0; v < columns.deep.size(); ++v) {
       if (attachment.bone[v] < 0 || !inside(columns.deep[v])) continue;

@@ -9,13 +9,11 @@
 #include <numeric>
 
 #include "repose/base/error.h"
+#include "repose/model/region.h"
 #include "repose/base/text.h"
-#include "repose/surface/defects.h"
-#include "repose/surface/distance.h"
 #include "repose/surface/point_tree.h"
 #include "repose/surface/read.h"
 #include "repose/surface/vertex_values.h"
-#include "repose/surface/volume.h"
 
 namespace repose::model {
 
@@ -60,34 +58,6 @@ struct Place {
 
 using Inside = std::function<bool(const Place&)>;
 
-Inside inside_of(const scene::SphereRegion& sphere) {
-  return [sphere](const Place& at) { return (at.middle - sphere.center).norm() <= sphere.radius; };
-}
-
-Inside inside_of(const scene::MeshRegion& mesh) {
-  const surface::Surface read = surface::read_surface(mesh.file);
-  const surface::Defects defects = surface::inspect(read, false);
-  if (defects.border_edges > 0 || defects.non_manifold_edges > 0)
-    base::refuse("{}: a region of a material is the inside of a closed mesh; this one has {}",
-                 mesh.file.string(), surface::describe(defects));
-  const auto tree = std::make_shared<surface::DistanceTree>(read);
-  return [tree](const Place& at) { return tree->contains(at.middle); };
-}
-
-Inside inside_of(const scene::LabelRegion& region) {
-  const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
-  const Mat3 to_voxels = surface::inverse_axes(*labels);
-  return [labels, to_voxels, label = region.label](const Place& place) {
-    const Vec3 at = to_voxels * (place.middle - labels->origin);
-    std::array<int64_t, 3> voxel;
-    for (int axis = 0; axis < 3; ++axis) {
-      voxel[axis] = std::lround(at[axis]);
-      if (voxel[axis] < 0 || voxel[axis] >= labels->size[axis]) return false;
-    }
-    return labels->at(voxel[0], voxel[1], voxel[2]) == static_cast<float>(label);
-  };
-}
-
 /// Which vertices are painted.
 std::vector<char> painted_vertices(const scene::PaintedRegion& region,
                                    const surface::VertexValues& mesh) {
@@ -112,6 +82,12 @@ std::vector<char> painted_vertices(const scene::PaintedRegion& region,
       painted[p] &= std::abs(values[p] - region.color[c]) <= tolerance;
   }
   return painted;
+}
+
+/// A prism lies in a region of space where its middle does.
+template <class Where>
+Inside inside_of(const Where& where) {
+  return [contains = contains_of(where)](const Place& at) { return contains(at.middle); };
 }
 
 /// A prism lies in it where the painted mesh's vertex nearest to the skin above is painted.

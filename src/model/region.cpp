@@ -12,11 +12,11 @@
 namespace repose::model {
 namespace {
 
-Inside inside(const scene::SphereRegion& sphere, double near) {
+Contains inside(const scene::SphereRegion& sphere, double near) {
   return [=](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius + near; };
 }
 
-Inside inside(const scene::CurveRegion& curve, double near) {
+Contains inside(const scene::CurveRegion& curve, double near) {
   return [=](const Vec3& x) {
     for (size_t k = 0; k + 1 < curve.path.size(); ++k) {
       const Vec3 axis = curve.path[k + 1] - curve.path[k], from = x - curve.path[k];
@@ -28,7 +28,7 @@ Inside inside(const scene::CurveRegion& curve, double near) {
   };
 }
 
-Inside inside(const scene::MeshRegion& mesh, double near) {
+Contains inside(const scene::MeshRegion& mesh, double near) {
   const surface::Surface read = surface::read_surface(mesh.file);
   const surface::Defects defects = surface::inspect(read, false);
   if (defects.border_edges > 0 || defects.non_manifold_edges > 0)
@@ -40,7 +40,7 @@ Inside inside(const scene::MeshRegion& mesh, double near) {
   };
 }
 
-Inside inside(const scene::LabelRegion& region, double near) {
+Contains inside(const scene::LabelRegion& region, double near) {
   const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
   const Mat3 to_voxels = surface::inverse_axes(*labels);
   std::array<int64_t, 3> reach;
@@ -63,7 +63,7 @@ Inside inside(const scene::LabelRegion& region, double near) {
 
 }  // namespace
 
-Inside inside_of(const scene::Region& region, double near) {
+Contains contains_of(const scene::Region& region, double near) {
   return std::visit([&](const auto& of) { return inside(of, near); }, region);
 }
 

@@ -5,10 +5,10 @@
 
 namespace repose::model {
 
-using Inside = std::function<bool(const Vec3&)>;
+using Contains = std::function<bool(const Vec3&)>;
 
 /// Whether a point lies in a region, or no farther than `near` mm from it (to half a voxel of a
 /// label map). Reads the region's file; throws InputError for a mesh that is not closed.
-Inside inside_of(const scene::Region& region, double near = 0);
+Contains contains_of(const scene::Region& region, double near = 0);
 
 }  // namespace repose::model

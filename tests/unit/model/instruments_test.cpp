@@ -75,25 +75,6 @@ TEST(PushedShape, a_mesh_is_met_as_the_shape_it_is) {
   std::filesystem::remove(file);
 }
 
-TEST(PushedShape, the_nearest_point_lies_on_the_surface) {
-  const Vec3 push(0, 0, -10);
-  const auto foot = [&](const Instrument& instrument, const Vec3& p, const Vec3& point,
-                        const Vec3& normal) {
-    const PushedShape::Foot found = PushedShape(instrument).nearest(p);
-    EXPECT_LT((found.point - point).norm(), 1e-12) << found.point.transpose();
-    EXPECT_NEAR(std::abs(found.normal.dot(normal)), 1, 1e-12) << found.normal.transpose();
-  };
-  foot({scene::Sphere{{0, 0, 20}, 5}, push}, {0, 0, 4}, {0, 0, 5}, {0, 0, 1});
-  foot({scene::Capsule{{-9, 0, 20}, {9, 0, 20}, 5}, push}, {3, 0, 7}, {3, 0, 5}, {0, 0, 1});
-  foot({scene::Box{{0, 0, 20}, {8, 8, 4}}, push}, {1, 2, 8.5}, {1, 2, 8}, {0, 0, 1});
-  foot({scene::Box{{0, 0, 20}, {8, 8, 4}}, push}, {1, 2, 0}, {1, 2, 8}, {0, 0, 1});
-  foot({scene::HalfSpace{{0, 0, 20}, {0, 0, -3}}, push}, {7, 8, 14}, {7, 8, 10}, {0, 0, 1});
-  const auto file = std::filesystem::temp_directory_path() / "instrument_foot_test.ply";
-  surface::write_ply(file, patches::box({-4, -4, 18}, {4, 4, 22}));
-  foot({scene::ClosedMesh{file}, push}, {1, 2, 8.5}, {1, 2, 8}, {0, 0, 1});
-  std::filesystem::remove(file);
-}
-
 scene::Scene pressed(const Instrument& instrument) {
   scene::Scene scene = patches::scene_of(3, {"bone"});
   scene.instruments = {instrument};

@@ -44,7 +44,7 @@ TEST(PolakRibiere, FindsTheRestPositionOfTissue) {
   discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 0.3});
   discrete::Tangent tangent(objective);
   linear::TangentSolver solver(positions, tangent);
-  Minimiser newton(objective, solver, nullptr);
+  solve::Minimiser newton(objective, solver, nullptr);
   const base::VecHandle x = positions.make_vector(), rest = positions.make_vector();
   ASSERT_TRUE(newton.run(rest, 1e-9).converged);
   polak_ribiere(objective, x);
