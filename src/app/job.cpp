@@ -27,6 +27,7 @@ model::BuiltModel build(const model::Anatomy& anatomy, const std::filesystem::pa
 void read(const std::filesystem::path& input, Job& job) {
   if (results::is_hdf5(input)) {
     job.model = results::read_model(input);
+    job.wanted.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays the same
     return;
   }
   const scene::Scene scene = scene::read_scene(input);

@@ -194,6 +194,15 @@ int64_t step_count(const std::filesystem::path& file) {
   return count;
 }
 
+std::optional<double> last_bulk_modulus(const std::filesystem::path& file) {
+  const int64_t steps = step_count(file);
+  const std::string group = fmt::format("/step/{:04}", steps - 1);
+  const Reader in(file);
+  if (steps == 0 || !in.has_attribute(group, "bulk_modulus")) return {};
+  const double stored = in.number(group, "bulk_modulus");
+  return stored > 0 ? std::optional(stored) : std::nullopt;
+}
+
 namespace {
 
 struct ReadAttribute {

@@ -59,6 +59,35 @@ std::vector<Key> surface_keys() {
   return rows;
 }
 
+/// What tissue that ends at bone does.
+std::vector<Key> attach_keys() {
+  return {
+      {"tissue.released",
+       choice,
+       "contact",
+       "What such tissue does then: as attach.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}},
+      {"tissue.attach",
+       choice,
+       "fixed",
+       "What tissue that ends at bone does: move with it, slide along it at its distance, touch it "
+       "(lift off, never pass), or not know of it.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}},
+      {"tissue.attach_regions", list, "",
+       "Where tissue that ends at bone does otherwise; later ones beat earlier ones."},
+      {"tissue.attach_regions[].attach",
+       choice,
+       "required",
+       "As tissue.attach.",
+       "",
+       {},
+       {"fixed", "slide", "contact", "free"}}};
+}
+
 std::vector<Key> tissue_keys() {
   return {
       {"tissue", map, "required", "The soft tissue between skin and bone."},
@@ -88,30 +117,6 @@ std::vector<Key> tissue_keys() {
       {"tissue.release", number, "10",
        "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
        Range::at_least(0)},
-      {"tissue.released",
-       choice,
-       "contact",
-       "What such tissue does then: as attach.",
-       "",
-       {},
-       {"fixed", "slide", "contact", "free"}},
-      {"tissue.attach",
-       choice,
-       "fixed",
-       "What tissue that ends at bone does: move with it, slide along it at its distance, touch it "
-       "(lift off, never pass), or not know of it.",
-       "",
-       {},
-       {"fixed", "slide", "contact", "free"}},
-      {"tissue.attach_regions", list, "",
-       "Where tissue that ends at bone does otherwise; later ones beat earlier ones."},
-      {"tissue.attach_regions[].attach",
-       choice,
-       "required",
-       "As tissue.attach.",
-       "",
-       {},
-       {"fixed", "slide", "contact", "free"}},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks): attach_regions of contact."},
       {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
@@ -465,7 +470,7 @@ const std::vector<Key>& all_keys() {
   static const std::vector<Key> table = [] {
     std::vector<Key> rows;
     for (const auto& part :
-         {surface_keys(), tissue_keys(), material_keys(), spring_keys(), load_keys(),
+         {surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(), load_keys(),
           osteotomy_keys(), move_keys(), collision_keys(), instrument_keys(), contact_keys(),
           incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());

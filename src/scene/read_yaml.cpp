@@ -1,8 +1,11 @@
 #include "read_yaml.h"
 
+#include <yaml-cpp/eventhandler.h>
 #include <algorithm>
 #include <fstream>
+
 #include <iterator>
+#include <sstream>
 #include <string>
 
 #include "repose/base/error.h"
@@ -37,19 +40,48 @@ std::string read_text(const std::filesystem::path& file) {
   return text;
 }
 
+/// Notes where documents begin.
+class Documents : public YAML::EventHandler {
+ public:
+  std::vector<int> lines;  // from 1
+  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// The line of the second document, 0 for none. YAML::LoadAll, which would tell, goes on for ever
+/// with some damaged files.
+int second_document(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  Documents documents;
+  while (documents.lines.size() < 2 && parser.HandleNextDocument(documents)) {
+  }
+  return documents.lines.size() < 2 ? 0 : documents.lines[1];
+}
+
 }  // namespace
 
 YAML::Node read_yaml(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty() || documents[0].IsNull())
+    const YAML::Node document = YAML::Load(text);
+    if (document.IsNull())
       base::refuse("{}:1:1: the file is empty; a scene needs skin, bones and tissue",
                    file.string());
-    if (documents.size() > 1)
-      base::refuse("{}:{}:1: the file holds {} documents; a scene is one", file.string(),
-                   documents[1].Mark().line + 1, documents.size());
-    return documents[0];
+    if (const int second = second_document(text); second > 0)
+      base::refuse("{}:{}:1: the file holds 2 documents or more; a scene is one", file.string(),
+                   second);
+    return document;
   } catch (const YAML::Exception& error) {
     std::string reason = base::shown(error.msg);
     base::refuse("{}:{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1,

@@ -77,6 +77,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr double softened = 0.25;  // of the penalty's stiffness, in rough rounds
   constexpr double rough = 0.25;     // mm
   constexpr double missed = 0.25;    // of the accuracy, by contact
+  constexpr double safety = 2;       // the estimate is so many times what is left
   const auto p = objective_.touches().multipliers();
   before_.assign(p.begin(), p.end());
   walls_before_.clear();
@@ -93,13 +94,18 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     move_multipliers();
   }
   set_stiffness(stiffness_);
+  if (outcome.stopped) {
+    const base::VecHandle gradient = objective_.positions().make_vector();
+    outcome.objective = objective_.evaluate(displacement, gradient);
+    outcome.gradient_max = discrete::largest_block(gradient);
+  }
   for (int round = 0; round < most_rounds && !outcome.stopped; ++round) {
     if (round < paired_anew) pair(displacement, damped);
     outcome = minimiser_.run(displacement, (1 - missed) * accuracy);
     iterations += outcome.iterations;
     objective_.positions().update(displacement);
     const double left = violation();
-    outcome.displacement_error += left;
+    outcome.displacement_error += safety * left;
     const bool over = outcome.converged && outcome.displacement_error <= accuracy;
     if (!outcome.converged || over) break;
     move_multipliers();

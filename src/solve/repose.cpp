@@ -36,7 +36,8 @@ model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& se
   measure(objective, n);
   // What is fixed stores energy, too, that no search knows of.
   const bool whole = settings.exact_volume || objective.positions().part().solid;
-  n.objective = whole ? n.f_e + n.potential : outcome.objective;
+  const double contact = std::isfinite(n.contact_energy) ? n.contact_energy : 0;
+  n.objective = whole ? n.f_e + n.potential + contact : outcome.objective;
   n.gradient_max = outcome.gradient_max;
   n.displacement_error = outcome.displacement_error;
   n.iterations = outcome.iterations;

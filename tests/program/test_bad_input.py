@@ -203,7 +203,10 @@ CASES = {
     "initial Hessian of unknown name": (
         lambda i: i.option("-tao_type", "lmvm", "-tao_lmvm_initial", "stif"), ["stif", "stiffness"]),
     "force with a penalty": (
-        lambda i: i.option("-functional", "force", "-volume", "penalty"), ["force", "penalty"]),
+        lambda i: [*i.scene("  mass:", "  springs: {default: {modulus: 0.05}}\n  mass:"),
+                   "-functional", "force", "-volume", "penalty"], ["force", "penalty"]),
+    "force of a solid": (
+        lambda i: i.option("-functional", "force"), ["force", "tissue.springs"]),
     "two inputs": (
         lambda i: i.option("scene.yaml"), ["scene.yaml"]),
     "missing output folder": (

@@ -131,8 +131,9 @@ def test_units_scale(run, solved, tmp_path):
                         ("spring/reference", 1), ("spring/stiffness", 1), ("prism/rest_volume", 3)):
         model[name] = model[name] * 10.0**power
     write_model(tmp_path / "model.h5", model)
-    large = finished(run, tmp_path, "model.h5", ["-accuracy", 1e-5])
     small = last(solved(ADVANCE, "-accuracy", 1e-6))
+    large = finished(run, tmp_path, "model.h5",
+                     ["-accuracy", 1e-5, "-bulk_modulus", repr(float(small["bulk_modulus"]))])
     assert large["objective"] == pytest.approx(1e3 * small["objective"], rel=1e-11)
     assert np.abs(large["point/position"] / 10 - small["point/position"]).max() < 2e-6
 

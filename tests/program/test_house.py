@@ -13,7 +13,7 @@ ROOMS = {
     "scene": {"base"},
     "surface": {"base"},
     "model": {"base", "scene", "surface"},
-    "mechanics": {"base", "model"},
+    "mechanics": {"base", "surface", "model"},
     "discrete": {"base", "model", "mechanics"},
     "linear": {"base", "model", "mechanics", "discrete"},
     "check": {"base", "model", "mechanics"},

@@ -25,6 +25,7 @@ def tissue_of(material):
     young, poisson, skin = MATERIALS[material]
     return f"""
 skin: {MESHES}/paper_skin.ply
+contact: {{bones: off, cuts: off}}
 bones:
   - {{name: skull, file: {MESHES}/paper_skull.ply}}
   - {{name: mandible, file: {MESHES}/paper_mandible.ply}}

@@ -25,7 +25,8 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
                            int64_t most_unknowns = 5'000'000);
 
 /// A row about the last model of a convergence, which was solved to `wanted` mm.
-std::string describe_convergence(const GridSequence& sequence, double wanted, const std::string& limit);
+std::string describe_convergence(const GridSequence& sequence, double wanted,
+                                 const std::string& limit);
 
 /// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
 struct Discretisation {

@@ -4,7 +4,7 @@
 
 #include "repose/mechanics/rigid_body.h"
 
-/// Frictionless contact as an augmented Lagrangian (docs/model.md "Contact"), on plain arrays like
+/// Frictionless contact as an augmented Lagrangian (docs/theory/contact.md), on plain arrays like
 /// the other terms: for each constraint of gap g, area a, multiplier p (N/mm²)
 ///     a/(2k) (max(0, p − k g)² − p²),
 /// without the max where a point slides.

@@ -27,7 +27,7 @@ inline constexpr int shape_numbers = 7;
 /// keeps its distance and slides along.
 enum class Binding : int8_t { touches = 0, slides = 1 };
 
-/// Points that touch bodies, frictionless (docs/model.md "Contact").
+/// Points that touch bodies, frictionless (docs/theory/contact.md).
 struct Touches {
   std::vector<int64_t> point;    ///< [C]
   std::vector<int32_t> body;     ///< [C] row of Contact::bodies

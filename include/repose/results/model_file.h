@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "repose/model/model.h"
@@ -31,6 +32,8 @@ bool is_checkpoint(const std::filesystem::path& file);
 
 /// How many steps a file has; 0 for a model. InputError where /step/0000 … are not in sequence.
 int64_t step_count(const std::filesystem::path& file);
+/// Bulk modulus κ of the penalty (N/mm²) in the last step of a file; nothing where it has none.
+std::optional<double> last_bulk_modulus(const std::filesystem::path& file);
 /// Step number `step` (from 0) of a file with `model`; InputError as read_model.
 StoredStep read_step(const std::filesystem::path& file, int64_t step, const model::Model& model);
 
