@@ -67,14 +67,16 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
   return found;
 }
 
-std::string describe_convergence(const GridSequence& sequence, double wanted, const std::string& limit) {
+std::string describe_convergence(const GridSequence& sequence, double wanted,
+                                 const std::string& limit) {
   const Level& last = sequence.levels.back();
   const std::string why = sequence.refusal.empty() ? limit : sequence.refusal;
   return fmt::format(
       "  {:<22} of these, the last; mesh and layers leave its skin {:.2g} mm from the continuum at "
       "most, by its distance from the one before{}\n",
       "solved model", last.discretisation_error,
-      sequence.near_enough ? "" : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
+      sequence.near_enough ? ""
+                           : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
 }
 
 Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,

@@ -93,12 +93,12 @@ class Recomputation {
   const std::vector<Vec3>& x_;
   const std::vector<double>& pressure_;  // [M] or empty
   const std::vector<model::PointField>& fields_;
-  double elastic_ = 1;                   // weight of f
-  double smooth_force_ = 0;              // Σ (√(|F|² + ε²) − ε)
-  std::vector<double> at_point_;         // [N] Σ noise of the forces there, N
-  std::vector<double> nodal_pressure_;   // [N] e/C of averaged volumes, N/mm², or empty
-  std::vector<Vec3> gradient_;           // [N] of the objective
-  std::vector<double> noise_;            // [N] of the gradient
+  double elastic_ = 1;                  // weight of f
+  double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
+  std::vector<double> at_point_;        // [N] Σ noise of the forces there, N
+  std::vector<double> nodal_pressure_;  // [N] e/C of averaged volumes, N/mm², or empty
+  std::vector<Vec3> gradient_;          // [N] of the objective
+  std::vector<double> noise_;           // [N] of the gradient
   RecomputedStep step_;
 };
 

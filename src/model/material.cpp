@@ -9,8 +9,8 @@
 #include <numeric>
 
 #include "repose/base/error.h"
-#include "repose/model/region.h"
 #include "repose/base/text.h"
+#include "repose/model/region.h"
 #include "repose/surface/point_tree.h"
 #include "repose/surface/read.h"
 #include "repose/surface/vertex_values.h"

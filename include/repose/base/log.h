@@ -5,7 +5,8 @@
 /// and without the log nothing costs more than a test.
 namespace repose::base {
 
-/// The event of that name, registered when first asked for, −1 without PETSc: keep it in a static of the function.
+/// The event of that name, registered when first asked for, −1 without PETSc: keep it in a static
+/// of the function.
 PetscLogEvent log_event(const char* name);
 
 /// An event from here to the end of the scope, with floating-point operations done in it.
