@@ -70,6 +70,8 @@ std::vector<base::Option> run_options() {
   return {
       {"stability", OptionKind::flag, "",
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
+      {"verify_path", OptionKind::flag, "",
+       "Solve again in twice the load steps; another rest position is exit status 2."},
       {"monitor_mm", OptionKind::flag, "",
        "Print time, evaluations and the estimated distance to go after each iteration."},
       {"time_limit",

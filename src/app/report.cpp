@@ -155,6 +155,24 @@ std::string describe_folds(const model::Model& model, const std::vector<double>&
       count, at.x(), at.y(), at.z());
 }
 
+std::string describe_path(const PathCheck& c) {
+  const auto row = [](const std::string& text) { return report_row("path", text); };
+  if (c.steps == 0) return row("none: nothing moves");
+  const std::string way = fmt::format("in {} load steps in place of {}", 2 * c.steps, c.steps);
+  if (!c.again.path.complete())
+    return row(fmt::format("NOT VERIFIED: {} the run ended at load {:.4g}: {}", way,
+                           c.again.path.load, c.again.last.reason));
+  const std::string apart =
+      fmt::format("{:.2g} mm apart at most, 95 % within {:.2g} mm", c.largest, c.percentile_95);
+  if (c.holds()) return row(fmt::format("verified: {} the same rest position, {}", way, apart));
+  return row(fmt::format(
+      "THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about ({:.1f}, "
+      "{:.1f}, {:.1f}) mm; its objective is {:.6g}, that of the result {:.6g}: look "
+      "there before you trust it; springs buckle where they are pressed together "
+      "(raise the volume stiffness, or make the tissue a solid)",
+      way, apart, c.place.x(), c.place.y(), c.place.z(), c.again.last.objective, c.objective));
+}
+
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())

@@ -19,6 +19,7 @@
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/surface/write.h"
+#include "verify_path.h"
 #include "writer.h"
 
 namespace repose::app {
@@ -73,6 +74,7 @@ class Run {
   solve::Tearing tear();
   Coarser solve_coarser();
   solve::Summary search(Writer& writer);
+  std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
   std::string write_given_skin(const Writer& writer) const;
 
@@ -141,7 +143,8 @@ solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
   if (writer.makes_checkpoints())
     settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
-  const bool needed = writer.makes_checkpoints() || writer.compares() || !job_.held.empty();
+  const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
+                      !job_.held.empty();
   solve::Summary summary =
       needed ? solve::find_repose(comm, job_.model, settings, start_, stages_, std::ref(writer))
              : solve::find_repose(comm, std::move(job_.model), settings, start_, stages_,
@@ -161,6 +164,14 @@ std::string Run::describe_folds(const model::StepNumbers& last, const Writer& wr
   base::on_first_rank(
       comm, [&] { text = app::describe_folds(results::read_model(name_ + ".h5"), ratios); });
   return text;
+}
+
+/// Solves what came to rest again, in twice the load steps, where that is asked for. Collective.
+std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer& writer) {
+  if (!strategy_.verifies_path || !summary.path.complete()) return {};
+  PathCheck check = verify_path(comm, job_.model, strategy_.settings, summary, writer.positions());
+  stages_.end("verify path");
+  return check;
 }
 
 /// Writes the displacement of the given skin, in the place of which another was solved, to
@@ -190,12 +201,15 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   say(folded ? describe_folds(summary.last, writer) : "");
   const std::string given = write_given_skin(writer);
   stages_.end("write");
+  const std::optional<PathCheck> path = verify(summary, writer);
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   say(coarser.told + writer.comparison() + describe_tearing(tearing));
+  if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);
-  return summary.path.complete() && !folded ? base::Exit::done : base::Exit::not_converged;
+  const bool holds = summary.path.complete() && !folded && (!path || path->holds());
+  return holds ? base::Exit::done : base::Exit::not_converged;
 }
 
 }  // namespace

@@ -21,21 +21,23 @@ struct Obstacle {
   bool given;
   bool to_region;  ///< solving a part of the tissue only
   bool to_coarse;  ///< solving coarser models
+  bool to_path;    ///< verifying the path
   const char* what;
 };
 
 std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
   return {
-      {s.settings.force, true, true, "the functional is force"},
-      {s.settings.exact_volume, true, true, "the volume term is exact"},
-      {options.has("restart"), true, true, "the run goes on from another result"},
-      {options.flag("stability"), true, false, "the stability of the whole is asked for"},
-      {!job.anatomy, false, true,
+      {s.settings.force, true, true, false, "the functional is force"},
+      {s.settings.exact_volume, true, true, false, "the volume term is exact"},
+      {options.has("restart"), true, true, true, "the run goes on from another result"},
+      {options.flag("stability"), true, false, false, "the stability of the whole is asked for"},
+      {!job.anatomy, false, true, false,
        "the input is a model, which does not tell what it was made from"},
-      {s.settings.path.load_steps > 0, false, true, "load_steps are asked for"},
-      {!job.cuts.empty(), false, true, "the scene has incisions"},
-      {job.touches, true, false, "tissue touches bone, instruments or itself"},
-      {s.tears, false, true, "the tissue may tear"},
+      {s.settings.path.load_steps > 0, false, true, false, "load_steps are asked for"},
+      {!job.cuts.empty(), false, true, false, "the scene has incisions"},
+      {job.touches, true, false, false, "tissue touches bone, instruments or itself"},
+      {s.tears, false, true, true, "the tissue may tear"},
+      {s.verifies_path, false, true, false, "the path is to be verified"},
   };
 }
 
@@ -101,6 +103,12 @@ void choose_region(const base::Options& options, const std::string& obstacle, St
   s.settings.extent = wanted == "on" ? solve::Extent::region : solve::Extent::automatic;
 }
 
+/// Refuses to verify a path that is not a matter of load steps.
+void require_path(const std::string& obstacle, const Strategy& s) {
+  if (s.verifies_path && !obstacle.empty())
+    base::refuse("-verify_path: {}; leave the option out", obstacle);
+}
+
 std::string describe_minimum(const Strategy& s, const Job& job) {
   const std::string minimised =
       job.solid ? "the energy of a solid"
@@ -137,6 +145,7 @@ std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Jo
                                                   : "the whole: " + region.why) +
       report_row("coarser models",
                  describe_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), s));
+  if (s.verifies_path) text += report_row("verified", "by a second run in twice the load steps");
   if (s.tears) text += report_row("tearing", "in rounds: at rest, then springs above the limit go");
   return text;
 }
@@ -152,8 +161,10 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.settings.monitor = options.flag("monitor_mm");
   s.settings.initial_equilibrium = job.initial_equilibrium;
   s.tears = job.tearing.has_value();
+  s.verifies_path = options.flag("verify_path");
   const Wish wish = wish_of(options);
   const std::vector<Obstacle> all = obstacles(options, job, s);
+  require_path(first_obstacle(all, &Obstacle::to_path), s);
   choose_region(options, first_obstacle(all, &Obstacle::to_region), s);
   base::on_first_rank(
       comm, [&] { choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s); });

@@ -1,8 +1,12 @@
 """The rest position does not depend on how many parts the bones' motion is made in."""
 
+import re
+
+import numpy as np
 import pytest
 
-from tissue import last, same_face, steps
+from conftest import PROJECT
+from tissue import apart, last, same_face, steps
 
 
 def check(solved, scene, accuracy, factors, ranks=1):
@@ -31,3 +35,45 @@ def test_loads_rise_to_one(solved):
     loads = [step["load"] for step in steps(solved("paper_jaw_opening.yaml", "-accuracy", 1e-6))]
     assert loads[0] == 0 and loads[-1] == 1
     assert all(a < b for a, b in zip(loads, loads[1:]))
+
+
+def verified(run, scene, *options, ranks=1):
+    """What -verify_path says of a scene, and the exit status."""
+    said = run("repose-solve", PROJECT / "meshes" / scene, "-verify_path", *options, ranks=ranks)
+    assert said.stderr == ""
+    row = next(line for line in said.stdout.splitlines() if line.startswith("  path "))
+    return said.returncode, row, said.stdout
+
+
+def largest_difference(row):
+    return float(re.search(r"(\S+) mm apart at most", row)[1])
+
+
+def test_a_path_that_leads_elsewhere_is_told(run, solved):
+    """An opening of 8° in one step: springs are pressed together, and jump to another place."""
+    scene, first = "paper_jaw_opening.yaml", ["-accuracy", 1e-3, "-load_steps"]
+    status, row, said = verified(run, scene, *first, 1)
+    assert status == 2 and "THE REST POSITION DEPENDS ON IT: in 2 load steps in place of 1" in row
+    one, two = (last(solved(scene, *first, count)) for count in (1, 2))
+    assert apart(one, two) > 1
+    assert largest_difference(row) == pytest.approx(apart(one, two), rel=0.05)
+    farthest = np.linalg.norm(one["point/position"] - two["point/position"], axis=1).argmax()
+    at = one["point/position"][farthest] - one["point/displacement"][farthest]
+    place = re.search(r"farthest about \((\S+), (\S+), (\S+)\) mm", row).groups()
+    assert [float(x) for x in place] == pytest.approx(at, abs=0.06)
+    assert "NOT CONVERGED" not in said
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_path_that_is_one(run, ranks):
+    status, row, said = verified(run, "head_solid.yaml", ranks=ranks)
+    assert status == 0 and "verified: in 2 load steps in place of 1" in row
+    assert 0 < largest_difference(row) <= 0.2  # twice the accuracy
+
+
+@pytest.mark.parametrize("options, why", [
+    (["-adapt"], "-adapt: the path is to be verified"),
+    (["-restart", "a.h5"], "-verify_path: the run goes on from another result")])
+def test_a_path_that_cannot_be_verified(run, options, why):
+    said = run("repose-solve", PROJECT / "meshes/head_solid.yaml", "-verify_path", *options)
+    assert (said.returncode, said.stdout) == (1, "") and why in said.stderr

@@ -35,6 +35,21 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
 /// What tore and where, in two rows; nothing where no limit was asked for.
 std::string describe_tearing(const solve::Tearing& tearing);
 
+/// Whether a run in twice the load steps comes to the same rest position.
+struct PathCheck {
+  int64_t steps = 0;          ///< of the first run; 0: nothing moves
+  double allowed = 0;         ///< mm, that two searches for one rest position may differ by
+  double objective = 0;       ///< of the first run
+  solve::Summary again;       ///< the second run
+  double largest = 0;         ///< mm, between the two, of all soft-tissue points
+  double percentile_95 = 0;   ///< likewise; on rank 0
+  Vec3 place = Vec3::Zero();  ///< initial, of the largest; on rank 0
+  bool holds() const { return steps == 0 || (again.path.complete() && largest <= allowed); }
+};
+
+/// What came of it, in a row.
+std::string describe_path(const PathCheck& check);
+
 /// How many prisms have volume ratios [M] ≤ 0 and where the worst one was at first, in a line that
 /// says what can be done; nothing where there is none.
 std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio);

@@ -21,6 +21,7 @@ struct Strategy {
   std::vector<adapt::Resolution> resolutions;  ///< coarsest first, their number on all ranks
   std::string limit;                           ///< why a solid's go no finer, on rank 0
   bool preview = false;                        ///< the last of them is taken in any case
+  bool verifies_path = false;                  ///< solved again in twice the load steps
   bool tears = false;                          ///< in rounds of searches
   std::string explanation;                     ///< what is done and why, a row each; on rank 0
 };
