@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""Breaks the program on purpose, one break at a time, in a worktree of its own, and says which
-tests
-catch it. A break that no test catches has survived, and wants a test.
+"""Breaks the program on purpose, one break at a time, in a worktree of its own, and says which test
+catches it. A break that no test catches has survived, and wants a test.
 
     tests/mutations/mutate.py -scratch ../scratch                 # all
     tests/mutations/mutate.py -scratch ../scratch -breaks 'sign'  # those whose names match
     tests/mutations/mutate.py -check                              # only that each break has its
     place
 
-The worktree is of the last commit; it is made if it is not there, and stays. Exit status 1 where a
-break
-survived or has no place.
+The worktree is of the last commit; it is made if it is not there, and stays. After each break only
+what it touches is built again, and the tests end at the first that fails; where those that the list
+names pass, the wider ones have their turn. Exit status 1 where a break survived or has no place.
 """
 
 import argparse
@@ -23,7 +22,12 @@ sys.dont_write_bytecode = True
 from breaks import BREAKS  # noqa: E402
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
-TIME_LIMIT = 600  # seconds, of the tests of one break: a search that does not end is caught, too
+TIME_LIMIT = 1200  # seconds, of one test: a search that does not end is caught, too
+# Where the tests that a break names pass.
+WIDER = (
+    r"^(base|scene|mechanics|solve|results|adapt)\.|^model\.(build|cut|motion|stiffness)"
+    r"|^program\.(minimum|solid|extremes)$"
+)
 
 
 def place_of(old, project):
@@ -51,7 +55,8 @@ def run(*command, cwd, **more):
 def make_scratch(folder):
     if not folder.exists():
         run("git", "worktree", "add", "--detach", folder, "HEAD", cwd=PROJECT, check=True)
-        run("cmake", "--preset", "ci", cwd=folder, check=True)
+        # A break may well leave a name unused.
+        run("cmake", "--preset", "ci", "-DREPOSE_WERROR=OFF", cwd=folder, check=True)
     head = run("git", "rev-parse", "HEAD", cwd=PROJECT, check=True).stdout.strip()
     run("git", "checkout", "-f", "--detach", head, cwd=folder, check=True)
 
@@ -71,7 +76,7 @@ def targets_of(tests):
 
 
 def caught_by(build, pattern, jobs):
-    """The first tests that fail, or why there are none."""
+    """The first test that fails, or why there is none."""
     tests = tests_of(pattern, build)
     if not tests:
         return "", f"no test matches {pattern}"
@@ -81,21 +86,11 @@ def caught_by(build, pattern, jobs):
             (line for line in built.stdout.splitlines() if "error" in line), ""
         )
     exactly = "^(" + "|".join(map(re.escape, tests)) + ")$"
-    try:
-        tested = run(
-            "ctest",
-            "-R",
-            exactly,
-            "--stop-on-failure",
-            "--timeout",
-            120,
-            cwd=build,
-            timeout=TIME_LIMIT,
-        )
-    except subprocess.TimeoutExpired:
-        return "no end", ""
-    failed = re.findall(r"^\s*\d+ - (\S+) \(", tested.stdout, re.M)
-    return ", ".join(failed), "" if failed else f"passes {len(tests)} tests"
+    options = ["--stop-on-failure", "--timeout", TIME_LIMIT]
+    tested = run("ctest", "-R", exactly, *options, cwd=build)
+    failed = re.findall(r"^\s*\d+ - (\S+) \((\w+)\)", tested.stdout, re.M)
+    words = [name + (" comes to no end" if how == "Timeout" else "") for name, how in failed]
+    return ", ".join(words), "" if failed else f"passes {len(tests)} tests"
 
 
 def one(name, old, new, pattern, scratch, jobs):
@@ -106,6 +101,8 @@ def one(name, old, new, pattern, scratch, jobs):
     try:
         path.write_text(text.replace(old, new))
         caught, why = caught_by(scratch / "build-ci", pattern, jobs)
+        if not caught and why.startswith("passes"):
+            caught, why = caught_by(scratch / "build-ci", WIDER, jobs)
     finally:
         path.write_text(text)
     return ("caught", caught) if caught else ("SURVIVED", why)
