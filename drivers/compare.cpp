@@ -22,6 +22,7 @@
 #include "repose/scene/landmarks.h"
 #include "repose/surface/compare.h"
 #include "repose/surface/face_parts.h"
+#include "repose/surface/paint.h"
 #include "repose/surface/read.h"
 #include "repose/surface/register.h"
 #include "repose/surface/write.h"
@@ -38,7 +39,8 @@ std::vector<base::Option> option_table() {
       {"both", OptionKind::flag, "", "Also from ACTUAL to PREDICTED."},
       {"spacing", OptionKind::number, "1", "Longest side of the parts measured.", length, "MM"},
       {"skip_rim", OptionKind::flag, "", "Leave out what lies beyond the rim of an open surface."},
-      {"regions", OptionKind::path, "", "Label map: numbers for each label on their own, too."},
+      {"regions", OptionKind::path, "",
+       "Label map, or painted PLY of the skin: numbers for each label or color on their own, too."},
       {"landmarks", OptionKind::path, "",
        "Landmarks of PREDICTED (.mrk.json, .fcsv, .csv): numbers around each."},
       {"actual_landmarks", OptionKind::path, "",
@@ -85,7 +87,17 @@ int64_t label_at(const surface::Volume& labels, const Mat3& to_index, const Vec3
   return static_cast<int64_t>(labels.at(at[0], at[1], at[2]));
 }
 
+void print_painted(const std::string& file, const std::vector<Sample>& samples) {
+  const surface::Paint paint(file);
+  std::vector<std::vector<Sample>> regions(paint.names().size());
+  for (const Sample& sample : samples)
+    if (const int row = paint.at(sample.point); row >= 0) regions[row].push_back(sample);
+  for (size_t row = 0; row < regions.size(); ++row)
+    print_row("  " + paint.names()[row], regions[row]);
+}
+
 void print_regions(const std::string& file, const std::vector<Sample>& samples) {
+  if (file.ends_with(".ply") || file.ends_with(".PLY")) return print_painted(file, samples);
   const surface::Volume labels = surface::read_volume(file);
   const Mat3 to_index = surface::inverse_axes(labels);
   std::map<int64_t, std::vector<Sample>> regions;

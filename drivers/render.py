@@ -36,6 +36,7 @@ COLUMNS = ("before", "after", *COLOURED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
+FLESH = (0.70, 0.36, 0.33)
 MAGMA = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")  # light to dark
 BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
 
@@ -127,12 +128,30 @@ class Result:
         self.used, corners = np.unique(self.model["skin/points"][:], return_inverse=True)
         self.corners = corners.reshape(-1, 3)
         self.before = self.model["point/position"][:][self.used]
+        self.walls = self.find_walls()
         bones = self.model.get("bone_surfaces")
         self.bone_corners = bones["triangles"][:] if bones else np.zeros((0, 3), int)
         self.bones_before = bones["points"][:] if bones else np.zeros((0, 3))
 
+    def find_walls(self):
+        """Quadrilaterals at which tissue ends beside itself: sides of cuts, lips, the rim."""
+        prisms = self.model["prism/points"][:] if "prism/points" in self.model else []
+        if not len(prisms):
+            return np.zeros((0, 4), int)
+        sides = np.concatenate([prisms[:, corners] for corners in
+                                ((0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))])
+        _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True,
+                                    return_counts=True)
+        return sides[first[count == 1]]
+
+    def wall(self, step):
+        return self.points(step)[self.walls.ravel()]
+
+    def points(self, step):
+        return self.steps[step]["point/position"][:]
+
     def skin(self, step):
-        return self.steps[step]["point/position"][:][self.used]
+        return self.points(step)[self.used]
 
     def bones(self, step):
         moved = self.steps[step].get("bone_surface/points")
@@ -164,7 +183,13 @@ class Result:
             numbers["advance"] = self.steps[step]["point/advance"][:][self.used]
         if "prism/von_mises" in self.steps[step] or "spring/tension" in self.steps[step]:
             numbers["stress"] = self.stress(step)
-        return {"skin": skin, "bones": self.bones(step), "load": self.loads[step], **numbers}
+        return {"skin": skin, "bones": self.bones(step), "walls": self.wall(step),
+                "load": self.loads[step], **numbers}
+
+    def first(self):
+        """Before the bones move."""
+        return {"skin": self.before, "bones": self.bones_before,
+                "walls": self.model["point/position"][:][self.walls.ravel()]}
 
     def between(self, load):
         """The state at a load: between two steps everything moves evenly."""
@@ -217,9 +242,15 @@ def beside(bones, skin):
     return clip.GetOutput()
 
 
+def round_up(number):
+    """To two digits."""
+    digit = 10.0 ** (np.floor(np.log10(number)) - 1) if number > 0 else 1.0
+    return float(np.ceil(number / digit * (1 - 1e-12)) * digit)
+
+
 def colours(column, numbers):
     """The colour table of a column: from 0, or as far inwards as outwards."""
-    largest = float(np.abs(numbers).max()) or 1.0
+    largest = round_up(float(np.abs(numbers).max())) or 1.0
     ramp, low = (BOTH, -largest) if column == "advance" else (MAGMA, 0.0)
     table = vtk.vtkColorTransferFunction()
     for i, text in enumerate(ramp):
@@ -319,17 +350,18 @@ def colour_bar(table):
 
 
 def actors(column, state, result, tables):
+    """The skin, and what is seen through it or where it is open: bones, the sides of cuts."""
     if column == "before":
-        return [actor(surface(result.before, result.corners), SKIN)]
-    if column == "after":
-        return [actor(surface(state["skin"], result.corners), SKIN)]
-    if column == "bones":
-        skin = surface(state["skin"], result.corners)
-        veil = [actor(skin, SKIN, opacity=0.35)]
-        if len(result.bone_corners) == 0:
-            return veil
-        return [actor(beside(surface(state["bones"], result.bone_corners), skin), IVORY), *veil]
-    return [actor(surface(state["skin"], result.corners, state[column]), SKIN, tables[column])]
+        state = result.first()
+    table = tables.get(column)
+    skin = surface(state["skin"], result.corners, state[column] if table else None)
+    drawn = []
+    if len(result.bone_corners):
+        drawn.append(actor(beside(surface(state["bones"], result.bone_corners), skin), IVORY))
+    if column != "bones" and len(result.walls):
+        fan = 4 * np.arange(len(result.walls))[:, None, None] + [[0, 1, 2], [0, 2, 3]]
+        drawn.append(actor(surface(state["walls"], fan.reshape(-1, 3)), FLESH))
+    return [*drawn, actor(skin, SKIN, table, 0.35 if column == "bones" else 1.0)]
 
 
 class Sheet:

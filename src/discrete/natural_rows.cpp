@@ -141,9 +141,7 @@ void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const
   const ContactState state = contact_state(objective);
   rows.point_fields.push_back({"contact_gap", false, bring(points, state.gap)});
   rows.point_fields.push_back({"contact_pressure", false, bring(points, state.pressure)});
-  const std::vector<Vec3> force = natural(state.force);
-  const double* first = numbers(force);
-  rows.point_fields.push_back({"contact_force", true, {first, first + 3 * force.size()}});
+  rows.point_fields.push_back(field("contact_force", state.force));
 }
 
 model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
@@ -163,6 +161,12 @@ std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
   std::vector<Vec3> rows(slab.rows());
   carry(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
   return rows;
+}
+
+model::PointField NaturalRows::field(const std::string& name, std::span<const Vec3> values) const {
+  const std::vector<Vec3> rows = natural(values);
+  const double* first = numbers(rows);
+  return {name, true, {first, first + 3 * rows.size()}};
 }
 
 std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {

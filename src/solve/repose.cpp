@@ -219,6 +219,23 @@ std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
   return contacts;
 }
 
+struct Stability {
+  Spectrum spectrum;
+  std::vector<Vec3> mode;  // [local points], 0 where nothing is unknown
+};
+
+/// At the unknowns' displacement and the positions' load. Collective.
+Stability stability_of(linear::TangentSolver& solver, const discrete::Positions& positions,
+                       Vec displacement) {
+  Stability found;
+  const base::VecHandle mode = positions.make_vector();
+  found.spectrum.smallest = smallest_eigenvalue(solver, displacement, mode);
+  found.spectrum.largest = largest_eigenvalue(solver.hessian().exact());
+  found.mode.assign(positions.local().size(), Vec3::Zero());
+  positions.spread(mode, found.mode);
+  return found;
+}
+
 Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
                       const Start& start, base::Stages& stages, const Receiver& receive) {
   if (part.total_unknowns == 0)
@@ -245,20 +262,21 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
         summary.last.epsilon = searcher.epsilon();
         const bool start = load == 0 && settings.initial_equilibrium;
         const bool end = load == 1 || !outcome.converged;
+        std::optional<Stability> stability;
         if (settings.stability && (start || end)) {
-          linear::TangentSolver& solver = searcher.elastic_solver();
-          Spectrum spectrum;
-          spectrum.smallest = smallest_eigenvalue(solver, displacement);
-          spectrum.largest = largest_eigenvalue(solver.hessian().exact());
-          if (start) summary.initial_spectrum = spectrum;
-          if (end) summary.final_spectrum = spectrum;
-          summary.last.smallest_eigenvalue = spectrum.smallest;
-          summary.last.largest_eigenvalue = spectrum.largest;
+          stability = stability_of(searcher.elastic_solver(), positions, displacement);
+          if (start) summary.initial_spectrum = stability->spectrum;
+          if (end) summary.final_spectrum = stability->spectrum;
+          summary.last.smallest_eigenvalue = stability->spectrum.smallest;
+          summary.last.largest_eigenvalue = stability->spectrum.largest;
         }
         summary.last.seconds = seconds;
         summary.last.evaluations = searcher.evaluations() - evaluations_before;
         evaluations_before = searcher.evaluations();
-        receive(summary.last, natural.rows(objective, settings.exact_volume));
+        model::StepRows rows = natural.rows(objective, settings.exact_volume);
+        if (stability && !std::isnan(stability->spectrum.smallest))
+          rows.point_fields.push_back(natural.field("stability_mode", stability->mode));
+        receive(summary.last, rows);
       });
   summary.contacts = contacts_of(objective);
   summary.unknowns = 3 * part.total_unknowns;

@@ -121,6 +121,13 @@ double first_eigenvalue(EPS eps) {
   return value;
 }
 
+void scale_mode(Vec mode) {
+  PetscReal most = 0, least = 0;
+  check(VecMax(mode, nullptr, &most));
+  check(VecMin(mode, nullptr, &least));
+  check(VecScale(mode, (most >= -least ? 1 : -1) / discrete::largest_block(mode)));
+}
+
 }  // namespace
 
 double largest_eigenvalue(Mat hessian) {
@@ -129,7 +136,8 @@ double largest_eigenvalue(Mat hessian) {
   return first_eigenvalue(eps);
 }
 
-double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, int64_t direct_limit) {
+double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
+                           int64_t direct_limit) {
   constexpr double tolerance = 1e-8;  // of the eigenvalue
   constexpr int most = 2000;          // iterations
   solver.prepare(displacement);
@@ -141,7 +149,12 @@ double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, int6
     choose_shift_and_invert(eps, exact);
   else
     choose_preconditioned(eps, solver);
-  return first_eigenvalue(eps);
+  const double value = first_eigenvalue(eps);
+  check(VecSet(mode, 0));
+  if (std::isnan(value)) return value;
+  check(EPSGetEigenvector(eps, 0, mode, nullptr));
+  scale_mode(mode);
+  return value;
 }
 
 }  // namespace repose::solve

@@ -72,6 +72,38 @@ def test_regions_by_a_label_map(run, tmp_path):
     assert [*rows(result.stdout)] == ["PREDICTED to ACTUAL", "corresponding vertices", "label 2"]
 
 
+def paint(file, mesh, kind, names, values):
+    """A text PLY of the mesh with what a person painted at its vertices."""
+    head = ["ply", "format ascii 1.0", f"element vertex {len(mesh.points)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"property {kind} {name}" for name in names]
+    head += ["element face 0", "property list uchar int vertex_indices", "end_header"]
+    rows = [" ".join(map(str, [*p, *v])) for p, v in zip(mesh.points, values)]
+    file.write_text("\n".join(head + rows) + "\n")
+
+
+def test_regions_painted_on_a_mesh(run, tmp_path):
+    """A red cap, its rim blended with the white of the rest by the brush; and labels."""
+    mesh = meshio.read(sphere(tmp_path / "a.ply", 40))
+    sphere(tmp_path / "b.ply", 38)
+    red = np.clip((mesh.points[:, 2] - 10) / 4, 0, 1)
+    colors = np.column_stack([np.full(len(red), 255), *[np.round(255 * (1 - red)).astype(int)] * 2])
+    paint(tmp_path / "painted.ply", mesh, "uchar", ["red", "green", "blue"], colors)
+    found = rows(run("repose-compare", "a.ply", "b.ply", "-regions", "painted.ply").stdout)
+    assert {name for name in found if name.startswith("color")} == {"color 255 255 255", "color 255 0 0"}
+    share = found["color 255 0 0"][0] / found["PREDICTED to ACTUAL"][0]
+    assert share == pytest.approx((40 - 12) / 80, abs=0.04)  # Archimedes: area goes with height
+    assert found["color 255 0 0"][1] == pytest.approx(2, abs=0.05)
+    paint(tmp_path / "labels.ply", mesh, "int", ["label"], (mesh.points[:, :1] > 0).astype(int) + 6)
+    found = rows(run("repose-compare", "a.ply", "b.ply", "-regions", "labels.ply").stdout)
+    assert sum(found[f"label {n}"][0] for n in (6, 7)) == found["PREDICTED to ACTUAL"][0]
+    assert found["label 6"][0] == pytest.approx(found["label 7"][0], rel=0.1)
+    # What is far from all that is painted belongs to no region.
+    moved = meshio.Mesh(mesh.points + [500, 0, 0], mesh.cells)
+    paint(tmp_path / "far.ply", moved, "int", ["label"], [[1]] * len(mesh.points))
+    assert rows(run("repose-compare", "a.ply", "b.ply", "-regions", "far.ply").stdout)["label 1"][0] == 0
+
+
 def test_numbers_around_landmarks(run, tmp_path):
     sphere(tmp_path / "b.ply", 40)
     mesh = meshio.read(sphere(tmp_path / "a.ply", 40))
@@ -169,6 +201,7 @@ CASES = {
     "no mesh": (["a.ply", "text.ply"], ["text.ply"]),
     "no folder": (["a.ply", "a.ply", "-output", "no/such/x"], ["no/such/x"]),
     "no such regions": (["a.ply", "a.ply", "-regions", "none.nii"], ["none.nii"]),
+    "unpainted regions": (["a.ply", "a.ply", "-regions", "a.ply"], ["a.ply", "neither colors"]),
     "no such landmarks": (["a.ply", "a.ply", "-landmarks", "none.csv"], ["none.csv"]),
     "parts of nothing": (["a.ply", "a.ply", "-parts"], ["-landmarks"]),
     "parts of a head without nose": (["a.ply", "a.ply", "-parts", "-landmarks", "marks.csv"],

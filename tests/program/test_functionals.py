@@ -211,13 +211,22 @@ def test_stability_is_reported_when_asked_for(run, small, tmp_path):
     tissue = Tissue(model_of(tmp_path / "steady.h5"), "none", 0)
     assert final["smallest_eigenvalue"] == pytest.approx(eigenvalue(tissue, final, "SA"), rel=1e-5)
     assert final["largest_eigenvalue"] == pytest.approx(eigenvalue(tissue, final, "LA"), rel=0.01)
+    mode, value = final["point/stability_mode"][tissue.soft], final["smallest_eigenvalue"]
+    assert np.linalg.norm(mode, axis=1).max() == pytest.approx(1)
+    assert hessian(tissue, final) @ mode.ravel() == pytest.approx(value * mode.ravel(), abs=1e-5 * value)
+    assert not final["point/stability_mode"][~tissue.soft].any()
     assert run("repose-check", "steady.h5").returncode == 0
     run("repose-solve", scene, *options)
     assert all("smallest_eigenvalue" not in step for step in steps(tmp_path / "steady.h5"))
 
 
 def eigenvalue(tissue, step, which):
-    """The smallest or largest by scipy, from difference quotients of numpy's gradient."""
+    """The smallest or largest by scipy."""
+    return eigsh(hessian(tissue, step), k=1, which=which, tol=1e-7, return_eigenvectors=False)[0]
+
+
+def hessian(tissue, step):
+    """From difference quotients of numpy's gradient."""
     soft, x = tissue.soft, step["point/position"]
 
     def product(way):
@@ -228,5 +237,4 @@ def eigenvalue(tissue, step, which):
         return ((there - back) / (2 * h))[soft].ravel()
 
     size = 3 * soft.sum()
-    return eigsh(LinearOperator((size, size), product, dtype=float), k=1, which=which, tol=1e-7,
-                 return_eigenvectors=False)[0]
+    return LinearOperator((size, size), product, dtype=float)

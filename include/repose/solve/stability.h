@@ -22,7 +22,11 @@ double largest_eigenvalue(Mat hessian);
 /// Up to `direct_limit` scalar unknowns by Krylov–Schur (Stewart 2001) with shift-and-invert at a
 /// shift that MUMPS' inertia shows to be below every eigenvalue (Sylvester); above by LOBPCG
 /// (Knyazev 2001) with the preconditioner of `solver`. `-eps_…` and `-st_…` options apply.
-double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement,
+///
+/// `mode`, laid out as `displacement`, receives the eigenvector: the motion that the tissue resists
+/// least. Its longest 3-vector has length 1, its largest entry is positive; zero where the
+/// eigenvalue is not a number.
+double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
                            int64_t direct_limit = linear::TangentSolver::factors_limit);
 
 }  // namespace repose::solve

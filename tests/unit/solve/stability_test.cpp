@@ -21,6 +21,7 @@ struct Energy {
   discrete::Objective objective;
   discrete::Tangent tangent;
   linear::TangentSolver solver;
+  base::VecHandle mode;  // of the last call of `smallest`
 
   Energy(MPI_Comm comm, const model::Model& model, const mechanics::Weights& weights = {})
       : part(discrete::distribute(comm, model)),
@@ -30,7 +31,8 @@ struct Energy {
         solver(positions, tangent) {}
 
   double smallest(Vec displacement, int64_t direct_limit) {
-    return solve::smallest_eigenvalue(solver, displacement, direct_limit);
+    mode = positions.make_vector();
+    return solve::smallest_eigenvalue(solver, displacement, mode, direct_limit);
   }
   double smallest_at_start(int64_t direct_limit) {
     const base::VecHandle start = positions.make_vector();
@@ -65,6 +67,10 @@ TEST_P(Solver, StretchedChainHasTheEigenvaluesOfAString) {
   const double across = k * stretch / length;
   const double expected = across * (2 - 2 * std::cos(M_PI / links));
   EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * expected);
+  std::vector<Vec3> mode(energy.positions.local().size(), Vec3::Zero());
+  energy.positions.spread(energy.mode, mode);
+  for (size_t i = 0; i < mode.size(); ++i)
+    EXPECT_NEAR(mode[i].norm(), std::sin(M_PI * energy.part.point_row[i] / links), 1e-5);
   const double along = k * (2 + 2 * std::cos(M_PI / links));
   EXPECT_NEAR(energy.largest_at_start(), along, 0.01 * along);
 }
@@ -109,6 +115,11 @@ TEST_P(Solver, DoesNotDependOnTheRanks) {
     Energy energy(MPI_COMM_WORLD, block, weights);
     const base::VecHandle moved = testing::random_vector(energy.positions, 1, size);
     const double value = energy.smallest(moved, GetParam());
+    EXPECT_NEAR(discrete::largest_block(energy.mode), 1, 1e-12);
+    const base::VecHandle stretched = energy.positions.make_vector();
+    check(MatMult(energy.tangent.exact(), energy.mode, stretched));
+    check(VecAXPY(stretched, -value, energy.mode));
+    EXPECT_LT(discrete::largest_block(stretched), 1e-3 * std::abs(value));
     double expected = 0;
     if (base::rank(MPI_COMM_WORLD) == 0) {
       Energy serial(MPI_COMM_SELF, block, weights);
