@@ -3,6 +3,7 @@
 
     drivers/render.py NAME [-output picture.png] [-views front,three-quarter,profile]
         [-columns before,after,movement,bones] [-step last] [-film film.gif] [-frames 24]
+        [-scene scene.yaml]
 
 NAME is the result (NAME.h5, the ending may be left out). One row a view, one column a way to see it:
 
@@ -13,6 +14,7 @@ NAME is the result (NAME.h5, the ending may be left out). One row a view, one co
     bones           the skin as a veil over the bones
 
 -film draws the columns along the load steps, between which it moves evenly, into an animated GIF.
+-scene shows the instruments of the scene, which the result does not hold; it needs PyYAML.
 Needs VTK and h5py, and no display: pip install vtk h5py, with apt-get install libegl1
 libgl1-mesa-dri; or, without pip, apt-get install --no-install-recommends python3-paraview
 python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
@@ -36,7 +38,7 @@ COLUMNS = ("before", "after", *COLOURED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
-FLESH = (0.70, 0.36, 0.33)
+FLESH, GREY, STEEL = (0.70, 0.36, 0.33), (0.72, 0.74, 0.78), (0.45, 0.55, 0.65)
 MAGMA = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")  # light to dark
 BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
 
@@ -70,11 +72,14 @@ def arguments():
     parser.add_argument("-step", default="last")
     parser.add_argument("-film")
     parser.add_argument("-frames", type=int, default=24)
+    parser.add_argument("-scene")
     chosen = parser.parse_args()
     chosen.name = os.path.abspath(chosen.name.removesuffix(".h5"))
     chosen.output = os.path.abspath(chosen.film or chosen.output or chosen.name + ".png")
     chosen.views = words("-views", chosen.views, tuple(VIEWS))
     chosen.columns = words("-columns", chosen.columns, COLUMNS)
+    if chosen.scene and not os.path.isfile(chosen.scene):
+        refuse(f"-scene {chosen.scene}: no such file")
     if not os.path.isfile(chosen.name + ".h5"):
         refuse(f"{chosen.name}.h5 is missing: NAME is the result's path")
     if not os.path.isdir(os.path.dirname(chosen.output)):
@@ -129,6 +134,7 @@ class Result:
         self.corners = corners.reshape(-1, 3)
         self.before = self.model["point/position"][:][self.used]
         self.walls = self.find_walls()
+        self.instruments = []
         bones = self.model.get("bone_surfaces")
         self.bone_corners = bones["triangles"][:] if bones else np.zeros((0, 3), int)
         self.bones_before = bones["points"][:] if bones else np.zeros((0, 3))
@@ -188,7 +194,7 @@ class Result:
 
     def first(self):
         """Before the bones move."""
-        return {"skin": self.before, "bones": self.bones_before,
+        return {"skin": self.before, "bones": self.bones_before, "load": 0.0,
                 "walls": self.model["point/position"][:][self.walls.ravel()]}
 
     def between(self, load):
@@ -228,6 +234,58 @@ def surface(points, corners, numbers=None):
     normals.SplittingOff()
     normals.Update()
     return normals.GetOutput()
+
+
+def read_instruments(file):
+    """[(shape, push)] of a scene, the shapes as the scene gives them: before the push."""
+    try:
+        import yaml
+    except ImportError:
+        refuse("-scene needs PyYAML: pip install pyyaml, or apt-get install python3-yaml")
+    try:
+        with open(file, encoding="utf-8") as text:
+            scene = yaml.safe_load(text)
+        return [(shape_of(entry, os.path.dirname(os.path.abspath(file))), np.array(entry["push"]))
+                for entry in scene.get("instruments") or []]
+    except (AttributeError, KeyError, TypeError, ValueError, yaml.YAMLError) as reason:
+        refuse(f"{file}: not a scene that repose-solve takes: {reason}")
+
+
+def shape_of(entry, folder):
+    """A closed surface of an instrument, or the plane of a half-space."""
+    if "sphere" in entry:
+        source = vtk.vtkSphereSource()
+        source.SetCenter(*entry["sphere"]["center"])
+        source.SetRadius(entry["sphere"]["radius"])
+        source.SetThetaResolution(48)
+        source.SetPhiResolution(24)
+    elif "capsule" in entry:
+        line = vtk.vtkLineSource()
+        line.SetPoint1(*entry["capsule"]["from"])
+        line.SetPoint2(*entry["capsule"]["to"])
+        source = vtk.vtkTubeFilter()
+        source.SetInputConnection(line.GetOutputPort())
+        source.SetRadius(entry["capsule"]["radius"])
+        source.SetNumberOfSides(48)
+        source.CappingOn()
+    elif "box" in entry:
+        source = vtk.vtkCubeSource()
+        source.SetCenter(*entry["box"]["center"])
+        source.SetXLength(entry["box"]["size"][0])
+        source.SetYLength(entry["box"]["size"][1])
+        source.SetZLength(entry["box"]["size"][2])
+    elif "half_space" in entry:
+        source = vtk.vtkRegularPolygonSource()
+        source.SetCenter(*entry["half_space"]["point"])
+        source.SetNormal(*entry["half_space"]["normal"])
+        source.SetRadius(60)
+        source.SetNumberOfSides(64)
+    else:
+        reader = {".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader, ".obj": vtk.vtkOBJReader}
+        source = reader[os.path.splitext(entry["mesh"])[1].lower()]()
+        source.SetFileName(os.path.join(folder, entry["mesh"]))
+    source.Update()
+    return source.GetOutput()
 
 
 def beside(bones, skin):
@@ -357,10 +415,14 @@ def actors(column, state, result, tables):
     skin = surface(state["skin"], result.corners, state[column] if table else None)
     drawn = []
     if len(result.bone_corners):
-        drawn.append(actor(beside(surface(state["bones"], result.bone_corners), skin), IVORY))
+        bones = beside(surface(state["bones"], result.bone_corners), skin)
+        drawn.append(actor(bones, GREY if table else IVORY))
     if column != "bones" and len(result.walls):
         fan = 4 * np.arange(len(result.walls))[:, None, None] + [[0, 1, 2], [0, 2, 3]]
         drawn.append(actor(surface(state["walls"], fan.reshape(-1, 3)), FLESH))
+    for shape, push in result.instruments:
+        drawn.append(actor(shape, STEEL, opacity=0.6))
+        drawn[-1].SetPosition(*(state["load"] * push))
     return [*drawn, actor(skin, SKIN, table, 0.35 if column == "bones" else 1.0)]
 
 
@@ -447,6 +509,8 @@ def write_film(frames, output):
 def main():
     chosen = arguments()
     result = Result(chosen.name + ".h5")
+    if chosen.scene:
+        result.instruments = read_instruments(chosen.scene)
     last = len(result.steps) - 1
     if chosen.step != "last" and not (chosen.step.isdecimal() and int(chosen.step) <= last):
         refuse(f"-step {chosen.step}: {chosen.name}.h5 has the steps 0 to {last}, or last")

@@ -77,8 +77,10 @@ def paint(file, mesh, kind, names, values):
     head = ["ply", "format ascii 1.0", f"element vertex {len(mesh.points)}"]
     head += [f"property float {axis}" for axis in "xyz"]
     head += [f"property {kind} {name}" for name in names]
-    head += ["element face 0", "property list uchar int vertex_indices", "end_header"]
+    faces = mesh.cells_dict["triangle"]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
     rows = [" ".join(map(str, [*p, *v])) for p, v in zip(mesh.points, values)]
+    rows += [" ".join(map(str, [3, *face])) for face in faces]
     file.write_text("\n".join(head + rows) + "\n")
 
 
@@ -86,13 +88,13 @@ def test_regions_painted_on_a_mesh(run, tmp_path):
     """A red cap, its rim blended with the white of the rest by the brush; and labels."""
     mesh = meshio.read(sphere(tmp_path / "a.ply", 40))
     sphere(tmp_path / "b.ply", 38)
-    red = np.clip((mesh.points[:, 2] - 10) / 4, 0, 1)
+    red = np.clip((mesh.points @ [1, 2, 3] / 14**0.5 - 10) / 4, 0, 1)
     colors = np.column_stack([np.full(len(red), 255), *[np.round(255 * (1 - red)).astype(int)] * 2])
     paint(tmp_path / "painted.ply", mesh, "uchar", ["red", "green", "blue"], colors)
     found = rows(run("repose-compare", "a.ply", "b.ply", "-regions", "painted.ply").stdout)
     assert {name for name in found if name.startswith("color")} == {"color 255 255 255", "color 255 0 0"}
     share = found["color 255 0 0"][0] / found["PREDICTED to ACTUAL"][0]
-    assert share == pytest.approx((40 - 12) / 80, abs=0.04)  # Archimedes: area goes with height
+    assert share == pytest.approx((40 - 12) / 80, abs=0.06)  # area goes with height, samples nearly
     assert found["color 255 0 0"][1] == pytest.approx(2, abs=0.05)
     paint(tmp_path / "labels.ply", mesh, "int", ["label"], (mesh.points[:, :1] > 0).astype(int) + 6)
     found = rows(run("repose-compare", "a.ply", "b.ply", "-regions", "labels.ply").stdout)

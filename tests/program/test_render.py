@@ -29,6 +29,7 @@ def needs_vtk():
 WRONG = {"no result": (["none"], "none.h5 is missing"),
          "unknown view": (["{}", "-views", "back"], "-views back: unknown, take some of front"),
          "unknown column": (["{}", "-columns", "x"], "-columns x: unknown, take some of before"),
+         "no scene": (["{}", "-scene", "none.yaml"], "-scene none.yaml: no such file"),
          "not a film": (["{}", "-film", "way.mp4"], "-film must end in .gif"),
          "no folder": (["{}", "-output", "none/p.png"], "none/p.png: make its folder first")}
 
@@ -59,6 +60,27 @@ def test_a_picture_has_a_column_a_way_and_a_row_a_view(render, solved, tmp_path)
     wide, high = size_of(tmp_path / "one.png")
     four_wide, two_high = size_of(tmp_path / "many.png")
     assert four_wide == 4 * wide and two_high > 1.2 * high
+
+
+def test_instruments_of_the_scene_are_drawn(render, solved, tmp_path):
+    needs_vtk()
+    pytest.importorskip("yaml")
+    result = solved("paper_jaw_opening.yaml")
+    shapes = ["sphere: {center: [0, -90, 0], radius: 20}", "box: {center: [0, 0, 0], size: [40, 300, 40]}",
+              "capsule: {from: [0, 0, 0], to: [0, -150, 0], radius: 5}",
+              "half_space: {point: [0, -150, 0], normal: [0, 1, 0]}",
+              f"mesh: {PROJECT / 'meshes/head_mandible.ply'}"]
+    plain = render(result, "-output", "plain.png", "-views", "front", "-columns", "after")
+    assert plain.returncode == 0, plain.stderr
+    for shape in shapes:
+        (tmp_path / "s.yaml").write_text(f"instruments: [{{{shape}, push: [0, 5, 0]}}]\n")
+        drawn = render(result, "-output", "s.png", "-views", "front", "-columns", "after",
+                       "-scene", "s.yaml")
+        assert (drawn.returncode, drawn.stderr) == (0, ""), shape
+        assert (tmp_path / "s.png").read_bytes() != (tmp_path / "plain.png").read_bytes(), shape
+    (tmp_path / "s.yaml").write_text("instruments: [{sphere: {radius: 1}, push: [0, 5, 0]}]\n")
+    refused = render(result, "-scene", "s.yaml")
+    assert refused.returncode == 1 and refused.stderr.count("\n") == 1 and "s.yaml" in refused.stderr
 
 
 def test_paraview_draws_the_same_result(solved, tmp_path, environment):
