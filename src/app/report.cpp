@@ -43,15 +43,20 @@ std::string region_row(const solve::RegionSummary& r) {
                   r.active, r.columns, r.rounds, r.force, r.error));
 }
 
-std::string verdict(const solve::Summary& s) {
-  if (s.path.complete()) return "";
-  return fmt::format(
-      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).{}\n",
-      s.path.load, s.last.displacement_error, s.last.reason,
-      s.path.last.stable || s.path.last.stopped
-          ? ""
-          : " The tissue buckles there, or is between several rest positions: move "
-            "the bones less, or give the tissue tension.");
+/// Why a run that did not come to rest did not, as far as that is known, and what to change.
+std::string remedy(const solve::Summary& s, bool stretched) {
+  if (!s.path.last.stable && stretched)
+    return " The tissue buckles there, or is between several rest positions: move the bones less, "
+           "or lower tissue.turgor: what the skin's tension presses together beneath it may have no "
+           "balance, or none any more where it is cut.";
+  if (s.path.last.stopped) return "";
+  if (!s.path.last.stable)
+    return " The tissue buckles there, or is between several rest positions: move the bones less, "
+           "or give the tissue tension.";
+  if (std::isfinite(s.last.penetration))
+    return " Tissue meets bone, an instrument or itself there: leave contact.stiffness and "
+           "contact.grid to the program, or move less.";
+  return "";
 }
 
 }  // namespace
@@ -181,10 +186,17 @@ std::string describe_stages(const base::Stages& stages) {
   return text;
 }
 
+std::string describe_failure(const solve::Summary& s, bool stretched) {
+  if (s.path.complete()) return "";
+  return fmt::format(
+      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).{}\n",
+      s.path.load, s.last.displacement_error, s.last.reason, remedy(s, stretched));
+}
+
 std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,
                          const base::Stages& stages) {
-  std::string text = verdict(s);
-  text += report_row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
+  std::string text =
+      report_row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
   text += report_row("accuracy", fmt::format("{:.3g} mm reached, {:.3g} mm asked for",
                                              s.last.displacement_error, settings.path.accuracy));
   text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"

@@ -202,6 +202,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const std::string given = write_given_skin(writer);
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
+  say(describe_failure(summary, job_.recording.has_value()));
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   say(coarser.told + writer.comparison() + describe_tearing(tearing));
   if (path) say(describe_path(*path));

@@ -57,8 +57,11 @@ std::string describe_folds(const model::Model& model, const std::vector<double>&
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 
+/// Why a run did not come to rest and what to change, loudly in one line; nothing where it did.
+/// `stretched`: it began in an initial equilibrium.
+std::string describe_failure(const solve::Summary& summary, bool stretched);
+
 /// How it ended: load, accuracy, reason, work, inverted prisms, and time and memory of each stage.
-/// An answer that is not converged, or folds tissue, says so first and loudly.
 std::string describe_run(const solve::Summary& summary, const solve::Settings& settings, int ranks,
                          const base::Stages& stages);
 
