@@ -19,8 +19,9 @@ std::string why_bare(const scene::Scene& scene, const SkinMesh& mesh, const Bone
                      int32_t bone, int64_t reached) {
   if (reached > 0)
     return fmt::format(
-        "all {} columns that reach it are let go: on the fixed rim, in an unattached region, or "
-        "within {} mm of a piece that moves differently; set tissue.release smaller",
+        "all {} columns that reach it are let go: on the fixed rim, by tissue.attach or a region, "
+        "or within {} mm of a piece that moves differently; set tissue.release smaller, or attach "
+        "some to be fixed or slide",
         reached, scene.tissue.release);
   return fmt::format(
       "no column of tissue reaches it: it is {:.1f} mm from the skin and tissue.attach_within is "
@@ -57,8 +58,9 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
                   const Model& model, Attachment& attachment) {
   const std::string file = scene.file.string();
   std::vector<int64_t> tied(bones.size(), 0);
-  for (const int32_t bone : model.points.bone)
-    if (bone >= 0) ++tied[bone];
+  for (const auto& bones_of : {model.points.bone, attachment.slides_on})
+    for (const int32_t bone : bones_of)
+      if (bone >= 0) ++tied[bone];
   for (int32_t b = 0; b < bones.size(); ++b) {
     if (tied[b] > 0) continue;
     const std::string why = why_bare(scene, mesh, bones, b, attachment.reached[b]);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "repose/base/error.h"
 #include "triangle_tree.h"
 
 namespace repose::surface {
@@ -91,7 +92,9 @@ class FieldBuilder {
       field.size_[a] = 1 + static_cast<int32_t>((high[a] - low[a] + 2 * margin) / (b * h));
       points_[a] = int64_t{b} * field.size_[a];
     }
-    field.place_.assign(int64_t{field.size_[0]} * field.size_[1] * field.size_[2], -1);
+    const int64_t blocks = int64_t{field.size_[0]} * field.size_[1] * field.size_[2];
+    if (blocks > most_blocks) refuse();
+    field.place_.assign(blocks, -1);
   }
 
   /// Leaves out what is far from all points.
@@ -132,6 +135,15 @@ class FieldBuilder {
 
  private:
   using Index = std::array<int64_t, 3>;
+  static constexpr int64_t most_blocks = int64_t{1} << 27;
+  static constexpr size_t most_values = size_t{1} << 26;
+
+  [[noreturn]] void refuse() const {
+    base::refuse(
+        "the distances to a body of contact would take more than {} million points of a grid of "
+        "{:g} mm; make contact.grid larger",
+        most_values >> 20, field_.spacing_);
+  }
 
   int64_t block_row(int64_t i, int64_t j, int64_t k) const {
     return (k * field_.size_[1] + j) * field_.size_[0] + i;
@@ -145,6 +157,7 @@ class FieldBuilder {
     if (!wanted_[row]) return -1;
     int32_t& place = field_.place_[row];
     if (place < 0) {
+      if (field_.value_.size() >= most_values) refuse();
       place = static_cast<int32_t>(field_.value_.size() / cells);
       field_.value_.resize(field_.value_.size() + cells, std::numeric_limits<float>::infinity());
       triangle_.resize(field_.value_.size(), -1);
