@@ -1,28 +1,35 @@
 #include "repose/discrete/gather.h"
 
-#include <numeric>
-
 #include "repose/base/agreement.h"
+#include "repose/discrete/message.h"
 
 namespace repose::discrete {
 
+namespace {
+
+/// The arrays of all ranks one after the other, each of any length.
+template <class T>
+std::vector<T> gathered(MPI_Comm comm, std::vector<T> mine) {
+  if (base::rank(comm) > 0) {
+    Sender(comm, 0)(mine);
+    return {};
+  }
+  for (int from = 1; from < base::size(comm); ++from) {
+    std::vector<T> theirs;
+    Receiver(comm, from)(theirs);
+    mine.insert(mine.end(), theirs.begin(), theirs.end());
+  }
+  return mine;
+}
+
+}  // namespace
+
 std::vector<double> gather(MPI_Comm comm, const double* values, size_t count) {
-  const int own = static_cast<int>(count), size = base::size(comm);
-  std::vector<int> counts(size), starts(size + 1, 0);
-  MPI_Gather(&own, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
-  std::partial_sum(counts.begin(), counts.end(), starts.begin() + 1);
-  std::vector<double> all(starts.back());
-  MPI_Gatherv(values, own, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0,
-              comm);
-  return all;
+  return gathered(comm, std::vector<double>(values, values + count));
 }
 
 std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab) {
-  const std::vector<double> numbers =
-      gather(comm, slab.empty() ? nullptr : slab.data()->data(), 3 * slab.size());
-  std::vector<Vec3> points(numbers.size() / 3);
-  for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec3>(&numbers[3 * i]);
-  return points;
+  return gathered(comm, slab);
 }
 
 }  // namespace repose::discrete

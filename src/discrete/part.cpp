@@ -9,6 +9,7 @@
 #include "repose/base/error.h"
 #include "repose/base/log.h"
 #include "repose/base/pick.h"
+#include "repose/discrete/countable.h"
 #include "repose/discrete/message.h"
 #include "repose/discrete/partition.h"
 #include "repose/model/motion.h"
@@ -362,7 +363,10 @@ Part distribute(MPI_Comm comm, const Model& model) {
   const base::Logged logged(event);
   const int ranks = base::size(comm);
   ColumnGraph graph;
-  base::on_first_rank(comm, [&] { graph = column_graph(model); });
+  base::on_first_rank(comm, [&] {
+    require_countable(static_cast<int64_t>(model.points.position.size()));
+    graph = column_graph(model);
+  });
   const std::vector<int> column_owner = partition(comm, graph);
   std::optional<Plan> plan;  // on rank 0
   std::optional<LocalNumbers> local;

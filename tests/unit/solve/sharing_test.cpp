@@ -3,7 +3,11 @@
 #include <set>
 
 #include "../../layered_patch.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
 #include "repose/base/scatter.h"
+#include "repose/discrete/countable.h"
+#include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/partition.h"
 #include "rest.h"
@@ -86,6 +90,30 @@ TEST(Sharing, AModelGivenAwayIsSolvedAndLetGoOf) {
   for (size_t i = 0; i < position.size(); ++i)
     EXPECT_LT((position[i] - kept.rows.position[i]).norm(), 2 * settings.path.accuracy) << i;
   EXPECT_TRUE(m.springs.points.empty());
+}
+
+TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
+  constexpr PetscInt largest = 2147483647;
+  EXPECT_NO_THROW(discrete::require_countable(715827882, largest));
+  EXPECT_THROW(discrete::require_countable(715827883, largest), base::InputError);
+  constexpr int64_t many = 3'000'000'001;
+  int64_t next = 0;
+  for (int rank = 0; rank < 7; ++rank) {
+    const base::Slab slab = base::slab(many, rank, 7);
+    EXPECT_EQ(slab.begin, next);
+    EXPECT_EQ(slab.rows(), rank < 4 ? 428571429 : 428571428);
+    next = slab.end;
+  }
+  EXPECT_EQ(next, many);
+}
+
+TEST(Sharing, GathersSlabsOfDifferentLengthsInOrder) {
+  const int rank = base::rank(PETSC_COMM_WORLD), ranks = base::size(PETSC_COMM_WORLD);
+  const std::vector<double> mine(rank, 10.0 + rank);  // none on rank 0
+  const std::vector<double> all = discrete::gather(PETSC_COMM_WORLD, mine.data(), mine.size());
+  std::vector<double> expected;
+  for (int r = 0; r < ranks && rank == 0; ++r) expected.insert(expected.end(), r, 10.0 + r);
+  EXPECT_EQ(all, expected);
 }
 
 }  // namespace

@@ -1,0 +1,12 @@
+#pragma once
+#include <petscsys.h>
+
+#include <cstdint>
+
+namespace repose::discrete {
+
+/// Throws InputError where a model's coordinates, three a point, are more than the whole numbers of
+/// PETSc can count: 2³¹ − 1 unless it was built with 64-bit indices.
+void require_countable(int64_t points, PetscInt largest = PETSC_MAX_INT);
+
+}  // namespace repose::discrete
