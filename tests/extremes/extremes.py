@@ -21,6 +21,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "benchmark"), str(HERE.parent / "pr
 
 import pytest  # noqa: E402
 
+import rows_contact  # noqa: E402
 import rows_scenes  # noqa: E402
 import rows_solid  # noqa: E402
 import rows_springs  # noqa: E402
@@ -31,6 +32,7 @@ from page import option_parser, print_table  # noqa: E402
 GROUPS = {
     "springs": [*rows_springs.ROWS, *rows_scenes.rows_of("springs")],
     "solid": [*rows_solid.ROWS, *rows_scenes.rows_of("solid")],
+    "contact": rows_contact.ROWS,
 }
 HEAD = """| row | tissue | expected | got | evaluations | estimate, mm | error, mm | verdict |
 |---|---|---|---|--:|--:|--:|---|"""
