@@ -101,7 +101,7 @@ TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
   for (int rank = 0; rank < 7; ++rank) {
     const base::Slab slab = base::slab(many, rank, 7);
     EXPECT_EQ(slab.begin, next);
-    EXPECT_EQ(slab.rows(), rank < 4 ? 428571429 : 428571428);
+    EXPECT_EQ(slab.rows(), rank < 5 ? 428571429 : 428571428);
     next = slab.end;
   }
   EXPECT_EQ(next, many);
