@@ -14,8 +14,9 @@ million unknowns want for lack of memory. Positions at the model's points are ke
 RESULT_linear.npy or RESULT_quadratic.npy, and found there the next time. A row of the table: the
 mean and largest distance over the points of the skin that moved by more than -moving mm in the
 finite elements, and the mean over the mean motion. -against: the finite elements are those of
-another result, of the same skin with other layers. -output puts the table below the mark
-<!-- finite elements --> of a page that is there. One core; times are CPU s.
+another result, of the same skin with other layers, or one whose prisms halve.py has divided.
+-output puts the table below the mark <!-- finite elements --> of a page that is there. One core;
+times are CPU s.
 Needs Debian 12's packages: apt-get install --no-install-recommends python3-dolfinx python3-h5py
 python3-scipy (and Debian's own /usr/bin/python3, not another).
 """
@@ -244,8 +245,10 @@ def skin_rows(model):
 
 def difference(model, position, other, reference_position, moving):
     """Mean and largest distance over the points of the skin that the reference, positions of the
-    model `other` of the same skin, moves by more than `moving` mm, and their mean motion, mm."""
-    skin, others = skin_rows(model), skin_rows(other)
+    model `other` of the same skin or of one that `model` has halved (halve.py), moves by more than
+    `moving` mm, and their mean motion, mm."""
+    others = skin_rows(other)
+    skin = skin_rows(model)[:len(others)]
     motion = np.linalg.norm(reference_position - other["point/position"], axis=1)[others]
     moved = motion > moving
     apart = np.linalg.norm(position[skin] - reference_position[others], axis=1)[moved]

@@ -12,11 +12,13 @@
 #include <functional>
 #include <map>
 #include <random>
+#include <string_view>
 #include <thread>
 
 #include "../layered_patch.h"
 #include "repose/mechanics/energy.h"
 #include "repose/mechanics/hessian.h"
+#include "repose/model/material.h"
 
 namespace {
 
@@ -28,12 +30,28 @@ using mechanics::Weights;
 
 constexpr Weights springs_only{1.0, VolumeTerm::none, 0.0};
 constexpr Weights with_penalty{1.0, VolumeTerm::penalty, 0.4};
+constexpr Weights of_solid{1.0, VolumeTerm::penalty, 1.0};
 constexpr int64_t layers = 4;
 constexpr int64_t sizes[] = {35, 354};       // columns along a side: 5e3 and 5e5 points
 constexpr double out_of_all_caches = 1.5e9;  // bytes of STREAM's three arrays
 
+/// The patch as a solid of ν = 0.45 in place of springs.
+mechanics::Loops solid_loops(model::Model model) {
+  model.springs = {};
+  model::Prisms& prisms = model.prisms;
+  const model::Moduli of = model::moduli({0.015, 0.45});
+  prisms.shear_modulus.assign(prisms.points.size(), of.shear);
+  prisms.modulus.assign(prisms.points.size(), of.volume);
+  for (const double volume : prisms.rest_volume)
+    prisms.target_volume.push_back(volume * (1 + of.shear / of.volume));
+  model::assemble_edges("patch", model);
+  return mechanics::make_loops(model, 0, static_cast<int64_t>(prisms.points.size()),
+                               static_cast<int64_t>(model.edges.points.size()),
+                               static_cast<int64_t>(model.points.position.size()));
+}
+
 struct Workload {
-  mechanics::Loops springs, prisms;  // one each, for products of one kind
+  mechanics::Loops springs, prisms, solid;  // the first two for products of one kind
   std::vector<Vec3> position, direction, result;
 
   explicit Workload(int64_t columns) {
@@ -41,6 +59,7 @@ struct Workload {
     springs = mechanics::make_loops(model, static_cast<int64_t>(model.springs.points.size()),
                                     static_cast<int64_t>(model.prisms.points.size()));
     std::swap(prisms.prisms, springs.prisms);
+    solid = solid_loops(model);
     std::mt19937 engine(1);
     std::uniform_real_distribution<double> noise(-0.1, 0.1);
     for (const Vec3& x : model.points.position) {
@@ -62,13 +81,14 @@ Workload& workload(int64_t columns) {
 /// What is measured: how many elements, what they read and write, and the work.
 struct Kernel {
   const char* name;
-  std::function<int64_t(const Workload&)> elements;
+  int64_t (*elements)(const Workload&);
   double vectors;  ///< read or written once a point
   std::function<void(Workload&, Kernels)> work;
 };
 
 int64_t springs(const Workload& w) { return w.spring_loop().size(); }
 int64_t prisms(const Workload& w) { return w.prism_loop().size(); }
+int64_t edges(const Workload& w) { return w.solid.edges.size(); }
 
 const Kernel kernels[] = {
     {"spring energy and gradient", springs, 3,
@@ -89,6 +109,21 @@ const Kernel kernels[] = {
      [](Workload& w, Kernels k) {
        mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result, k);
      }},
+    {"solid edge energy and gradient", edges, 3,
+     [](Workload& w, Kernels k) {
+       benchmark::DoNotOptimize(
+           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result, k));
+     }},
+    {"solid prism with its edges, energy and gradient", prisms, 3,
+     [](Workload& w, Kernels k) {
+       benchmark::DoNotOptimize(
+           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result, k) +
+           mechanics::add_prism_gradient(w.solid.prisms, w.position, of_solid, w.result, k));
+     }},
+    {"solid prism with its edges, Hessian action", prisms, 4,
+     [](Workload& w, Kernels k) {
+       mechanics::add_hessian_action(w.solid, w.position, of_solid, w.direction, w.result, k);
+     }},
 };
 
 /// Bytes of the places of a loop's elements: of runs, or of each element's points.
@@ -101,14 +136,21 @@ double bytes_of_places(const Loop& loop, Kernels kernels) {
          point_bytes * static_cast<double>(loop.size() - in_runs);
 }
 
+/// Bytes of a loop's elements: their places, and some numbers for each.
+template <class Loop>
+double bytes_of_elements(const Loop& loop, int numbers, Kernels kernels) {
+  return bytes_of_places(loop, kernels) +
+         static_cast<double>(numbers * sizeof(double)) * static_cast<double>(loop.size());
+}
+
 /// Bytes that go over a kernel's arrays once, for all elements.
 double bytes(const Kernel& kernel, const Workload& w, Kernels kernels) {
-  const bool spring = kernel.elements(w) == springs(w);
-  const double places =
-      spring ? bytes_of_places(w.spring_loop(), kernels) : bytes_of_places(w.prism_loop(), kernels);
-  const double numbers = (spring ? 3 : 2) * sizeof(double);
-  return places + numbers * static_cast<double>(kernel.elements(w)) +
-         kernel.vectors * sizeof(Vec3) * static_cast<double>(w.position.size());
+  double elements = 0;
+  const bool solid = std::string_view(kernel.name).starts_with("solid");
+  if (kernel.elements == springs) elements = bytes_of_elements(w.spring_loop(), 3, kernels);
+  if (kernel.elements == prisms) elements = bytes_of_elements(w.prism_loop(), 2, kernels);
+  if (solid) elements += bytes_of_elements(w.solid.edges, 1, kernels);
+  return elements + kernel.vectors * sizeof(Vec3) * static_cast<double>(w.position.size());
 }
 
 /// Bytes of the springs' arrays, a size that STREAM is measured at, too.

@@ -64,10 +64,10 @@ def synthetic(tools, size, scene):
 
 
 def events(log):
-    """Count and seconds of PETSc's events of linear systems, from a -log_view."""
+    """Count and seconds of events of linear systems, from a -log_view."""
     found = {}
     for line in log.read_text(errors="replace").splitlines():
         words = line.split()
-        if len(words) > 10 and words[0] in ("PCRenew", "PCApply", "MatMult"):
+        if len(words) > 10 and words[0] in ("PCRenew", "PCApply", "MatMult", "RpHessianAction"):
             found[words[0]] = int(words[1]), float(words[3])
     return found

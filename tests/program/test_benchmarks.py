@@ -5,9 +5,11 @@ import importlib.util
 import re
 import sys
 
+import numpy as np
 import pytest
 
 from conftest import PROJECT, finish, programs
+from tissue import last, model_of, prism_volumes
 
 
 METHODS = "default,default_end,stiffness,stiffness_step,lmvm,polak_ribiere,liblbfgs,L-BFGS-B"
@@ -100,3 +102,31 @@ def test_the_picture_is_there(estimate):
     if not importlib.util.find_spec("matplotlib"):
         pytest.skip("matplotlib is not installed")
     assert (estimate / "estimate.png").read_bytes().startswith(b"\x89PNG")
+
+
+FORWARD = """skin: {meshes}/paper_skin.ply
+bones:
+  - {{name: skull, file: {meshes}/paper_skull.ply}}
+  - {{name: mandible, file: {meshes}/paper_mandible.ply}}
+tissue: {{layers: 4}}
+contact: {{bones: off, cuts: off}}
+moves: [{{bone: mandible, translate: [0, -3, 0]}}]
+"""
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_a_halved_model_is_the_same_body(run, environment, tmp_path, layers):
+    (tmp_path / "scene.yaml").write_text(FORWARD.format(meshes=PROJECT / "meshes"))
+    assert run("repose-solve", "scene.yaml", "-output", "whole").returncode == 0
+    halving = run_script("halve.py", tmp_path, environment, "whole.h5", "m.h5", "-layers", layers)
+    assert (halving.returncode, halving.stderr) == (0, ""), halving
+    assert run("repose-solve", "m.h5", "-output", "half").returncode == 0
+    one, other = (model_of(tmp_path / f"{name}.h5") for name in ("whole", "half"))
+    parts = [prism_volumes(m["point/position"], m["prism/points"])[0] for m in (one, other)]
+    assert parts[1].min() > 0 and len(parts[1]) == 4 * layers * len(parts[0])
+    assert parts[1].reshape(len(parts[0]), -1).sum(1) == pytest.approx(parts[0], rel=1e-12)
+    skin = [m["point/layer"] == 0 for m in (one, other)]
+    moved = [last(tmp_path / f"{name}.h5")["point/displacement"] for name in ("whole", "half")]
+    count = skin[0].sum()
+    apart = np.linalg.norm(moved[0][skin[0]] - moved[1][skin[1]][:count], axis=1)
+    assert 0.02 < apart.mean() < 0.1 * np.linalg.norm(moved[0][skin[0]], axis=1).mean()
