@@ -28,12 +28,6 @@ int64_t logged(const char* name) {
   return info.count;
 }
 
-double dot(Vec x, Vec y) {
-  PetscScalar product = 0;
-  check(VecDot(x, y, &product));
-  return product;
-}
-
 /// Finds the rest position of a problem by a function that watches it.
 class WatchedSearch {
  public:

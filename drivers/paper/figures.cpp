@@ -14,11 +14,11 @@ namespace repose::paper {
 
 namespace {
 
-const MPI_Comm comm = PETSC_COMM_SELF;
+const MPI_Comm alone = PETSC_COMM_SELF;
 
 /// F_i of every local point at the initial positions.
 std::vector<Vec3> initial_forces(const discrete::Part& part) {
-  discrete::Positions positions(comm, part);
+  discrete::Positions positions(alone, part);
   discrete::Objective objective(positions, {});
   positions.update(positions.make_vector());
   return objective.residual_force();
@@ -54,9 +54,9 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
   model::Model model = model::build_model(scene).model;
   model::Model strained = model;
   strain_skin(strained, turgor);
-  solve::prestress(comm, model, {turgor, model.gravity});
-  const discrete::Part part = discrete::distribute(comm, model);
-  const std::vector<Vec3> before = initial_forces(discrete::distribute(comm, strained));
+  solve::prestress(alone, model, {turgor, model.gravity});
+  const discrete::Part part = discrete::distribute(alone, model);
+  const std::vector<Vec3> before = initial_forces(discrete::distribute(alone, strained));
   const std::vector<Vec3> after = initial_forces(part);
   std::string text = "x,y,z,before_x,before_y,before_z,after_x,after_y,after_z,layer\n";
   for (int64_t i = 0; i < part.owned_points; ++i) {
@@ -74,10 +74,10 @@ bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   wanted.volume = scene::VolumeForm::penalty;
   wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, wanted, model);
   const solve::Settings settings = app::settings_of(wanted, false);
-  results::ResultFile file(comm, name, model);
-  base::Stages stages(comm);
+  results::ResultFile file(alone, name, model);
+  base::Stages stages(alone);
   const solve::Summary summary =
-      solve::find_repose(comm, model, settings, {}, stages,
+      solve::find_repose(alone, model, settings, {}, stages,
                          [&](const model::StepNumbers& numbers, const model::StepRows& rows) {
                            file.append(numbers, rows);
                          });

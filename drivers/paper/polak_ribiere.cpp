@@ -10,12 +10,6 @@ using base::check;
 
 namespace {
 
-double dot(Vec x, Vec y) {
-  PetscScalar product = 0;
-  check(VecDot(x, y, &product));
-  return product;
-}
-
 /// Moves `displacement` to the minimum along `direction`.
 void minimise_along(discrete::Function& function, Vec direction, double tolerance, Vec displacement,
                     Vec trial) {
@@ -28,6 +22,12 @@ void minimise_along(discrete::Function& function, Vec direction, double toleranc
 }
 
 }  // namespace
+
+double dot(Vec x, Vec y) {
+  PetscScalar product = 0;
+  check(VecDot(x, y, &product));
+  return product;
+}
 
 PolakRibiereOutcome polak_ribiere(discrete::Function& function, Vec displacement,
                                   const PolakRibiereSettings& settings) {

@@ -22,4 +22,6 @@ struct PolakRibiereOutcome {
 PolakRibiereOutcome polak_ribiere(discrete::Function& function, Vec displacement,
                                   const PolakRibiereSettings& settings = {});
 
+double dot(Vec x, Vec y);  ///< collective
+
 }  // namespace repose::paper

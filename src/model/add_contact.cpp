@@ -104,7 +104,7 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
 }
 
 /// Finer than the tissue can follow, teeth and edges catch single points.
-double spacing(const scene::Scene& scene, const SkinMesh& mesh) {
+double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh) {
   constexpr double share = 0.75;  // of the mean edge
   if (scene.contact && scene.contact->grid) return *scene.contact->grid;
   double sum = 0;
@@ -136,7 +136,7 @@ void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachme
   for (size_t i = 0; i < scene.instruments.size(); ++i)
     if (scene.instruments[i].slide) touch_instrument(scene, i, area, model);
   if (contact.touches.point.empty()) contact.bodies.clear();
-  contact.spacing = spacing(scene, mesh);
+  contact.spacing = grid_spacing(scene, mesh);
   contact.stiffness = penalty(scene, model, mesh.points.size());
 }
 

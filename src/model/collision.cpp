@@ -13,8 +13,6 @@
 namespace repose::model {
 namespace {
 
-constexpr double same_motion = 1e-9;  // largest difference of matrix entries, mm or none
-
 /// The constant twist of a screw motion, the logarithm of a small part of it:
 /// t = (1 + (1−cos θ)/θ² K + (θ−sin θ)/θ³ K²) v with K = [θ u]× for a part that turns by θ.
 surface::Twist twist_of(const scene::RigidMotion& motion) {
@@ -108,11 +106,12 @@ void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) 
   if (pair.contact()) look_at_the_end(a, b, pair);
 }
 
-bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
-  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same_motion;
-}
-
 }  // namespace
+
+bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
+  constexpr double same = 1e-9;  // largest difference of matrix entries, mm or none
+  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same;
+}
 
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double least_margin = 0.05;
 constexpr double shortening = 0.9;
-constexpr double steepest = 1.0;
 constexpr double thinnest = 0.05;  // mm
 
 /// Least value of c[0] + c[1] s + c[2] s² for s in [0, 1].
@@ -86,7 +85,7 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
     std::copy_if(changed.begin(), changed.end(), std::back_inserter(stuck), too_thin);
     std::erase_if(changed, too_thin);
     for (const int64_t v : changed) thickness[v] *= shortening;
-    const std::vector<int64_t> drawn = limit_slope(mesh, steepest, changed, thickness);
+    const std::vector<int64_t> drawn = limit_slope(mesh, steepest_depth, changed, thickness);
     changed.insert(changed.end(), drawn.begin(), drawn.end());
     folded = triangles_around(mesh, changed);
     std::erase_if(folded, [&](int64_t f) {

@@ -2,20 +2,18 @@
 
 #include <algorithm>
 
+#include "repose/model/collision.h"
+
 namespace repose::model {
 namespace {
-
-constexpr double same_motion = 1e-9;  // largest difference of matrix entries, mm or none
 
 /// For each bone, the bones that move differently from it.
 std::vector<std::vector<int32_t>> others(const std::vector<scene::RigidMotion>& moves) {
   std::vector<std::vector<int32_t>> differing(moves.size());
   for (size_t own = 0; own < moves.size(); ++own)
-    for (size_t other = 0; other < moves.size(); ++other) {
-      const Mat4 difference = moves[own].matrix() - moves[other].matrix();
-      if (difference.cwiseAbs().maxCoeff() > same_motion)
+    for (size_t other = 0; other < moves.size(); ++other)
+      if (!move_alike(moves[own], moves[other]))
         differing[own].push_back(static_cast<int32_t>(other));
-    }
   return differing;
 }
 

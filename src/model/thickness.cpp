@@ -11,7 +11,6 @@ namespace {
 
 constexpr double deeper_than_nearest = 1.6, deeper_by = 2.0;  // mm
 constexpr double bone_room = 0.95, skin_room = 0.45;
-constexpr double steepest = 1.0;
 constexpr double held_weight = 100.0;
 constexpr double spike_width = 1.5, spike_height = 0.2;  // mm
 
@@ -25,7 +24,7 @@ double to_other_side(const surface::DistanceTree& skin, const Vec3& from, const 
 void flatten(const SkinMesh& mesh, std::vector<double>& thickness) {
   std::vector<int64_t> all(thickness.size());
   std::iota(all.begin(), all.end(), 0);
-  limit_slope(mesh, steepest, all, thickness);
+  limit_slope(mesh, steepest_depth, all, thickness);
 }
 
 /// Cuts off what stands out by more than spike_height from the field smoothed over spike_width:

@@ -22,7 +22,7 @@ bool leads_somewhere(hid_t file, const std::string& path) {
   }
 }
 
-base::Hdf5File open(const std::filesystem::path& file) {
+base::Hdf5File open_result(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) base::refuse("{}: no such file", file.string());
   if (std::filesystem::is_directory(file, error))
@@ -37,7 +37,8 @@ base::Hdf5File open(const std::filesystem::path& file) {
 
 }  // namespace
 
-Reader::Reader(const std::filesystem::path& file) : name_(file.string()), file_(open(file)) {}
+Reader::Reader(const std::filesystem::path& file)
+    : name_(file.string()), file_(open_result(file)) {}
 
 void Reader::refuse(const std::string& path, const std::string& what) const {
   base::refuse("{}: {}: {}", name_, path, what);

@@ -20,7 +20,7 @@ bool is_control(char c) {
          c == '\x7f';
 }
 
-std::string read_text(const std::filesystem::path& file) {
+std::string read_scene_text(const std::filesystem::path& file) {
   constexpr std::uintmax_t largest = 1 << 20;
   const std::string name = file.string();
   std::error_code error;
@@ -72,7 +72,7 @@ int second_document(const std::string& text) {
 }  // namespace
 
 YAML::Node read_yaml(const std::filesystem::path& file) {
-  const std::string text = read_text(file);
+  const std::string text = read_scene_text(file);
   try {
     const YAML::Node document = YAML::Load(text);
     if (document.IsNull())

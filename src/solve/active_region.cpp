@@ -18,7 +18,7 @@ using model::PointSet;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unreached = std::numeric_limits<double>::infinity();
 
 template <size_t n>
 bool touches(const std::array<int64_t, n>& element, const std::vector<char>& flagged) {
@@ -186,7 +186,7 @@ std::vector<Vec3> initial_forces(const Model& model) {
 }
 
 ActiveRegion::ActiveRegion(const Model& model, const std::vector<Vec3>& force)
-    : model_(model), graph_(discrete::column_graph(model)), distance_(graph_.columns(), infinity) {
+    : model_(model), graph_(discrete::column_graph(model)), distance_(graph_.columns(), unreached) {
   measure(set_in_motion(force));
 }
 
@@ -260,7 +260,7 @@ int64_t ActiveRegion::columns(double farthest) const {
 double ActiveRegion::largest() const {
   double largest = 0;
   for (const double distance : distance_)
-    if (distance < infinity) largest = std::max(largest, distance);
+    if (distance < unreached) largest = std::max(largest, distance);
   return largest;
 }
 

@@ -23,8 +23,8 @@ using base::pick;
 
 namespace {
 
-constexpr double safety = 2;       // as the Minimiser's: the estimate is so many Newton steps long
-constexpr double own_share = 0.5;  // of the accuracy, for the search in the region
+constexpr double newton_steps = 2;  // as the Minimiser's: the estimate is so many Newton steps long
+constexpr double own_share = 0.5;   // of the accuracy, for the search in the region
 // What the fit of displacements on heads gives: they fall by exp(−0.7) over a thickness.
 constexpr double decay = 0.7;
 constexpr double border_share = 0.4;  // of the accuracy, the displacement at the first border
@@ -324,7 +324,7 @@ Border RegionSearch::border(double width, double& passed_on) {
   check(VecPointwiseMult(band.gradient, band.gradient, band.mask(held)));
   const base::VecHandle step = band.positions.make_vector();
   const bool convex = problem.solver().solve(band.displacement, band.gradient, step, 1e-2);
-  found.error = convex ? safety * discrete::largest_block(step) : infinity;
+  found.error = convex ? newton_steps * discrete::largest_block(step) : infinity;
   for (char& flag : unknown) flag = !flag;
   passed_on = correct(band, part, step, whole_->mask(unknown)) / sum_of_blocks(band.gradient);
   return found;

@@ -26,6 +26,9 @@ struct CollisionReport {
   double safe_load = 1;  ///< all bones can move so far together without a contact
 };
 
+/// Whether two bones keep their places towards each other, to rounding.
+bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b);
+
 /// Follows the moves, screw motions from load 0 to 1, of all pairs of bones that move differently
 /// by conservative advancement, so that no contact on the way is missed. A contact is two triangles
 /// within clearance + tolerance of each other; it is found before they are within the clearance.

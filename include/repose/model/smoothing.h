@@ -16,6 +16,9 @@ namespace repose::model {
 Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
                              const std::vector<double>& weight, const std::vector<double>& length);
 
+/// The steepest that depths below the skin may be, mm per mm along it.
+constexpr double steepest_depth = 1.0;
+
 /// Lowers values until |f_p − f_q| ≤ slope · |e| on every edge: the largest such field below
 /// `values`. Only vertices in `seeds` may be out of order with their neighbours at first.
 /// O(V log V) where all are seeds, else about proportional to what changes. Returns the vertices
