@@ -283,6 +283,14 @@ def test_models_and_curves_in_ras_give_the_same_face(panel, head, tmp_path, bina
     assert len(lps["Points"]) > len(triangles_of(MESHES / "paper_skin.ply")[0])
 
 
+def test_the_lips_are_the_scenes_mouth_and_a_cut_is_an_incision(panel, head, tmp_path):
+    """The solver names what it refuses: so much of a scene that the panel writes is seen."""
+    short = slicer_curve(tmp_path / "short.mrk.json", [[47.0, -80.0, 8.0]], "LPS")
+    for flag, key in (("--lips", "mouth.path"), ("--incision", "incisions[0].path")):
+        result = panel(*head(), flag, short, "--predictedSkin", tmp_path / "skin.vtp")
+        assert result.returncode != 0 and key in result.stderr, (key, result.stderr)
+
+
 def test_progress_only_grows_and_ends(panel, head, tmp_path):
     result = panel(*head(), "--tissue", "springs", "--accuracy", 1e-6, "--predictedSkin",
                    tmp_path / "skin.vtp")

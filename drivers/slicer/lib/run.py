@@ -164,11 +164,13 @@ def write_scene(chosen, folder):
     if not bones:
         raise Refusal("no bone is chosen")
     layers = chosen["layers"]
-    cuts = [("lips", layers), ("incision", min(chosen["incisionLayers"], layers))]
     scene = {"skin": link(chosen["skin"], folder, "skin"), "bones": bones,
-             "tissue": {"layers": layers, **TISSUE[chosen["tissue"]]}, "moves": moves,
-             "incisions": [{"path": link(chosen[cut], folder, cut), "layers": deep}
-                           for cut, deep in cuts if chosen[cut]]}
+             "tissue": {"layers": layers, **TISSUE[chosen["tissue"]]}, "moves": moves}
+    if chosen["lips"]:
+        scene["mouth"] = {"path": link(chosen["lips"], folder, "lips")}
+    if chosen["incision"]:
+        scene["incisions"] = [{"path": link(chosen["incision"], folder, "incision"),
+                               "layers": min(chosen["incisionLayers"], layers)}]
     file = folder / "scene.yaml"
     file.write_text(json.dumps({key: value for key, value in scene.items() if value}, indent=1))
     return file, numbers
