@@ -111,14 +111,16 @@ class Result:
         self.counts |= {"points": len(model["point/set"]), "skin triangles": len(self.corners),
                         "layers": int(model["point/layer"][:].max()) + 1}
         self.volume, self.ratio = model["prism/rest_volume"][:], step["prism/volume_ratio"][:]
-        self.strain = {label: f"{np.abs(step[name][:]).max(initial=0):.3g}" for label, name in (
+        self.strain = {label: three_digits(step[name][:]) for label, name in (
             ("largest tension of a spring, N", "spring/tension"),
             ("largest von Mises stress, N/mm²", "prism/von_mises"),
             ("largest stretch", "prism/principal_stretch")) if name in step}
         if "point/contact_pressure" in step:
             pressure = np.nan_to_num(step["point/contact_pressure"][:])
-            self.strain |= {"points of tissue in contact": str(int((pressure > 0).sum())),
-                            "largest contact pressure, N/mm²": f"{pressure.max(initial=0):.3g}"}
+            self.strain |= {"points of tissue in contact": int((pressure > 0).sum()),
+                            "largest contact pressure, N/mm²": three_digits(pressure),
+                            "deepest that anything passes what it touches, mm":
+                            Figure(f"{step.attrs['penetration']:.2g}")}
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0
@@ -131,6 +133,15 @@ class Result:
             first += len(points)
             self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
                                "motion": rigid(points, after)})
+
+
+class Figure(str):
+    """A number as it is to be shown."""
+
+
+def three_digits(values):
+    """The largest of them."""
+    return Figure(f"{np.abs(values).max(initial=0):.3g}")
 
 
 def text(value):
@@ -417,7 +428,7 @@ def meshes(result):
 def table(head, rows):
     """Rows of cells; numbers stand right."""
     def cell(value):
-        kind = ' class="number"' if isinstance(value, (int, float)) else ""
+        kind = ' class="number"' if isinstance(value, (int, float, Figure)) else ""
         return f"<td{kind}>{html.escape(shown(value))}</td>"
 
     body = "".join(f"<tr>{''.join(map(cell, row))}</tr>" for row in rows)
@@ -464,6 +475,16 @@ def landmark_table(placed, lost):
     return table(head, rows) + (lost_ones if rest else "")
 
 
+def opening(result):
+    """How far the sides of cuts and lips, which begin at one place, are apart in the end, at most."""
+    places, place, count = np.unique(result.before, axis=0, return_inverse=True, return_counts=True)
+    place, farthest = place.ravel(), 0.0
+    for shared in np.flatnonzero(count > 1):
+        sides = result.after[place == shared]
+        farthest = max(farthest, *np.linalg.norm(sides - sides[0], axis=1))
+    return farthest if (count > 1).any() else None
+
+
 def tissue(result):
     ratio, change = result.ratio, result.volume * (result.ratio - 1)
     rows = [("largest movement of the skin, mm", float(result.movement.max())),
@@ -477,6 +498,8 @@ def tissue(result):
             ("prisms: 95 % change by less than, %",
              float(100 * np.percentile(abs(ratio - 1), 95)) if len(ratio) else 0.0),
             ("prisms inside out", int(result.end["inverted_prisms"])), *result.strain.items()]
+    if (apart := opening(result)) is not None:
+        rows.insert(2, ("lips and cuts open by at most, mm", float(apart)))
     return table(("", ""), rows)
 
 
@@ -487,7 +510,11 @@ def accuracy(result):
     model = result.end.get("discretisation_error")
     left = f"{model:.2g} mm at most (estimate)" if model is not None else \
         "not estimated; repose-solve -discretisation estimates it"
-    return f"<p>What mesh and layers leave out: {left}.</p>" + table(
+    lowest = result.end.get("smallest_eigenvalue")
+    steady = "" if lowest is None else "<p>" + (
+        "Stable" if lowest > 0 else "NOT STABLE: it may buckle") + \
+        f": smallest eigenvalue {lowest:.3g} N/mm.</p>"
+    return f"<p>What mesh and layers leave out: {left}.</p>{steady}" + table(
         ("load", "converged", "to the rest position, mm", "iterations", "evaluations", "s", ""),
         rows)
 
@@ -539,7 +566,7 @@ body{font:16px/1.45 sans-serif;color:#222;max-width:60rem;margin:2rem auto;paddi
 h1{font-size:1.6rem}h2{font-size:1.25rem;border-bottom:1px solid #ccc;margin-top:2.2rem}
 table{border-collapse:collapse;margin:.8rem 0}
 td,th{padding:.2rem .7rem;text-align:left;vertical-align:top;border-bottom:1px solid #e4e4e4}
-td{overflow-wrap:anywhere}
+td{overflow-wrap:anywhere}td:first-child{white-space:nowrap}
 .number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
 img,svg{max-width:100%}svg{max-height:36rem}text{font-size:15px}
 pre{background:#f5f5f5;padding:.8rem;overflow:auto}
@@ -568,7 +595,7 @@ def page(chosen, result, placed, lost):
         ("Look", VIEW % result.movement.max() + pictures(result)),
         ("Profile", profile_picture(result, known, plane, before) + (
             table(("", "", "before", "after", "change"), rows) if rows else
-            "<p>No angles: give landmarks by -landmarks or -scene.</p>")),
+            "<p>No angles: not all landmarks that one needs are on the skin.</p>")),
         ("Landmarks", landmark_table(placed, lost) if placed else "<p>None are given.</p>"),
         ("Tissue", tissue(result)), ("Accuracy", accuracy(result)),
         ("Where this comes from", provenance(chosen, result))]

@@ -74,6 +74,8 @@ void Objective::place_bodies() {
 
 double Objective::add_contact(double scale, std::span<Vec3> gradient) {
   if (!positions_.part().contact) return 0;
+  static const PetscLogEvent event = base::log_event("RpContact");
+  const base::Logged logged(event);
   place_bodies();
   return touches_.add_gradient(positions_.local(), scale, gradient) +
          walls_.add_gradient(positions_.local(), scale, gradient);

@@ -103,9 +103,26 @@ def test_contact_is_told_where_there_is_any(report, opened, tmp_path):
         pressure = np.zeros(len(step["point/position"]))
         pressure[:3] = 0.5, 0.25, np.nan
         step["point/contact_pressure"] = pressure
+        step.attrs["penetration"] = 0.0213
     page = page_of(report, tmp_path, tmp_path / "touching.h5")
     assert page.rows["points of tissue in contact"] == ["2"]
     assert page.rows["largest contact pressure, N/mm²"] == ["0.5"]
+    assert page.rows["deepest that anything passes what it touches, mm"] == ["0.021"]
+
+
+def test_lips_that_part_are_measured(report, opened, tmp_path):
+    row = "lips and cuts open by at most, mm"
+    assert row not in page_of(report, tmp_path, opened).rows
+    shutil.copy(opened, tmp_path / "parted.h5")
+    with h5py.File(tmp_path / "parted.h5", "r+") as h5:
+        one, other = np.unique(h5["model/skin/points"][:])[[3, 40]]
+        h5["model/point/position"][other] = h5["model/point/position"][one]
+        after = h5["step"][sorted(h5["step"])[-1]]["point/position"]
+        apart = np.linalg.norm(after[one] - after[other])
+        h5["step"][sorted(h5["step"])[-1]].attrs["smallest_eigenvalue"] = 0.0125
+    page = page_of(report, tmp_path, tmp_path / "parted.h5")
+    assert page.rows[row] == [f"{apart:.2f}"]
+    assert "Stable: smallest eigenvalue 0.0125 N/mm." in page.text["p"]
 
 
 def test_the_page_stands_alone(report, opened, tmp_path):
