@@ -130,3 +130,19 @@ def test_a_halved_model_is_the_same_body(run, environment, tmp_path, layers):
     count = skin[0].sum()
     apart = np.linalg.norm(moved[0][skin[0]] - moved[1][skin[1]][:count], axis=1)
     assert 0.02 < apart.mean() < 0.1 * np.linalg.norm(moved[0][skin[0]], axis=1).mean()
+
+
+def test_the_cookbook_holds_its_recipes(environment, tmp_path):
+    page, count = tmp_path / "page.md", r"\| (\d+) \| (\d+) \| (\d+) \| ([\d.]+) \|"
+    page.write_text("<!-- measured -->\n<!-- end of measured -->\nrest\n")
+    result = run_script("cookbook.py", tmp_path, environment, "-scenes", "paper_jaw_advance",
+                        "-recipes", ";-accuracy 0.000001", "-output", page)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    rows = re.findall(r"^\| (.+?) " + count, page.read_text(), re.M)
+    assert [row[0] for row in rows] == ["none", "`-accuracy 0.000001`"]
+    assert page.read_text().endswith("rest\n") and rows[0][4] == "1"
+    assert all(int(more) > int(few) > 0 for few, more in zip(rows[0][1:4], rows[1][1:4]))
+    script = (PROJECT / "tests/benchmark/cookbook.py").read_text()
+    recipes = re.findall(r'"(-[^"]*)"', script.partition("RECIPES = [")[2].partition("]\n")[0])
+    guide = (PROJECT / "docs/guide/solver.md").read_text()
+    assert [row[0] for row in re.findall(r"^\| `(.+?)` " + count, guide, re.M)] == recipes
