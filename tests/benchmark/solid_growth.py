@@ -6,9 +6,9 @@
                                     [-output docs/measurements/solid.md]
 
 Synthetic heads of the given numbers of skin vertices, four layers, the jaw opened by 8° and brought
-6 mm forward, to 0.01 mm. lmvm is the default: limited-memory BFGS that begins with a multigrid cycle
-and ends with Newton steps; ntr, nls and cg are TAO's. Seconds are those of the search on its own
-model, the estimate of the distance to rest included. Needs: apt-get install
+6 mm forward, to 0.01 mm, without contact. lmvm is the default: limited-memory BFGS that begins with a
+multigrid cycle and ends with Newton steps; ntr, nls and cg are TAO's. Seconds are those of the search
+on its own model, the estimate of the distance to rest included. Needs: apt-get install
 --no-install-recommends python3-h5py python3-numpy
 """
 
@@ -28,6 +28,7 @@ tissue:
 moves:
   - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}
   - {bone: mandible, translate: [0, -6, 0]}
+contact: {bones: off, cuts: off}
 solve: {accuracy: 0.01}
 """
 HEAD = ("| unknowns | ν | method | evaluations | Hessians | search, s | µs/unknown | memory, MiB | "
