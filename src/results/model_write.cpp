@@ -54,9 +54,12 @@ void write_edges(hid_t model, const model::Edges& edges) {
   write_array(group, "weight", {e}, edges.weight.data());
 }
 
-/// What a shape is made of, in a row of model::shape_numbers.
-std::vector<double> numbers_of(const model::Body::Shape& shape) {
+/// What a body's shape is made of, in a row of model::shape_numbers; zeros for a bone, which has
+/// its surface.
+std::vector<double> numbers_of(const model::Body& body) {
   std::vector<double> row;
+  if (body.bone >= 0) return std::vector<double>(model::shape_numbers, 0.0);
+  const model::Body::Shape& shape = body.shape;
   const auto put = [&](const Vec3& v) { row.insert(row.end(), {v.x(), v.y(), v.z()}); };
   if (const auto* ball = std::get_if<scene::Sphere>(&shape))
     put(ball->center), row.push_back(ball->radius);
@@ -82,7 +85,7 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
     bone.push_back(body.bone);
     kind.push_back(body.bone >= 0 ? 0 : static_cast<int8_t>(1 + body.shape.index()));
     push.push_back(body.push);
-    const std::vector<double> row = numbers_of(body.shape);
+    const std::vector<double> row = numbers_of(body);
     shape.insert(shape.end(), row.begin(), row.end());
     const auto* mesh = std::get_if<surface::Surface>(&body.shape);
     if (!mesh || body.bone >= 0) continue;

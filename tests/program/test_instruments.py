@@ -97,6 +97,8 @@ def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):
     force = np.array([float(w) for w in found[2].split(",")])
     model, step = model_of(folder / "slide.h5"), last(folder / "slide.h5")
     x, pressed = step["point/position"], step["point/contact_pressure"] > 0
+    of_bones = model["contact/body_bone"] >= 0  # which have surfaces, and no other shape
+    assert of_bones.any() and (model["contact/body_shape"][of_bones] == 0).all()
     assert pressed.sum() == int(found[1]) > 2
     outward = (x[pressed] - CENTER) / np.linalg.norm(x[pressed] - CENTER, axis=1)[:, None]
     skin = model["point/layer"] == 0

@@ -2,6 +2,7 @@
 
 import sys
 
+import meshio
 import numpy as np
 import pytest
 
@@ -80,3 +81,43 @@ def test_a_scene_turned_and_moved_is_turned_and_moved(run, tmp_path, tissue):
     )
     assert np.abs(there - (position @ turn.T + shift)).max() < 5e-9
     assert energy_there == pytest.approx(energy, rel=1e-9)
+
+
+CHEEK = {"center": np.array([-63.0, -98.0, -10.0]), "push": np.array([12.0, 16.0, 0.0])}
+
+
+def pressed_cheek(run, folder, name, turn, shift):
+    """The paper's head, turned and moved, with a ball that slides on its cheek: the step at rest."""
+    for part in ("skin", "skull", "mandible"):
+        mesh = meshio.read(PROJECT / f"meshes/paper_{part}.ply")
+        points = mesh.points.astype(float) @ turn.T + shift
+        meshio.Mesh(points, mesh.cells).write(folder / f"{name}_{part}.ply")
+    center, push = (list(map(float, v)) for v in (turn @ CHEEK["center"] + shift, turn @ CHEEK["push"]))
+    (folder / f"{name}.yaml").write_text(f"""skin: {name}_skin.ply
+bones:
+  - {{name: skull, file: {name}_skull.ply}}
+  - {{name: mandible, file: {name}_mandible.ply}}
+tissue:
+  layers: 4
+  material: {{preset: face}}
+contact: {{bones: off}}
+instruments:
+  - {{sphere: {{center: {center}, radius: 20}}, push: {push}, skin: slide}}
+""")
+    result = run("repose-solve", f"{name}.yaml", "-accuracy", 1e-5)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    return last(folder / f"{name}.h5")
+
+
+def test_a_scene_of_contact_turned_and_moved_is_turned_and_moved(run, tmp_path):
+    """A ball's distance is exact; grids of meshes lie along the axes, and are left out."""
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    shift = np.array([200.0, -300.0, 400.0])
+    here = pressed_cheek(run, tmp_path, "here", np.eye(3), np.zeros(3))
+    there = pressed_cheek(run, tmp_path, "there", turn, shift)
+    assert (here["point/contact_pressure"] > 0).sum() >= 5
+    moved = here["point/position"] @ turn.T + shift
+    assert np.linalg.norm(there["point/position"] - moved, axis=1).max() <= 2e-5
+    assert there["point/contact_force"] == pytest.approx(here["point/contact_force"] @ turn.T,
+                                                         abs=1e-5)
