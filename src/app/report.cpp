@@ -47,7 +47,8 @@ std::string region_row(const solve::RegionSummary& r) {
 std::string remedy(const solve::Summary& s, bool stretched) {
   if (!s.path.last.stable && stretched)
     return " The tissue buckles there, or is between several rest positions: move the bones less, "
-           "or lower tissue.turgor: what the skin's tension presses together beneath it may have no "
+           "or lower tissue.turgor: what the skin's tension presses together beneath it may have "
+           "no "
            "balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
   if (!s.path.last.stable)
