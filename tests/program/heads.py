@@ -41,8 +41,7 @@ def soup(points, triangles, random):
 
 def scene_of(skin, edge=4, prefix="", axis=AXIS, center=CENTER):
     bones = ", ".join(f"{{name: {bone}, file: {prefix}{bone}.ply}}" for bone in BONES)
-    tissue = next(line for line in SCENE.read_text().splitlines() if "springs:" in line).strip()
-    return (f"skin: {skin}\nbones: [{bones}]\ntissue: {{layers: 4, edge: {edge}, {tissue}}}\n"
+    return (f"skin: {skin}\nbones: [{bones}]\ntissue: {{layers: 4, edge: {edge}}}\n"
             f"moves: [{{bone: mandible, rotate: {{axis: {axis.tolist()}, "
             f"center: {center.tolist()}, angle: 8}}}}]\n")
 

@@ -60,7 +60,7 @@ def test_all_move_alike(faces, variant, other):
 
 
 def test_without_an_edge_all_places_are_listed_and_written(folder, environment):
-    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace("edge: 4, ", ""))
+    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace(", edge: 4", ""))
     result = runner(folder, environment)("repose-solve", "as_it_is.yaml")
     assert result.returncode == 1 and result.stderr.count("\n") == 1
     assert "in 2 places" in result.stderr and "tissue.edge" in result.stderr
