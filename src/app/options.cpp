@@ -72,6 +72,9 @@ std::vector<base::Option> run_options() {
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
       {"verify_path", OptionKind::flag, "",
        "Solve again in twice the load steps; another rest position is exit status 2."},
+      {"sensitivity", OptionKind::flag, "",
+       "Estimate how much the face depends on border, material and release, by a linear solve "
+       "each."},
       {"monitor_mm", OptionKind::flag, "",
        "Print time, evaluations and the estimated distance to go after each iteration."},
       {"time_limit",

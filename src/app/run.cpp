@@ -19,6 +19,7 @@
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/surface/write.h"
+#include "sensitivity.h"
 #include "verify_path.h"
 #include "writer.h"
 
@@ -77,6 +78,7 @@ class Run {
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
   std::string write_given_skin(const Writer& writer) const;
+  std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
 
   Job& job_;
   Strategy strategy_;
@@ -144,7 +146,7 @@ solve::Summary Run::search(Writer& writer) {
   if (writer.makes_checkpoints())
     settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
-                      !job_.held.empty();
+                      strategy_.sensitivity || !job_.held.empty();
   solve::Summary summary =
       needed ? solve::find_repose(comm, job_.model, settings, start_, stages_, std::ref(writer))
              : solve::find_repose(comm, std::move(job_.model), settings, start_, stages_,
@@ -191,6 +193,15 @@ std::string Run::write_given_skin(const Writer& writer) const {
   return report_row("given skin", file + ": its vertices, with displacement");
 }
 
+/// What the answer would be if the scene's assumptions were others. Collective.
+std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
+  if (!strategy_.sensitivity || !summary.path.complete()) return "";
+  const solve::RestState rest{writer.positions(), writer.contact_pressures()};
+  const auto found = sensitivities(comm, job_, strategy_.settings.weights, rest);
+  stages_.end("sensitivity");
+  return describe_sensitivities(found);
+}
+
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
@@ -202,9 +213,10 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const std::string given = write_given_skin(writer);
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
+  const std::string sensitivity = describe_sensitivity(summary, writer);
   say(describe_failure(summary, job_.recording.has_value()));
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
-  say(coarser.told + writer.comparison() + describe_tearing(tearing));
+  say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing));
   if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));

@@ -152,6 +152,18 @@ std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Jo
 
 }  // namespace
 
+/// On rank 0.
+void choose_sensitivity(const base::Options& options, const Job& job, Strategy& s) {
+  if (!options.flag("sensitivity")) return;
+  const auto cannot = [](const char* why) {
+    base::refuse("-sensitivity: {}; leave the option out", why);
+  };
+  if (!job.solid) cannot("it is of a material, and the tissue is springs");
+  if (!job.anatomy) cannot("the input is a model, which does not tell what it was made from");
+  if (s.coarse == Coarse::instead) cannot("a coarser model takes the place of the scene's own");
+  s.sensitivity = true;
+}
+
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
   scene::Solve wanted = job.wanted;
   override_by(options, wanted);
@@ -166,13 +178,15 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   const std::vector<Obstacle> all = obstacles(options, job, s);
   require_path(first_obstacle(all, &Obstacle::to_path), s);
   choose_region(options, first_obstacle(all, &Obstacle::to_region), s);
-  base::on_first_rank(
-      comm, [&] { choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s); });
+  base::on_first_rank(comm, [&] {
+    choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s);
+    choose_sensitivity(options, job, s);
+  });
   MPI_Bcast(&s.coarse, sizeof s.coarse, MPI_BYTE, 0, comm);
   auto models = static_cast<int>(s.resolutions.size());
   MPI_Bcast(&models, 1, MPI_INT, 0, comm);
   s.resolutions.resize(models);
-  MPI_Bcast(&s.preview, 1, MPI_C_BOOL, 0, comm);
+  for (bool* flag : {&s.preview, &s.sensitivity}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (!options.flag("dry_run")) return s;
   const auto region = solve::choose_region(comm, job.model, s.settings);
   if (base::rank(comm) == 0) s.explanation = explain(wish, all, job, region, s);

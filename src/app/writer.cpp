@@ -32,6 +32,7 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
   last_.rows.position = rows.position;
   last_.rows.pressure = rows.pressure;
   last_.rows.volume_ratio = rows.volume_ratio;
+  last_.rows.point_fields = rows.point_fields;
   if (!makes_checkpoints() || !numbers.converged) return;
   reached_ = {numbers, rows};
   saved_ = false;
@@ -50,6 +51,13 @@ std::vector<Vec3> Writer::positions() const {
 std::vector<double> Writer::volume_ratios() const {
   const std::vector<double>& ratio = last_.rows.volume_ratio;
   return discrete::gather(comm_, ratio.data(), ratio.size());
+}
+
+std::vector<double> Writer::contact_pressures() const {
+  for (const model::PointField& field : last_.rows.point_fields)
+    if (field.name == "contact_pressure")
+      return discrete::gather(comm_, field.values.data(), field.values.size());
+  return {};
 }
 
 std::string Writer::reactions(const std::vector<std::vector<int64_t>>& held) const {

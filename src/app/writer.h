@@ -39,6 +39,8 @@ class Writer {
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
   std::vector<double> volume_ratios() const;
+  /// [N] N/mm², or nothing where tissue touches nothing; likewise.
+  std::vector<double> contact_pressures() const;
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const;
 

@@ -22,6 +22,7 @@ struct Strategy {
   std::string limit;                           ///< why a solid's go no finer, on rank 0
   bool preview = false;                        ///< the last of them is taken in any case
   bool verifies_path = false;                  ///< solved again in twice the load steps
+  bool sensitivity = false;                    ///< asked for, of a rest position at load 1
   bool tears = false;                          ///< in rounds of searches
   std::string explanation;                     ///< what is done and why, a row each; on rank 0
 };

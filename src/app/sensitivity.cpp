@@ -1,0 +1,130 @@
+#include "sensitivity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "repose/app/report.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/model/cut.h"
+#include "repose/solve/prestress.h"
+
+namespace repose::app {
+
+namespace {
+
+constexpr double moves = 0.5;  // mm, of the skin that counts
+
+/// Downwards: pressures of a change towards 0.5 are not of first order.
+void give_way(scene::Material& material) {
+  const auto lower = [](double& poisson) { poisson = poisson < 0.47 ? poisson - 0.05 : 0.45; };
+  lower(material.deep.poisson);
+  for (scene::Stratum& stratum : material.strata) lower(stratum.elasticity.poisson);
+}
+
+void stiffen_skin(scene::Material& material) {
+  constexpr double thickness = 1.5, times = 5;  // mm, of the moduli, as in the preset skin_on_fat
+  if (material.strata.empty()) material.strata.push_back({thickness, material.deep});
+  material.strata.front().elasticity.young *= times;
+}
+
+/// The model of a scene in place of the job's own, as read_job would make it. Collective.
+model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) {
+  model::BuiltModel built;
+  base::on_first_rank(
+      comm, [&] { built = model::build_model(scene, job.anatomy->skin, job.anatomy->bones); });
+  if (job.recording) solve::prestress(comm, built.model, *job.recording);
+  base::on_first_rank(comm, [&] {
+    for (const model::Cut& cut : built.cuts) model::cut_along(cut, built.model);
+  });
+  return std::move(built.model);
+}
+
+Sensitivity over_skin(const model::Model& model, const std::vector<Vec3>& position,
+                      const std::vector<Vec3>& change) {
+  Sensitivity found;
+  std::vector<double> lengths;
+  for (size_t i = 0; i < change.size(); ++i) {
+    const Vec3& initial = model.points.position[i];
+    if (model.points.layer[i] > 0 || (position[i] - initial).norm() < moves) continue;
+    lengths.push_back(change[i].norm());
+    if (lengths.back() <= found.largest) continue;
+    found.largest = lengths.back();
+    found.where = initial;
+  }
+  found.known = !change.empty();
+  if (lengths.empty()) return found;
+  std::sort(lengths.begin(), lengths.end());
+  found.median = lengths[(lengths.size() - 1) / 2];
+  found.percentile_95 = lengths[(lengths.size() - 1) * 95 / 100];
+  return found;
+}
+
+}  // namespace
+
+std::vector<Variation> variations(const scene::Scene& scene) {
+  constexpr double more = 1.5;
+  std::vector<Variation> all;
+  const auto vary = [&](const char* name, bool applies, auto&& change) {
+    if (!applies) return;
+    all.push_back({name, scene});
+    change(all.back().scene);
+  };
+  using scene::Rim;
+  using scene::Scene;
+  vary("a rim let go", scene.rim != Rim::free, [](Scene& s) { s.rim = Rim::free; });
+  vary("a rim held all round", scene.rim != Rim::fixed, [](Scene& s) { s.rim = Rim::fixed; });
+  vary("a lower Poisson's ratio (0.40 for 0.45, 0.45 for 0.49)", scene.tissue.material.has_value(),
+       [](Scene& s) { give_way(*s.tissue.material); });
+  vary("a skin of 1.5 mm, five times as stiff", scene.tissue.material.has_value(),
+       [](Scene& s) { stiffen_skin(*s.tissue.material); });
+  const bool moved = std::any_of(scene.moves.begin(), scene.moves.end(),
+                                 [](const auto& move) { return !move.is_identity(); });
+  vary("tissue.release half as large again", moved && scene.tissue.release > 0,
+       [](Scene& s) { s.tissue.release *= more; });
+  return all;
+}
+
+std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
+                                       const mechanics::Weights& weights,
+                                       const solve::RestState& rest) {
+  std::vector<Variation> all;
+  if (job.anatomy) all = variations(job.anatomy->scene);
+  auto count = static_cast<int>(all.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  all.resize(count);
+  std::vector<Sensitivity> found;
+  for (const Variation& variation : all) {
+    Sensitivity one;
+    try {
+      const model::Model other = model_of(comm, job, variation.scene);
+      one = over_skin(other, rest.position, solve::first_order_change(comm, other, weights, rest));
+    } catch (const base::InputError&) {
+      // no tissue fits so: nothing is known of it
+    }
+    one.name = variation.name;
+    found.push_back(one);
+  }
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.percentile_95 > b.percentile_95; });
+  return found;
+}
+
+std::string describe_sensitivities(const std::vector<Sensitivity>& found) {
+  std::string text;
+  for (const Sensitivity& s : found) {
+    const std::string told =
+        s.known ? fmt::format(
+                      "{} moves half of the skin by less than {:.2g} mm, 95 % by {:.2g} mm, "
+                      "all by {:.2g} mm, the most near ({:.0f}, {:.0f}, {:.0f})",
+                      s.name, s.median, s.percentile_95, s.largest, s.where.x(), s.where.y(),
+                      s.where.z())
+                : fmt::format("{}: not known to first order", s.name);
+    text += report_row("sensitivity", told);
+  }
+  return text;
+}
+
+}  // namespace repose::app

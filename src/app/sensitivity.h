@@ -1,0 +1,38 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "repose/app/job.h"
+#include "repose/solve/sensitivity.h"
+
+/// How much a face depends on what a scene knows least.
+namespace repose::app {
+
+/// The scene with one of its assumptions replaced by another that is as likely.
+struct Variation {
+  std::string name;  ///< a phrase, for the report
+  scene::Scene scene;
+};
+
+/// Border held or let go, a lower Poisson's ratio, a stiffer skin, more tissue let go of bone:
+/// those that apply to a scene.
+std::vector<Variation> variations(const scene::Scene& scene);
+
+/// How far the skin goes by a variation, over the skin that moves by more than 0.5 mm.
+struct Sensitivity {
+  std::string name;
+  bool known = false;                                 ///< the linear system was solved
+  double median = 0, percentile_95 = 0, largest = 0;  ///< mm
+  Vec3 where = Vec3::Zero();                          ///< mm, the initial place of the largest
+};
+
+/// One for each variation of a job that came to rest at `rest`, the largest first, by one linear
+/// solve each or, with contact, a few; on rank 0. Collective.
+std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
+                                       const mechanics::Weights& weights,
+                                       const solve::RestState& rest);
+
+/// Rows for a person.
+std::string describe_sensitivities(const std::vector<Sensitivity>& found);
+
+}  // namespace repose::app

@@ -1,0 +1,158 @@
+#include "repose/solve/sensitivity.h"
+
+#include <limits>
+#include <utility>
+
+#include "repose/base/agreement.h"
+#include "repose/base/scatter.h"
+#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/model/motion.h"
+#include "repose/solve/problem.h"
+
+namespace repose::solve {
+
+using base::check;
+using model::PointSet;
+
+namespace {
+
+/// `model` with all that is fixed held at `position` at load 1.
+model::Model held_at(model::Model model, const std::vector<Vec3>& position) {
+  model::Points& points = model.points;
+  for (size_t i = 0; i < position.size(); ++i) {
+    if (points.set[i] == PointSet::soft_tissue) continue;
+    points.set[i] = PointSet::held;
+    points.target[i] = position[i];
+  }
+  return model;
+}
+
+/// [N] mm from `position` to where a model has fixed points at load 1; 0 for the others.
+std::vector<Vec3> ways_of_fixed(const model::Model& model, const std::vector<Vec3>& position) {
+  const model::PrescribedMotion motion(model);
+  std::vector<Vec3> way(position.size(), Vec3::Zero());
+  for (size_t i = 0; i < way.size(); ++i)
+    if (model.points.set[i] != PointSet::soft_tissue)
+      way[i] = motion.at(model, static_cast<int64_t>(i), 1) - position[i];
+  return way;
+}
+
+/// Rank 0's rows, on all ranks.
+void share_rows(MPI_Comm comm, std::vector<Vec3>& rows, int64_t total) {
+  rows.resize(total);
+  MPI_Bcast(rows.data(), static_cast<int>(3 * total), MPI_DOUBLE, 0, comm);
+}
+
+/// Gives the pressure of each owned point to what it is nearest to. Not collective.
+void press(discrete::Objective& objective, const std::vector<Vec3>& pressure) {
+  mechanics::TouchLoop& touches = objective.touches();
+  const auto position = objective.positions().local();
+  std::vector<double> least(pressure.size(), std::numeric_limits<double>::infinity());
+  std::vector<double*> nearest(pressure.size(), nullptr);
+  std::vector<double> multiplier(touches.multipliers().size(), 0.0);
+  const auto offer = [&](int64_t point, double gap, double& to) {
+    if (gap < least[point]) std::tie(least[point], nearest[point]) = std::pair(gap, &to);
+  };
+  touches.look_at_all(position);
+  for (size_t c = 0; c < multiplier.size(); ++c)
+    offer(touches.touches().point[c], touches.gaps()[c], multiplier[c]);
+  for (mechanics::WallPair& pair : objective.walls().pairs())
+    if (pair.area > 0) offer(pair.points[0], pair.gap(position), pair.multiplier);
+  for (size_t i = 0; i < pressure.size(); ++i)
+    if (nearest[i]) *nearest[i] = pressure[i].x();
+  touches.set_multipliers(multiplier);
+}
+
+/// Contact as it is at rest, at the positions' state. Collective.
+void bring_to_contact(const discrete::NaturalRows& natural, const RestState& rest,
+                      Problem& problem) {
+  discrete::Objective& objective = problem.objective();
+  const MPI_Comm comm = objective.positions().comm();
+  std::vector<Vec3> rows;
+  for (const double p : rest.pressure) rows.emplace_back(p, 0, 0);
+  if (base::rank(comm) == 0) rows.resize(rest.position.size(), Vec3::Zero());
+  const std::vector<Vec3> pressure = natural.owned(base::scatter(comm, rows));
+  if (!objective.walls().empty()) objective.walls().pair(objective.positions().local());
+  press(objective, pressure);
+  problem.tangent().change_pattern();
+}
+
+/// Lets points press that a step takes into bodies, and those go that it takes off them; whether
+/// there are any. Collective.
+bool flip_contacts(Problem& problem, Vec displacement, Vec step) {
+  discrete::Positions& positions = problem.objective().positions();
+  mechanics::TouchLoop& touches = problem.objective().touches();
+  const double stiffness = touches.stiffness(), slight = 1e-9 * stiffness;
+  const auto gaps_at = [&](Vec state) {
+    positions.update(state);
+    touches.look_at_all(positions.local());
+    return std::vector<double>(touches.gaps().begin(), touches.gaps().end());
+  };
+  base::VecHandle moved = positions.make_vector();
+  check(VecWAXPY(moved, 1.0, displacement, step));
+  const std::vector<double> after = gaps_at(moved), before = gaps_at(displacement);
+  std::vector<double> multiplier(touches.multipliers().begin(), touches.multipliers().end());
+  int flipped = 0;
+  for (size_t c = 0; c < multiplier.size(); ++c) {
+    if (touches.touches().binding[c] == model::Binding::slides) continue;
+    const bool pressed = multiplier[c] > stiffness * before[c],
+               presses = multiplier[c] > stiffness * after[c];
+    if (presses == pressed) continue;
+    multiplier[c] = stiffness * before[c] + (presses ? slight : 0);
+    flipped = 1;
+  }
+  touches.set_multipliers(multiplier);
+  MPI_Allreduce(MPI_IN_PLACE, &flipped, 1, MPI_INT, MPI_MAX, positions.comm());
+  if (flipped) problem.tangent().forget();
+  return flipped != 0;
+}
+
+/// −∇Φ − H_sb Δx_b, into `force`.
+void load_on(Problem& problem, Vec displacement, const std::vector<Vec3>& way, Vec force) {
+  discrete::Objective& objective = problem.objective();
+  const discrete::Part& part = objective.positions().part();
+  base::VecHandle gradient = objective.positions().make_vector();
+  objective.evaluate(displacement, gradient);
+  std::vector<Vec3> direction(part.point_row.size());
+  for (size_t i = 0; i < direction.size(); ++i) direction[i] = way[part.point_row[i]];
+  objective.hessian_action(direction, force);
+  check(VecAXPBY(force, -1.0, -1.0, gradient));
+}
+
+}  // namespace
+
+std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
+                                     const mechanics::Weights& weights, const RestState& rest) {
+  constexpr double close = 1e-3;  // relative residual
+  constexpr int contact_rounds = 4;
+  model::Model held;
+  std::vector<Vec3> way;
+  base::on_first_rank(comm, [&] {
+    held = held_at(other, rest.position);
+    way = ways_of_fixed(other, rest.position);
+  });
+  const discrete::Part part = discrete::distribute(comm, held);
+  discrete::Positions positions(comm, part);
+  const discrete::NaturalRows natural(comm, part);
+  share_rows(comm, way, part.total_points);
+  const base::VecHandle displacement = positions.make_vector(), force = positions.make_vector(),
+                        step = positions.make_vector();
+  natural.take(base::scatter(comm, rest.position), positions, displacement);
+  positions.set_load(1);
+  Problem problem(positions, weights, false);
+  problem.function().evaluate(displacement, force);
+  if (part.contact) bring_to_contact(natural, rest, problem);
+  for (int left = contact_rounds; left > 0; --left) {
+    load_on(problem, displacement, way, force);
+    linear::TangentSolver& solver = problem.solver();
+    if (!solver.solve(displacement, force, step, close) || !solver.finished()) return {};
+    if (!part.contact || !flip_contacts(problem, displacement, step)) break;
+  }
+  std::vector<Vec3> change(part.point_row.size());
+  for (size_t i = 0; i < change.size(); ++i) change[i] = way[part.point_row[i]];
+  positions.spread(step, change);
+  return discrete::gather_points(comm, natural.natural(change));
+}
+
+}  // namespace repose::solve

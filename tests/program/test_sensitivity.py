@@ -1,0 +1,79 @@
+"""What -sensitivity says of a variation is what the varied scene, solved, comes to."""
+
+import re
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import last, model_of
+
+SCENE = """skin: paper_skin.ply
+bones:
+  - {name: skull, file: paper_skull.ply}
+  - {name: mandible, file: paper_mandible.ply}
+tissue:
+  layers: 4
+moves:
+  - {bone: mandible, translate: [0, -3, 0]}
+"""
+SKIN = "  material: {skin: {thickness: 1.5, young: 0.075}}\n"
+VARIED = {
+    "a rim let go": SCENE + "boundary: {rim: free}\n",
+    "a skin of 1.5 mm, five times as stiff": SCENE.replace("moves", SKIN + "moves"),
+    "a lower Poisson's ratio (0.40 for 0.45, 0.45 for 0.49)":
+        SCENE.replace("moves", "  material: {poisson: 0.4}\nmoves"),
+    "tissue.release half as large again": SCENE.replace("moves", "  release: 15\nmoves"),
+}
+ROW = re.compile(r"sensitivity +(.*) moves half of the skin by less than (\S+) mm, 95 % by (\S+) "
+                 r"mm, all by (\S+) mm")
+
+
+def prepare(folder, text):
+    for mesh in (PROJECT / "meshes").glob("paper_*.ply"):
+        if not (folder / mesh.name).exists():
+            (folder / mesh.name).symlink_to(mesh)
+    (folder / "face.yaml").write_text(text)
+
+
+def solve(run, folder, text, *options, ranks=1):
+    """What a run says, and skin and its rest position."""
+    prepare(folder, text)
+    result = run("repose-solve", "face.yaml", "-accuracy", 0.001, *options, ranks=ranks)
+    assert result.returncode == 0, result
+    model, skin = model_of(folder / "face.h5"), slice(0, None, 4)
+    assert (model["point/layer"][skin] == 0).all()
+    return (result.stdout, model["point/position"][skin],
+            last(folder / "face.h5")["point/position"][skin])
+
+
+def test_predictions_are_those_of_the_varied_scenes(run, tmp_path):
+    text, initial, rest = solve(run, tmp_path, SCENE, "-sensitivity")
+    told = {name: [float(x) for x in found] for name, *found in ROW.findall(text)}
+    assert told.keys() == VARIED.keys()
+    assert [*told.values()] == sorted(told.values(), key=lambda row: -row[1])
+    moves = np.linalg.norm(rest - initial, axis=1) > 0.5
+    for name, scene in VARIED.items():
+        _, _, varied = solve(run, tmp_path, scene)
+        true = np.quantile(np.linalg.norm(varied - rest, axis=1)[moves], [0.5, 0.95, 1])
+        assert np.allclose(told[name], true, rtol=0.3, atol=0.02), (name, told[name], true)
+
+
+def test_ranks_agree(run, tmp_path):
+    one, two = (ROW.findall(solve(run, tmp_path, SCENE, "-sensitivity", ranks=ranks)[0])
+                for ranks in (1, 2))
+    assert len(one) == len(VARIED)
+    for a, b in zip(sorted(one), sorted(two)):
+        assert a[0] == b[0]
+        assert np.allclose(np.array(a[1:], float), np.array(b[1:], float), rtol=0.1, atol=0.01)
+
+
+@pytest.mark.parametrize("text, options, words", [
+    (SCENE.replace("moves", "  springs: {default: {modulus: 0.05}}\nmoves"), [], "springs"),
+    (SCENE, ["-adapt"], "coarser model"),
+])
+def test_what_it_is_not_known_of_is_refused(run, tmp_path, text, options, words):
+    prepare(tmp_path, text)
+    result = run("repose-solve", "face.yaml", "-sensitivity", *options)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "-sensitivity" in result.stderr and words in result.stderr
