@@ -127,7 +127,7 @@ void ContactSearch::go_back(Vec displacement) {
 double penetration(discrete::Objective& objective) {
   mechanics::TouchLoop& touches = objective.touches();
   const auto position = objective.positions().local();
-  touches.look(position);
+  touches.look_at_all(position);
   double deepest = 0;
   for (const double gap : touches.gaps()) deepest = std::max(deepest, -gap);
   mechanics::WallLoop now = objective.walls();

@@ -75,7 +75,7 @@ class Pseudonormals {
 }  // namespace
 
 /// Fills a field: closest triangles are found near the surface and handed on from grid point to
-/// grid point.
+/// grid point, on both sides as far as outsides are asked for; then signs; then deeper inside.
 class FieldBuilder {
  public:
   FieldBuilder(const Surface& surface, DistanceField& field)
@@ -116,20 +116,12 @@ class FieldBuilder {
   }
 
   void fill() {
+    limit_ = field_.reach_ + 2 * field_.spacing_;
     for (size_t t = 0; t < surface_.triangles.size(); ++t) begin_at(static_cast<int32_t>(t));
-    for (size_t next = 0; next < queue_.size(); ++next) {
-      const Index at = queue_[next];  // the queue grows meanwhile
-      const int32_t triangle = triangle_[slot(at)];
-      for (int a = 0; a < 3; ++a)
-        for (const int64_t step : {-1, 1}) {
-          Index beside = at;
-          beside[a] += step;
-          if (triangle == deep)
-            sink(beside);
-          else
-            offer(beside, triangle);
-        }
-    }
+    spread();
+    give_signs();
+    limit_ = field_.depth_;
+    spread();
     for (float& value : field_.value_) value = std::min(value, static_cast<float>(field_.reach_));
   }
 
@@ -162,8 +154,10 @@ class FieldBuilder {
       field_.value_.resize(field_.value_.size() + cells, std::numeric_limits<float>::infinity());
       triangle_.resize(field_.value_.size(), -1);
     }
-    return place * cells + ((at[2] % b) * b + at[1] % b) * b + at[0] % b;
+    return place * cells + cell(at);
   }
+
+  static int64_t cell(const Index& at) { return ((at[2] % b) * b + at[1] % b) * b + at[0] % b; }
 
   Vec3 place_of(const Index& at) const {
     return field_.origin_ + field_.spacing_ * Vec3(static_cast<double>(at[0]),
@@ -171,19 +165,95 @@ class FieldBuilder {
                                                    static_cast<double>(at[2]));
   }
 
+  /// Hands triangles on from the grid points in the queue to their neighbours, up to limit_.
+  void spread() {
+    for (size_t next = 0; next < queue_.size(); ++next) {
+      const Index at = queue_[next];  // the queue grows meanwhile
+      const int32_t triangle = triangle_[slot(at)];
+      for_neighbours(at, [&](const Index& beside) {
+        if (triangle == deep)
+          sink(beside);
+        else
+          offer(beside, triangle);
+      });
+    }
+    queue_.clear();
+  }
+
+  template <class Visit>
+  static void for_neighbours(const Index& at, Visit&& visit) {
+    for (int a = 0; a < 3; ++a)
+      for (const int64_t step : {-1, 1}) {
+        Index beside = at;
+        beside[a] += step;
+        visit(beside);
+      }
+  }
+
+  /// The distance of a grid point to a triangle, where it is the smallest yet: as if outside until
+  /// signs are given, then inside, where all else is known.
   void offer(const Index& at, int32_t triangle) {
     const int64_t row = slot(at);
-    if (row < 0 || triangle_[row] == triangle) return;
-    const Vec3 query = place_of(at);
-    Vec3 closest;
-    const auto distance = static_cast<float>(std::sqrt(
-        squared_distance(query, corners(surface_, surface_.triangles[triangle]), &closest)));
+    if (row < 0 || triangle_[row] == triangle || (signed_ && outside(row))) return;
+    const auto distance = static_cast<float>(
+        std::sqrt(squared_distance(place_of(at), corners(surface_, surface_.triangles[triangle]))));
     if (!(distance < std::abs(field_.value_[row]))) return;
-    const bool inside = normals_.inside(query, triangle, closest);
-    if (inside && distance > field_.depth_) return sink(at);
-    field_.value_[row] = inside ? -distance : distance;
+    if (signed_ && !(distance < limit_)) return sink(at);
+    field_.value_[row] = signed_ ? -distance : distance;
     triangle_[row] = triangle;
-    if (inside || distance < field_.reach_ + 2 * field_.spacing_) queue_.push_back(at);
+    if (distance < limit_) queue_.push_back(at);
+  }
+
+  bool outside(int64_t row) const {
+    return std::isfinite(field_.value_[row]) && field_.value_[row] > 0;
+  }
+
+  /// Grid neighbours whose distances add up to more than their own lie on one side: they vote. One
+  /// alone is misled where the closest triangle is a sliver, whose normal says little. Those inside
+  /// are left in the queue.
+  void give_signs() {
+    signed_ = true;
+    std::vector<char> seen(field_.value_.size(), 0);
+    for (int64_t k = 0; k < points_[2]; ++k)
+      for (int64_t j = 0; j < points_[1]; ++j)
+        for (int64_t i = 0; i < points_[0]; ++i) give_sign({i, j, k}, seen);
+  }
+
+  void give_sign(const Index& first, std::vector<char>& seen) {
+    if (!known(first) || seen[slot(first)]) return;
+    std::vector<Index> side{first};
+    seen[slot(first)] = 1;
+    int64_t votes = 0;
+    for (size_t next = 0; next < side.size(); ++next) {
+      const Index at = side[next];
+      votes += is_inside(at) ? 1 : -1;
+      for_neighbours(at, [&](const Index& beside) {
+        if (!known(beside) || seen[slot(beside)]) return;
+        if (!(field_.value_[slot(at)] + field_.value_[slot(beside)] > field_.spacing_)) return;
+        seen[slot(beside)] = 1;
+        side.push_back(beside);
+      });
+    }
+    if (votes <= 0) return;
+    for (const Index& at : side) {
+      field_.value_[slot(at)] *= -1;
+      queue_.push_back(at);
+    }
+  }
+
+  /// Whether a grid point has a distance; makes no block.
+  bool known(const Index& at) const {
+    for (int a = 0; a < 3; ++a)
+      if (at[a] < 0 || at[a] >= points_[a]) return false;
+    const int32_t place = field_.place_[block_row(at[0] / b, at[1] / b, at[2] / b)];
+    return place >= 0 && std::isfinite(field_.value_[place * cells + cell(at)]);
+  }
+
+  bool is_inside(const Index& at) {
+    const int32_t triangle = triangle_[slot(at)];
+    Vec3 closest;
+    squared_distance(place_of(at), corners(surface_, surface_.triangles[triangle]), &closest);
+    return normals_.inside(place_of(at), triangle, closest);
   }
 
   /// A grid point is deeper inside than anybody asks for.
@@ -215,6 +285,8 @@ class FieldBuilder {
   std::vector<char> wanted_;       // [blocks]
   std::vector<int32_t> triangle_;  // [kept values] the closest, −1 or deep
   std::vector<Index> queue_;
+  bool signed_ = false;
+  double limit_ = 0;  // mm, up to which triangles are handed on
   static constexpr int32_t deep = -2;
 };
 

@@ -25,10 +25,11 @@ class DistanceField {
 
   DistanceField() = default;
   /// From exact distances to the closest triangle, found near the surface and handed on from grid
-  /// point to grid point; the sign is that of the angle-weighted pseudonormal there (Bærentzen &
-  /// Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal"). Left out
-  /// where a grid block is farther than `near` mm from all of `points`, if there are any; −`near`
-  /// at least, or −`reach`. `spacing` and `reach` in mm. O(T + grid points).
+  /// point to grid point. The sign is that of the angle-weighted pseudonormal there (Bærentzen &
+  /// Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal"), put to the
+  /// vote among grid points between which no surface can lie, because slivers mislead some. Left
+  /// out where a grid block is farther than `near` mm from all of `points`, if there are any;
+  /// −`near` at least, or −`reach`. `spacing` and `reach` in mm. O(T + grid points).
   DistanceField(const Surface& surface, double spacing, double reach,
                 const std::vector<Vec3>& points, double near);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "repose/surface/distance.h"
@@ -38,6 +39,23 @@ TEST(DistanceField, rounds_a_convex_edge_by_less_than_half_a_spacing_and_nothing
   EXPECT_GT(at_edge, 0.05);
   EXPECT_LT(at_edge, 0.5);
   EXPECT_DOUBLE_EQ(field.value({0, 0, 40}), 6.0);
+}
+
+TEST(DistanceField, is_not_misled_by_slivers_whose_normals_say_little) {
+  for (const double y : {-1e-7, 0.0, 1e-7})
+    for (const double z : {-1e-7, 0.0, 1e-7}) {
+      Surface s = box({-20, -20, -20}, {20, 20, 20});
+      const auto middle = static_cast<int64_t>(s.points.size());  // of the edge from 4 to 5
+      s.points.push_back({0, -20 + y, 20 + z});
+      *std::find(s.triangles.begin(), s.triangles.end(), Triangle{1, 5, 4}) = {1, 5, middle};
+      s.triangles.push_back({1, middle, 4});
+      s.triangles.push_back({5, 4, middle});
+      const DistanceField field(s, 1.0, 6.0, {}, 10);
+      for (double beyond = 0.5; beyond < 12; beyond += 0.5) {
+        EXPECT_GT(field.value({0, -20 - beyond, 20 + beyond}), 0) << y << " " << z << " " << beyond;
+        EXPECT_LT(field.value({0, -20 + beyond, 20 - beyond}), 0) << y << " " << z << " " << beyond;
+      }
+    }
 }
 
 TEST(DistanceField, derivatives_are_those_of_its_value) {
