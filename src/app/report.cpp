@@ -119,11 +119,18 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
   std::string text;
   for (size_t k = 0; k < s.contacts.size(); ++k) {
     const solve::BodyContact& on = s.contacts[k];
+    const std::string name = k < bodies.size() ? bodies[k] : "the sides of cuts";
+    if (on.inside > 0)
+      text += report_row(
+          "inside at the start",
+          fmt::format("{} points begin up to {:.2g} mm inside {}, the deepest at ({:.1f}, {:.1f}, "
+                      "{:.1f}) mm; they go no deeper",
+                      on.inside, on.deepest, name, on.where.x(), on.where.y(), on.where.z()));
     if (on.points == 0) continue;
     text += report_row(
-        "contact", fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N",
-                               on.points, k < bodies.size() ? bodies[k] : "the sides of cuts",
-                               on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
+        "contact",
+        fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N", on.points,
+                    name, on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
   }
   if (std::isfinite(s.last.penetration))
     text += report_row("penetration", fmt::format("{:.2g} mm at most", s.last.penetration));

@@ -77,9 +77,9 @@ void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
       if (model.points.set[column * layers] != PointSet::held) continue;
       const Vec3& at = model.points.position[column * layers];
       base::refuse(
-          "{}: incisions[{}]: an instrument holds the skin on the path near ({:.2f}, {:.2f}, "
+          "{}: {}: an instrument holds the skin on the path near ({:.2f}, {:.2f}, "
           "{:.2f}); move one of them",
-          scene.file.string(), i, at.x(), at.y(), at.z());
+          scene.file.string(), scene.incisions[i].name, at.x(), at.y(), at.z());
     }
 }
 

@@ -196,7 +196,7 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
   std::set<int64_t> taken;
   std::set<std::array<int64_t, 2>> edges;
   for (size_t i = 0; i < incisions.size(); ++i) {
-    PathCutter cutter(fmt::format("{}: incisions[{}]", scene_file, i), skin, taken, edges);
+    PathCutter cutter(fmt::format("{}: {}", scene_file, incisions[i].name), skin, taken, edges);
     cuts.push_back({cutter.cut(incisions[i].path), incisions[i].layers});
   }
   return cuts;

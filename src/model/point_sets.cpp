@@ -61,10 +61,11 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
   for (const auto& bones_of : {model.points.bone, attachment.slides_on})
     for (const int32_t bone : bones_of)
       if (bone >= 0) ++tied[bone];
+  const bool touching = scene.contact && scene.contact->bones;
   for (int32_t b = 0; b < bones.size(); ++b) {
     if (tied[b] > 0) continue;
     const std::string why = why_bare(scene, mesh, bones, b, attachment.reached[b]);
-    if (!scene.moves[b].is_identity())
+    if (!scene.moves[b].is_identity() && !(touching && attachment.reached[b] > 0))
       base::refuse("{}: bone '{}' moves but no tissue is attached to it: {}", file,
                    scene.bones[b].name, why);
     attachment.remarks.push_back(

@@ -1,5 +1,7 @@
 #include "read_incisions.h"
 
+#include <fmt/format.h>
+
 #include "repose/scene/landmarks.h"
 
 namespace repose::scene {
@@ -17,7 +19,7 @@ std::vector<Vec3> read_path(const Value& value) {
 }
 
 Incision read_mouth(const Value& value, int layers) {
-  return {read_path(Map(value).at("path")), layers};
+  return {read_path(Map(value).at("path")), layers, "mouth"};
 }
 
 namespace {
@@ -35,7 +37,10 @@ Incision read_incision(const Map& map, int layers) {
 
 std::vector<Incision> read_incisions(const Value& list, int layers) {
   std::vector<Incision> incisions;
-  for (const Value& item : list.items()) incisions.push_back(read_incision(Map(item), layers));
+  for (const Value& item : list.items()) {
+    incisions.push_back(read_incision(Map(item), layers));
+    incisions.back().name = fmt::format("incisions[{}]", incisions.size() - 1);
+  }
   return incisions;
 }
 

@@ -188,6 +188,34 @@ void show_states(Searcher& searcher, const Settings& settings,
   });
 }
 
+/// Points of this rank that were inside bodies at the start.
+void add_inside(const discrete::Part& part, const model::Touches& touches,
+                std::vector<BodyContact>& contacts) {
+  constexpr double told = 0.1;  // mm
+  for (size_t c = 0; c < touches.point.size(); ++c) {
+    const double depth = -touches.offset[c];
+    if (touches.binding[c] == model::Binding::slides || depth < told) continue;
+    BodyContact& on = contacts[touches.body[c]];
+    ++on.inside;
+    if (depth <= on.deepest) continue;
+    on.deepest = depth;
+    on.where = part.model.points.position[touches.point[c]];
+  }
+}
+
+void sum_over_ranks(MPI_Comm comm, BodyContact& on) {
+  MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
+  MPI_Allreduce(MPI_IN_PLACE, on.force.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
+  MPI_Allreduce(MPI_IN_PLACE, &on.inside, 1, MPI_INT64_T, MPI_SUM, comm);
+  struct {
+    double depth;
+    int rank;
+  } deepest{on.deepest, base::rank(comm)};
+  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
+  on.deepest = deepest.depth;
+  MPI_Bcast(on.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+}
+
 /// At the objective's last update. Collective.
 std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
@@ -211,11 +239,8 @@ std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
     ++contacts.back().points;
     contacts.back().force -= pressure * pair.area * pair.normal;
   }
-  for (BodyContact& on : contacts) {
-    const MPI_Comm comm = objective.positions().comm();
-    MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
-    MPI_Allreduce(MPI_IN_PLACE, on.force.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
-  }
+  add_inside(part, touches.touches(), contacts);
+  for (BodyContact& on : contacts) sum_over_ranks(objective.positions().comm(), on);
   return contacts;
 }
 

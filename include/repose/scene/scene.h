@@ -209,6 +209,7 @@ struct Contact {
 struct Incision {
   std::vector<Vec3> path;  ///< mm, at least two points on or near the skin
   int layers;              ///< point layers that it parts, from the skin down, ≥ 1
+  std::string name = {};   ///< where the scene tells of it
 };
 
 struct Solve {

@@ -51,6 +51,9 @@ struct RegionSummary {
 struct BodyContact {
   int64_t points = 0;         ///< that press
   Vec3 force = Vec3::Zero();  ///< N, of the tissue on the body; of cuts' sides, of one on the other
+  int64_t inside = 0;         ///< points that were inside the body at the start, and stay so
+  double deepest = 0;         ///< mm, of these
+  Vec3 where = Vec3::Zero();  ///< mm, the deepest one at the start
 };
 
 /// What a run came to, for the closing table.

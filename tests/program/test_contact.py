@@ -1,0 +1,114 @@
+"""Contact as a whole: lips that part, operations with everything on, and what is refused in words."""
+
+import numpy as np
+import pytest
+
+from conftest import PROJECT, runner
+from tissue import last, model_of
+
+DATA = PROJECT.parent / "shared/data/head"
+ACCURACY = 0.02  # mm
+real_head = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+SOLID = (PROJECT / "meshes/head_solid.yaml").read_text()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The shipped scenes, and the surfaces that they name."""
+    top = tmp_path_factory.mktemp("contact")
+    for file in (PROJECT / "meshes").glob("*head_*"):
+        (top / file.name).symlink_to(file)
+    if DATA.is_dir():
+        for name in ("face.ply", "skull.ply", "mandible.ply"):
+            (top / name).symlink_to(DATA / name)
+    return top
+
+
+@pytest.fixture(scope="module")
+def solve(folder, environment):
+    """solve(scene, *options, ranks=1) → the result's file, which must converge and be checked."""
+    run = runner(folder, environment)
+
+    def result(scene, *options, ranks=1):
+        name = "_".join([scene, str(ranks), *map(str, options)])
+        done = run("repose-solve", f"{scene}.yaml", "-output", name, "-accuracy", ACCURACY,
+                   *options, ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        checked = run("repose-check", f"{name}.h5")
+        assert (checked.returncode, checked.stderr) == (0, ""), checked
+        return folder / f"{name}.h5"
+
+    return result
+
+
+def skin(file):
+    model, step = model_of(file), last(file)
+    on_skin = model["point/layer"] == 0
+    return model["point/position"][on_skin], step["point/displacement"][on_skin]
+
+
+@real_head
+@pytest.mark.parametrize("operation", ["genioplasty", "le_fort"])
+def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operation):
+    scene = f"real_head_{operation}"
+    first = skin(solve(scene))[1]
+    assert np.linalg.norm(first, axis=1).max() > 3
+    for options, ranks in (((), 2), ((), 3), (("-load_steps", 2), 1)):
+        other = skin(solve(scene, *options, ranks=ranks))[1]
+        assert np.linalg.norm(other - first, axis=1).max() < 2 * ACCURACY
+
+
+@real_head
+def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
+    file = solve("real_head_split")
+    assert last(file)["inverted_prisms"] == 0
+    places, moved = skin(file)
+    chin = np.linalg.norm(places - [3.3, -303.9, 343.2], axis=1) < 8
+    assert moved[chin][:, 1].mean() == pytest.approx(-6, rel=0.25)
+
+
+@real_head
+def test_lips_part_when_the_jaw_opens(solve):
+    places, moved = skin(solve("real_head_mouth"))
+    middle = np.abs(places[:, 0] - 2) < 4
+    lips = middle & (np.abs(places[:, 2] - 369) < 3) & (places[:, 1] < -305)
+    down = moved[lips][:, 2]
+    assert down.max() > -4 and down.min() < -12, "one lip stays, the other goes"
+
+
+@real_head
+def test_tissue_that_slides_takes_less_along_than_tissue_that_is_held(folder, solve):
+    text = (folder / "real_head_genioplasty.yaml").read_text()
+    (folder / "slid.yaml").write_text(text.replace("  release:", "  attach: slide\n  release:"))
+    held, slid = (np.linalg.norm(skin(solve(scene))[1], axis=1)
+                  for scene in ("real_head_genioplasty", "slid"))
+    assert slid.sum() < 0.9 * held.sum()
+
+
+def test_tissue_that_a_bone_only_pushes_is_told_of_not_refused(folder, environment):
+    run = runner(folder, environment)
+    (folder / "pushed.yaml").write_text(SOLID.replace("  layers: 4", "  attach: contact\n  layers: 4"))
+    done = run("repose-solve", "pushed.yaml", "-dry_run")
+    assert done.returncode == 0 and "no tissue is attached to bone 'mandible'" in done.stdout
+
+
+BAD = {
+    "teeth far from bone": ("  layers: 4", "  layers: 4\n  teeth: [{sphere: {center: [0, -400, 0], radius: 5}}]",
+                            "teeth"),
+    "lips off the skin": ("moves:", "mouth: {path: [[0, -300, 0], [20, -300, 0]]}\nmoves:", "mouth"),
+    "one point of lips": ("moves:", "mouth: {path: [[0, -90, -40]]}\nmoves:", "mouth"),
+    "no such word": ("  layers: 4", "  attach: glued\n  layers: 4", "attach"),
+    "grid of 0 mm": ("moves:", "contact: {grid: 0}\nmoves:", "grid"),
+    "negative stiffness": ("moves:", "contact: {stiffness: -1}\nmoves:", "stiffness"),
+    "a switch misspelt": ("moves:", "contact: {bones: perhaps}\nmoves:", "bones"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bad_contact_is_refused_in_one_line(folder, environment, case, ranks):
+    before, after, names = BAD[case]
+    (folder / "bad.yaml").write_text(SOLID.replace(before, after, 1))
+    done = runner(folder, environment)("repose-solve", "bad.yaml", ranks=ranks)
+    assert done.returncode == 1 and not (folder / "bad.h5").exists()
+    assert len(done.stderr.splitlines()) == 1 and names in done.stderr, done.stderr
