@@ -160,8 +160,6 @@ def draw(faces, chosen):
             middle = np.abs(places[:, 0] - 2.5) < 3
             profile = now[middle & (places[:, 1] < -285)]
             profile = profile[np.argsort(places[middle & (places[:, 1] < -285)][:, 2])]
-            apart = np.linalg.norm(np.diff(profile, axis=0), axis=1) > 6  # the lips
-            profile[:-1][apart] = np.nan
             axis.plot(-profile[:, 1], profile[:, 2], label=way,
                       color="0.6" if way == "start" else None)
         axis.set(title=case, aspect="equal", ylim=(325, 395))

@@ -1,5 +1,6 @@
 #include "repose/model/cut.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -33,8 +34,9 @@ double area(const surface::Surface& s) {
   return sum;
 }
 
-std::string refusal(const std::vector<scene::Incision>& incisions) {
+std::string refusal(std::vector<scene::Incision> incisions) {
   surface::Surface skin = patches::square(6, 60);
+  for (size_t i = 0; i < incisions.size(); ++i) incisions[i].name = fmt::format("incisions[{}]", i);
   try {
     insert_paths(incisions, "scene.yaml", skin);
   } catch (const base::InputError& error) {
