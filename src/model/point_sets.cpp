@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "repose/base/error.h"
 
@@ -61,7 +62,10 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
   for (const auto& bones_of : {model.points.bone, attachment.slides_on})
     for (const int32_t bone : bones_of)
       if (bone >= 0) ++tied[bone];
-  const bool touching = scene.contact && scene.contact->bones;
+  const bool touching =
+      scene.contact && scene.contact->bones &&
+      std::count(attachment.free.begin(), attachment.free.end(), 1) <
+          std::accumulate(attachment.reached.begin(), attachment.reached.end(), int64_t{0});
   for (int32_t b = 0; b < bones.size(); ++b) {
     if (tied[b] > 0) continue;
     const std::string why = why_bare(scene, mesh, bones, b, attachment.reached[b]);
