@@ -9,7 +9,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/model/bones.h"
+#include "repose/model/build.h"
 #include "repose/model/collision.h"
 
 namespace {

@@ -16,22 +16,22 @@
 #include <map>
 
 #include "repose/base/agreement.h"
+#include "repose/base/log.h"
 #include "repose/base/program.h"
-#include "repose/base/progress.h"
 #include "repose/base/whole_file.h"
+#include "repose/meshtools/compare.h"
+#include "repose/meshtools/face_parts.h"
+#include "repose/meshtools/paint.h"
+#include "repose/meshtools/register.h"
 #include "repose/scene/landmarks.h"
-#include "repose/surface/compare.h"
-#include "repose/surface/face_parts.h"
-#include "repose/surface/paint.h"
 #include "repose/surface/read.h"
-#include "repose/surface/register.h"
 #include "repose/surface/write.h"
 
 namespace {
 
 using namespace repose;
 using base::OptionKind;
-using surface::Sample;
+using meshtools::Sample;
 
 std::vector<base::Option> option_table() {
   const base::Range length{1e-3, 1000};
@@ -70,14 +70,14 @@ void print_header() {
 }
 
 void print_row(const std::string& name, const std::vector<Sample>& samples) {
-  const auto s = surface::statistics(samples);
+  const auto s = meshtools::statistics(samples);
   std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.1f %8.1f\n", name.c_str(),
               static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.median,
               s.percentile_90, s.percentile_95, s.most, 100 * s.within_1, 100 * s.within_2);
 }
 
 /// The label at the nearest voxel; 0 outside the map.
-int64_t label_at(const surface::Volume& labels, const Mat3& to_index, const Vec3& point) {
+int64_t label_at(const imaging::Volume& labels, const Mat3& to_index, const Vec3& point) {
   const Vec3 index = to_index * (point - labels.origin);
   std::array<int64_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {
@@ -88,7 +88,7 @@ int64_t label_at(const surface::Volume& labels, const Mat3& to_index, const Vec3
 }
 
 void print_painted(const std::string& file, const std::vector<Sample>& samples) {
-  const surface::Paint paint(file);
+  const meshtools::Paint paint(file);
   std::vector<std::vector<Sample>> regions(paint.names().size());
   for (const Sample& sample : samples)
     if (const int row = paint.at(sample.point); row >= 0) regions[row].push_back(sample);
@@ -98,8 +98,8 @@ void print_painted(const std::string& file, const std::vector<Sample>& samples) 
 
 void print_regions(const std::string& file, const std::vector<Sample>& samples) {
   if (file.ends_with(".ply") || file.ends_with(".PLY")) return print_painted(file, samples);
-  const surface::Volume labels = surface::read_volume(file);
-  const Mat3 to_index = surface::inverse_axes(labels);
+  const imaging::Volume labels = imaging::read_volume(file);
+  const Mat3 to_index = imaging::inverse_axes(labels);
   std::map<int64_t, std::vector<Sample>> regions;
   for (const Sample& sample : samples)
     regions[label_at(labels, to_index, sample.point)].push_back(sample);
@@ -115,7 +115,7 @@ void print_landmarks(const std::string& file, double radius, const std::vector<S
   }
 }
 
-void print_parts(const surface::FaceParts& parts, const std::vector<Sample>& samples) {
+void print_parts(const meshtools::FaceParts& parts, const std::vector<Sample>& samples) {
   std::map<std::string, std::vector<Sample>> regions;
   for (const Sample& sample : samples) regions[parts.at(sample.point)].push_back(sample);
   for (const char* name : {"nose", "upper lip", "lower lip", "chin", "left cheek", "right cheek"})
@@ -140,7 +140,7 @@ surface::Surface above(const surface::Surface& whole, double height) {
 using Marks = std::map<std::string, Vec3>;
 
 /// What brings landmarks of ACTUAL to those of PREDICTED; nothing where fewer than three agree.
-surface::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
+meshtools::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
   std::vector<Vec3> moving, fixed;
   for (const auto& [name, position] : actual)
     if (const auto found = predicted.find(name); found != predicted.end()) {
@@ -148,21 +148,21 @@ surface::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
       fixed.push_back(found->second);
     }
   if (moving.size() < 3) return {};
-  return surface::fit_landmarks(moving, fixed, false).transform;
+  return meshtools::fit_landmarks(moving, fixed, false).transform;
 }
 
-surface::Similarity bring(const base::Options& options, const surface::Surface& actual,
-                          const surface::Surface& predicted, const Marks& marks,
-                          const Marks& actual_marks) {
-  const surface::Similarity start = by_landmarks(marks, actual_marks);
-  surface::Surface moving = surface::weld_and_orient(surface::moved(actual, start));
+meshtools::Similarity bring(const base::Options& options, const surface::Surface& actual,
+                            const surface::Surface& predicted, const Marks& marks,
+                            const Marks& actual_marks) {
+  const meshtools::Similarity start = by_landmarks(marks, actual_marks);
+  surface::Surface moving = surface::weld_and_orient(meshtools::moved(actual, start));
   surface::Surface fixed = surface::weld_and_orient(predicted);
   if (options.text("register") == "upper") {
-    const double height = surface::FaceParts(marks, options.text("landmarks")).upper_face();
+    const double height = meshtools::FaceParts(marks, options.text("landmarks")).upper_face();
     moving = above(moving, height);
     fixed = above(fixed, height);
   }
-  const surface::IcpResult icp = surface::refine_by_icp(moving, fixed, {}, {});
+  const meshtools::IcpResult icp = meshtools::refine_by_icp(moving, fixed, {}, {});
   std::printf("ACTUAL is brought to PREDICTED (%s): rms %.4g mm over the nearest %lld vertices\n",
               icp.converged ? "converged" : "NOT CONVERGED", icp.rms_plane,
               static_cast<long long>(icp.pairs));
@@ -181,7 +181,8 @@ void print_vertices(const surface::Surface& predicted, const surface::Surface& a
 }
 
 /// From each landmark of ACTUAL to that of PREDICTED.
-void print_pairs(const Marks& predicted, const Marks& actual, const surface::Similarity& brought) {
+void print_pairs(const Marks& predicted, const Marks& actual,
+                 const meshtools::Similarity& brought) {
   std::printf("%-28s %10s %10s %10s %10s\n", "predicted - actual, mm", "distance", "forward",
               "left", "up");
   for (const auto& [name, position] : predicted)
@@ -208,10 +209,10 @@ void require_landmarks(const base::Options& options) {
 
 /// Distances one way, with a row of the table.
 std::vector<Sample> measure(const base::Options& options, const surface::Surface& from,
-                            const surface::SignedDistance& to, const std::string& name) {
+                            const meshtools::SignedDistance& to, const std::string& name) {
   base::Progress progress(MPI_COMM_WORLD);
-  auto samples = surface::sample_distances(from, to, options.number("spacing"),
-                                           [&](double done) { progress.show(name, done); });
+  auto samples = meshtools::sample_distances(from, to, options.number("spacing"),
+                                             [&](double done) { progress.show(name, done); });
   progress.clear();
   if (options.flag("skip_rim"))
     std::erase_if(samples, [](const Sample& sample) { return sample.beyond_rim; });
@@ -239,13 +240,13 @@ std::string histogram(const std::vector<Sample>& samples, double reach) {
 }
 
 void write_results(const std::string& name, const surface::Surface& predicted,
-                   const surface::SignedDistance& to, const std::vector<Sample>& samples,
+                   const meshtools::SignedDistance& to, const std::vector<Sample>& samples,
                    double reach) {
   surface::PointData data;
   data.fields.push_back({"distance", {}});
   for (const Vec3& point : predicted.points) {
     data.fields[0].values.push_back(to.at(point).distance);
-    data.colours.push_back(surface::distance_colour(data.fields[0].values.back(), reach));
+    data.colours.push_back(meshtools::distance_colour(data.fields[0].values.back(), reach));
   }
   surface::write_surface(name + ".vtp", predicted, data);
   base::write_whole_file(name + ".csv", histogram(samples, reach));
@@ -259,24 +260,24 @@ void run(const base::Options& options) {
   surface::Surface actual = surface::read_surface(options.arguments()[1]);
   const Marks marks = marks_of(options, "landmarks"),
               actual_marks = marks_of(options, "actual_landmarks");
-  surface::Similarity brought;
+  meshtools::Similarity brought;
   if (options.text("register") != "none") {
     brought = bring(options, actual, predicted, marks, actual_marks);
-    actual = surface::moved(actual, brought);
+    actual = meshtools::moved(actual, brought);
   }
-  const surface::SignedDistance to_actual(actual);
+  const meshtools::SignedDistance to_actual(actual);
   print_header();
   const auto samples = measure(options, predicted, to_actual, "PREDICTED to ACTUAL");
   print_vertices(predicted, actual);
   if (options.flag("parts"))
-    print_parts(surface::FaceParts(marks, options.text("landmarks")), samples);
+    print_parts(meshtools::FaceParts(marks, options.text("landmarks")), samples);
   if (options.has("regions")) print_regions(options.text("regions"), samples);
   if (options.has("landmarks"))
     print_landmarks(options.text("landmarks"), options.number("radius"), samples);
   if (options.flag("both"))
-    measure(options, actual, surface::SignedDistance(predicted), "ACTUAL to PREDICTED");
+    measure(options, actual, meshtools::SignedDistance(predicted), "ACTUAL to PREDICTED");
   if (!actual_marks.empty()) print_pairs(marks, actual_marks, brought);
-  const double widest = std::max(surface::statistics(samples).percentile_95, 1e-3);
+  const double widest = std::max(meshtools::statistics(samples).percentile_95, 1e-3);
   const double reach = options.text("reach") == "auto" ? widest : options.number("reach");
   write_results(options.text("output"), predicted, to_actual, samples, reach);
 }

@@ -8,10 +8,10 @@
 #include <cstdio>
 
 #include "repose/base/agreement.h"
+#include "repose/base/log.h"
 #include "repose/base/program.h"
-#include "repose/base/progress.h"
+#include "repose/meshtools/decimate.h"
 #include "repose/scene/landmarks.h"
-#include "repose/surface/decimate.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
 
@@ -32,8 +32,8 @@ std::vector<base::Option> option_table() {
           {"output", OptionKind::path, "decimated.ply", "The file to write (PLY)."}};
 }
 
-surface::DecimateOptions wanted(const base::Options& options) {
-  surface::DecimateOptions wanted;
+meshtools::DecimateOptions wanted(const base::Options& options) {
+  meshtools::DecimateOptions wanted;
   const std::filesystem::path output = options.text("output");
   if (output.extension() != ".ply")
     base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
@@ -53,7 +53,7 @@ void print(const char* what, const surface::Surface& surface) {
               surface.points.size(), describe(surface::inspect(surface)).c_str());
 }
 
-void print(const surface::Decimated& result, const surface::DecimateOptions& wanted) {
+void print(const meshtools::Decimated& result, const meshtools::DecimateOptions& wanted) {
   if (std::isfinite(wanted.distance)) std::printf("  bound asked      %g mm\n", wanted.distance);
   std::printf("  bound proven     %.6g mm from the result to the input (reached: %.6g mm)\n",
               result.to_input.upper, result.to_input.lower);
@@ -65,12 +65,12 @@ void print(const surface::Decimated& result, const surface::DecimateOptions& wan
 }
 
 void run(const base::Options& options) {
-  const surface::DecimateOptions choice = wanted(options);
+  const meshtools::DecimateOptions choice = wanted(options);
   const surface::Surface input = surface::load_surface(options.arguments()[0], surface::Role::mesh);
   print("input", input);
   base::Progress progress(MPI_COMM_WORLD);
   const auto before = static_cast<double>(input.triangles.size());
-  const surface::Decimated result = surface::decimate(input, choice, [&](int64_t left) {
+  const meshtools::Decimated result = meshtools::decimate(input, choice, [&](int64_t left) {
     progress.show(fmt::format("decimating: {} triangles left ({:.1f} %)", left,
                               100 * static_cast<double>(left) / before),
                   -1);

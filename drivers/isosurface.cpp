@@ -9,12 +9,12 @@
 #include <cstdio>
 
 #include "repose/base/agreement.h"
+#include "repose/base/log.h"
 #include "repose/base/program.h"
-#include "repose/base/progress.h"
+#include "repose/imaging/extract.h"
+#include "repose/imaging/volume_filter.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
-#include "repose/surface/extract.h"
-#include "repose/surface/volume_filter.h"
 #include "repose/surface/write.h"
 
 namespace {
@@ -62,8 +62,8 @@ std::vector<base::Option> option_table() {
           {"output", OptionKind::path, "mesh.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
 }
 
-surface::Extraction wanted_of(const base::Options& options) {
-  surface::Extraction wanted;
+imaging::Extraction wanted_of(const base::Options& options) {
+  imaging::Extraction wanted;
   if (options.has("level")) wanted.level = options.number("level");
   wanted.otsu = options.flag("otsu");
   if (options.has("label")) wanted.label = options.integer("label");
@@ -78,7 +78,7 @@ surface::Extraction wanted_of(const base::Options& options) {
   }
   wanted.voxel = options.number("voxel");
   wanted.close_holes = options.number("close_holes");
-  if (options.text("border") == "open") wanted.border = surface::VolumeBorder::open;
+  if (options.text("border") == "open") wanted.border = imaging::VolumeBorder::open;
   wanted.largest = options.flag("largest");
   wanted.components_above = options.number("components_above");
   const bool labels = options.flag("labels") || wanted.label;
@@ -87,8 +87,8 @@ surface::Extraction wanted_of(const base::Options& options) {
   return wanted;
 }
 
-void print_volume(const surface::Volume& volume) {
-  const auto range = surface::value_range(volume);
+void print_volume(const imaging::Volume& volume) {
+  const auto range = imaging::value_range(volume);
   std::printf("%s: %lld × %lld × %lld voxels of %.4g × %.4g × %.4g mm, values %g … %g\n",
               volume.name.c_str(), static_cast<long long>(volume.size[0]),
               static_cast<long long>(volume.size[1]), static_cast<long long>(volume.size[2]),
@@ -111,10 +111,10 @@ std::string numbered(const std::filesystem::path& file, int64_t label) {
   return (file.parent_path() / name).string() + file.extension().string();
 }
 
-void write_one(const surface::Volume& volume, const surface::Extraction& wanted,
+void write_one(const imaging::Volume& volume, const imaging::Extraction& wanted,
                const std::string& file) {
   base::Progress progress(MPI_COMM_WORLD);
-  const auto result = surface::extract(
+  const auto result = imaging::extract(
       volume, wanted, [&](const std::string& step, double done) { progress.show(step, done); });
   progress.show("checking and writing", -1);
   const std::string summary = describe_surface(result.surface);
@@ -128,18 +128,18 @@ void write_one(const surface::Volume& volume, const surface::Extraction& wanted,
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
-  surface::Extraction wanted = wanted_of(options);
+  imaging::Extraction wanted = wanted_of(options);
   const bool all = options.flag("labels");
   if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
     base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("reading", -1);
-  const surface::Volume volume = surface::read_volume(
+  const imaging::Volume volume = imaging::read_volume(
       options.arguments()[0], [&](double done) { progress.show("reading slices", done); });
   progress.clear();
   print_volume(volume);
   if (!all) return write_one(volume, wanted, output);
-  const auto labels = surface::labels_of(volume);
+  const auto labels = imaging::labels_of(volume);
   if (labels.empty()) base::refuse("{}: holds no label, only 0", volume.name);
   for (const int64_t label : labels) {
     wanted.label = label;

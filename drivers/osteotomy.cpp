@@ -10,8 +10,9 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/model/bones.h"
-#include "repose/surface/osteotomy.h"
+#include "repose/meshtools/osteotomy.h"
+#include "repose/model/build.h"
+#include "repose/surface/component.h"
 #include "repose/surface/read.h"
 
 namespace {
@@ -47,8 +48,8 @@ Vec3 vector(const base::Options& options, const char* name) {
   return result;
 }
 
-surface::Osteotomy plan_of(const base::Options& options) {
-  surface::Osteotomy plan{options.text("piece"), {}, {}, options.number("kerf"), {}};
+meshtools::Osteotomy plan_of(const base::Options& options) {
+  meshtools::Osteotomy plan{options.text("piece"), {}, {}, options.number("kerf"), {}};
   if (options.has("point") != options.has("normal"))
     base::refuse("a plane needs both -point X Y Z and -normal X Y Z");
   if (options.has("point"))
@@ -57,7 +58,7 @@ surface::Osteotomy plan_of(const base::Options& options) {
     if (plan.planes.empty()) base::refuse("-radius bounds a plane; give -point and -normal too");
     plan.planes[0].radius = options.number("radius");
   }
-  if (options.has("surface")) plan.surface = surface::load_cutter(options.text("surface"));
+  if (options.has("surface")) plan.surface = meshtools::load_cutter(options.text("surface"));
   if (options.has("seed")) plan.seed = vector(options, "seed");
   if (plan.planes.empty() && !plan.surface)
     base::refuse("no cut is given; give -point and -normal, or -surface");
@@ -82,9 +83,9 @@ Parts parts_of_scene(const base::Options& options, const std::filesystem::path& 
 }
 
 Parts parts_of_bone(const base::Options& options, const std::filesystem::path& input) {
-  const surface::Osteotomy plan = plan_of(options);
-  surface::Pieces pieces =
-      surface::cut_bone(surface::load_surface(input, surface::Role::bone), plan);
+  const meshtools::Osteotomy plan = plan_of(options);
+  meshtools::Pieces pieces =
+      meshtools::cut_bone(surface::load_surface(input, surface::Role::bone), plan);
   std::vector<std::string> remarks = pieces.remarks;
   if (plan.kerf > 0) remarks.push_back(fmt::format("the saw takes {:.1f} mm³", pieces.kerf_volume));
   return {{pieces.rest, pieces.piece}, {"rest", plan.piece}, remarks};
@@ -100,7 +101,7 @@ void cut(const base::Options& options) {
     const std::string file = fmt::format("{}_{}.ply", name, parts.names[k]);
     surface::write_ply(file, parts.surfaces[k]);
     std::printf("  wrote %s: %zu triangles, %.1f mm³\n", file.c_str(),
-                parts.surfaces[k].triangles.size(), surface::volume(parts.surfaces[k]));
+                parts.surfaces[k].triangles.size(), surface::volume_of(parts.surfaces[k]));
   }
 }
 

@@ -15,7 +15,6 @@
 #include "paper/page.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/base/shipped.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 

@@ -10,7 +10,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/surface/phantom.h"
+#include "repose/meshtools/phantom.h"
 
 namespace {
 
@@ -18,31 +18,30 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  using namespace surface;
   return {{"skin_vertices",
            OptionKind::integer,
            "2000",
            "Vertices of the skin; 477 is the paper's mesh.",
-           {phantom_vertices_min, phantom_vertices_max}},
+           {meshtools::phantom_vertices_min, meshtools::phantom_vertices_max}},
           {"bone_edge",
            OptionKind::number,
            "auto",
            "Edges of the bones at the face; auto: as the skin's, between 1 and 5.",
-           {phantom_bone_edge_min, phantom_bone_edge_max},
+           {meshtools::phantom_bone_edge_min, meshtools::phantom_bone_edge_max},
            "mm",
            {"auto"}},
           {"output", OptionKind::path, "head", "Path of the files without ending."}};
 }
 
 void write_head(const base::Options& options) {
-  surface::PhantomOptions wanted;
+  meshtools::PhantomOptions wanted;
   wanted.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
-  const surface::Phantom head = surface::make_phantom(wanted);
+  const meshtools::Phantom head = meshtools::make_phantom(wanted);
   for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
     std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),
                 part->triangles.size());
-  for (const auto& file : surface::write_phantom(options.text("output"), head))
+  for (const auto& file : meshtools::write_phantom(options.text("output"), head))
     std::printf("  wrote %s\n", file.c_str());
 }
 

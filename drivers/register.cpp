@@ -11,10 +11,10 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/meshtools/register.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/transform_file.h"
 #include "repose/surface/read.h"
-#include "repose/surface/register.h"
 
 namespace {
 
@@ -105,7 +105,7 @@ Pairs read_pairs(const base::Options& options) {
   return pairs;
 }
 
-void print_warnings(const surface::LandmarkFit& fit) {
+void print_warnings(const meshtools::LandmarkFit& fit) {
   if (fit.rms_mirrored < 0.3 * fit.rms_all)
     std::printf(
         "  note: a mirror image fits better (rms %.3g against %.3g mm): left and right are "
@@ -120,7 +120,7 @@ void print_warnings(const surface::LandmarkFit& fit) {
     std::printf("  note: of three landmarks none can be checked by the others; place more\n");
 }
 
-void print(const surface::LandmarkFit& fit, const Pairs& pairs) {
+void print(const meshtools::LandmarkFit& fit, const Pairs& pairs) {
   std::printf("  %-20s %12s %12s\n", "landmark", "residual", "leave-one-out");
   for (size_t i = 0; i < pairs.names.size(); ++i) {
     std::printf("  %-20s %9.3f mm ", pairs.names[i].c_str(), fit.residual[i]);
@@ -137,11 +137,11 @@ void print(const surface::LandmarkFit& fit, const Pairs& pairs) {
 }
 
 base::Exit refine(const base::Options& options, const surface::Surface& moving,
-                  const surface::Surface& fixed, surface::Similarity& transform) {
-  surface::IcpOptions wanted;
+                  const surface::Surface& fixed, meshtools::Similarity& transform) {
+  meshtools::IcpOptions wanted;
   wanted.trim = options.number("trim");
   wanted.most_steps = static_cast<int>(options.integer("icp_steps"));
-  const surface::IcpResult icp = surface::refine_by_icp(moving, fixed, transform, wanted);
+  const meshtools::IcpResult icp = meshtools::refine_by_icp(moving, fixed, transform, wanted);
   transform = icp.transform;
   std::printf(
       "  ICP %s after %d step(s): rms %.4g mm point to plane, %.4g mm point to point over "
@@ -156,15 +156,15 @@ base::Exit run(const base::Options& options) {
   const Pairs pairs = read_pairs(options);
   const surface::Surface moving = surface::read_surface(files[0]);
   const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));
-  const surface::LandmarkFit fit =
-      surface::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
+  const meshtools::LandmarkFit fit =
+      meshtools::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
   print(fit, pairs);
-  surface::Similarity transform = fit.transform;
+  meshtools::Similarity transform = fit.transform;
   base::Exit exit = base::Exit::done;
   if (options.flag("icp"))
     exit = refine(options, surface::weld_and_orient(moving), fixed, transform);
   const std::string name = options.text("output");
-  surface::write_ply(name + ".ply", surface::moved(moving, transform));
+  surface::write_ply(name + ".ply", meshtools::moved(moving, transform));
   scene::write_transform(name + ".tfm", transform.matrix());
   std::printf("  wrote %s.tfm and %s.ply\n", name.c_str(), name.c_str());
   return exit;

@@ -16,8 +16,8 @@
 #include <sstream>
 
 #include "repose/base/agreement.h"
+#include "repose/base/log.h"
 #include "repose/base/program.h"
-#include "repose/base/progress.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "tradeoff/study.h"

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "polak_ribiere.h"
-#include "repose/base/scoped_option.h"
+#include "repose/base/options.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/load_path.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "repose/base/usage.h"
+#include "repose/base/program.h"
 
 namespace repose::paper {
 

@@ -1,6 +1,6 @@
 #include "size.h"
 
-#include "repose/base/usage.h"
+#include "repose/base/program.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
 #include "repose/model/build.h"

@@ -13,13 +13,13 @@
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/scoped_option.h"
-#include "repose/base/usage.h"
+#include "repose/base/options.h"
+#include "repose/base/program.h"
 #include "repose/discrete/gather.h"
+#include "repose/meshtools/remesh.h"
 #include "repose/model/build.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
-#include "repose/surface/remesh.h"
 #include "skin.h"
 #include "ways.h"
 
@@ -87,7 +87,7 @@ class Study {
 
   void choose_edges() {
     if (plan_.edges) return;
-    double edge = base::rank(comm) == 0 ? surface::even_edge(anatomy_.skin) : 0;
+    double edge = base::rank(comm) == 0 ? meshtools::even_edge(anatomy_.skin) : 0;
     MPI_Bcast(&edge, 1, MPI_DOUBLE, 0, comm);
     plan_.edges = {std::round(15 * edge) / 10, std::round(20 * edge) / 10};
   }

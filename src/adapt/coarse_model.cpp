@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cctype>
 
+#include "repose/meshtools/remesh.h"
 #include "repose/model/skin_mesh.h"
 #include "repose/model/stiffness.h"
-#include "repose/surface/remesh.h"
 
 namespace repose::adapt {
 
@@ -88,7 +88,7 @@ model::BuiltModel coarse_model(const model::Anatomy& anatomy, const Model& fine,
   const bool same_layers = layers == scene.tissue.layers;
   scene.tissue.layers = layers;
   const surface::Surface skin =
-      resolution.edge > 0 ? surface::remesh(anatomy.skin, resolution.edge) : anatomy.skin;
+      resolution.edge > 0 ? meshtools::remesh(anatomy.skin, resolution.edge) : anatomy.skin;
   if (scene.tissue.material || scene.tissue.isotropic)
     return model::build_model(scene, skin, anatomy.bones);
   scene.tissue.springs = {

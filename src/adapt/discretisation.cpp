@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "repose/surface/remesh.h"
+#include "repose/meshtools/remesh.h"
 
 namespace repose::adapt {
 
@@ -32,7 +32,7 @@ std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy) {
   constexpr double fewest = 100;  // columns
   const scene::Tissue& tissue = anatomy.scene.tissue;
   const bool free = layers_are_free(tissue);
-  const double edge = surface::even_edge(anatomy.skin);
+  const double edge = meshtools::even_edge(anatomy.skin);
   std::vector<Resolution> resolutions;
   for (const int times : {4, 2}) {
     if (static_cast<double>(anatomy.skin.points.size()) < fewest * times * times) continue;
@@ -52,7 +52,7 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
   if (!layers_are_free(tissue))
     found.limit = "the scene fixes its layers (tissue.depths, depths_mm or mass)";
   if (!tissue.edge || !layers_are_free(tissue)) return found;
-  double edge = surface::even_edge(anatomy.skin);
+  double edge = meshtools::even_edge(anatomy.skin);
   int64_t unknowns = 3 * model::count(own).soft;
   int gaps = tissue.layers - 1;
   for (int k = 0; k < finer; ++k) {

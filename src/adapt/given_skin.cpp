@@ -3,8 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
-#include "repose/surface/compare.h"
-#include "repose/surface/point_tree.h"
+#include "repose/meshtools/compare.h"
+#include "repose/surface/distance.h"
 
 namespace repose::adapt {
 
@@ -70,7 +70,7 @@ surface::PointData displacement_of_given(const surface::Surface& given, const mo
                                          const std::vector<Vec3>& displacement) {
   const SkinPoints from = skin_points(model, displacement);
   const surface::PointTree tree(from.skin.points);
-  const surface::SignedDistance distance(from.skin);
+  const meshtools::SignedDistance distance(from.skin);
   surface::PointData data;
   data.vectors.push_back({"displacement", {}});
   data.fields.push_back({"solved", {}});

@@ -10,11 +10,10 @@
 #include "repose/adapt/transfer.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/scatter.h"
-#include "repose/base/scoped_option.h"
+#include "repose/base/options.h"
 #include "repose/discrete/gather.h"
+#include "repose/meshtools/remesh.h"
 #include "repose/model/motion.h"
-#include "repose/surface/remesh.h"
 
 namespace repose::adapt {
 
@@ -123,7 +122,7 @@ class SequenceSolver {
   /// Carries the answer of a level to the scene's points. On rank 0.
   void take(model::BuiltModel&& built, std::vector<Vec3>&& position, Level& level) {
     level.points = static_cast<int64_t>(position.size());
-    if (level.resolution.edge == 0) level.resolution.edge = surface::even_edge(anatomy_.skin);
+    if (level.resolution.edge == 0) level.resolution.edge = meshtools::even_edge(anatomy_.skin);
     const auto moved = sum(position, built.model.points.position, -1);
     std::vector<Vec3> carried =
         sum(fine_.points.position, Transfer(built.model, fine_).carry(moved), 1);
@@ -153,7 +152,7 @@ std::vector<Resolution> resolutions_by(double coarsening, double fewest,
   const int fewest_layers = std::min(3, tissue.layers);  // two are too stiff across to lead
   const bool free = layers_are_free(tissue);
   auto columns = static_cast<double>(anatomy.skin.points.size());
-  Resolution resolution{surface::even_edge(anatomy.skin), tissue.layers};
+  Resolution resolution{meshtools::even_edge(anatomy.skin), tissue.layers};
   std::vector<Resolution> levels;
   while ((columns /= coarsening * coarsening) >= fewest) {
     resolution.edge *= coarsening;
@@ -168,9 +167,9 @@ std::vector<Resolution> resolutions_by(double coarsening, double fewest,
 
 std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t most_columns) {
   std::vector<Resolution> levels = resolutions_by(2, 150, anatomy);
-  const double finest =
-      surface::even_edge(anatomy.skin) * std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
-                                                   static_cast<double>(most_columns));
+  const double finest = meshtools::even_edge(anatomy.skin) *
+                        std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
+                                  static_cast<double>(most_columns));
   std::erase_if(levels, [&](const Resolution& r) { return r.edge < finest; });
   return levels;
 }

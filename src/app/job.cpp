@@ -1,11 +1,11 @@
-#include "repose/app/job.h"
+#include "job.h"
 
-#include "repose/app/report.h"
+#include "report.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/model/cut.h"
-#include "repose/model/places.h"
+#include "repose/model/skin_mesh.h"
 #include "repose/results/model_file.h"
 #include "repose/surface/read.h"
 

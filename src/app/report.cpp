@@ -1,4 +1,4 @@
-#include "repose/app/report.h"
+#include "report.h"
 
 #include <fmt/format.h>
 

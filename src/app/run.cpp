@@ -8,18 +8,17 @@
 #include <limits>
 #include <optional>
 
+#include "report.h"
 #include "repose/adapt/discretisation.h"
 #include "repose/adapt/given_skin.h"
-#include "repose/app/report.h"
-#include "repose/app/strategy.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
-#include "repose/base/scatter.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/surface/write.h"
 #include "sensitivity.h"
+#include "strategy.h"
 #include "verify_path.h"
 #include "writer.h"
 

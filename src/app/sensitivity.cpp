@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "repose/app/report.h"
+#include "report.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/model/cut.h"

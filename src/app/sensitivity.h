@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "repose/app/job.h"
+#include "job.h"
 #include "repose/solve/sensitivity.h"
 
 /// How much a face depends on what a scene knows least.

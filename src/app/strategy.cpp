@@ -1,10 +1,10 @@
-#include "repose/app/strategy.h"
+#include "strategy.h"
 
 #include <fmt/format.h>
 
+#include "report.h"
 #include "repose/adapt/discretisation.h"
 #include "repose/app/options.h"
-#include "repose/app/report.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "repose/app/report.h"
+#include "report.h"
 
 namespace repose::app {
 

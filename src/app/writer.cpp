@@ -1,9 +1,8 @@
 #include "writer.h"
 
+#include "report.h"
 #include "repose/adapt/discretisation.h"
-#include "repose/app/report.h"
 #include "repose/base/agreement.h"
-#include "repose/base/scatter.h"
 #include "repose/discrete/gather.h"
 #include "repose/solve/reaction.h"
 

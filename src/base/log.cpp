@@ -1,5 +1,12 @@
 #include "repose/base/log.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+#include <cstdio>
+#include <cstdlib>
+
+#include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
 
 namespace repose::base {
@@ -31,5 +38,52 @@ LogStage::LogStage(const char* name) {
 }
 
 LogStage::~LogStage() { PetscLogStagePop(); }
+
+namespace {
+
+std::string duration(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  return fmt::format("{:.0f} min", seconds / 60);
+}
+
+/// Whether a person sees what is written to stderr: it is a terminal, or mpirun, which started this
+/// process with a pipe for stderr, passes it on to one.
+bool watched() {
+  if (isatty(STDERR_FILENO)) return true;
+  if (!std::getenv("OMPI_COMM_WORLD_SIZE")) return false;
+  const std::string shown = fmt::format("/proc/{}/fd/{}", getppid(), STDERR_FILENO);
+  const int file = open(shown.c_str(), O_WRONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool terminal = isatty(file);
+  close(file);
+  return terminal;
+}
+
+}  // namespace
+
+Progress::Progress(MPI_Comm comm) : visible_(rank(comm) == 0 && watched()) {}
+
+Progress::~Progress() { clear(); }
+
+void Progress::show(const std::string& text, double done) {
+  if (!visible_) return;
+  const auto now = Clock::now();
+  if (shown_ && now - last_ < std::chrono::milliseconds(100)) return;
+  last_ = now;
+  shown_ = true;
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  std::string left;
+  if (done > 0.02 && done < 1)
+    left = fmt::format("  about {} left", duration(elapsed * (1 - done) / done));
+  std::fputs(fmt::format("\r\033[K{}{}", text, left).c_str(), stderr);
+  std::fflush(stderr);
+}
+
+void Progress::clear() {
+  if (!shown_) return;
+  std::fputs("\r\033[K", stderr);
+  std::fflush(stderr);
+  shown_ = false;
+}
 
 }  // namespace repose::base

@@ -9,8 +9,8 @@
 
 #include "petsc_option_names.h"
 #include "repose/base/error.h"
-#include "repose/base/nearest.h"
 #include "repose/base/petsc.h"
+#include "repose/base/text.h"
 
 namespace repose::base {
 

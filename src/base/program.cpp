@@ -1,6 +1,11 @@
 #include "repose/base/program.h"
 
+#include <hdf5.h>
+#include <malloc.h>
+#include <sys/resource.h>
 #include <cstdio>
+#include <ctime>
+#include <fstream>
 
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
@@ -41,6 +46,60 @@ int run_program(Options& options, const std::function<Exit()>& work) {
     return static_cast<int>(Exit::done);
   }
   return guarded(options, work);
+}
+
+double heap_bytes() {
+  const auto use = mallinfo2();
+  return static_cast<double>(use.uordblks) + static_cast<double>(use.hblkhd);
+}
+
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+namespace {
+
+/// The command line, words that hold a space in quotes; empty where there is no /proc.
+std::string command_line() {
+  std::ifstream stream("/proc/self/cmdline", std::ios::binary);
+  std::vector<std::string> words;
+  for (std::string word; std::getline(stream, word, '\0');) {
+    const bool quoted = word.empty() || word.find_first_of(" \t\n'\"$&;*?") != std::string::npos;
+    words.push_back(quoted ? fmt::format("'{}'", word) : word);
+  }
+  return fmt::format("{}", fmt::join(words, " "));
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> this_run(MPI_Comm comm) {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  return {{"program", "Repose " REPOSE_VERSION},
+          {"command", command_line()},
+          {"ranks", std::to_string(size(comm))},
+          {"libraries",
+           fmt::format("PETSc {}.{}.{}, HDF5 {}.{}.{}", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
+                       PETSC_VERSION_SUBMINOR, major, minor, release)}};
+}
+
+std::filesystem::path shipped_folder(const std::string& name) {
+  std::error_code error;
+  const std::filesystem::path bin =
+      std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  for (const std::filesystem::path& place :
+       {std::filesystem::path(name), bin / "../share/repose" / name, bin / "../.." / name})
+    if (std::filesystem::is_directory(place, error)) return place.lexically_normal();
+  return name;
+}
+
+void Stages::end(const std::string& name) {
+  double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  double mebibytes = static_cast<double>(usage.ru_maxrss) / 1024;
+  MPI_Allreduce(MPI_IN_PLACE, &seconds, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  MPI_Allreduce(MPI_IN_PLACE, &mebibytes, 1, MPI_DOUBLE, MPI_SUM, comm_);
+  stages_.push_back({name, seconds, mebibytes});
+  begin_ = Clock::now();
 }
 
 }  // namespace repose::base

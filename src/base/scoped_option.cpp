@@ -1,4 +1,4 @@
-#include "repose/base/scoped_option.h"
+#include "repose/base/options.h"
 
 #include "repose/base/petsc.h"
 

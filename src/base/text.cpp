@@ -1,9 +1,10 @@
 #include "repose/base/text.h"
 
 #include <fmt/format.h>
-
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 
 namespace repose::base {
 
@@ -54,6 +55,58 @@ std::string wanted_number(bool whole, std::string_view unit, const Range& range,
   if (const std::string limits = range.text(); !limits.empty()) result.append(", ").append(limits);
   for (const std::string& word : words) result.append(", or ").append(word);
   return result;
+}
+
+std::string lower(std::string_view text) {
+  std::string lowered(text);
+  for (char& c : lowered)
+    if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
+  return lowered;
+}
+
+std::string_view next_line(std::string_view text, size_t& position) {
+  const size_t begin = position;
+  const size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
+  position = text.substr(end, 2) == "\r\n" ? end + 2 : std::min(end + 1, text.size());
+  return text.substr(begin, end - begin);
+}
+
+std::vector<std::string_view> words(std::string_view line) {
+  std::vector<std::string_view> found;
+  constexpr auto blanks = " \t\v\f";
+  for (size_t begin = line.find_first_not_of(blanks); begin != line.npos;) {
+    const size_t end = std::min(line.find_first_of(blanks, begin), line.size());
+    found.push_back(line.substr(begin, end - begin));
+    begin = line.find_first_not_of(blanks, end);
+  }
+  return found;
+}
+
+std::size_t edit_distance(std::string_view a_text, std::string_view b_text) {
+  // Long input is garbage, not a misspelt name: the distance is only taken over its beginning.
+  constexpr std::size_t longest = 200;
+  const std::string a = lower(a_text.substr(0, longest)), b = lower(b_text.substr(0, longest));
+  std::vector<std::size_t> two_before(b.size() + 1), before(b.size() + 1), row(b.size() + 1);
+  std::iota(before.begin(), before.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t differ = a[i - 1] == b[j - 1] ? 0 : 1;
+      row[j] = std::min({before[j] + 1, row[j - 1] + 1, before[j - 1] + differ});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) row[j] = std::min(row[j], two_before[j - 2] + 1);
+    }
+    two_before.swap(before);
+    before.swap(row);
+  }
+  return before.back();
+}
+
+std::string nearest(std::string_view name, const std::vector<std::string>& known) {
+  if (known.empty()) return {};
+  return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(name, a) < edit_distance(name, b);
+  });
 }
 
 }  // namespace repose::base

@@ -1,4 +1,4 @@
-#include "repose/check/check_contact.h"
+#include "check_contact.h"
 
 #include <algorithm>
 #include <cmath>

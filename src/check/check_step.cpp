@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "repose/check/check_contact.h"
-#include "repose/check/recompute.h"
+#include "check_contact.h"
+#include "recompute.h"
 #include "repose/model/prism_geometry.h"
 
 namespace repose::check {

@@ -1,4 +1,4 @@
-#include "repose/check/recompute.h"
+#include "recompute.h"
 
 #include <algorithm>
 #include <cmath>

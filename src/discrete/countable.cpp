@@ -1,4 +1,4 @@
-#include "repose/discrete/countable.h"
+#include "countable.h"
 
 #include "repose/base/error.h"
 

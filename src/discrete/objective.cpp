@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flops.h"
 #include "repose/base/log.h"
-#include "repose/discrete/flops.h"
 #include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {

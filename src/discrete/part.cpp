@@ -5,11 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "countable.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/base/geometry.h"
 #include "repose/base/log.h"
-#include "repose/base/pick.h"
-#include "repose/discrete/countable.h"
 #include "repose/discrete/message.h"
 #include "repose/discrete/partition.h"
 #include "repose/model/motion.h"
@@ -266,19 +266,24 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   return part;
 }
 
+template <class Archive>
+void pass_shape(Archive& archive, mechanics::RigidBody::Shape& shape) {
+  std::visit(
+      [&](auto& of) {
+        if constexpr (requires { of.pass(archive); })
+          of.pass(archive);
+        else
+          archive(of);
+      },
+      shape);
+}
+
 void pass_bodies(Sender& archive, std::vector<mechanics::RigidBody>& bodies) {
   archive(static_cast<int64_t>(bodies.size()));
   for (const mechanics::RigidBody& body : bodies) {
     archive(body.bone(), body.push(), static_cast<int64_t>(body.shape().index()));
     auto shape = body.shape();
-    std::visit(
-        [&](auto& of) {
-          if constexpr (requires { of.pass(archive); })
-            of.pass(archive);
-          else
-            archive(of);
-        },
-        shape);
+    pass_shape(archive, shape);
   }
 }
 
@@ -300,14 +305,7 @@ void pass_bodies(Receiver& archive, std::vector<mechanics::RigidBody>& bodies) {
     Vec3 push = Vec3::Zero();
     archive(bone, push, index);
     auto shape = empty_shape(index);
-    std::visit(
-        [&](auto& of) {
-          if constexpr (requires { of.pass(archive); })
-            of.pass(archive);
-          else
-            archive(of);
-        },
-        shape);
+    pass_shape(archive, shape);
     bodies.emplace_back(std::move(shape), bone, push);
   }
 }

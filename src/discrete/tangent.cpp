@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flops.h"
 #include "repose/base/log.h"
-#include "repose/base/petsc_versions.h"
-#include "repose/discrete/flops.h"
+#include "repose/base/petsc.h"
 
 namespace repose::discrete {
 

@@ -17,7 +17,7 @@ void LagPolicy::renew() {
 
 void LagPolicy::move() { new_ = false; }
 
-void LagPolicy::take(KSP krylov) {
+void LagPolicy::observe(KSP krylov) {
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov, &reason));
   constexpr double endless = std::numeric_limits<double>::infinity();

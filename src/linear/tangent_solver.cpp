@@ -6,7 +6,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/log.h"
-#include "repose/base/petsc_versions.h"
+#include "repose/base/petsc.h"
 
 extern "C" PetscErrorCode PCCreate_Shell(PC pc);  // in no public header
 
@@ -117,7 +117,7 @@ void TangentSolver::lend_preconditioner(KSP other) {
 
 PetscErrorCode TangentSolver::after_solve(KSP krylov, Vec, Vec, void* me) {
   try {
-    static_cast<TangentSolver*>(me)->lag_.take(krylov);
+    static_cast<TangentSolver*>(me)->lag_.observe(krylov);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;
   }

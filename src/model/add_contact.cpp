@@ -1,4 +1,4 @@
-#include "repose/model/add_contact.h"
+#include "add_contact.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -7,8 +7,8 @@
 #include <map>
 #include <type_traits>
 
+#include "bone_field.h"
 #include "repose/base/error.h"
-#include "repose/model/bone_field.h"
 #include "repose/model/build.h"
 #include "repose/model/instruments.h"
 

@@ -1,12 +1,12 @@
-#include "repose/model/attachment.h"
+#include "attachment.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
+#include "region.h"
 #include "repose/base/error.h"
-#include "repose/model/region.h"
 
 namespace repose::model {
 namespace {

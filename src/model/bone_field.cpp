@@ -1,4 +1,4 @@
-#include "repose/model/bone_field.h"
+#include "bone_field.h"
 
 #include <limits>
 

@@ -1,31 +1,32 @@
-#include "repose/model/bones.h"
+#include "repose/model/build.h"
 
+#include "load_entry.h"
 #include "repose/base/error.h"
-#include "repose/model/load_entry.h"
-#include "repose/surface/osteotomy.h"
+#include "repose/meshtools/osteotomy.h"
+#include "repose/surface/component.h"
 #include "repose/surface/read.h"
 
 namespace repose::model {
 namespace {
 
-surface::Osteotomy plan_of(const scene::Osteotomy& cut, const std::string& piece) {
-  surface::Osteotomy plan{piece, {}, {}, cut.kerf, cut.seed};
+meshtools::Osteotomy plan_of(const scene::Osteotomy& cut, const std::string& piece) {
+  meshtools::Osteotomy plan{piece, {}, {}, cut.kerf, cut.seed};
   for (const scene::CutPlane& plane : cut.planes) {
     plan.planes.push_back({plane.point, plane.normal});
     if (plane.radius) plan.planes.back().radius = *plane.radius;
   }
-  if (cut.surface) plan.surface = surface::load_cutter(*cut.surface);
+  if (cut.surface) plan.surface = meshtools::load_cutter(*cut.surface);
   return plan;
 }
 
 void make(const scene::Scene& scene, const scene::Osteotomy& cut, Bones& bones) {
   surface::Surface& bone = bones.surfaces[cut.bone];
   const std::string& name = scene.bones[cut.piece].name;
-  surface::Pieces parts = surface::cut_bone(bone, plan_of(cut, name));
+  meshtools::Pieces parts = meshtools::cut_bone(bone, plan_of(cut, name));
   bones.remarks.push_back(fmt::format(
       "piece '{}' of {:.0f} mm³ is cut off '{}', which keeps {:.0f} mm³; the saw takes {:.0f} mm³",
-      name, surface::volume(parts.piece), scene.bones[cut.bone].name, surface::volume(parts.rest),
-      parts.kerf_volume));
+      name, surface::volume_of(parts.piece), scene.bones[cut.bone].name,
+      surface::volume_of(parts.rest), parts.kerf_volume));
   bones.remarks.insert(bones.remarks.end(), parts.remarks.begin(), parts.remarks.end());
   bone = std::move(parts.rest);
   bones.surfaces.push_back(std::move(parts.piece));

@@ -2,22 +2,21 @@
 
 #include <algorithm>
 
+#include "add_contact.h"
+#include "attachment.h"
+#include "columns.h"
+#include "layers.h"
+#include "load_entry.h"
+#include "loads.h"
+#include "orientation.h"
+#include "point_sets.h"
+#include "release.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
-#include "repose/model/add_contact.h"
-#include "repose/model/attachment.h"
-#include "repose/model/bones.h"
 #include "repose/model/collision.h"
-#include "repose/model/columns.h"
-#include "repose/model/layers.h"
-#include "repose/model/load_entry.h"
-#include "repose/model/loads.h"
 #include "repose/model/material.h"
-#include "repose/model/orientation.h"
-#include "repose/model/point_sets.h"
-#include "repose/model/release.h"
-#include "repose/model/solved_skin.h"
 #include "repose/model/stiffness.h"
+#include "solved_skin.h"
 
 namespace repose::model {
 namespace {

@@ -1,11 +1,11 @@
-#include "repose/model/columns.h"
+#include "columns.h"
 
 #include <algorithm>
 #include <functional>
 
-#include "repose/model/directions.h"
-#include "repose/model/fold.h"
-#include "repose/model/thickness.h"
+#include "directions.h"
+#include "fold.h"
+#include "thickness.h"
 
 namespace repose::model {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "add_contact.h"
 #include "cut_sides.h"
-#include "repose/model/add_contact.h"
 #include "repose/model/material.h"
 
 namespace repose::model {

@@ -1,4 +1,4 @@
-#include "repose/model/cut_path.h"
+#include "repose/model/cut.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
@@ -7,8 +7,8 @@
 #include <set>
 
 #include "repose/base/error.h"
-#include "repose/model/split_mesh.h"
 #include "repose/surface/distance.h"
+#include "split_mesh.h"
 
 namespace repose::model {
 namespace {

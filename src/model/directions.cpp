@@ -1,11 +1,11 @@
-#include "repose/model/directions.h"
+#include "directions.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "repose/model/places.h"
-#include "repose/model/smoothing.h"
+#include "repose/model/skin_mesh.h"
+#include "smoothing.h"
 
 namespace repose::model {
 namespace {

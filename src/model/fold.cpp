@@ -1,11 +1,11 @@
-#include "repose/model/fold.h"
+#include "fold.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <iterator>
 
-#include "repose/model/places.h"
-#include "repose/model/smoothing.h"
+#include "repose/model/skin_mesh.h"
+#include "smoothing.h"
 
 namespace repose::model {
 namespace {

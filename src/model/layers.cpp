@@ -1,4 +1,4 @@
-#include "repose/model/layers.h"
+#include "layers.h"
 
 #include <fmt/format.h>
 

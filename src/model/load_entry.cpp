@@ -1,18 +1,18 @@
-#include "repose/model/load_entry.h"
+#include "load_entry.h"
 
 #include "repose/base/error.h"
-#include "repose/surface/extract.h"
+#include "repose/imaging/extract.h"
 
 namespace repose::model {
 namespace {
 
-surface::Extraction extraction_of(const scene::VolumeEntry& entry) {
-  surface::Extraction wanted;
+imaging::Extraction extraction_of(const scene::VolumeEntry& entry) {
+  imaging::Extraction wanted;
   wanted.level = entry.level;
   if (entry.label) wanted.label = *entry.label;
   wanted.otsu = !entry.level && !entry.label;
   wanted.box = entry.box;
-  wanted.border = entry.open ? surface::VolumeBorder::open : surface::VolumeBorder::closed;
+  wanted.border = entry.open ? imaging::VolumeBorder::open : imaging::VolumeBorder::closed;
   wanted.voxel = entry.voxel;
   wanted.close_holes = entry.close_holes;
   wanted.smooth = entry.smooth;
@@ -31,7 +31,7 @@ std::string name_of(const scene::SurfaceEntry& entry, double level) {
 surface::Surface load_entry(const scene::SurfaceEntry& entry, surface::Role role) {
   if (!entry.volume) return surface::load_surface(entry.file, role);
   auto [surface, level, remarks] =
-      surface::extract(surface::read_volume(entry.file), extraction_of(*entry.volume));
+      imaging::extract(imaging::read_volume(entry.file), extraction_of(*entry.volume));
   surface.name = name_of(entry, level);
   return surface::accept_surface(surface, role);
 }

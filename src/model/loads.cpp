@@ -1,4 +1,4 @@
-#include "repose/model/loads.h"
+#include "loads.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -8,12 +8,11 @@
 #include <memory>
 #include <numeric>
 
+#include "region.h"
 #include "repose/base/error.h"
 #include "repose/base/text.h"
-#include "repose/model/region.h"
-#include "repose/surface/point_tree.h"
+#include "repose/surface/distance.h"
 #include "repose/surface/read.h"
-#include "repose/surface/vertex_values.h"
 
 namespace repose::model {
 

@@ -1,4 +1,4 @@
-#include "repose/model/multilevel.h"
+#include "multilevel.h"
 
 namespace repose::model {
 namespace {

@@ -1,8 +1,8 @@
-#include "repose/model/orientation.h"
+#include "orientation.h"
 
 #include <Eigen/Geometry>
 
-#include "repose/model/places.h"
+#include "repose/model/skin_mesh.h"
 
 namespace repose::model {
 namespace {

@@ -1,4 +1,4 @@
-#include "repose/model/places.h"
+#include "repose/model/skin_mesh.h"
 
 #include <utility>
 

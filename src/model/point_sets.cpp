@@ -1,4 +1,4 @@
-#include "repose/model/point_sets.h"
+#include "point_sets.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,13 +1,13 @@
-#include "repose/model/region.h"
+#include "region.h"
 
 #include <algorithm>
 #include <memory>
 
 #include "repose/base/error.h"
+#include "repose/imaging/volume.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/read.h"
-#include "repose/surface/volume.h"
 
 namespace repose::model {
 namespace {
@@ -41,8 +41,8 @@ Contains inside(const scene::MeshRegion& mesh, double near) {
 }
 
 Contains inside(const scene::LabelRegion& region, double near) {
-  const auto labels = std::make_shared<surface::Volume>(surface::read_volume(region.volume));
-  const Mat3 to_voxels = surface::inverse_axes(*labels);
+  const auto labels = std::make_shared<imaging::Volume>(imaging::read_volume(region.volume));
+  const Mat3 to_voxels = imaging::inverse_axes(*labels);
   std::array<int64_t, 3> reach;
   for (int axis = 0; axis < 3; ++axis) reach[axis] = std::lround(near / labels->spacing(axis));
   return [labels, to_voxels, reach, label = region.label](const Vec3& x) {

@@ -1,4 +1,4 @@
-#include "repose/model/release.h"
+#include "release.h"
 
 #include <algorithm>
 

@@ -1,10 +1,10 @@
-#include "repose/model/smoothing.h"
+#include "smoothing.h"
 
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCore>
 #include <queue>
 
-#include "repose/model/multilevel.h"
+#include "multilevel.h"
 
 namespace repose::model {
 namespace {

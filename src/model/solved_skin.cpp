@@ -1,19 +1,19 @@
-#include "repose/model/solved_skin.h"
+#include "solved_skin.h"
 
 #include <fmt/format.h>
 
-#include "repose/model/bone_field.h"
-#include "repose/surface/face.h"
+#include "bone_field.h"
+#include "repose/meshtools/face.h"
 
 namespace repose::model {
 namespace {
 
 constexpr double deepest_lifted = 3, thinnest_tissue = 0.3;  // mm
 
-surface::FaceRequest request_of(const Anatomy& anatomy) {
+meshtools::FaceRequest request_of(const Anatomy& anatomy) {
   const scene::Scene& scene = anatomy.scene;
   const double edge = *scene.tissue.edge;
-  surface::FaceRequest request{edge > 0 ? edge : surface::edge_for(anatomy.skin)};
+  meshtools::FaceRequest request{edge > 0 ? edge : meshtools::edge_for(anatomy.skin)};
   if (!scene.instruments.empty()) return request;
   for (size_t b = 0; b < anatomy.bones.size(); ++b)
     if (!scene.moves[b].is_identity()) request.beneath.push_back(anatomy.bones[b]);
@@ -41,8 +41,8 @@ int64_t lift_off(const std::vector<surface::Surface>& bones, surface::Surface& s
 }  // namespace
 
 void solve_remeshed(Anatomy& anatomy) {
-  const surface::FaceRequest request = request_of(anatomy);
-  surface::Face face = surface::solvable_face(anatomy.skin, request);
+  const meshtools::FaceRequest request = request_of(anatomy);
+  meshtools::Face face = meshtools::solvable_face(anatomy.skin, request);
   anatomy.remarks.push_back(fmt::format(
       "the skin that is solved has {} vertices with edges of {:.3g} mm, no angle below {:.0f}°; of "
       "them 95 % lie within {:.2f} mm of the given skin ({} triangles), all within {:.2f} mm",

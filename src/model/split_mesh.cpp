@@ -1,4 +1,4 @@
-#include "repose/model/split_mesh.h"
+#include "split_mesh.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "repose/model/tear.h"
+#include "repose/model/cut.h"
 
 #include <algorithm>
 #include <set>

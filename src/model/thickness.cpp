@@ -1,10 +1,10 @@
-#include "repose/model/thickness.h"
+#include "thickness.h"
 
 #include <algorithm>
 #include <limits>
 #include <numeric>
 
-#include "repose/model/smoothing.h"
+#include "smoothing.h"
 
 namespace repose::model {
 namespace {

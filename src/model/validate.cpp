@@ -3,7 +3,7 @@
 #include <numeric>
 
 #include "repose/base/error.h"
-#include "repose/base/pick.h"
+#include "repose/base/geometry.h"
 #include "repose/model/model.h"
 #include "repose/model/prism_geometry.h"
 #include "repose/scene/rigid_motion.h"

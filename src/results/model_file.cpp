@@ -2,7 +2,7 @@
 
 #include <fstream>
 
-#include "repose/results/reader.h"
+#include "reader.h"
 
 namespace repose::results {
 

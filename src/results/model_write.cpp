@@ -1,6 +1,6 @@
-#include "repose/results/model_write.h"
+#include "model_write.h"
 
-#include "repose/results/writer.h"
+#include "writer.h"
 
 namespace repose::results {
 

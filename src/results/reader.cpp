@@ -1,6 +1,6 @@
-#include "repose/results/reader.h"
+#include "reader.h"
 
-#include "repose/results/stored_array.h"
+#include "stored_array.h"
 
 namespace repose::results {
 

@@ -2,7 +2,6 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/scatter.h"
 #include "repose/results/model_file.h"
 
 namespace repose::results {

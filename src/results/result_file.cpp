@@ -6,16 +6,15 @@
 #include <optional>
 #include <unordered_map>
 
+#include "model_write.h"
 #include "repose/base/agreement.h"
 #include "repose/base/hdf5.h"
 #include "repose/base/log.h"
-#include "repose/base/scatter.h"
-#include "repose/base/this_run.h"
-#include "repose/results/model_write.h"
-#include "repose/results/unfinished_file.h"
-#include "repose/results/views.h"
-#include "repose/results/vtkhdf.h"
-#include "repose/results/writer.h"
+#include "repose/base/program.h"
+#include "unfinished_file.h"
+#include "views.h"
+#include "vtkhdf.h"
+#include "writer.h"
 
 namespace repose::results {
 

@@ -1,4 +1,4 @@
-#include "repose/results/stored_array.h"
+#include "stored_array.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "repose/results/unfinished_file.h"
+#include "unfinished_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>

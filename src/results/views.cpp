@@ -1,4 +1,4 @@
-#include "repose/results/views.h"
+#include "views.h"
 
 #include <fmt/format.h>
 

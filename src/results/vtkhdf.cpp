@@ -1,8 +1,8 @@
-#include "repose/results/vtkhdf.h"
+#include "vtkhdf.h"
 
 #include <algorithm>
 
-#include "repose/results/writer.h"
+#include "writer.h"
 
 namespace repose::results {
 

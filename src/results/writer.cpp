@@ -1,4 +1,4 @@
-#include "repose/results/writer.h"
+#include "writer.h"
 
 #include <algorithm>
 #include <exception>

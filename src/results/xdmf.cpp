@@ -1,4 +1,4 @@
-#include "repose/results/xdmf.h"
+#include "xdmf.h"
 
 #include <fmt/format.h>
 

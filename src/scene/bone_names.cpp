@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "repose/base/nearest.h"
+#include "repose/base/text.h"
 
 namespace repose::scene {
 

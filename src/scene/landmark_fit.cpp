@@ -1,4 +1,4 @@
-#include "repose/scene/landmark_fit.h"
+#include "landmark_fit.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "bone_names.h"
-#include "repose/base/nearest.h"
-#include "repose/scene/landmark_fit.h"
+#include "landmark_fit.h"
+#include "repose/base/text.h"
 #include "repose/scene/transform_file.h"
 
 namespace repose::scene {

@@ -9,7 +9,7 @@
 #include "read_moves.h"
 #include "read_osteotomies.h"
 #include "read_yaml.h"
-#include "repose/base/nearest.h"
+#include "repose/base/text.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/scene.h"
 #include "value.h"

@@ -1,7 +1,7 @@
 #include "transform_hdf5.h"
 
 #include "repose/base/error.h"
-#include "repose/base/hdf5_values.h"
+#include "repose/base/hdf5.h"
 #include "stored_transform.h"
 
 namespace repose::scene {

@@ -1,11 +1,11 @@
-#include "repose/solve/active_region.h"
+#include "active_region.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <queue>
 
-#include "repose/base/pick.h"
+#include "repose/base/geometry.h"
 #include "repose/mechanics/energy.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/model/motion.h"

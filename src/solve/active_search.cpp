@@ -6,14 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "active_region.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/pick.h"
-#include "repose/base/scatter.h"
+#include "repose/base/geometry.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/model/motion.h"
-#include "repose/solve/active_region.h"
 #include "repose/solve/problem.h"
 
 namespace repose::solve {

@@ -1,4 +1,4 @@
-#include "repose/solve/contact_search.h"
+#include "contact_search.h"
 
 #include <algorithm>
 #include <cmath>

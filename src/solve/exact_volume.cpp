@@ -1,4 +1,4 @@
-#include "repose/solve/exact_volume.h"
+#include "exact_volume.h"
 
 #include <algorithm>
 

@@ -1,9 +1,9 @@
-#include "repose/solve/initial_hessian.h"
+#include "initial_hessian.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "repose/base/petsc_versions.h"
+#include "repose/base/petsc.h"
 
 namespace repose::solve {
 
@@ -41,12 +41,12 @@ MPI_Comm comm_of(Mat matrix) { return PetscObjectComm(reinterpret_cast<PetscObje
 
 }  // namespace
 
-void StepWear::renew() {
+void StepLag::renew() {
   first_force_ = steps_ = cut_ = 0;
   best_rate_ = slowest;
 }
 
-bool StepWear::take(double force, double length) {
+bool StepLag::observe(double force, double length) {
   if (first_force_ == 0) {
     first_force_ = force;
     return false;
@@ -84,10 +84,10 @@ void InitialHessian::renew(Vec displacement) {
   lag_.renew();
 }
 
-bool InitialHessian::worn_out(double force, double length) {
+bool InitialHessian::needs_renewal(double force, double length) {
   if (renewals_ != solver_.renewals()) lag_.renew();  // by a look at the distance from rest
   renewals_ = solver_.renewals();
-  return lag_.take(force, length);
+  return lag_.observe(force, length);
 }
 
 bool begins_with_stiffness(const discrete::Positions& positions) {

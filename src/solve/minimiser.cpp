@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "initial_hessian.h"
 #include "repose/base/error.h"
-#include "repose/base/petsc_versions.h"
+#include "repose/base/petsc.h"
 
 namespace repose::solve {
 
@@ -120,7 +121,7 @@ struct Minimiser::Callbacks {
                                       self.error_, self.function_.evaluations(), x});
       check(TaoDefaultConvergenceTest(tao, nullptr));
       const bool over = done || self.stopped_ || self.stalled(iteration, value);
-      self.slowed_ = !over && self.initial_ && self.initial_->worn_out(force, length);
+      self.slowed_ = !over && self.initial_ && self.initial_->needs_renewal(force, length);
       if (over || self.slowed_) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
   }
@@ -143,6 +144,8 @@ Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver
   make_tao();
 }
 
+Minimiser::~Minimiser() = default;
+
 void Minimiser::make_tao() {
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
@@ -155,7 +158,7 @@ void Minimiser::make_tao() {
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
-    initial_.emplace(tao_, solver_);
+    initial_ = std::make_unique<InitialHessian>(tao_, solver_);
   closes_ = initial_ && function_.positions().part().solid;
   newton_ = uses_hessian(tao_);
   if (!newton_) return;

@@ -9,13 +9,12 @@
 #include <limits>
 #include <optional>
 
+#include "contact_search.h"
+#include "exact_volume.h"
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
-#include "repose/base/progress.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/solve/active_search.h"
-#include "repose/solve/contact_search.h"
-#include "repose/solve/exact_volume.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"

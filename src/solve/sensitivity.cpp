@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "repose/base/agreement.h"
-#include "repose/base/scatter.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/model/motion.h"

@@ -5,7 +5,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/discrete/gather.h"
-#include "repose/model/tear.h"
+#include "repose/model/cut.h"
 
 namespace repose::solve {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "edges.h"
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 #include "triangle_distance.h"
 
 namespace repose::surface {

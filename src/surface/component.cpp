@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edges.h"
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 namespace repose::surface {
 namespace {

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 #include "soup.h"
 #include "stl.h"
 
@@ -15,7 +16,7 @@ namespace {
 std::string first_word(const std::string& bytes) {
   size_t position = 0;
   while (position < bytes.size()) {
-    const auto found = words(next_line(bytes, position));
+    const auto found = base::words(base::next_line(bytes, position));
     if (!found.empty() && found[0][0] != '#') return std::string(found[0]);
   }
   return {};
@@ -57,37 +58,12 @@ Format recognise(const Content& content) {
   const std::string word = first_word(bytes);
   if (is_off_keyword(word)) return Format::off;
   const bool binary = bytes.find('\0') != std::string::npos;
-  if (lower(word) == "solid" && !binary) return Format::stl_text;
-  const std::string ending = lower(content.file.extension().string());
+  if (base::lower(word) == "solid" && !binary) return Format::stl_text;
+  const std::string ending = base::lower(content.file.extension().string());
   if (!binary && (ending == ".obj" || is_obj_keyword(word))) return Format::obj;
   if (ending == ".stl") return Format::stl_binary;
   base::refuse("{}: the content is none of PLY, STL, OBJ and OFF; convert the mesh to one of them",
                content.file.string());
-}
-
-std::string lower(std::string_view text) {
-  std::string lowered(text);
-  for (char& c : lowered)
-    if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
-  return lowered;
-}
-
-std::string_view next_line(std::string_view text, size_t& position) {
-  const size_t begin = position;
-  const size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
-  position = text.substr(end, 2) == "\r\n" ? end + 2 : std::min(end + 1, text.size());
-  return text.substr(begin, end - begin);
-}
-
-std::vector<std::string_view> words(std::string_view line) {
-  std::vector<std::string_view> found;
-  constexpr auto blanks = " \t\v\f";
-  for (size_t begin = line.find_first_not_of(blanks); begin != line.npos;) {
-    const size_t end = std::min(line.find_first_of(blanks, begin), line.size());
-    found.push_back(line.substr(begin, end - begin));
-    begin = line.find_first_not_of(blanks, end);
-  }
-  return found;
 }
 
 }  // namespace repose::surface

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "edges.h"
-#include "intersections.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/intersections.h"
 
 namespace repose::surface {
 namespace {

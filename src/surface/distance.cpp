@@ -1,16 +1,20 @@
 #include "repose/surface/distance.h"
 
 #include <CGAL/AABB_tree.h>
+#include <CGAL/Orthogonal_k_neighbor_search.h>
+#include <CGAL/Search_traits_3.h>
+#include <CGAL/Search_traits_adapter.h>
 #include <CGAL/intersections.h>
+#include <CGAL/property_map.h>
 #include <CGAL/version.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "cgal.h"
-#include "edges.h"
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 #if CGAL_VERSION_NR >= 1060000000
 #include <CGAL/AABB_traits_3.h>
@@ -21,6 +25,7 @@
 #endif
 
 namespace repose::surface {
+
 namespace {
 
 #if CGAL_VERSION_NR >= 1060000000
@@ -176,6 +181,34 @@ bool DistanceTree::contains(const Vec3& query) const {
     if (sure) return odd;
   }
   throw base::InternalError("every ray from a point runs along an edge of the surface");
+}
+
+namespace {
+
+using Row = std::pair<Point3, int64_t>;
+using Traits = CGAL::Search_traits_adapter<Row, CGAL::First_of_pair_property_map<Row>,
+                                           CGAL::Search_traits_3<Kernel>>;
+using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
+
+}  // namespace
+
+struct PointTree::Tree {
+  Search::Tree rows;
+};
+
+PointTree::PointTree(const std::vector<Vec3>& points) : tree_(std::make_unique<Tree>()) {
+  for (size_t p = 0; p < points.size(); ++p)
+    tree_->rows.insert({to_cgal(points[p]), static_cast<int64_t>(p)});
+  tree_->rows.build();
+}
+
+PointTree::~PointTree() = default;
+
+std::vector<int64_t> PointTree::nearest(const Vec3& query, int count) const {
+  std::vector<int64_t> rows;
+  for (const auto& [row, squared] : Search(tree_->rows, to_cgal(query), count))
+    rows.push_back(row.second);
+  return rows;
 }
 
 }  // namespace repose::surface

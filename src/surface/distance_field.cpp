@@ -7,7 +7,7 @@
 #include <map>
 
 #include "repose/base/error.h"
-#include "triangle_tree.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::surface {
 

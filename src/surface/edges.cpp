@@ -1,4 +1,4 @@
-#include "edges.h"
+#include "repose/surface/edges.h"
 
 #include <Eigen/Geometry>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "intersections.h"
+#include "repose/surface/intersections.h"
 
 #include <CGAL/box_intersection_d.h>
 #include <CGAL/intersections.h>

@@ -1,6 +1,6 @@
-#include "edges.h"
 #include "repose/base/error.h"
 #include "repose/surface/defects.h"
+#include "repose/surface/edges.h"
 #include "repose/surface/read.h"
 
 namespace repose::surface {

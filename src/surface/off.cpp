@@ -21,8 +21,8 @@ class Lines {
   std::vector<std::string_view> next() {
     while (position_ < content_.bytes.size()) {
       ++number_;
-      const auto line = next_line(content_.bytes, position_);
-      auto found = words(line.substr(0, line.find('#')));
+      const auto line = base::next_line(content_.bytes, position_);
+      auto found = base::words(line.substr(0, line.find('#')));
       if (!found.empty()) return found;
     }
     fail(content_, number_, "the file ends too early");

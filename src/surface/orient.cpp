@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <map>
 
-#include "edges.h"
 #include "repose/surface/distance.h"
+#include "repose/surface/edges.h"
 
 namespace repose::surface {
 namespace {

@@ -57,7 +57,7 @@ Complaint damaged_text(const std::string& file, int64_t added) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<int64_t>(last), '\n');
     size_t begin = last > 0 ? text.rfind('\n', last - 1) + 1 : 0;  // npos + 1 is the beginning
     base::refuse("{}:{}: truncated, or not a number where one belongs, near {}; export it anew",
-                 file, line - added, base::shown(next_line(text, begin)));
+                 file, line - added, base::shown(base::next_line(text, begin)));
   };
 }
 
@@ -68,7 +68,7 @@ std::string rewrite_lines(const std::string& text, Rewrite rewrite) {
   result.reserve(text.size());
   int64_t number = 0;
   for (size_t position = 0; position < text.size();) {
-    result += rewrite(next_line(text, position), ++number);
+    result += rewrite(base::next_line(text, position), ++number);
     result += '\n';
   }
   return result;
@@ -88,8 +88,8 @@ void check_point(const std::vector<std::string_view>& line, const std::string& f
 /// Lower case; solids lose their names, which could be keywords.
 std::string plain_stl(const Content& content) {
   return rewrite_lines(content.bytes, [&](std::string_view line, int64_t number) {
-    const std::string lowered = lower(line);
-    const auto found = words(lowered);
+    const std::string lowered = base::lower(line);
+    const auto found = base::words(lowered);
     if (found.empty()) return std::string();
     if (found[0] == "vertex") check_point(found, content.file.string(), number);
     const bool solid = found[0] == "solid" || found[0] == "endsolid";
@@ -100,7 +100,7 @@ std::string plain_stl(const Content& content) {
 /// Vertices and faces only, words separated by one blank.
 std::string plain_obj(const Content& content) {
   return rewrite_lines(content.bytes, [&](std::string_view line, int64_t number) {
-    const auto found = words(line.substr(0, line.find('#')));
+    const auto found = base::words(line.substr(0, line.find('#')));
     std::string plain;
     if (found.empty() || (found[0] != "v" && found[0] != "f")) return plain;
     if (found[0] == "v") check_point(found, content.file.string(), number);

@@ -30,7 +30,7 @@ class HeaderParser {
   PlyHeader parse() {
     size_t position = 0;
     while (position < content_.bytes.size()) {
-      const auto line = words(next_line(content_.bytes, position));
+      const auto line = base::words(base::next_line(content_.bytes, position));
       ++header_.lines;
       if (!line.empty() && line[0] == "end_header") {
         header_.bytes = position;

@@ -15,7 +15,7 @@ constexpr int64_t most_cells = int64_t{1} << 32;
 int64_t info(const Content& content, const PlyHeader& header, const char* name) {
   const std::string_view text = std::string_view(content.bytes).substr(0, header.bytes);
   for (size_t position = 0; position < text.size();) {
-    const auto line = words(next_line(text, position));
+    const auto line = base::words(base::next_line(text, position));
     if (line.size() != 3 || line[0] != "obj_info" || line[1] != name) continue;
     const auto number = base::parse_integer(line[2]);
     if (number && *number > 1 && *number < most_cells) return *number;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <map>
 
-#include "edges.h"
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 namespace repose::surface {
 namespace {

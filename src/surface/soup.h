@@ -30,15 +30,6 @@ Content read_content(const std::filesystem::path& file);
 /// when it is none of the known ones.
 Format recognise(const Content& content);
 
-/// ASCII letters in lower case, whatever the locale.
-std::string lower(std::string_view text);
-
-/// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
-std::string_view next_line(std::string_view text, size_t& position);
-
-/// The blank-separated words of a line.
-std::vector<std::string_view> words(std::string_view line);
-
 /// Readers of one format each; they refuse what is damaged, truncated or promises more than the
 /// file can hold, in one line. Indices and coordinates are left to read_surface.
 Soup parse_ply(Content content);

@@ -1,4 +1,4 @@
-#include "triangle_tree.h"
+#include "repose/surface/triangle_tree.h"
 
 #include <algorithm>
 #include <cmath>

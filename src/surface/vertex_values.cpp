@@ -1,4 +1,4 @@
-#include "repose/surface/vertex_values.h"
+#include "repose/surface/read.h"
 
 #include <algorithm>
 

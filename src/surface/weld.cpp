@@ -1,9 +1,9 @@
 #include <Eigen/Geometry>
 #include <set>
 
-#include "edges.h"
-#include "intersections.h"
 #include "orient.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/intersections.h"
 #include "repose/surface/read.h"
 
 namespace repose::surface {

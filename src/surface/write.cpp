@@ -5,6 +5,7 @@
 
 #include "bytes.h"
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/surface/read.h"
 #include "soup.h"
@@ -72,7 +73,7 @@ std::string obj_bytes(const Surface& surface, const PointData& data) {
 }
 
 std::string ending_of(const std::filesystem::path& file) {
-  return lower(file.extension().string());
+  return base::lower(file.extension().string());
 }
 
 void write_ply(const std::filesystem::path& file, const Surface& surface, const PointData& data) {

@@ -12,9 +12,8 @@
 #include "paper/contest.h"
 #include "paper/motion_race.h"
 #include "paper/polak_ribiere.h"
+#include "repose/base/options.h"
 #include "repose/base/program.h"
-#include "repose/base/scoped_option.h"
-#include "repose/base/usage.h"
 #include "repose/results/model_file.h"
 #include "repose/scene/scene.h"
 

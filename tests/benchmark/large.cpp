@@ -15,13 +15,13 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
-#include "repose/base/usage.h"
+#include "repose/base/program.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/objective.h"
+#include "repose/meshtools/phantom.h"
 #include "repose/model/build.h"
 #include "repose/results/model_file.h"
 #include "repose/results/result_file.h"
-#include "repose/surface/phantom.h"
 
 namespace {
 
@@ -78,8 +78,8 @@ void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
   surface::Surface skin;
   std::vector<surface::Surface> bones;
   if (base::rank(comm) == 0) {
-    skin = surface::make_phantom_skin(skin_vertices);
-    bones = {surface::make_phantom_skull(bone_edge), surface::make_phantom_mandible(bone_edge)};
+    skin = meshtools::make_phantom_skin(skin_vertices);
+    bones = {meshtools::make_phantom_skull(bone_edge), meshtools::make_phantom_mandible(bone_edge)};
   }
   clock.end("surfaces");
   model::Model model;

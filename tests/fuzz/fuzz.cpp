@@ -16,12 +16,12 @@
 
 #include "mutation.h"
 #include "repose/base/petsc.h"
+#include "repose/imaging/volume.h"
 #include "repose/results/model_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/scene.h"
 #include "repose/scene/transform_file.h"
 #include "repose/surface/read.h"
-#include "repose/surface/volume.h"
 #include "seeds.h"
 
 namespace repose::fuzz {
@@ -42,7 +42,7 @@ void read_result(const std::filesystem::path& file) {
 std::vector<Target> targets(const std::filesystem::path& folder) {
   using surface::ply_binary;
   const auto surface = [](const auto& file) { surface::read_surface(file); };
-  const auto volume = [](const auto& file) { surface::read_volume(file); };
+  const auto volume = [](const auto& file) { imaging::read_volume(file); };
   const auto landmarks = [](const auto& file) { scene::read_landmarks(file); };
   const surface::Surface s = tetrahedron();
   return {

@@ -12,14 +12,17 @@ ROOMS = {
     "base": set(),
     "scene": {"base"},
     "surface": {"base"},
-    "model": {"base", "scene", "surface"},
+    "imaging": {"base", "surface"},
+    "meshtools": {"base", "surface", "imaging"},
+    "model": {"base", "scene", "surface", "imaging", "meshtools"},
     "mechanics": {"base", "surface", "model"},
     "discrete": {"base", "model", "mechanics"},
     "linear": {"base", "model", "mechanics", "discrete"},
     "check": {"base", "model", "mechanics"},
     "solve": {"base", "model", "mechanics", "discrete", "linear"},
     "results": {"base", "model"},
-    "adapt": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve"},
+    "adapt": {"base", "scene", "surface", "meshtools", "model", "mechanics", "discrete", "linear",
+              "solve"},
     "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
             "results", "adapt"},
 }
@@ -27,9 +30,8 @@ PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]
 # Start of an included name → the folders that may include it.
 LIBRARIES = {
-    "CGAL/": ["src/surface"],
-    "vtk": ["src/surface"],
-    "itk": ["src/surface"],
+    "CGAL/": ["src/surface", "src/meshtools"],
+    "itk": ["src/imaging"],
     "yaml-cpp": ["src/scene"],
     "slepc": ["src/solve"],
     "petsctao": ["src/solve", "include/repose/solve"],
@@ -37,6 +39,8 @@ LIBRARIES = {
     "petsc": PETSC_ROOMS,
     "repose/base/petsc": PETSC_ROOMS,
 }
+SHARED = "../surface/cgal.h"  # no header of ours may show CGAL, and two rooms call it
+MOST_HEADERS = 12
 LONGEST, USUAL, USUAL_SHARE = 60, 35, 0.9
 WORDS = re.compile(r"\b(TO" r"DO|FIX" r"ME|XX" r"X|HA" r"CK)\b"
                    r"|(?<![\w.$})~*-])/(work|home|root|tmp|mnt|Users)/")
@@ -72,6 +76,8 @@ def crossings(name, text):
         for start, homes in LIBRARIES.items():
             if included.startswith(start) and folder.group(0) not in homes:
                 yield f"{name}:{line} includes {included}, which belongs in {', '.join(homes)}"
+        if "../" in included and included != SHARED:
+            yield f"{name}:{line} includes {included}, a header of another room's own"
         room = re.match(r"repose/(\w+)/", included)
         if room and room.group(1) not in ROOMS[folder.group(1)] | {folder.group(1)}:
             yield f"{name}:{line} includes {included}; {folder.group(1)} may not"
@@ -116,14 +122,64 @@ def test_includes_stay_in_their_rooms():
     ("include/repose/surface/a.h", "<CGAL/Surface_mesh.h>"),
     ("src/model/a.cpp", "<CGAL/Surface_mesh.h>"),
     ("src/model/a.cpp", "<yaml-cpp/yaml.h>"),
-    ("include/repose/surface/a.h", "<itkImage.h>"),
+    ("include/repose/imaging/a.h", "<itkImage.h>"),
     ("src/mechanics/a.cpp", "<petscvec.h>"),
     ("src/mechanics/a.cpp", '"repose/base/petsc.h"'),
     ("src/base/a.cpp", "<petsctao.h>"),
     ("src/solve/a.cpp", "<hdf5.h>"),
+    ("src/model/a.cpp", '"../surface/soup.h"'),
 ])
 def test_a_crossing_is_seen(name, include):
     assert list(crossings(name, f"#pragma once\n#include {include}\n"))
+
+
+def public_headers():
+    """{room: names of its public headers}, as an include directive has them."""
+    found = {room: set() for room in ROOMS}
+    for name, _ in sources():
+        if name.startswith("include/"):
+            found[name.split("/")[2]].add(name.removeprefix("include/"))
+    return found
+
+
+def headers_in_use(texts):
+    """Headers that files outside their own room include, and what these need themselves."""
+    included = {name: set(re.findall(r'#include "(repose/[^"]+)"', text)) for name, text in texts}
+    room = {name: re.sub(r"^(?:src|include/repose)/(\w+)/.*", r"\1", name) for name in included}
+    ahead = [header for name, headers in included.items() for header in headers
+             if header.split("/")[1] != room[name]]
+    used = set()
+    while ahead:
+        header = ahead.pop()
+        if header not in used:
+            used.add(header)
+            ahead += included.get(f"include/{header}", ())
+    return used
+
+
+def test_a_public_header_serves_other_rooms():
+    texts = [(name, text) for name, text in files(".h", ".cpp") if not name.startswith("tests/")]
+    used = headers_in_use(texts)
+    alone = [header for headers in public_headers().values() for header in headers - used]
+    assert not alone, f"used by their own room only, so they belong beside its sources: {alone}"
+
+
+def test_a_header_of_one_room_is_seen():
+    texts = [("src/model/a.cpp", '#include "repose/model/a.h"'), ("src/app/b.cpp", '#include "repose/model/b.h"'),
+             ("include/repose/model/b.h", '#include "repose/model/c.h"')]
+    assert headers_in_use(texts) == {"repose/model/b.h", "repose/model/c.h"}
+
+
+def test_rooms_have_few_public_headers():
+    counts = {room: len(headers) for room, headers in public_headers().items()}
+    assert min(counts.values()) > 0 and max(counts.values()) <= MOST_HEADERS, counts
+
+
+def test_no_room_holds_more_than_a_fifth():
+    lines = {room: 0 for room in ROOMS}
+    for name, text in sources():
+        lines[name.split("/")[2 if name.startswith("include/") else 1]] += text.count("\n")
+    assert max(lines.values()) <= sum(lines.values()) / 5, lines
 
 
 def test_functions_fit_on_a_screen():

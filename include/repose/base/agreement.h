@@ -1,8 +1,10 @@
 #pragma once
 #include <mpi.h>
-
 #include <functional>
 #include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
 
 namespace repose::base {
 
@@ -24,5 +26,8 @@ struct Slab {
   int64_t rows() const { return end - begin; }
 };
 Slab slab(int64_t n, int rank, int size);
+
+/// Rows that rank 0 holds, as a slab (base::slab) on every rank. Collective.
+std::vector<Vec3> scatter(MPI_Comm comm, const std::vector<Vec3>& all);
 
 }  // namespace repose::base

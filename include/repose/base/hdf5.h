@@ -1,8 +1,9 @@
 #pragma once
 #include <hdf5.h>
-
 #include <filesystem>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "repose/base/error.h"
 
@@ -71,5 +72,14 @@ Hdf5File open_hdf5(const std::filesystem::path& file, MPI_Comm comm);
 
 /// Creates a group without time stamps. Collective where the file is.
 Hdf5Group create_hdf5_group(hid_t place, const char* name);
+
+/// Whether there is something at a path whose parent exists.
+bool hdf5_has(hid_t file, const std::string& path);
+
+/// All numbers of a dataset, as doubles.
+std::vector<double> read_hdf5_numbers(hid_t file, const std::string& path);
+
+/// The first string of a dataset, of fixed or variable length.
+std::string read_hdf5_text(hid_t file, const std::string& path);
 
 }  // namespace repose::base

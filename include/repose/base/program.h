@@ -1,5 +1,11 @@
 #pragma once
+#include <mpi.h>
+#include <chrono>
+#include <filesystem>
 #include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "repose/base/error.h"
 #include "repose/base/options.h"
@@ -11,5 +17,43 @@ namespace repose::base {
 /// InputError must be the same on all ranks; after any other error MPI is aborted, so that no rank
 /// waits for another.
 int run_program(Options& options, const std::function<Exit()>& work);
+
+/// Bytes that this process holds on the heap, blocks mapped on their own included (glibc).
+double heap_bytes();
+
+/// CPU time of this process so far, s.
+double cpu_seconds();
+
+/// What a result is to be traced back by, as (name, text): "program" with its version, "command" as
+/// it was typed (where the system tells), "ranks", "libraries" with their versions. Not collective;
+/// PETSc must be initialised.
+std::vector<std::pair<std::string, std::string>> this_run(MPI_Comm comm);
+
+/// A folder that comes with the programs, such as "meshes", wherever they are called from: the one
+/// here, else where they are installed (PREFIX/bin → PREFIX/share/repose), else in the project they
+/// were built in. Where there is none, its name as it is. Not collective.
+std::filesystem::path shipped_folder(const std::string& name);
+
+/// The stages of a program with the wall time each took and the peak memory by its end.
+class Stages {
+ public:
+  explicit Stages(MPI_Comm comm) : comm_(comm) {}
+
+  struct Stage {
+    std::string name;
+    double seconds;    ///< largest over ranks
+    double mebibytes;  ///< peak resident memory so far, summed over ranks
+  };
+
+  /// Ends the stage under way (or the time since construction) and names it. Collective.
+  void end(const std::string& name);
+  const std::vector<Stage>& list() const { return stages_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  MPI_Comm comm_;
+  Clock::time_point begin_ = Clock::now();
+  std::vector<Stage> stages_;
+};
 
 }  // namespace repose::base

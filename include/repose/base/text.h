@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -20,6 +21,15 @@ std::optional<int64_t> parse_integer(std::string_view text);
 /// goes past 60 bytes becomes "...".
 std::string shown(std::string_view text);
 
+/// ASCII letters in lower case, whatever the locale.
+std::string lower(std::string_view text);
+
+/// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
+std::string_view next_line(std::string_view text, size_t& position);
+
+/// The blank-separated words of a line.
+std::vector<std::string_view> words(std::string_view line);
+
 /// The values a number may have.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
@@ -39,5 +49,12 @@ struct Range {
 /// place; `unit` may be empty.
 std::string wanted_number(bool whole, std::string_view unit, const Range& range,
                           const std::vector<std::string>& words);
+
+/// Least number of insertions, deletions, substitutions and swaps of neighbours that turn `a` into
+/// `b` (optimal string alignment), upper and lower case taken as one. Works on bytes.
+std::size_t edit_distance(std::string_view a, std::string_view b);
+
+/// The known name nearest to `name` (the first of several); empty when nothing is known.
+std::string nearest(std::string_view name, const std::vector<std::string>& known);
 
 }  // namespace repose::base

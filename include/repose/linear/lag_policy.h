@@ -26,7 +26,7 @@ class LagPolicy {
   void renew();  ///< a new one is made at the state
   void move();   ///< the state changes
   /// Takes in a solve just ended, whose residual history was recorded. The same on all ranks.
-  void take(KSP krylov);
+  void observe(KSP krylov);
 
  private:
   /// Iterations per e-fold of the residual when it was new, at least 1.

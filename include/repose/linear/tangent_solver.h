@@ -32,7 +32,7 @@ class TangentSolver {
   /// there.
   void renew(Vec displacement);
 
-  /// Makes `other` use the preconditioner, whose wear its solves add to.
+  /// Makes `other` use the preconditioner, whose lag its solves add to.
   void lend_preconditioner(KSP other);
 
   /// Solves H δ = rhs at `displacement` (prepared there), to a relative natural residual. Returns

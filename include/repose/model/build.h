@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "repose/model/cut_path.h"
+#include "repose/model/cut.h"
 #include "repose/model/instruments.h"
 #include "repose/model/model.h"
 #include "repose/scene/scene.h"
@@ -62,5 +62,15 @@ double effective_modulus(const Model& model);
 /// modulus Y. An exact volume starts with 10 Y.
 double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
                             const Model& model);
+
+/// The surfaces of a scene's bones at their initial position, named as in the scene.
+struct Bones {
+  std::vector<surface::Surface> surfaces;  ///< [scene.bones], pieces cut off, kerfs taken out
+  std::vector<std::string> remarks;        ///< lines for a person: what was cut
+};
+
+/// Reads the files of the scene's bones and makes its osteotomies in their order. Throws
+/// InputError naming the scene and the osteotomy where one cannot be made.
+Bones read_bones(const scene::Scene& scene);
 
 }  // namespace repose::model

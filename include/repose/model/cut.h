@@ -1,8 +1,31 @@
 #pragma once
-#include "repose/model/cut_path.h"
+#include <string>
+#include <vector>
+
 #include "repose/model/model.h"
+#include "repose/scene/scene.h"
+#include "repose/surface/surface.h"
 
 namespace repose::model {
+
+/// An incision in a model's own terms.
+struct Cut {
+  std::vector<int64_t> columns;  ///< skin vertices along it, neighbours joined by edges; tips first
+                                 ///< and last
+  int layers;                    ///< point layers that it parts, from the skin down
+  bool meets = false;            ///< its sides touch and do not pass each other
+};
+
+/// Makes the paths of incisions edges of the skin: triangles and edges that a path crosses are
+/// split where it runs, and the vertices that come of it added at the end. A path nearer to a
+/// vertex or an edge than a tenth of the edges there is moved onto it, against slivers; of path
+/// points closer to one another than half an edge the later are passed over. Between its points the
+/// path runs in the plane through both that holds the skin's normal. `skin` must be a valid skin
+/// (skin_mesh.h). Throws InputError naming `scene_file` and the incision where a path is further
+/// than 5 mm from the skin, shorter than an edge, comes to the skin's rim, or meets itself or
+/// another.
+std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
+                              const std::string& scene_file, surface::Surface& skin);
 
 /// Parts the tissue of a model made by make_layers along a cut. Points on the path but its two tips
 /// are doubled in layers 0 … cut.layers − 1, except bone points, which stay joined; the doubles
@@ -14,5 +37,17 @@ namespace repose::model {
 /// that crossed the cut now opens it. Returns the rows of the doubled points, the double second.
 /// Throws InternalError where the columns are no path of edges.
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model);
+
+/// What went with springs that tore.
+struct Tear {
+  int64_t prisms = 0, triangles = 0;  ///< removed, triangles of the drawn skin
+};
+
+/// Removes springs (`torn` [S]), and prisms and triangles of the drawn skin that have one of them
+/// for an edge. A prism's edges are the six of its triangles and the three that connect them; a
+/// diagonal is none. Points and the order of what is left stay as they are. Throws InputError,
+/// naming `what`, the point and its place, where soft tissue would be left that no springs join to
+/// a point that is held; the model is unchanged then.
+Tear remove_springs(const std::vector<char>& torn, const std::string& what, Model& model);
 
 }  // namespace repose::model

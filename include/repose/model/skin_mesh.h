@@ -2,8 +2,10 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "repose/base/error.h"
 #include "repose/surface/surface.h"
 
 namespace repose::model {
@@ -48,5 +50,22 @@ SkinMesh make_skin_mesh(const surface::Surface& skin);
 
 /// The same skin seen from the other side: every triangle and normal turned round.
 void flip(SkinMesh& mesh);
+
+/// A skin that no tissue fits, with the triangles where it does not.
+class RefusedPlaces : public base::InputError {
+ public:
+  RefusedPlaces(const std::string& message, surface::Surface places)
+      : InputError(message), places_(std::move(places)) {}
+  const surface::Surface& places() const { return places_; }
+
+ private:
+  surface::Surface places_;
+};
+
+/// Throws RefusedPlaces: one line with what is wrong at `vertices`, every place (a part of the skin
+/// that they make up) by its first vertex, and the remedy.
+[[noreturn]] void refuse_places(const std::string& skin_name, const SkinMesh& mesh,
+                                const std::vector<int64_t>& vertices, const std::string& what,
+                                const std::string& remedy);
 
 }  // namespace repose::model

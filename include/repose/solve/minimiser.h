@@ -3,13 +3,14 @@
 
 #include <exception>
 #include <functional>
-#include <optional>
+#include <memory>
 
 #include "repose/linear/tangent_solver.h"
-#include "repose/solve/initial_hessian.h"
 #include "repose/solve/rest_search.h"
 
 namespace repose::solve {
+
+class InitialHessian;
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
@@ -34,6 +35,7 @@ class Minimiser : public RestSearch {
   Minimiser(discrete::Function& function, linear::TangentSolver& solver, const Watch& watch);
   Minimiser(discrete::Function& function, linear::TangentSolver& solver,
             const ErrorEstimate& estimate, const Watch& watch);
+  ~Minimiser() override;
 
   /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
   /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
@@ -72,13 +74,13 @@ class Minimiser : public RestSearch {
   ErrorEstimate estimate_;
   Watch watch_;
   TaoHandle tao_;
-  std::optional<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
-  bool may_close_ = false;                 // … in the search under way
-  bool closed_ = false;                    // it did
-  bool closes_ = false;                    // near rest its search gives way to Newton steps
-  bool newton_ = true;                     // the TAO method uses the Hessian
-  bool slowed_ = false;                    // the initial Hessian is to be renewed
-  int64_t iterations_ = 0;                 // of the run under way, before TAO's present ones
+  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
+  bool may_close_ = false;                   // … in the search under way
+  bool closed_ = false;                      // it did
+  bool closes_ = false;                      // near rest its search gives way to Newton steps
+  bool newton_ = true;                       // the TAO method uses the Hessian
+  bool slowed_ = false;                      // the initial Hessian is to be renewed
+  int64_t iterations_ = 0;                   // of the run under way, before TAO's present ones
   bool automatic_forcing_ = true;
   bool cut_ = false;                    // the latest Newton step was
   double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "repose/base/interrupt.h"
-#include "repose/base/stages.h"
+#include "repose/base/program.h"
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
 #include "repose/solve/stability.h"

@@ -2,7 +2,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "repose/base/geometry.h"
 #include "repose/surface/surface.h"
 
 namespace repose::surface {
@@ -38,6 +40,20 @@ class DistanceTree {
   /// Whether `query` lies inside the (closed) surface or on it: the parity of the triangles that a
   /// ray crosses, whatever their orientation; rays that touch an edge are not counted (exact).
   bool contains(const Vec3& query) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+/// Answers which of many points are near. Construction O(P log P), each question O(log P).
+class PointTree {
+ public:
+  explicit PointTree(const std::vector<Vec3>& points);
+  ~PointTree();
+
+  /// Rows of the `count` points closest to `query` (all where there are fewer), nearest first.
+  std::vector<int64_t> nearest(const Vec3& query, int count) const;
 
  private:
   struct Tree;

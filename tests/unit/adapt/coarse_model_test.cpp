@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "repose/adapt/grid_sequence.h"
-#include "repose/surface/remesh.h"
+#include "repose/meshtools/remesh.h"
 
 namespace repose::adapt {
 namespace {
@@ -61,7 +61,7 @@ TEST(Rungs, get_coarser_to_a_least_number_of_columns) {
 
 TEST(Remesh, by_the_even_edge_keeps_the_number_of_triangles) {
   const surface::Surface skin = head().skin;
-  const surface::Surface same = surface::remesh(skin, surface::even_edge(skin));
+  const surface::Surface same = meshtools::remesh(skin, meshtools::even_edge(skin));
   EXPECT_NEAR(static_cast<double>(same.triangles.size()) / skin.triangles.size(), 1, 0.2);
 }
 

@@ -1,4 +1,4 @@
-#include "repose/base/nearest.h"
+#include "repose/base/text.h"
 
 #include <gtest/gtest.h>
 

@@ -5,10 +5,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "model/solved_skin.h"
 #include "patches.h"
 #include "repose/base/error.h"
-#include "repose/model/places.h"
-#include "repose/model/solved_skin.h"
+#include "repose/model/skin_mesh.h"
 
 namespace repose::model {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "repose/base/error.h"
-#include "repose/surface/osteotomy.h"
+#include "repose/meshtools/osteotomy.h"
 
 namespace repose::model {
 namespace {
@@ -81,7 +81,7 @@ TEST(Collisions, both_may_move) {
 }
 
 TEST(Collisions, a_fresh_cut_may_part_and_slide_but_not_press) {
-  const surface::Pieces parts = surface::cut_bone(
+  const meshtools::Pieces parts = meshtools::cut_bone(
       box("bone", {0, 0, 0}, {60, 50, 40}), {"piece", {{{30, 0, 0}, {1, 0, 0.5}}}, {}, 0, {}});
   const auto report = [&](const Vec3& way) {
     return follow_moves({parts.rest, parts.piece}, {{}, RigidMotion::translation(way)}, {});

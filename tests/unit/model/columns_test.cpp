@@ -1,15 +1,15 @@
-#include "repose/model/columns.h"
+#include "model/columns.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 
+#include "model/directions.h"
+#include "model/fold.h"
+#include "model/smoothing.h"
 #include "patches.h"
 #include "repose/base/error.h"
-#include "repose/model/directions.h"
-#include "repose/model/fold.h"
-#include "repose/model/places.h"
-#include "repose/model/smoothing.h"
+#include "repose/model/skin_mesh.h"
 
 namespace repose::model {
 namespace {

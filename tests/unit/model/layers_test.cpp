@@ -1,4 +1,4 @@
-#include "repose/model/layers.h"
+#include "model/layers.h"
 
 #include <gtest/gtest.h>
 

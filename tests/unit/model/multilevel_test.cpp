@@ -1,4 +1,4 @@
-#include "repose/model/multilevel.h"
+#include "model/multilevel.h"
 
 #include <gtest/gtest.h>
 

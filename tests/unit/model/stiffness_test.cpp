@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "model/layers.h"
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
-#include "repose/model/layers.h"
 
 namespace repose::model {
 namespace {

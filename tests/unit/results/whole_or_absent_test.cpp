@@ -2,7 +2,7 @@
 #include <sstream>
 
 #include "files.h"
-#include "repose/results/unfinished_file.h"
+#include "results/unfinished_file.h"
 
 namespace repose::results {
 namespace {

@@ -1,4 +1,4 @@
-#include "repose/scene/landmark_fit.h"
+#include "scene/landmark_fit.h"
 
 #include <gtest/gtest.h>
 

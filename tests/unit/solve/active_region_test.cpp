@@ -1,15 +1,14 @@
-#include "repose/solve/active_region.h"
+#include "solve/active_region.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <limits>
 
+#include "check/recompute.h"
 #include "models.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/scatter.h"
-#include "repose/check/recompute.h"
 #include "repose/solve/active_search.h"
 #include "rest.h"
 

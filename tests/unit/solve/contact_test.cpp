@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "repose/model/add_contact.h"
+#include "model/add_contact.h"
 #include "repose/model/cut.h"
 #include "rest.h"
 #include "solid_block.h"

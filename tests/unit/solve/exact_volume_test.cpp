@@ -1,4 +1,4 @@
-#include "repose/solve/exact_volume.h"
+#include "solve/exact_volume.h"
 
 #include <gtest/gtest.h>
 

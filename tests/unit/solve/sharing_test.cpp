@@ -3,10 +3,9 @@
 #include <set>
 
 #include "../../layered_patch.h"
+#include "discrete/countable.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/base/scatter.h"
-#include "repose/discrete/countable.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/partition.h"

@@ -4,9 +4,9 @@
 
 #include "moved_block.h"
 #include "repose/base/agreement.h"
-#include "repose/base/scoped_option.h"
+#include "repose/base/options.h"
 #include "repose/discrete/tangent.h"
-#include "repose/solve/predictor.h"
+#include "repose/solve/load_path.h"
 
 namespace repose {
 namespace {

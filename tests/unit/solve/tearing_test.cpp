@@ -7,7 +7,7 @@
 #include "models.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/model/tear.h"
+#include "repose/model/cut.h"
 
 namespace repose {
 namespace {

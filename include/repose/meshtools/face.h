@@ -1,0 +1,36 @@
+#pragma once
+#include "repose/imaging/outer_skin.h"
+
+namespace repose::meshtools {
+
+using imaging::Rolling;
+using surface::Surface;
+
+/// What of a given skin is solved, and how it is meshed.
+struct FaceRequest {
+  double edge;                     ///< mm, of the triangles
+  std::vector<Surface> beneath{};  ///< the skin near these (moved bones) …
+  std::vector<Vec3> places{};      ///< … and these is taken; where there are none, all of it
+  double near = 25;                ///< mm from them, straight
+  double margin = 35;              ///< mm further along the skin
+  double tolerance = 3;  ///< mm: what of the given skin is farther off (ears) is passed over
+  Rolling rolling{};
+};
+
+struct Face {
+  Surface skin;                     ///< manifold, one component, its triangles nearly equilateral
+  double off_95 = 0, off_most = 0;  ///< mm from its vertices to the given skin
+  double least_angle = 0;           ///< degrees, of its triangles
+};
+
+/// A skin fit to be solved, from any triangles: the outer skin (outer_skin.h) over the bones that
+/// move and a margin, without the scan's ends and with no hole in it, remeshed and then drawn along
+/// its normals to the given triangles, whose offsets within the tolerance are averaged over an
+/// edge, so that noise is not followed. Throws InputError where the outer skin is nowhere near the
+/// bones.
+Face solvable_face(const Surface& given, const FaceRequest& request);
+
+/// An edge for a head of this size, mm: a seventieth of the surface's bounding diagonal, 2 to 8.
+double edge_for(const Surface& given);
+
+}  // namespace repose::meshtools

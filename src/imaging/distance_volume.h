@@ -1,0 +1,19 @@
+#pragma once
+#include "repose/imaging/volume.h"
+#include "repose/surface/surface.h"
+
+namespace repose::imaging {
+
+using surface::Surface;
+
+/// A grid of cubes of `voxel` mm whose values are the distance, mm, from each centre to the nearest
+/// triangle, whatever the triangles' orientation and holes. It reaches at least `margin` mm beyond
+/// the surface on every side. Exact in the voxels that a triangle passes; elsewhere the closest
+/// points are handed on from voxel to voxel (Danielsson, "Euclidean distance mapping", 1980), which
+/// is wrong by a small part of a voxel at most. O(voxels + T).
+Volume distance_volume(const Surface& surface, double voxel, double margin);
+
+/// The same over the grid of another volume, whose values are not looked at.
+Volume distance_volume(const Surface& surface, const Volume& grid);
+
+}  // namespace repose::imaging

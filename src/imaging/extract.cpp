@@ -1,0 +1,85 @@
+#include "repose/imaging/extract.h"
+
+#include "repose/base/error.h"
+#include "repose/imaging/taubin.h"
+#include "repose/imaging/volume_filter.h"
+#include "repose/surface/component.h"
+
+namespace repose::imaging {
+using namespace surface;
+namespace {
+
+Watch watch_step(const StepWatch& watch, const char* step) {
+  if (!watch) return {};
+  return [&watch, step](double done) { watch(step, done); };
+}
+
+std::string size_text(const Volume& volume) {
+  return fmt::format("{} × {} × {} voxels of {:.3g} × {:.3g} × {:.3g} mm", volume.size[0],
+                     volume.size[1], volume.size[2], volume.spacing(0), volume.spacing(1),
+                     volume.spacing(2));
+}
+
+/// What goes into the isosurface: the volume itself where nothing is done to it, else `changed`.
+const Volume& prepare(const Volume& volume, const Extraction& wanted, const StepWatch& watch,
+                      Volume& changed, std::vector<std::string>& remarks) {
+  const Volume* field = &volume;
+  const auto become = [&](Volume next) {
+    changed = std::move(next);
+    field = &changed;
+  };
+  if (wanted.box) become(crop(*field, (*wanted.box)[0], (*wanted.box)[1]));
+  if (wanted.box) remarks.push_back("cropped to " + size_text(*field));
+  if (wanted.label) become(label_field(*field, *wanted.label, label_smoothing));
+  if (wanted.close_holes > 0) {
+    become(close_gaps(*field, wanted.close_holes, watch_step(watch, "closing holes")));
+    remarks.push_back(fmt::format("holes closed up to {:g} mm wide", 2 * wanted.close_holes));
+  }
+  if (wanted.voxel > 0) {
+    become(coarsen(*field, wanted.voxel));
+    remarks.push_back("averaged to " + size_text(*field));
+  }
+  return *field;
+}
+
+void choose_components(Surface& surface, const Extraction& wanted,
+                       std::vector<std::string>& remarks) {
+  if (!wanted.largest && wanted.components_above == 0) return;
+  const size_t all = surface.triangles.size();
+  surface = wanted.largest ? largest_component(surface)
+                           : components_above(surface, wanted.components_above);
+  remarks.push_back(fmt::format("{} kept: {} of {} triangles",
+                                wanted.largest
+                                    ? "largest component"
+                                    : fmt::format("components ≥ {:g} mm³", wanted.components_above),
+                                surface.triangles.size(), all));
+}
+
+void smooth(Surface& surface, int64_t rounds, const StepWatch& watch,
+            std::vector<std::string>& remarks) {
+  if (rounds == 0) return;
+  const double volume = volume_of(surface);
+  const double moved = smooth_taubin(surface, rounds, watch_step(watch, "smoothing"));
+  remarks.push_back(
+      fmt::format("smoothed by {} rounds: points moved by {:.3g} mm at most, volume by {:+.3g} %",
+                  rounds, moved, 100 * (volume_of(surface) / volume - 1)));
+}
+
+}  // namespace
+
+Extracted extract(const Volume& volume, const Extraction& wanted, const StepWatch& watch) {
+  if (int{wanted.level.has_value()} + int{wanted.otsu} + int{wanted.label.has_value()} != 1)
+    base::refuse("{}: what the surface is must be said in one way: a level, Otsu's, or a label",
+                 volume.name);
+  Extracted result{{}, 0, volume.remarks};
+  Volume changed;
+  const Volume& field = prepare(volume, wanted, watch, changed, result.remarks);
+  if (wanted.level) result.level = *wanted.level;
+  if (wanted.otsu) result.level = otsu_level(field);
+  result.surface = isosurface(field, result.level, wanted.border, watch_step(watch, "isosurface"));
+  choose_components(result.surface, wanted, result.remarks);
+  smooth(result.surface, wanted.smooth, watch, result.remarks);
+  return result;
+}
+
+}  // namespace repose::imaging

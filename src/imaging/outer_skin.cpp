@@ -1,0 +1,167 @@
+#include "repose/imaging/outer_skin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "distance_volume.h"
+#include "flat_parts.h"
+#include "repose/base/error.h"
+#include "repose/imaging/isosurface.h"
+#include "repose/surface/component.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
+
+namespace repose::imaging {
+using namespace surface;
+namespace {
+
+constexpr double most_voxels = 3e7;
+constexpr double open_end = 150;   // mm, length of the border loop where a head is cut off
+constexpr double cap_area = 3000;  // mm²
+constexpr double on_cone = 1.05;   // of the ball's radius
+
+/// Triangles from the middle of every border loop to its edges: of those that a ball would pass,
+/// and of those so long that the head ends there.
+struct Cones {
+  Surface all, ends;
+};
+
+Cones cones_of(const Surface& surface, double passes) {
+  const EdgeTable edges(surface.triangles);
+  UnionFind loops(static_cast<int64_t>(surface.points.size()));
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    if (edges[e].size() == 1) loops.unite(edges[e].front().low, edges[e].front().high);
+  struct Loop {
+    double length = 0;
+    Vec3 sum = Vec3::Zero();
+    std::vector<std::array<Vec3, 2>> sides;
+  };
+  std::map<int64_t, Loop> of_vertex;
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    if (edges[e].size() != 1) continue;
+    const Vec3 &a = surface.points[edges[e].front().low],
+               &b = surface.points[edges[e].front().high];
+    Loop& loop = of_vertex[loops.find(edges[e].front().low)];
+    loop.length += (b - a).norm();
+    loop.sum += (b - a).norm() * (a + b) / 2;
+    loop.sides.push_back({a, b});
+  }
+  Cones cones;
+  const auto add = [](const Loop& loop, Surface& cone) {
+    for (const auto& [a, b] : loop.sides) {
+      const auto first = static_cast<int64_t>(cone.points.size());
+      cone.points.insert(cone.points.end(), {a, b, loop.sum / loop.length});
+      cone.triangles.push_back({first, first + 1, first + 2});
+    }
+  };
+  for (const auto& [vertex, loop] : of_vertex) {
+    if (loop.length > passes) add(loop, cones.all);
+    if (loop.length > open_end) add(loop, cones.ends);
+  }
+  return cones;
+}
+
+/// Vertices that coincide become one, so that borders are borders.
+Surface welded(const Surface& given) {
+  Surface surface{given.name, given.points, {}};
+  const std::vector<int64_t> first = coincident_points(given.points);
+  for (const auto& [a, b, c] : given.triangles)
+    if (!repeats_vertex({first[a], first[b], first[c]}))
+      surface.triangles.push_back({first[a], first[b], first[c]});
+  return surface;
+}
+
+void append(const Surface& part, Surface& whole) {
+  const auto shift = static_cast<int64_t>(whole.points.size());
+  whole.points.insert(whole.points.end(), part.points.begin(), part.points.end());
+  for (const auto& [a, b, c] : part.triangles)
+    whole.triangles.push_back({a + shift, b + shift, c + shift});
+}
+
+/// Makes `distance` negative but where {distance ≥ radius} is connected with the grid's corner:
+/// −radius is then the border of the outside, and larger values lie nearer to the solid.
+void keep_outside(double radius, Volume& distance) {
+  std::vector<char> reached(distance.values.size(), 0);
+  std::vector<int64_t> front{0};
+  reached[0] = 1;
+  const std::array<int64_t, 3> step{1, distance.size[0], distance.size[0] * distance.size[1]};
+  while (!front.empty()) {
+    const int64_t voxel = front.back();
+    front.pop_back();
+    for (int axis = 0; axis < 3; ++axis) {
+      const int64_t along = voxel / step[axis] % distance.size[axis];
+      for (const int64_t side : {-1, 1}) {
+        if (along + side < 0 || along + side >= distance.size[axis]) continue;
+        const int64_t next = voxel + side * step[axis];
+        if (reached[next] || distance.values[next] < radius) continue;
+        reached[next] = 1;
+        front.push_back(next);
+      }
+    }
+  }
+  for (size_t v = 0; v < reached.size(); ++v)
+    distance.values[v] = reached[v] || distance.values[v] < radius ? -distance.values[v] : 0;
+}
+
+/// The distance to `border` over a grid, positive where the grid's own values are at least `level`.
+Volume signed_distance(const Surface& border, const Volume& grid, double level) {
+  Volume signed_values = distance_volume(border, grid);
+  for (size_t v = 0; v < grid.values.size(); ++v)
+    if (grid.values[v] < level) signed_values.values[v] *= -1;
+  return signed_values;
+}
+
+double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
+  Vec3 low = surface.points.front(), high = low;
+  for (const Vec3& point : surface.points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  const Vec3 size = high - low + Vec3::Constant(2 * margin);
+  return std::max(rolling.voxel, std::cbrt(size.prod() / most_voxels));
+}
+
+/// The parts of the border of the outside, `radius` away from the skin, that lie over the scan's
+/// ends.
+Surface caps_of(const Surface& border, const Surface& ends, double radius) {
+  std::vector<char> cap = flat_parts(border, cap_area);
+  if (!ends.triangles.empty()) {
+    const TriangleTree tree(ends);
+    const double near = on_cone * on_cone * radius * radius;
+    for (size_t t = 0; t < border.triangles.size(); ++t) {
+      const Corners at = corners(border, border.triangles[t]);
+      if (tree.any_within((at[0] + at[1] + at[2]) / 3, near) >= 0) cap[t] = 1;
+    }
+  }
+  Surface caps{border.name, border.points, {}};
+  for (size_t t = 0; t < cap.size(); ++t)
+    if (cap[t]) caps.triangles.push_back(border.triangles[t]);
+  return caps;
+}
+
+}  // namespace
+
+OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
+  Surface solid = welded(given);
+  if (solid.triangles.empty()) base::refuse("{}: holds no triangle", given.name);
+  const Cones cones = cones_of(solid, 6 * rolling.outside);
+  append(cones.all, solid);
+  const double margin = rolling.outside + 3 * rolling.voxel;
+  Volume field = distance_volume(solid, voxel_for(solid, rolling, margin), margin);
+  keep_outside(rolling.outside, field);
+  const Surface outside = largest_component(isosurface(field, -rolling.outside));
+  field = signed_distance(outside, field, -rolling.outside);
+  const double core = rolling.outside + rolling.inside;
+  if (*std::max_element(field.values.begin(), field.values.end()) <= core)
+    base::refuse(
+        "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
+        "at several ends) leave tissue.edge out",
+        given.name, 2 * rolling.inside);
+  const Surface inner = largest_component(isosurface(field, core));
+  field = signed_distance(inner, field, core);
+  return {largest_component(isosurface(field, -rolling.inside)),
+          caps_of(outside, cones.ends, rolling.outside), rolling.outside};
+}
+
+}  // namespace repose::imaging

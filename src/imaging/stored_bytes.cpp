@@ -1,0 +1,160 @@
+#include "stored_bytes.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "repose/base/error.h"
+#include "repose/base/text.h"
+
+namespace repose::imaging {
+namespace {
+
+constexpr int64_t nifti_header = 348;  // bytes
+
+/// How many bytes come out of a zlib or gzip stream, or several in a row, from `offset` on; of a
+/// damaged one those before the damage.
+int64_t unpacked_bytes(const std::filesystem::path& file, int64_t offset) {
+  constexpr int any_header = 47;  // zlib's code for: zlib or gzip, found out
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(offset);
+  std::vector<char> packed(1 << 16), unpacked(1 << 18);
+  z_stream stream{};
+  if (inflateInit2(&stream, any_header) != Z_OK) throw base::InternalError("zlib does not start");
+  int64_t total = 0;
+  int status = Z_OK;
+  while (status == Z_OK || status == Z_STREAM_END) {
+    if (stream.avail_in == 0) {
+      in.read(packed.data(), static_cast<std::streamsize>(packed.size()));
+      stream.next_in = reinterpret_cast<Bytef*>(packed.data());
+      stream.avail_in = static_cast<uInt>(in.gcount());
+      if (stream.avail_in == 0) break;
+    }
+    if (status == Z_STREAM_END) inflateReset(&stream);
+    stream.next_out = reinterpret_cast<Bytef*>(unpacked.data());
+    stream.avail_out = static_cast<uInt>(unpacked.size());
+    status = inflate(&stream, Z_NO_FLUSH);
+    total += static_cast<int64_t>(unpacked.size() - stream.avail_out);
+    if (status == Z_BUF_ERROR) status = Z_OK;
+  }
+  inflateEnd(&stream);
+  return total;
+}
+
+int64_t size_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  return error ? 0 : static_cast<int64_t>(size);
+}
+
+/// What a MetaImage header says of where its voxels are.
+struct MetaHeader {
+  std::string data;  ///< LOCAL, or a file's name
+  bool compressed = false;
+  int64_t bytes = 0;  ///< of the header, up to the voxels
+};
+
+MetaHeader meta_header(const std::filesystem::path& file) {
+  MetaHeader header;
+  std::ifstream in(file, std::ios::binary);
+  for (std::string line; header.data.empty() && std::getline(in, line);) {
+    const auto found = base::words(line);
+    if (found.size() != 3 || found[1] != "=") continue;
+    if (found[0] == "CompressedData") header.compressed = base::lower(found[2]) == "true";
+    if (found[0] == "ElementDataFile") header.data = found[2];
+  }
+  header.bytes = in.tellg();
+  return header;
+}
+
+/// The bytes of voxels in a MetaImage; −1 where they lie in several files.
+int64_t meta_bytes(const std::filesystem::path& file) {
+  const MetaHeader header = meta_header(file);
+  const bool local = base::lower(header.data) == "local";
+  const auto data = local ? file : file.parent_path() / header.data;
+  if (header.data.find('%') != std::string::npos || header.data == "LIST") return -1;
+  if (!local && size_of(data) == 0)
+    base::refuse("{}: its voxels should be in {}, which is missing or empty; copy that file, too",
+                 file.string(), data.string());
+  const int64_t offset = local ? header.bytes : 0;
+  return header.compressed ? unpacked_bytes(data, offset) : size_of(data) - offset;
+}
+
+/// Whether a DICOM file packs its pixels: its transfer syntax, the element (0002, 0010), is none of
+/// 1.2.840.10008.1.2, .1.2.1 and .1.2.2.
+bool is_packed_dicom(const std::filesystem::path& file) {
+  std::string begin(4096, '\0');
+  std::ifstream(file, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  const std::string element("\2\0\x10\0UI", 6);
+  const size_t at = begin.find(element);
+  if (at == std::string::npos || at + 8 >= begin.size()) return false;
+  const std::string syntax = begin.substr(at + 8, static_cast<unsigned char>(begin[at + 6]));
+  const std::string text = syntax.substr(0, syntax.find('\0'));
+  return text != "1.2.840.10008.1.2" && text != "1.2.840.10008.1.2.1" &&
+         text != "1.2.840.10008.1.2.2";
+}
+
+int64_t stored_bytes(const std::filesystem::path& file, ImageFormat format) {
+  if (format == ImageFormat::meta) return meta_bytes(file);
+  if (format == ImageFormat::nrrd) return -1;
+  if (format == ImageFormat::dicom) return is_packed_dicom(file) ? -1 : size_of(file);
+  const bool packed = base::lower(file.extension().string()) == ".gz";
+  const int64_t all = packed ? unpacked_bytes(file, 0) : size_of(file);
+  return all - nifti_header;
+}
+
+}  // namespace
+
+void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes) {
+  const int64_t stored = stored_bytes(file, format);
+  if (stored >= 0 && stored < bytes)
+    base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it anew",
+                 file.string(), stored, bytes);
+}
+
+void check_nifti_spacing(const std::filesystem::path& file) {
+  std::array<unsigned char, nifti_header> header{};
+  gzFile in = gzopen(file.c_str(), "rb");  // reads what is not packed as well
+  const int read = in ? gzread(in, header.data(), nifti_header) : 0;
+  if (in) gzclose(in);
+  const auto word = [&](size_t at) {
+    const bool little = header[0] == 0x5c;  // of 348, the first number
+    uint32_t bits = 0;
+    for (size_t b = 0; b < 4; ++b) bits = bits << 8 | header[at + (little ? 3 - b : b)];
+    return bits;
+  };
+  if (read != nifti_header || word(0) != nifti_header) return;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const float spacing = std::bit_cast<float>(word(80 + 4 * axis));
+    if (spacing == 0 || !std::isfinite(spacing))
+      base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
+                   file.string(), "ijk"[axis], spacing);
+  }
+}
+
+void check_meta_dimensions(const std::filesystem::path& file) {
+  constexpr int64_t most = 10;
+  std::ifstream in(file, std::ios::binary);
+  for (std::string line; std::getline(in, line);) {
+    const std::string_view text = line;
+    const size_t sign = std::min(text.find('='), text.size());
+    const auto key = base::words(text.substr(0, sign));
+    if (key.size() != 1 || sign == text.size()) continue;
+    const auto value = base::words(text.substr(sign + 1));
+    if (key[0] == "ElementDataFile") return;
+    if (key[0] != "NDims") continue;
+    const auto number = value.size() == 1 ? base::parse_integer(value[0]) : std::nullopt;
+    if (!number || *number < 1 || *number > most)
+      base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
+                   base::shown(text.substr(sign + 1)), most);
+  }
+}
+
+}  // namespace repose::imaging

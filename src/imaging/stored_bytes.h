@@ -1,0 +1,22 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+
+#include "itk/image.h"
+
+namespace repose::imaging {
+
+/// Throws InputError where a file of MetaImage, NIfTI or DICOM is too short to hold `bytes` of
+/// voxels: their libraries fill up with zeros or leave what they find (NRRD's does not). Compressed
+/// files are unpacked to their end, without keeping it. Files it cannot judge pass.
+void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes);
+
+/// Throws InputError where a NIfTI file's header holds a spacing of 0, which its library takes for
+/// 1, or none that is finite. A file that is no NIfTI passes.
+void check_nifti_spacing(const std::filesystem::path& file);
+
+/// Throws InputError where a MetaImage's header says it has more dimensions than its library counts
+/// to in a lifetime.
+void check_meta_dimensions(const std::filesystem::path& file);
+
+}  // namespace repose::imaging

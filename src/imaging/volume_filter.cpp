@@ -1,0 +1,82 @@
+#include "repose/imaging/volume_filter.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "repose/base/error.h"
+
+namespace repose::imaging {
+
+std::array<float, 2> value_range(const Volume& volume) {
+  float least = std::numeric_limits<float>::infinity(), greatest = -least;
+  for (const float value : volume.values) {
+    least = std::min(least, value);
+    greatest = std::max(greatest, value);
+  }
+  return {least, greatest};
+}
+
+double otsu_level(const Volume& volume) {
+  constexpr int bins = 1024;
+  const auto [least, greatest] = value_range(volume);
+  if (least == greatest)
+    base::refuse("{}: every value is {:g}, so no level parts them; check the volume", volume.name,
+                 least);
+  const double width = (static_cast<double>(greatest) - least) / bins;
+  std::array<double, bins> count{};
+  for (const float value : volume.values)
+    ++count[std::min(bins - 1, static_cast<int>((value - least) / width))];
+  double all = 0, moment = 0, below = 0, moment_below = 0, most = -1;
+  int split = 0;
+  for (int b = 0; b < bins; ++b) {
+    all += count[b];
+    moment += b * count[b];
+  }
+  for (int b = 0; b + 1 < bins; ++b) {
+    below += count[b];
+    moment_below += b * count[b];
+    if (below == 0 || below == all) continue;
+    const double apart = moment_below / below - (moment - moment_below) / (all - below);
+    const double between = below * (all - below) * apart * apart;
+    if (between <= most) continue;
+    most = between;
+    split = b;
+  }
+  return least + (split + 1) * width;
+}
+
+Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
+  const Mat3 to_index = volume.axes.inverse();
+  Vec3 first = Vec3::Constant(std::numeric_limits<double>::infinity()), last = -first;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 point;
+    for (int axis = 0; axis < 3; ++axis) point[axis] = corner >> axis & 1 ? high[axis] : low[axis];
+    const Vec3 index = to_index * (point - volume.origin);
+    first = first.cwiseMin(index);
+    last = last.cwiseMax(index);
+  }
+  std::array<int64_t, 3> begin, end;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto most = static_cast<double>(volume.size[axis] - 1);
+    begin[axis] = static_cast<int64_t>(std::clamp(std::floor(first[axis] + 1e-6), 0.0, most));
+    end[axis] = static_cast<int64_t>(std::clamp(std::ceil(last[axis] - 1e-6), 0.0, most)) + 1;
+    if (end[axis] - begin[axis] < 2)
+      base::refuse("{}: the box ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}) mm lies beside it",
+                   volume.name, low.x(), low.y(), low.z(), high.x(), high.y(), high.z());
+  }
+  Volume part{volume.name, {}, volume.axes, volume.origin, {}, volume.remarks};
+  for (int axis = 0; axis < 3; ++axis) {
+    part.size[axis] = end[axis] - begin[axis];
+    part.origin += static_cast<double>(begin[axis]) * volume.axes.col(axis);
+  }
+  for (int64_t k = begin[2]; k < end[2]; ++k)
+    for (int64_t j = begin[1]; j < end[1]; ++j) {
+      const float* row = &volume.values[volume.index(0, j, k)];
+      part.values.insert(part.values.end(), row + begin[0], row + end[0]);
+    }
+  return part;
+}
+
+}  // namespace repose::imaging

@@ -1,0 +1,267 @@
+#include "repose/meshtools/face.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <queue>
+
+#include "level_cut.h"
+#include "repose/base/error.h"
+#include "repose/imaging/taubin.h"
+#include "repose/meshtools/remesh.h"
+#include "repose/surface/component.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
+
+namespace repose::meshtools {
+using namespace surface;
+using namespace imaging;
+namespace {
+
+constexpr double beside_cap = 6;  // mm, from the skin to the end of a scan
+constexpr int border_smoothing = 12;
+constexpr int fits = 4;
+constexpr int unfoldings = 20;
+constexpr double folded = 0.2;  // cosine between a vertex' normal and that of a triangle around it
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+/// Neighbours of each vertex.
+using Neighbours = std::vector<std::vector<int64_t>>;
+
+Neighbours neighbours_of(const Surface& surface) {
+  Neighbours neighbours(surface.points.size());
+  const EdgeTable edges(surface.triangles);
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    neighbours[edges[e].front().low].push_back(edges[e].front().high);
+    neighbours[edges[e].front().high].push_back(edges[e].front().low);
+  }
+  return neighbours;
+}
+
+/// mm along edges from the vertices within `near` of the bones, but for those at a scan's end.
+std::vector<double> way_from_bones(const Surface& skin, const Neighbours& neighbours,
+                                   const std::vector<char>& end, const FaceRequest& request) {
+  using Entry = std::pair<double, int64_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
+  std::vector<double> way(skin.points.size(), infinite);
+  const auto offer = [&](int64_t v, double length) {
+    if (end[v] || !(length < way[v])) return;
+    way[v] = length;
+    front.emplace(length, v);
+  };
+  for (size_t v = 0; v < way.size(); ++v)
+    for (const Vec3& place : request.places)
+      if ((skin.points[v] - place).norm() <= request.near) offer(static_cast<int64_t>(v), 0);
+  for (const Surface& bone : request.beneath) {
+    const TriangleTree tree(bone);
+    for (size_t v = 0; v < way.size(); ++v)
+      if (tree.any_within(skin.points[v], request.near * request.near) >= 0)
+        offer(static_cast<int64_t>(v), 0);
+  }
+  while (!front.empty()) {
+    const auto [length, v] = front.top();
+    front.pop();
+    if (length > way[v]) continue;
+    for (const int64_t other : neighbours[v])
+      offer(other, length + (skin.points[other] - skin.points[v]).norm());
+  }
+  return way;
+}
+
+/// Vertices at the end of the scan.
+std::vector<char> ends_of(const OuterSkin& outer) {
+  std::vector<char> end(outer.skin.points.size(), 0);
+  if (outer.caps.triangles.empty()) return end;
+  const TriangleTree tree(outer.caps);
+  const double reach = outer.cap_height + beside_cap;
+  for (size_t v = 0; v < end.size(); ++v)
+    end[v] = tree.any_within(outer.skin.points[v], reach * reach) >= 0;
+  return end;
+}
+
+/// Makes the parts outside that the face surrounds a part of it, but where the scan ends.
+void fill(const Neighbours& neighbours, const std::vector<char>& end, std::vector<double>& inside) {
+  std::vector<char> seen(inside.size(), 0);
+  std::vector<std::vector<int64_t>> parts;
+  for (size_t v = 0; v < inside.size(); ++v) {
+    if (seen[v] || inside[v] >= 0) continue;
+    std::vector<int64_t> part{static_cast<int64_t>(v)};
+    seen[v] = 1;
+    for (size_t next = 0; next < part.size(); ++next)
+      for (const int64_t other : neighbours[part[next]])
+        if (!seen[other] && inside[other] < 0) {
+          seen[other] = 1;
+          part.push_back(other);
+        }
+    parts.push_back(std::move(part));
+  }
+  const auto largest = std::max_element(
+      parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  for (auto part = parts.begin(); part != parts.end(); ++part) {
+    const auto at_end = [&](int64_t v) { return end[v] != 0; };
+    if (part == largest || std::any_of(part->begin(), part->end(), at_end)) continue;
+    for (const int64_t v : *part) inside[v] = 1;
+  }
+}
+
+void smooth(const Neighbours& neighbours, int rounds, std::vector<double>& values) {
+  for (int round = 0; round < rounds; ++round) {
+    const std::vector<double> old = values;
+    for (size_t v = 0; v < values.size(); ++v) {
+      double sum = old[v];
+      for (const int64_t other : neighbours[v]) sum += old[other];
+      values[v] = sum / static_cast<double>(neighbours[v].size() + 1);
+    }
+  }
+}
+
+/// The part of the outer skin that is solved.
+Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
+  const Neighbours neighbours = neighbours_of(outer.skin);
+  const std::vector<char> end = ends_of(outer);
+  std::vector<double> inside(end.size(), request.margin);
+  if (!request.beneath.empty() || !request.places.empty()) {
+    inside = way_from_bones(outer.skin, neighbours, end, request);
+    for (double& value : inside) value = request.margin - std::min(value, 2 * request.margin);
+  }
+  for (size_t v = 0; v < end.size(); ++v)
+    if (end[v]) inside[v] = -request.margin;
+  smooth(neighbours, border_smoothing, inside);
+  fill(neighbours, end, inside);
+  const Surface part = cut_at_zero(outer.skin, inside);
+  if (part.triangles.empty())
+    base::refuse(
+        "{}: nothing of it is within {:g} mm of a bone that moves; check that skin and "
+        "bones come from one scan and in one frame",
+        outer.skin.name, request.near);
+  return largest_component(part);
+}
+
+std::vector<Vec3> normals_of(const Surface& surface) {
+  std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
+  for (const Triangle& t : surface.triangles) {
+    const Corners p = corners(surface, t);
+    for (const int64_t v : t) normals[v] += (p[1] - p[0]).cross(p[2] - p[0]);
+  }
+  for (Vec3& normal : normals) normal.normalize();
+  return normals;
+}
+
+/// Points of the given triangles no farther apart than `spacing`, with their areas, in a ball
+/// around the face.
+struct Sampled {
+  std::vector<Vec3> point;
+  std::vector<double> area;
+};
+
+Sampled sample(const Surface& given, const TriangleTree& face, double spacing, double tolerance) {
+  Sampled samples;
+  for (const Triangle& triangle : given.triangles) {
+    const auto [a, b, c] = corners(given, triangle);
+    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    const double reach = tolerance + longest;
+    if (face.any_within((a + b + c) / 3, reach * reach) < 0) continue;
+    const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
+    const double area = (b - a).cross(c - a).norm() / 2 / (n * n);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; i + j < n; ++j)
+        for (int half = 0; half < (i + j + 1 < n ? 2 : 1); ++half) {
+          const double x = (i + (1.0 + half) / 3) / n, y = (j + (1.0 + half) / 3) / n;
+          samples.point.push_back(a + x * (b - a) + y * (c - a));
+          samples.area.push_back(area);
+        }
+  }
+  return samples;
+}
+
+Vec3 weights_at(const Corners& t, const Vec3& point) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double area = normal.squaredNorm();
+  const double a = (t[2] - t[1]).cross(point - t[1]).dot(normal) / area;
+  const double b = (t[0] - t[2]).cross(point - t[2]).dot(normal) / area;
+  return {a, b, 1 - a - b};
+}
+
+/// Draws the vertices along their normals to the samples within the tolerance.
+void fit(const Sampled& samples, double tolerance, const Neighbours& neighbours, Surface& face) {
+  const TriangleTree tree(face);
+  const std::vector<Vec3> normals = normals_of(face);
+  std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
+  for (size_t s = 0; s < samples.point.size(); ++s) {
+    const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance);
+    if (nearest.triangle < 0) continue;
+    const Triangle& triangle = face.triangles[nearest.triangle];
+    const Vec3 share = weights_at(tree.corners_of(nearest.triangle), nearest.point);
+    for (int k = 0; k < 3; ++k) {
+      const double part = samples.area[s] * std::max(share[k], 0.0);
+      offset[triangle[k]] += part * normals[triangle[k]].dot(samples.point[s] - nearest.point);
+      weight[triangle[k]] += part;
+    }
+  }
+  for (size_t v = 0; v < offset.size(); ++v) offset[v] = weight[v] > 0 ? offset[v] / weight[v] : 0;
+  smooth(neighbours, 1, offset);
+  for (size_t v = 0; v < offset.size(); ++v) face.points[v] += offset[v] * normals[v];
+}
+
+/// Moves vertices on folds to the middle of their neighbours until none is.
+void unfold(const Neighbours& neighbours, Surface& face) {
+  for (int round = 0; round < unfoldings; ++round) {
+    const std::vector<Vec3> normals = normals_of(face), old = face.points;
+    std::vector<char> moved(old.size(), 0);
+    for (const Triangle& triangle : face.triangles) {
+      const Corners p = corners(face, triangle);
+      const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+      for (const int64_t v : triangle)
+        if (normal.dot(normals[v]) < folded)
+          for (const int64_t corner : triangle) moved[corner] = 1;
+    }
+    if (std::count(moved.begin(), moved.end(), 1) == 0) return;
+    for (size_t v = 0; v < moved.size(); ++v) {
+      if (!moved[v]) continue;
+      face.points[v] = Vec3::Zero();
+      for (const int64_t other : neighbours[v]) face.points[v] += old[other];
+      face.points[v] /= static_cast<double>(neighbours[v].size());
+    }
+  }
+}
+
+void measure(const Surface& given, Face& face) {
+  const TriangleTree tree(given);
+  std::vector<double> off;
+  for (const Vec3& point : face.skin.points) off.push_back(std::sqrt(tree.nearest(point).squared));
+  std::sort(off.begin(), off.end());
+  face.off_95 = off[static_cast<size_t>(0.95 * static_cast<double>(off.size() - 1))];
+  face.off_most = off.back();
+  double greatest_cosine = -1;
+  for (const Triangle& triangle : face.skin.triangles) {
+    const Corners p = corners(face.skin, triangle);
+    for (int k = 0; k < 3; ++k)
+      greatest_cosine =
+          std::max(greatest_cosine,
+                   (p[(k + 1) % 3] - p[k]).normalized().dot((p[(k + 2) % 3] - p[k]).normalized()));
+  }
+  face.least_angle = std::acos(std::min(greatest_cosine, 1.0)) * 180 / std::numbers::pi;
+}
+
+}  // namespace
+
+Face solvable_face(const Surface& given, const FaceRequest& request) {
+  Face face;
+  face.skin = remesh(region_of(outer_skin(given, request.rolling), request), request.edge);
+  const Neighbours neighbours = neighbours_of(face.skin);
+  const Sampled samples =
+      sample(given, TriangleTree(face.skin), request.edge / 2, request.tolerance);
+  for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);
+  unfold(neighbours, face.skin);
+  measure(given, face);
+  face.skin.name = given.name;
+  return face;
+}
+
+double edge_for(const Surface& given) {
+  return std::clamp(bounding_diagonal(given.points) / 70, 2.0, 8.0);
+}
+
+}  // namespace repose::meshtools

@@ -1,0 +1,11 @@
+#pragma once
+#include "repose/surface/surface.h"
+
+namespace repose::meshtools {
+
+using surface::Surface;
+
+/// What of a closed manifold surface has values ≥ 0, linear in its triangles: cut exactly along 0.
+Surface cut_at_zero(const Surface& surface, const std::vector<double>& values);
+
+}  // namespace repose::meshtools

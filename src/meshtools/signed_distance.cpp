@@ -1,0 +1,77 @@
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "repose/meshtools/compare.h"
+#include "repose/surface/edges.h"
+
+namespace repose::meshtools {
+using namespace surface;
+using namespace imaging;
+namespace {
+
+constexpr double on_border_of_triangle = 1e-9;  // barycentric
+
+/// Barycentric coordinates of a point on a triangle.
+Vec3 barycentric(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
+  const Vec3 normal = (b - a).cross(c - a);
+  const double area = normal.squaredNorm();
+  const double at_a = (c - b).cross(point - b).dot(normal) / area;
+  const double at_b = (a - c).cross(point - c).dot(normal) / area;
+  return {at_a, at_b, 1 - at_a - at_b};
+}
+
+double angle_at(const Vec3& corner, const Vec3& one, const Vec3& other) {
+  const Vec3 a = one - corner, b = other - corner;
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+}  // namespace
+
+SignedDistance::SignedDistance(const Surface& surface)
+    : surface_(surface),
+      tree_(surface),
+      vertex_normal_(surface.points.size(), Vec3::Zero()),
+      side_(surface.triangles.size()),
+      vertex_on_border_(surface.points.size(), false) {
+  for (const Triangle& triangle : surface.triangles) {
+    const Vec3 p[3] = {surface.points[triangle[0]], surface.points[triangle[1]],
+                       surface.points[triangle[2]]};
+    face_normal_.push_back((p[1] - p[0]).cross(p[2] - p[0]).normalized());
+    for (int k = 0; k < 3; ++k)
+      vertex_normal_[triangle[k]] +=
+          angle_at(p[k], p[(k + 1) % 3], p[(k + 2) % 3]) * face_normal_.back();
+  }
+  const EdgeTable edges(surface.triangles);
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    Feature side{Vec3::Zero(), edges[e].size() == 1};
+    for (const HalfEdge& half : edges[e]) side.normal += face_normal_[half.triangle];
+    for (const HalfEdge& half : edges[e]) side_[half.triangle][half.corner] = side;
+    if (!side.border) continue;
+    vertex_on_border_[edges[e].front().low] = true;
+    vertex_on_border_[edges[e].front().high] = true;
+  }
+}
+
+SignedDistance::Feature SignedDistance::feature_at(const DistanceTree::Nearest& nearest) const {
+  const Triangle& triangle = surface_.triangles[nearest.triangle];
+  const Vec3 weight = barycentric(surface_.points[triangle[0]], surface_.points[triangle[1]],
+                                  surface_.points[triangle[2]], nearest.point);
+  int small = 0, smallest = 0, largest = 0;
+  for (int k = 0; k < 3; ++k) {
+    small += weight[k] < on_border_of_triangle;
+    if (weight[k] < weight[smallest]) smallest = k;
+    if (weight[k] > weight[largest]) largest = k;
+  }
+  if (small == 0) return {face_normal_[nearest.triangle], false};
+  if (small == 1) return side_[nearest.triangle][(smallest + 1) % 3];
+  return {vertex_normal_[triangle[largest]], vertex_on_border_[triangle[largest]]};
+}
+
+SignedDistance::Answer SignedDistance::at(const Vec3& point) const {
+  const auto nearest = tree_.nearest(point);
+  const Feature feature = feature_at(nearest);
+  const bool behind = (point - nearest.point).dot(feature.normal) < 0;
+  return {behind ? -nearest.distance : nearest.distance, feature.border};
+}
+
+}  // namespace repose::meshtools

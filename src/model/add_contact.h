@@ -1,0 +1,26 @@
+#pragma once
+#include "attachment.h"
+#include "repose/model/cut.h"
+#include "repose/model/model.h"
+#include "repose/model/skin_mesh.h"
+#include "repose/scene/scene.h"
+
+namespace repose::model {
+
+/// What the tissue of a model of make_layers touches: bones that it may reach as they move, unless
+/// the scene's contact leaves them out; bones that it slides along; instruments on which the skin
+/// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
+/// its median thickness; distances are read from grids of the scene's spacing, or 0.75 of the mean
+/// edge of the skin. Throws InputError naming the scene and an instrument that reaches no free
+/// point of the skin.
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model);
+
+/// Doubled points, whose pairs are given, touch what the points touched, with half the area each.
+void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
+
+/// The sides of a cut made by cut_along, whose pairs of doubled points are given, do not pass one
+/// another any more.
+void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
+
+}  // namespace repose::model

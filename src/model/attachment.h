@@ -1,0 +1,32 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "bone_field.h"
+#include "columns.h"
+#include "repose/scene/scene.h"
+
+namespace repose::model {
+
+/// What the deepest point of each column does, [V].
+struct Attachment {
+  std::vector<int32_t> bone;         ///< that it moves with, −1 for none
+  std::vector<int32_t> slides_on;    ///< bone that it slides along, −1 for none
+  std::vector<char> free;            ///< 1: it does not even touch bones
+  std::vector<int64_t> reached;      ///< [bones] columns that could hold to each bone
+  double largest_gap = 0;            ///< mm between an attached deepest point and its bone
+  int64_t released = 0;              ///< columns let go near a piece that moves differently
+  std::vector<std::string> remarks;  ///< lines for a person
+
+  /// A column that moves with a bone does otherwise.
+  void settle(size_t column, scene::Attach how);
+};
+
+/// Ties a column that ends at bone, or short of it by no more than 1.5 mm or half its thickness, to
+/// the bone nearest to its deepest point; then all do what `tissue` wants, by region (a mesh or a
+/// label holds what is up to 2 mm from it). Throws InputError where a region holds no column that
+/// ends at bone and is to slide.
+Attachment attach_columns(const Columns& columns, const BoneField& bones,
+                          const scene::Tissue& tissue);
+
+}  // namespace repose::model

@@ -1,0 +1,30 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "xdmf.h"
+
+namespace repose::results {
+
+/// How much of everything a result file holds.
+struct FileCounts {
+  int64_t points = 0, springs = 0, prisms = 0, skin = 0;
+  int64_t bone_points = 0, bone_triangles = 0;  ///< of the merged bone surfaces
+  bool pressure = false;                        ///< every step has pressures, …
+  bool stress = false;                          ///< … and the other fields of a solid
+};
+
+/// An array of the points that some steps have.
+struct OptionalField {
+  std::string name;
+  bool vector = false;
+  std::vector<bool> in_step;  ///< [steps]
+};
+
+/// What ParaView is offered of a result file, one block a file: tissue (wedges), springs (lines),
+/// skin and bones (triangles). `bones_moved` [steps]: whether the step stores moved bone surfaces.
+/// Tissue and skin show the optional fields. Blocks without a cell are listed too.
+std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<OptionalField>& fields,
+                             const std::vector<bool>& bones_moved);
+
+}  // namespace repose::results

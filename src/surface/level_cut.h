@@ -1,9 +1,0 @@
-#pragma once
-#include "repose/surface/surface.h"
-
-namespace repose::surface {
-
-/// What of a closed manifold surface has values ≥ 0, linear in its triangles: cut exactly along 0.
-Surface cut_at_zero(const Surface& surface, const std::vector<double>& values);
-
-}  // namespace repose::surface

@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Figures of the house: lines and public headers of each room, functions beyond a screen, functions
+with many parameters, and, with the programs' folder, the frames between main and TaoSolve.
+
+    tests/program/house_figures.py [build/bin]
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+from conftest import PROJECT
+from test_house import LONGEST, ROOMS, USUAL, functions, public_headers, sources
+
+PARAMETERS = 5
+# A TaoSolve that tells how many frames of the program's own are above it.
+COUNTER = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <execinfo.h>
+#include <stdio.h>
+#include <string.h>
+int TaoSolve(void *tao) {
+  void *frame[256];
+  int own = 0, n = backtrace(frame, 256);
+  Dl_info here, me;
+  dladdr((void *)TaoSolve, &me);
+  for (int i = 0; i < n; ++i)
+    own += dladdr(frame[i], &here) && strstr(here.dli_fname, "repose-solve");
+  fprintf(stderr, "FRAMES %d\n", own);
+  return ((int (*)(void *))dlsym(RTLD_NEXT, "TaoSolve"))(tao);
+}
+"""
+
+
+def parameters(text):
+    """(first line, number of parameters) of each function that is declared or defined."""
+    text = re.sub(r"//.*", "", text)
+    found = []
+    for match in re.finditer(r"^ {0,4}[\w:<>,&*\[\] ]*?[\w>&*] ?\b(?:\w+::)*~?\w+\(", text, re.M):
+        depth, commas, inside = 1, 0, ""
+        for char in text[match.end():]:
+            depth += {"(": 1, "<": 1, "{": 1, "[": 1, ")": -1, ">": -1, "}": -1, "]": -1}.get(char, 0)
+            if depth == 0:
+                break
+            commas += depth == 1 and char == ","
+            inside += char
+        head = match.group(0).strip()
+        if inside.strip() and not re.match(r"(return|else|if|for|while|throw|case)\b", head):
+            found.append((text.count("\n", 0, match.start()) + 1, commas + 1))
+    return found
+
+
+def declares(text, line):
+    """Whether the statement at `line` has typed parameters, not arguments."""
+    head = " ".join(text.splitlines()[line - 1:line + 6]).split("{")[0].split(";")[0]
+    return bool(re.search(r"\w[&*>]* \w+[,)=]", head))
+
+
+def frames(programs):
+    """Frames of the program between main and TaoSolve, both left out."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, library = os.path.join(folder, "count.c"), os.path.join(folder, "count.so")
+        with open(source, "w", encoding="utf-8") as file:
+            file.write(COUNTER)
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
+        solve = os.path.join(os.path.abspath(programs), "repose-solve")
+        run = subprocess.run([solve, str(PROJECT / "meshes/head_solid.yaml"), "-output", "frames"],
+                             cwd=folder, env=os.environ | {"LD_PRELOAD": library}, text=True,
+                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False)
+    return max(int(n) for n in re.findall(r"FRAMES (\d+)", run.stderr)) - 2  # main, _start
+
+
+def main():
+    lines = {room: 0 for room in ROOMS}
+    lengths, many = [], []
+    for name, text in sources():
+        lines[name.split("/")[2 if name.startswith("include/") else 1]] += text.count("\n")
+        lengths += [length for _, length in functions(text)]
+        many += [f"{name}:{line}" for line, n in parameters(text)
+                 if n > PARAMETERS and declares(text, line)]
+    headers = public_headers()
+    print("| room | lines | public headers |\n|---|--:|--:|")
+    for room, count in lines.items():
+        print(f"| `{room}` | {count} | {len(headers[room])} |")
+    print(f"| all | {sum(lines.values())} | {sum(map(len, headers.values()))} |\n")
+    print(f"{len(lengths)} functions: {sum(n > USUAL for n in lengths)} above {USUAL} lines, "
+          f"{sum(n > LONGEST for n in lengths)} above {LONGEST}; "
+          f"{len(many)} with more than {PARAMETERS} parameters.")
+    if len(sys.argv) > 1:
+        print(f"Frames between main and TaoSolve: {frames(sys.argv[1])}.")
+
+
+if __name__ == "__main__":
+    main()
