@@ -1,58 +1,13 @@
 #pragma once
-#include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
-#include <string>
-
+#include "../../folder.h"
 #include "../../layered_patch.h"
-#include "repose/base/error.h"
 #include "repose/results/result_file.h"
 
-/// A folder of a test's own, a small model with everything a file can hold, and a result of it.
+/// A small model with everything a file can hold, and a result of it.
 namespace repose::results {
 
-class Folder {
- public:
-  Folder() {
-    static int made = 0;
-    const std::string name =
-        "results_test_" + std::to_string(getpid()) + "_" + std::to_string(made++);
-    path_ = std::filesystem::temp_directory_path() / name;
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::filesystem::path path(const std::string& name) const { return path_ / name; }
-  /// Names of what is in it, sorted, separated by spaces.
-  std::string content() const {
-    std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(path_))
-      names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    std::string text;
-    for (const std::string& name : names) text += (text.empty() ? "" : " ") + name;
-    return text;
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// What a call refuses with, "accepted" if it does not; any other exception passes.
-template <class Call>
-std::string refusal(const Call& call) {
-  try {
-    call();
-  } catch (const base::InputError& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos)
-        << "one line: " << error.what();
-    return error.what();
-  }
-  return "accepted";
-}
+using test::Folder;
+using test::refusal;
 
 /// Two bones with surfaces; the second moves 2 mm up.
 inline model::Model small_model() {
