@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/model/model.h"
 #include "repose/model/prism_geometry.h"
 #include "repose/scene/rigid_motion.h"
+#include "repose/surface/edges.h"
 
 namespace repose::model {
 
@@ -209,33 +209,16 @@ void refuse_unattached(const Model& m, const std::string& file) {
           file, i);
 }
 
-/// Points that are joined, each by the lowest of them that is found so far.
-class Parts {
- public:
-  explicit Parts(size_t points) : above_(points) { std::iota(above_.begin(), above_.end(), 0); }
-  int64_t of(int64_t point) {
-    while (above_[point] != point) point = above_[point] = above_[above_[point]];
-    return point;
-  }
-  void join(const std::array<int64_t, 2>& ends) {
-    const int64_t one = of(ends[0]), other = of(ends[1]);
-    above_[std::max(one, other)] = std::min(one, other);
-  }
-
- private:
-  std::vector<int64_t> above_;
-};
-
 void refuse_floating(const Model& m, const std::string& file) {
   const size_t points = m.points.set.size();
-  Parts parts(points);
-  for (const auto& ends : m.springs.points) parts.join(ends);
-  for (const auto& ends : m.edges.points) parts.join(ends);
+  surface::UnionFind parts(static_cast<int64_t>(points));
+  for (const auto& ends : m.springs.points) parts.unite(ends[0], ends[1]);
+  for (const auto& ends : m.edges.points) parts.unite(ends[0], ends[1]);
   std::vector<bool> held(points, false);
   for (size_t i = 0; i < points; ++i)
-    if (m.points.set[i] != PointSet::soft_tissue) held[parts.of(static_cast<int64_t>(i))] = true;
+    if (m.points.set[i] != PointSet::soft_tissue) held[parts.find(static_cast<int64_t>(i))] = true;
   for (size_t i = 0; i < points; ++i)
-    if (!held[parts.of(static_cast<int64_t>(i))])
+    if (!held[parts.find(static_cast<int64_t>(i))])
       refuse(
           "{}: /model/point: row {} at ({:.4g}, {:.4g}, {:.4g}) mm is soft tissue, and nothing "
           "holds it or what it is joined to; make a point there a boundary point (set 1), or "

@@ -214,9 +214,13 @@ class FieldBuilder {
   void give_signs() {
     signed_ = true;
     std::vector<char> seen(field_.value_.size(), 0);
-    for (int64_t k = 0; k < points_[2]; ++k)
-      for (int64_t j = 0; j < points_[1]; ++j)
-        for (int64_t i = 0; i < points_[0]; ++i) give_sign({i, j, k}, seen);
+    for (int64_t row = 0; row < static_cast<int64_t>(field_.place_.size()); ++row) {
+      if (field_.place_[row] < 0) continue;
+      const Index block{row % field_.size_[0], row / field_.size_[0] % field_.size_[1],
+                        row / field_.size_[0] / field_.size_[1]};
+      for (int64_t c = 0; c < cells; ++c)
+        give_sign({b * block[0] + c % b, b * block[1] + c / b % b, b * block[2] + c / b / b}, seen);
+    }
   }
 
   void give_sign(const Index& first, std::vector<char>& seen) {

@@ -1,7 +1,9 @@
 """Fixtures of the end-to-end tests: programs run as a person runs them, and a hang is a failure."""
 
+import importlib.util
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 
@@ -40,6 +42,20 @@ def finish(command, cwd, environment, time_limit):
             os.killpg(process.pid, signal.SIGKILL)
         pytest.fail(f"still running after {time_limit} s: {' '.join(map(str, command))}")
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def vtk_version():
+    """(major, minor) of the VTK that this interpreter has, (0, 0) of none."""
+    if importlib.util.find_spec("vtkmodules") is None:
+        return 0, 0
+    from vtkmodules.vtkCommonCore import vtkVersion
+    return vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()
+
+
+def can_draw():
+    """Whether render.py can: without a display from VTK 9.4 on, else on a screen in memory."""
+    older = vtk_version() > (0, 0) or shutil.which("pvbatch")
+    return vtk_version() >= (9, 4) or bool(older and shutil.which("xvfb-run"))
 
 
 @pytest.fixture(scope="session")

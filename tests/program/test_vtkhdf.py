@@ -1,12 +1,11 @@
 """NAME.h5 as a VTKHDF file: what VTK and ParaView open is what HDF5 holds, stored once."""
 
-import importlib.util
 
 import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, vtk_version
 from tissue import last, model_of, steps, write_model
 
 OPENING = "paper_jaw_opening.yaml"
@@ -156,8 +155,8 @@ def shown(grids, name, vtk):
 
 
 def test_vtk_reads_every_array_of_every_step(opening):
-    if importlib.util.find_spec("vtkmodules") is None:
-        pytest.skip("VTK is not installed (pip install vtk)")
+    if vtk_version() < (9, 3):
+        pytest.skip("no VTK from 9.3 on (pip install vtk)")
     import vtkmodules.all as vtk
     import vtkmodules.util.numpy_support
     reader = vtk.vtkHDFReader()
