@@ -19,8 +19,30 @@ std::string ending(bool settled, bool stopped, const std::string& unsettled) {
   return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");
 }
 
+/// Why a way that came to its end was hard, and what to change.
+std::string hardship(const solve::Halvings& h) {
+  constexpr int64_t usual = 4;
+  if (h.count() <= usual) return "";
+  return report_row(
+      "remark",
+      h.folded >= h.failed + h.strayed
+          ? "a hard way: tissue folds on it; move the bones less or release more tissue "
+            "(tissue.release); springs: raise the volume stiffness, or make the tissue a solid"
+          : "a hard way: tissue buckles on it, or has several rest positions, and -verify_path "
+            "says whether they matter; move the bones less; springs: raise the volume stiffness, "
+            "or make "
+            "the tissue a solid");
+}
+
+std::string halved(const solve::Halvings& h) {
+  if (h.count() == 0) return "none halved";
+  return fmt::format("{} halved: {} folded tissue, {} led elsewhere than predicted, {} failed",
+                     h.count(), h.folded, h.strayed, h.failed);
+}
+
 std::string work_rows(const solve::Summary& s) {
-  return report_row("load steps", fmt::format("{} ({} halved)", s.path.steps, s.path.halvings)) +
+  return report_row("load steps", fmt::format("{} ({})", s.path.steps, halved(s.path.halvings))) +
+         hardship(s.path.halvings) +
          report_row("iterations", fmt::format("{}", s.path.iterations)) +
          report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
                                                s.evaluations, s.assemblies));
@@ -57,7 +79,9 @@ std::string remedy(const solve::Summary& s, bool stretched) {
   if (std::isfinite(s.last.penetration))
     return " Tissue meets bone, an instrument or itself there: leave contact.stiffness and "
            "contact.grid to the program, or move less.";
-  return "";
+  if (!std::isfinite(s.last.displacement_error))
+    return " Bring the stiffnesses of the tissue closer together.";
+  return " Check the units and stiffnesses, move the bones less, or try more -load_steps.";
 }
 
 }  // namespace

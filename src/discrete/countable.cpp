@@ -13,4 +13,13 @@ void require_countable(int64_t points, PetscInt largest) {
       points, largest / 3);
 }
 
+void require_addressable(int64_t pairs, PetscInt largest) {
+  if (pairs <= largest / 9) return;
+  base::refuse(
+      "a rank would hold second derivatives of {} pairs of points, and this build of PETSc "
+      "addresses those of {} at most; solve on more ranks, or build PETSc with "
+      "--with-64-bit-indices",
+      pairs, largest / 9);
+}
+
 }  // namespace repose::discrete

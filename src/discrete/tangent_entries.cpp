@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "countable.h"
 #include "repose/base/agreement.h"
 
 namespace repose::discrete {
@@ -12,6 +13,9 @@ using mechanics::Curvature;
 TangentEntries::TangentEntries(const Objective& objective)
     : objective_(objective), part_(objective.positions().part()) {
   make_pattern();
+  base::together(objective.positions().comm(), [this] {
+    require_addressable(static_cast<int64_t>(rows_[0].column.size() + rows_[1].column.size()));
+  });
   make_pattern_matrix();
   find_slots();
 }

@@ -31,6 +31,13 @@ class Stopwatch {
 
 }  // namespace
 
+Halvings& Halvings::operator+=(const Halvings& more) {
+  failed += more.failed;
+  folded += more.folded;
+  strayed += more.strayed;
+  return *this;
+}
+
 LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& settings)
     : objective_(problem.objective()),
       predictor_(objective_, problem.elastic_solver()),
@@ -100,6 +107,13 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   objective_.positions().update(displacement);
 }
 
+void LoadPath::take_back(const Attempt& tried, Vec displacement) {
+  objective_.positions().set_load(result_.load);
+  search_.go_back(displacement);
+  Halvings& h = result_.halvings;
+  ++(!tried.outcome.converged ? h.failed : tried.folded ? h.folded : h.strayed);
+}
+
 void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
   const Stopwatch watch;
   const double before = result_.load;
@@ -132,19 +146,17 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   std::optional<Attempt> coarser;
   while (result_.last.converged && !result_.last.stopped && result_.load < 1) {
     const Stopwatch watch;
-    const double before = result_.load;
-    const double target = before + step > 1 - 1e-3 * longest ? 1 : before + step;
-    const Attempt tried = attempt(displacement, target);
+    const double target = result_.load + step;
+    const double load = target > 1 - 1e-3 * longest ? 1 : target;
+    const Attempt tried = attempt(displacement, load);
     if (tried.outcome.stopped || halvings == most_halvings || follows(tried, coarser)) {
-      accept(tried.outcome, target, displacement);
+      accept(tried.outcome, load, displacement);
       step = std::min(longest, 2 * step);
       halvings = std::max(0, halvings - 1);
       coarser.reset();
       on_step(result_.last, result_.load, watch.seconds());
     } else {
-      positions.set_load(before);
-      search_.go_back(displacement);
-      ++result_.halvings;
+      take_back(tried, displacement);
       step /= 2;
       ++halvings;
       coarser = tried;

@@ -47,7 +47,13 @@ class Verdict:
 
 
 def volume_weight(step):
-    return step["bulk_modulus"] if step["volume"] == b"penalty" else 0.0
+    """Of a prism's squared change of volume, by the prisms' volumes; the paper's objective λ f_e +
+    (1-λ) f_v is divided by λ."""
+    if step["volume"] == b"penalty":
+        return lambda volume: step["bulk_modulus"] / volume
+    if step["volume"] == b"paper" and step["lambda"] < 1:
+        return lambda volume: np.full(len(volume), 2 * (1 - step["lambda"]) / step["lambda"])
+    return None
 
 
 def tissue_of(model, step, exact=False):
@@ -150,10 +156,19 @@ def shortened(text, folder):
     return line.replace(str(folder) + "/", "").removeprefix("repose-solve: ")
 
 
+def with_contact(model, step):
+    """The minimisers know no contact: its forces, which repose-check recomputes, are dead loads."""
+    if "point/contact_force" not in step:
+        return model
+    name = "point/external_force"
+    return model | {name: model[name] + step["point/contact_force"]}
+
+
 def judged(row, result, file, environment):
     """What is to be said of a run that left a result."""
-    path, model = steps(file), model_of(file)
+    path = steps(file)
     step = path[-1]
+    model = with_contact(model_of(file), step)
     verdict = Verdict(
         row, ended(result, step), sum(s["evaluations"] for s in path), step["displacement_error"]
     )

@@ -28,13 +28,14 @@ def law(elongation, stiffness, reference, power):
 
 
 class Network:
-    """Energy of a model of springs with the volume term Σ ½ kappa (v - v0)²/v0 (0: none) and loads.
+    """Energy of a model of springs with loads and a volume term Σ ½ w (v - v0)², `weight(v0)` → w
+    of each prism (None: no such term).
 
     Positions are [N, 3], mm, of the type of `dtype`.
     """
 
-    def __init__(self, model, kappa=0.0, dtype=float):
-        self.model, self.kappa, self.dtype = model, kappa, dtype
+    def __init__(self, model, weight=None, dtype=float):
+        self.model, self.dtype = model, dtype
         self.rest = model["point/position"].astype(dtype)
         self.soft = np.flatnonzero(model["point/set"] == 0)
         self.ends = model["spring/points"]
@@ -43,10 +44,9 @@ class Network:
             for name in ("rest_length", "stiffness", "reference")
         )
         self.power = model["spring/exponent"].astype(int)
-        self.prisms = (
-            model.get("prism/points", np.zeros((0, 6), int)) if kappa else np.zeros((0, 6), int)
-        )
+        self.prisms = model["prism/points"] if weight else np.zeros((0, 6), int)
         self.volume = volumes(self.rest.astype(float), self.prisms)[0]
+        self.weight = weight(self.volume) if weight else self.volume
         self.load = (
             model["point/mass"][:, None] * model["gravity"] + model["point/external_force"]
         ).astype(dtype)
@@ -64,7 +64,7 @@ class Network:
         value = energy.sum() - (self.load * (x - self.rest)).sum()
         if len(self.prisms):
             v, slopes = volumes(x, self.prisms)
-            push = self.kappa * (v - self.volume) / self.volume
+            push = self.weight * (v - self.volume)
             value += (push * (v - self.volume)).sum() / 2
             np.add.at(gradient, self.prisms, push[:, None, None] * slopes)
         return value, gradient
@@ -117,11 +117,10 @@ class Network:
     def of_volume(self, x, curved):
         """Second derivatives of the volume term, [M, 6, 6, 3, 3]."""
         v, slopes = volumes(x, self.prisms)
-        stiffness = self.kappa / self.volume
-        k = stiffness[:, None, None, None, None] * np.einsum("mid,mje->mijde", slopes, slopes)
+        k = self.weight[:, None, None, None, None] * np.einsum("mid,mje->mijde", slopes, slopes)
         if curved:
             along = 6 * np.einsum(
-                "m,ijk,mkd->mijd", stiffness * (v - self.volume), VOLUME, centred(x, self.prisms)
+                "m,ijk,mkd->mijd", self.weight * (v - self.volume), VOLUME, centred(x, self.prisms)
             )
             for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                 k[..., a, b] += along[..., c]

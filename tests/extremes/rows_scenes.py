@@ -93,9 +93,9 @@ def rows_of(kind):
     tissue = TISSUES[kind]
     volume = "solve: {volume: {form: penalty, poisson: 0.4967}}\n" if kind == "springs" else ""
 
-    def row(name, *arguments, may_end=HARD, options=(), slow=True, **more):
+    def row(name, *arguments, may_end=HARD, slow=True, **more):
         scene = head(tissue, *arguments, solve=volume, **more)
-        return Row(name, lambda _: scene, (*LIMITED, *options), may_end=may_end, slow=slow)
+        return Row(name, lambda _: scene, LIMITED, may_end=may_end, slow=slow)
 
     yield row("head: jaw 6 mm forward", forward(6), may_end="", slow=False)
     yield row("head: jaw opened by 8°", turned(8), may_end="", slow=False)
@@ -118,15 +118,3 @@ def rows_of(kind):
         may_end=HARD + "|SETTLED",
         slow=True,
     )
-    if kind == "springs":
-        for kappa in ("1e-9", "1e9"):
-            yield row(f"head: kappa {kappa}", forward(6), options=("-bulk_modulus", kappa))
-        for weight in ("1e-9", "1"):
-            yield Row(
-                f"head: volume paper, lambda {weight}",
-                lambda _: head(tissue, forward(6)),
-                (*LIMITED, "-volume", "paper", "-lambda", weight),
-                may_end=HARD,
-                slow=True,
-                judged=False,
-            )

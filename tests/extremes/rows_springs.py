@@ -214,9 +214,14 @@ def far_out(factor, **row):
     return Row(f"a rod pulled out to {factor:g} times its length", make, NONE, truth=truth, **row)
 
 
+def of_paper(weight, **row):
+    options = ("-volume", "paper", "-lambda", weight, "-accuracy", "1e-6")
+    return Row(f"lambda {weight}", plain(), options, **row)
+
+
 BUCKLES = "minimum|buckl|curvature"
 ROWS = [
-    chain_row("stiffness 1e-9 … 1e12 in a chain", 12, (-9, 12), 1, 1e-9, may_end="too far apart"),
+    chain_row("stiffness 1e-9 … 1e12 in a chain", 12, (-9, 12), 1, 1e-9, may_end="too far apart.*closer"),
     chain_row("stiffness 1e-3 … 1e3 in a chain", 41, (-3, 3), 2),
     chain_row("stiffness 1e-6 … 1e6 in a chain", 41, (-6, 6), 3, 1e-3),
     Row("skin of 1e6 on tissue of 1e-6 N/mm", layered(1e6, 1e-6), FINE),
@@ -227,6 +232,7 @@ ROWS = [
         may_end="rounding|not converged",
     ),
     Row("skin of 1e-9 on tissue of 1e12 N/mm", layered(1e-9, 1e12), NONE),
+    Row("s_ref 1e-80 mm, σ⁴ beyond all numbers", plain(reference=1e-80), NONE, refused="too large"),
     Row("s_ref 1e-9 mm", plain(reference=1e-9), NONE, truth=follow(8)),
     Row("s_ref 1e-3 mm", plain(reference=1e-3), FINE, truth=follow(8)),
     Row("s_ref 1e9 mm", plain(reference=1e9), FINE, truth=follow(8)),
@@ -273,4 +279,7 @@ ROWS = [
         "kappa 1e-9 N/mm²", plain(), ("-bulk_modulus", "1e-9", "-accuracy", "1e-6"), truth=follow(8)
     ),
     Row("kappa 1e9 N/mm²", plain(), ("-bulk_modulus", "1e9", "-accuracy", "1e-6")),
+    of_paper("1e-9", may_end=BUCKLES),
+    of_paper("1"),
+    of_paper("0", refused="lambda.*above 0|> 0"),
 ]

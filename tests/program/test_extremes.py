@@ -109,6 +109,7 @@ def test_folded_tissue_is_no_success_unless_allowed(solve, run, tmp_path):
     assert result.returncode == 2 and result.stderr == ""
     line = next(line for line in result.stdout.splitlines() if line.startswith("FOLDED"))
     assert f"{folded['inverted_prisms']} prisms" in line and "-allow_folded" in line
+    assert "a hard way: tissue folds on it; move the bones less" in result.stdout
     assert last(tmp_path / "out.h5")["inverted_prisms"] == folded["inverted_prisms"]
 
 

@@ -31,12 +31,21 @@ struct PathSettings {
   double start_load = 0;  ///< of a restarted run
 };
 
+/// Load steps that were made again in two parts, by the reason.
+struct Halvings {
+  int64_t failed = 0;   ///< the search came to no end
+  int64_t folded = 0;   ///< more tissue was inside out
+  int64_t strayed = 0;  ///< it ended far from the prediction
+  int64_t count() const { return failed + folded + strayed; }
+  Halvings& operator+=(const Halvings& more);
+};
+
 /// What a run came to.
 struct PathOutcome {
   Outcome last;
   double load = 0;    ///< reached
   int64_t steps = 0;  ///< accepted
-  int64_t halvings = 0;
+  Halvings halvings;
   int64_t iterations = 0;
   bool leapt = false;  ///< it came from a guess, not along the path
   bool complete() const { return last.converged && load == 1; }
@@ -71,6 +80,7 @@ class LoadPath {
   void settle(Vec displacement, const OnStep& on_step);
   void leap(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
+  void take_back(const Attempt& tried, Vec displacement);
 
   discrete::Objective& objective_;
   Predictor predictor_;

@@ -95,6 +95,8 @@ TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
   constexpr PetscInt largest = 2147483647;
   EXPECT_NO_THROW(discrete::require_countable(715827882, largest));
   EXPECT_THROW(discrete::require_countable(715827883, largest), base::InputError);
+  EXPECT_NO_THROW(discrete::require_addressable(238609294, largest));
+  EXPECT_THROW(discrete::require_addressable(238609295, largest), base::InputError);
   constexpr int64_t many = 3'000'000'001;
   int64_t next = 0;
   for (int rank = 0; rank < 7; ++rank) {

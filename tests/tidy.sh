@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Runs clang-tidy 14 (Debian 12) with the checks of .clang-tidy over src and drivers, rooms in
+# batches; nothing need be built. Exit status 1 where it warns.
+#   tests/tidy.sh                    # all
+#   tests/tidy.sh 'solve|results'    # files and batches whose names match
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. drivers/setup.sh
+
+install_packages clang-tidy-14
+cmake --preset tidy >/dev/null
+exec run-clang-tidy-14 -quiet -p build-tidy -j "${JOBS:-$(nproc)}" "${1:-.}"

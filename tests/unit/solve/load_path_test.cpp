@@ -1,0 +1,146 @@
+#include "repose/solve/load_path.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "moved_block.h"
+
+namespace repose {
+namespace {
+
+using base::check;
+
+/// A slab of tissue on bone that goes aside by 1 mm.
+model::Model slab_on_moving_bone() {
+  model::Model slab = testing::block(5, 4, 3, 2, [](int, int, int a) {
+    return a == 2 ? model::PointSet::bone : model::PointSet::soft_tissue;
+  });
+  testing::aim(slab, [](const Vec3& at) { return Vec3(at + Vec3(0, 1, 0)); });
+  return slab;
+}
+
+/// A search that ends where a test says: `move(step)` is how far from its start all tissue goes,
+/// mm, and `fails(step)` whether it comes to no end, by the part of the load since the last step.
+class Scripted : public solve::RestSearch {
+ public:
+  std::function<Vec3(double step)> move = [](double) { return Vec3::Zero(); };
+  std::function<bool(double step)> fails = [](double) { return false; };
+  double accepted = 0;
+  int taken_back = 0;
+
+  explicit Scripted(const discrete::Positions& positions) : positions_(positions) {}
+  solve::Outcome run(Vec displacement, double) override {
+    const double step = positions_.load() - accepted;
+    const base::VecHandle way = positions_.make_vector();
+    positions_.keep_owned(std::vector<Vec3>(positions_.local().size(), move(step)), way);
+    check(VecAXPY(displacement, 1, way));
+    solve::Outcome outcome;
+    outcome.converged = !fails(step);
+    return outcome;
+  }
+  void go_back(Vec) override { ++taken_back; }
+
+ private:
+  const discrete::Positions& positions_;
+};
+
+struct Path : testing::MovedBlock {
+  solve::Problem problem{positions, {1, mechanics::VolumeTerm::penalty, 0.4}, false};
+  Scripted search{positions};
+  solve::PathSettings settings{.accuracy = 1e-3, .load_steps = 4};
+  base::VecHandle displacement = positions.make_vector();
+  std::vector<double> loads;
+
+  Path() : MovedBlock(slab_on_moving_bone()) {}
+  solve::PathOutcome run(Vec guess = nullptr) {
+    solve::LoadPath path(problem, search, settings);
+    return path.run(displacement, guess, [&](const solve::Outcome&, double load, double) {
+      loads.push_back(search.accepted = load);
+    });
+  }
+  /// All tissue lies deeper by so much, mm.
+  base::VecHandle lowered(double depth) const {
+    base::VecHandle v = positions.make_vector();
+    positions.keep_owned(std::vector<Vec3>(positions.local().size(), Vec3(0, 0, -depth)), v);
+    return v;
+  }
+};
+
+TEST(LoadPath, TakesStepsThatGoAsPredicted) {
+  Path path;
+  const solve::PathOutcome result = path.run();
+  EXPECT_TRUE(result.complete());
+  EXPECT_EQ(result.halvings.count(), 0);
+  EXPECT_EQ(path.loads, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
+  EXPECT_NEAR(discrete::largest_block(path.displacement), 1, 1e-6);  // with its bone
+}
+
+TEST(LoadPath, HalvesAStepThatFails) {
+  Path path;
+  path.search.fails = [](double step) { return step > 0.1; };
+  const solve::PathOutcome result = path.run();
+  EXPECT_TRUE(result.complete());
+  EXPECT_GE(result.halvings.failed, 2);
+  EXPECT_EQ(result.halvings.failed, result.halvings.count());
+  EXPECT_EQ(path.search.taken_back, result.halvings.count());
+  for (size_t i = 1; i < path.loads.size(); ++i) EXPECT_LE(path.loads[i] - path.loads[i - 1], 0.1);
+}
+
+TEST(LoadPath, EndsWhereEveryStepFails) {
+  Path path;
+  path.search.fails = [](double step) { return step > 0; };
+  const solve::PathOutcome result = path.run();
+  EXPECT_FALSE(result.complete());
+  EXPECT_EQ(result.halvings.failed, 5);
+  EXPECT_EQ(result.load, 0.25 / 32);
+}
+
+TEST(LoadPath, HalvesAStepThatFoldsTissue) {
+  Path path;
+  path.settings.accuracy = 1e3;  // any end is as predicted
+  path.search.move = [](double step) { return Vec3(0, 0, step > 0.2 ? -50 : 0); };
+  const solve::PathOutcome result = path.run();
+  EXPECT_TRUE(result.complete());
+  EXPECT_GE(result.halvings.folded, 2);
+  EXPECT_EQ(result.halvings.folded, result.halvings.count());
+  EXPECT_LT(discrete::largest_block(path.displacement), 2);
+}
+
+TEST(LoadPath, HalvesAStepThatEndsFarFromThePrediction) {
+  Path path;
+  path.search.move = [](double step) { return Vec3(4 * step * step, 0, 0); };
+  const solve::PathOutcome result = path.run();
+  EXPECT_TRUE(result.complete());
+  EXPECT_GE(result.halvings.strayed, 1);
+  EXPECT_EQ(result.halvings.strayed, result.halvings.count());
+  for (size_t i = 1; i < path.loads.size(); ++i)
+    EXPECT_NEAR(path.loads[i] - path.loads[i - 1], 0.125, 1e-12);
+}
+
+TEST(LoadPath, TakesAJumpThatHalvingDoesNotShrink) {
+  Path path;
+  path.search.move = [](double step) { return Vec3(step > 0 ? 0.2 : 0, 0, 0); };
+  const solve::PathOutcome result = path.run();
+  EXPECT_TRUE(result.complete());
+  EXPECT_GT(result.halvings.strayed, 0);
+  for (size_t i = 1; i < path.loads.size(); ++i)
+    EXPECT_GE(path.loads[i] - path.loads[i - 1], 0.124);
+}
+
+TEST(LoadPath, LeapsToAGuessThatIsNotFolded) {
+  Path path;
+  EXPECT_TRUE(path.run(path.lowered(0.5)).leapt);
+  EXPECT_EQ(path.loads, (std::vector<double>{0, 1}));
+}
+
+TEST(LoadPath, LeavesAGuessThatIsFolded) {
+  Path path;
+  const solve::PathOutcome result = path.run(path.lowered(50));
+  EXPECT_TRUE(result.complete());
+  EXPECT_FALSE(result.leapt);
+  EXPECT_EQ(path.loads.size(), 5u);
+}
+
+}  // namespace
+}  // namespace repose
