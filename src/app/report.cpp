@@ -220,17 +220,24 @@ std::string describe_stages(const base::Stages& stages) {
 
 std::string describe_failure(const solve::Summary& s, bool stretched) {
   if (s.path.complete()) return "";
-  return fmt::format(
-      "NOT CONVERGED: the run ended at load {:.4g} with an estimated {:.3g} mm to go ({}).{}\n",
-      s.path.load, s.last.displacement_error, s.last.reason, remedy(s, stretched));
+  return fmt::format("NOT CONVERGED: the run ended at load {:.4g} with {} to go ({}).{}\n",
+                     s.path.load,
+                     std::isfinite(s.last.displacement_error)
+                         ? fmt::format("an estimated {:.3g} mm", s.last.displacement_error)
+                         : "an unknown distance",
+                     s.last.reason, remedy(s, stretched));
 }
 
 std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,
                          const base::Stages& stages) {
   std::string text =
       report_row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
-  text += report_row("accuracy", fmt::format("{:.3g} mm reached, {:.3g} mm asked for",
-                                             s.last.displacement_error, settings.path.accuracy));
+  const double error = s.last.displacement_error;
+  text += report_row(
+      "accuracy",
+      fmt::format("{}, {:.3g} mm asked for",
+                  std::isfinite(error) ? fmt::format("{:.3g} mm reached", error) : "not known",
+                  settings.path.accuracy));
   text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
                                                          : "NOT A MINIMUM: negative curvature");
   if (s.initial_spectrum) text += report_row("at the start", stability(*s.initial_spectrum));

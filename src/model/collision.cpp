@@ -50,10 +50,13 @@ struct Mover {
   /// Depth of the deepest of `points`, placed by `pose`, inside this bone.
   double depth_of(const std::vector<Vec3>& points, const Mat4& pose) {
     if (!inside) inside = std::make_unique<surface::DistanceTree>(surface);
+    Eigen::AlignedBox3d box;
+    for (const Vec3& point : surface.points) box.extend(point);
     double depth = 0;
     for (const Vec3& point : points) {
       const Vec3 p = placed(pose, point);
-      if (inside->contains(p)) depth = std::max(depth, inside->nearest(p).distance);
+      if (box.contains(p) && inside->contains(p))
+        depth = std::max(depth, inside->nearest(p).distance);
     }
     return depth;
   }
@@ -106,6 +109,36 @@ void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) 
   if (pair.contact()) look_at_the_end(a, b, pair);
 }
 
+std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
+                             const std::vector<scene::RigidMotion>& moves) {
+  std::vector<Mover> movers;
+  for (size_t k = 0; k < bones.size(); ++k)
+    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr});
+  return movers;
+}
+
+/// Remarks on bones that end inside others, of a scene that asks for nothing about contacts.
+void tell_of_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
+                      std::vector<std::string>& remarks) {
+  constexpr double worth_saying = 1;  // mm: segmented teeth overlap by some tenths
+  const auto as_the_first = [&](const scene::RigidMotion& m) {
+    return move_alike(m, scene.moves[0]);
+  };
+  if (std::all_of(scene.moves.begin(), scene.moves.end(), as_the_first)) return;
+  std::vector<Mover> movers = movers_of(bones, scene.moves);
+  for (size_t i = 0; i < bones.size(); ++i)
+    for (size_t j = i + 1; j < bones.size(); ++j) {
+      if (move_alike(scene.moves[i], scene.moves[j])) continue;
+      BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
+      look_at_the_end(movers[i], movers[j], pair);
+      if (pair.depth > worth_saying)
+        remarks.push_back(fmt::format(
+            "bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide tells where they "
+            "meet, and collision: {{mode: clamp}} moves them no farther",
+            scene.bones[i].name, scene.bones[j].name, pair.depth));
+    }
+}
+
 }  // namespace
 
 bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
@@ -116,9 +149,7 @@ bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
                              const scene::Collision& wanted) {
-  std::vector<Mover> movers;
-  for (size_t k = 0; k < bones.size(); ++k)
-    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr});
+  std::vector<Mover> movers = movers_of(bones, moves);
   CollisionReport report;
   for (size_t i = 0; i < bones.size(); ++i)
     for (size_t j = i + 1; j < bones.size(); ++j) {
@@ -136,11 +167,13 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
                                   const scene::Collision& wanted) {
   std::vector<std::string> lines;
   for (const BonePair& pair : report.pairs) {
+    const std::string start = pair.gap > 0 ? fmt::format("{:.2f} mm apart", pair.gap) : "touching";
     std::string line =
-        fmt::format("bones '{}' and '{}', {:.2f} mm apart at the start: ", scene.bones[pair.a].name,
-                    scene.bones[pair.b].name, pair.gap);
+        fmt::format("bones '{}' and '{}', {} at the start: ", scene.bones[pair.a].name,
+                    scene.bones[pair.b].name, start);
     if (!pair.contact())
-      line += fmt::format("stay {} mm apart", wanted.clearance);
+      line += wanted.clearance > 0 ? fmt::format("stay {} mm apart", wanted.clearance)
+                                   : std::string("do not come to touch");
     else
       line += fmt::format("come within {} mm at load {:.4f}, at ({:.1f}, {:.1f}, {:.1f})",
                           wanted.clearance + wanted.tolerance, pair.load, pair.at.x(), pair.at.y(),
@@ -158,7 +191,7 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
 
 void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
                      std::vector<std::string>& remarks) {
-  if (!scene.collision) return;
+  if (!scene.collision) return tell_of_overlaps(bones, scene, remarks);
   const CollisionReport report = follow_moves(bones, scene.moves, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
   remarks.insert(remarks.end(), lines.begin(), lines.end());

@@ -109,10 +109,17 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
 }
 
 TEST(Collisions, report_and_none_change_nothing) {
-  scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({0, 0, 20})});
+  scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({8, 0, 20})});
   std::vector<std::string> remarks;
   heed_collisions(jaws, scene, remarks);
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_EQ(remarks[0].find("bones 'upper' and 'lower' end 5.0 mm inside one another"), 0u)
+      << remarks[0];
+  scene.moves[1] = RigidMotion::translation({8, 0, 10.9});
+  remarks.clear();
+  heed_collisions(jaws, scene, remarks);
   EXPECT_TRUE(remarks.empty());
+  scene.moves[1] = RigidMotion::translation({8, 0, 20});
   scene.collision = scene::Collision{};
   heed_collisions(jaws, scene, remarks);
   EXPECT_EQ(scene.moves[1].apply(Vec3::Zero()).z(), 20);
