@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "repose/surface/edges.h"
+#include "fans.h"
 #include "repose/surface/intersections.h"
 
 namespace repose::surface {
@@ -29,18 +29,6 @@ void count_edge_defects(const EdgeTable& edges, Defects& d) {
     d.first_non_manifold_edge[0] = edge[0].low;
     d.first_non_manifold_edge[1] = edge[0].high;
   }
-}
-
-/// Corners of triangles united to fans over the edges that two triangles share.
-UnionFind fans(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  UnionFind corners(3 * static_cast<int64_t>(triangles.size()));
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const auto edge = edges[e];
-    if (edge.size() != 2) continue;
-    corners.unite(edge[0].corner_at_low(), edge[1].corner_at_low());
-    corners.unite(edge[0].corner_at_high(), edge[1].corner_at_high());
-  }
-  return corners;
 }
 
 void count_fans(const Surface& surface, UnionFind& corners, Defects& d) {

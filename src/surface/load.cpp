@@ -1,3 +1,4 @@
+#include "fans.h"
 #include "repose/base/error.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/edges.h"
@@ -81,7 +82,11 @@ Surface accept_surface(const Surface& raw, Role role) {
   if (surface.triangles.empty())
     base::refuse("{}: none of its {} triangles has an area; export the mesh anew", surface.name,
                  raw.triangles.size());
-  const Defects defects = inspect(surface, false);
+  Defects defects = inspect(surface, false);
+  if (role == Role::mesh && defects.non_manifold_edges == 0 && defects.non_manifold_vertices > 0) {
+    split_fans(surface);
+    defects = inspect(surface, false);
+  }
   check_manifold(surface, defects, role);
   if (role == Role::skin) check_one_component(surface, defects);
   if (role == Role::bone) check_closed(surface, defects);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "fans.h"
 #include "repose/base/error.h"
-#include "repose/surface/edges.h"
 
 namespace repose::surface {
 namespace {
@@ -116,14 +116,7 @@ void keep_largest(ScanMesh& mesh) {
 /// Gives each fan of triangles at a point a point of its own, and drops points without triangles.
 void renumber(ScanMesh& mesh, const PointData& data) {
   std::vector<Triangle>& triangles = mesh.surface.triangles;
-  const EdgeTable edges(triangles);
-  UnionFind corners(3 * static_cast<int64_t>(triangles.size()));
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const auto edge = edges[e];
-    if (edge.size() != 2) continue;
-    corners.unite(edge[0].corner_at_low(), edge[1].corner_at_low());
-    corners.unite(edge[0].corner_at_high(), edge[1].corner_at_high());
-  }
+  UnionFind corners = fans(triangles, EdgeTable(triangles));
   std::map<int64_t, int64_t> row;  // of the fan's first corner
   std::vector<int64_t> source;
   for (int64_t c = 0; c < 3 * static_cast<int64_t>(triangles.size()); ++c) {

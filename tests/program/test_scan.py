@@ -51,6 +51,15 @@ def test_a_real_scan_becomes_a_mesh(run, tmp_path, name, cells):
 
 
 @real
+def test_a_scan_can_be_decimated(run):
+    """Its sheets touch in points, which are doubled."""
+    made = run("repose-scan", DATA / "bun000.ply", "-output", "scan.ply")
+    assert made.returncode == 0 and int(re.search(r"(\d+) doubled", made.stdout)[1]) > 0
+    result = run("repose-decimate", "scan.ply", "-distance", 1, "-output", "less.ply")
+    assert (result.returncode, result.stderr) == (0, ""), result
+
+
+@real
 def test_the_largest_component_alone(run):
     result = run("repose-scan", DATA / "bun000.ply", "-largest")
     assert result.returncode == 0

@@ -12,7 +12,7 @@ namespace repose::surface {
 enum class Role {
   skin,  ///< may be open: a manifold patch or a closed surface, one component
   bone,  ///< closed, manifold, oriented outwards; several components are allowed
-  mesh,  ///< manifold, open or closed, of any size and any number of components
+  mesh,  ///< manifold once sheets that touch in points are parted; of any size and parts
   raw    ///< any triangles of a head's size, which stay as they are
 };
 

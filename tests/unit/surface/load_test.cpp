@@ -67,6 +67,11 @@ TEST_F(Load, non_manifold_edges_and_vertices_of_either_role) {
     EXPECT_TRUE(says(refused(pinched, role), "1 non-manifold vertex(es)"));
     EXPECT_TRUE(says(refused(pinched, role), "first at (100.00, 100.00, 100.00) mm"));
   }
+  EXPECT_TRUE(says(refused(fin, Role::mesh), "1 non-manifold edge(s)"));
+  const Surface parted = load_surface(write("pinched.off", off_text(pinched)), Role::mesh);
+  EXPECT_EQ(parted.points.size(), pinched.points.size() + 1) << "a point for each sheet";
+  EXPECT_EQ(inspect(parted).non_manifold_vertices, 0);
+  EXPECT_EQ(inspect(parted).components, 2);
 }
 
 TEST_F(Load, a_moebius_strip_has_no_orientation) {
