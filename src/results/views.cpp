@@ -61,6 +61,7 @@ XdmfBlock springs(const FileCounts& counts, size_t steps) {
           .geometry = moving_points(steps),
           .arrays = {{"elongation", "step/spring/elongation"},
                      {"tension", "step/spring/tension"},
+                     {"rest_length", "/model/spring/rest_length"},
                      {"set", "/model/spring/set", false, false, short_integer}}};
 }
 

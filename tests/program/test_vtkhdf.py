@@ -1,11 +1,14 @@
 """NAME.h5 as a VTKHDF file: what VTK and ParaView open is what HDF5 holds, stored once."""
 
+import os
+import shutil
+import sys
 
 import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT, vtk_version
+from conftest import PROJECT, finish
 from tissue import last, model_of, steps, write_model
 
 OPENING = "paper_jaw_opening.yaml"
@@ -116,18 +119,22 @@ def test_advance_is_the_way_along_the_normal_of_the_skin_above(opening):
     assert normal[column[mouth]][1] < 0
 
 
-def test_stress_stretch_and_uncertainty_of_a_solid_are_shown(run, tmp_path):
+def test_what_a_solid_tells_is_shown(run, environment, tmp_path):
     head = "\n".join(f"  - {{name: {bone}, file: {PROJECT}/meshes/paper_{bone}.ply}}"
                      for bone in ("skull", "mandible"))
     (tmp_path / "solid.yaml").write_text(
         f"skin: {PROJECT}/meshes/paper_skin.ply\nbones:\n{head}\n"
         "tissue: {layers: 3, material: {preset: face}}\n"
         "moves: [{bone: mandible, translate: [0, -3, 0]}]\n")
-    assert run("repose-solve", "solid.yaml", "-discretisation", "-output", "solid").returncode == 0
+    solved = run("repose-solve", "solid.yaml", "-discretisation", "-stability", "-output", "solid")
+    assert solved.returncode == 0, solved
+    read_back(tmp_path / "solid.h5", environment)
     with h5py.File(tmp_path / "solid.h5") as h5:
         shows(h5, "von_mises")
         shows(h5, "principal_stretch")
-        shows(h5, "discretisation_error", "point")
+        for name in ("discretisation_error", "contact_gap", "contact_pressure", "contact_force"):
+            shows(h5, name, "point")
+        assert "stability_mode" in h5["VTKHDF/PointData"]
         assert h5["VTKHDF/CellData/principal_stretch"].shape[1] == 3
 
 
@@ -142,46 +149,24 @@ def test_a_model_without_prisms_shows_its_springs(solved, run, tmp_path):
         assert np.array_equal(h5["VTKHDF/Connectivity"][:], model["spring/points"].ravel())
 
 
-def shown(grids, name, vtk):
-    """An array of the parts that VTK read, by its name in the file."""
-    place, _, array = name.partition("/")
-    found = []
-    for grid in grids:
-        data = {"Points": grid.GetPoints, "PointData": grid.GetPointData,
-                "CellData": grid.GetCellData}[place]()
-        found.append(vtk.util.numpy_support.vtk_to_numpy(
-            data.GetArray(array) if array else data.GetData()))
-    return np.concatenate(found)
+def read_back(file, environment):
+    """Compares all that this Python's readers show, and those that REPOSE_READERS names."""
+    others = [name for name in os.environ.get("REPOSE_READERS", "").split(":") if name]
+    for python in [sys.executable, *others]:
+        said = finish([python, str(PROJECT / "tests/program/read_back.py"), str(file)], file.parent,
+                      environment, 120)
+        assert (said.returncode, said.stderr) == (0, ""), said
+        assert said.stdout.count(f"{len(steps(file))} load steps") == said.stdout.count("agree") > 0
 
 
-def test_vtk_reads_every_array_of_every_step(opening):
-    if vtk_version() < (9, 3):
-        pytest.skip("no VTK from 9.3 on (pip install vtk)")
-    import vtkmodules.all as vtk
-    import vtkmodules.util.numpy_support
-    reader = vtk.vtkHDFReader()
-    reader.SetFileName(str(opening))
-    reader.UpdateInformation()
-    times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
-    path, model = steps(opening), model_of(opening)
-    assert list(times) == [step["load"] for step in path]
-    for time, step in zip(times, path):
-        reader.UpdateTimeStep(time)
-        read = reader.GetOutputDataObject(0)
-        grids = [read]  # VTK 9.3 merges the parts, later ones do not
-        if read.IsA("vtkPartitionedDataSet"):
-            grids = [read.GetPartition(part) for part in range(read.GetNumberOfPartitions())]
-        rows = {"PointData": len(model["bone_surfaces/points"]),
-                "CellData": len(model["bone_surfaces/bone"])}
-        for name, array in (MOVING | STAYING).items():
-            tissue = step[array] if name in MOVING else model[array]
-            wanted = of_both_parts(name, tissue, model, step, rows.get(name.split("/")[0]))
-            assert same(shown(grids, name, vtkmodules), wanted), (time, name)
-        bone = shown(grids, "CellData/bone", vtkmodules)
-        assert np.array_equal(bone[-len(model["bone_surfaces/bone"]):], model["bone_surfaces/bone"])
-        types = [grid.GetCellType(i) for grid in grids for i in range(grid.GetNumberOfCells())]
-        assert np.array_equal(types, np.where(bone < 0, 13, 5))
-        kind = vtkmodules.util.numpy_support.vtk_to_numpy
-        corners = kind(grids[0].GetCells().GetConnectivityArray())
-        prisms = model["prism/points"].size
-        assert np.array_equal(corners[:prisms], model["prism/points"].ravel())
+def test_other_programs_read_every_array_of_every_step(opening, environment):
+    read_back(opening, environment)
+
+
+def test_a_reader_that_shows_another_step_is_noticed(opening, environment, tmp_path):
+    for part in opening.parent.glob(f"{opening.stem}*"):
+        shutil.copy(part, tmp_path)
+    view = tmp_path / f"{opening.stem}_tissue.xdmf"
+    view.write_text(view.read_text().replace("step/0002/point/adv", "step/0001/point/adv"))
+    with pytest.raises(AssertionError, match="tissue, step 0002, advance: .* they differ"):
+        read_back(tmp_path / opening.name, environment)
