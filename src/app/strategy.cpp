@@ -74,6 +74,7 @@ std::vector<adapt::Resolution> resolutions_for(const Wish& wish, const model::An
   constexpr int64_t preview_columns = 4000;
   if (wish.coarse == Coarse::compare) return adapt::halved_resolutions(anatomy);
   const auto columns = static_cast<int64_t>(anatomy.skin.points.size());
+  if (!wish.insisted && columns < preview_columns) return {};  // is as soon solved itself
   return adapt::compared_resolutions(anatomy, wish.insisted ? columns : preview_columns);
 }
 
