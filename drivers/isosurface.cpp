@@ -3,16 +3,21 @@
 ///     repose-isosurface ct.nii.gz -level -300 -largest -output skin.ply
 ///     repose-isosurface dicom_folder -level 300 -components_above 1000 -smooth 10 -output bone.stl
 ///     repose-isosurface labels.nii.gz -labels -largest -output bones.ply
+///     repose-isosurface ct.mhd -level 226 -apart skull.mrk.json jaw.mrk.json -largest -output
+///     bone.ply
 ///
-/// Writes the mesh, with -labels one a label (bones_1.ply, bones_2.ply, …), in LPS and mm, and says
-/// what it did to the data. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
+/// Writes the mesh, with -labels one a label (bones_1.ply, bones_2.ply, …), with -apart one a bone,
+/// in LPS and mm, and says what it did to the data. Exit status: 0 done, 1 bad input (nothing
+/// written), 3 internal error.
 #include <cstdio>
 
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/imaging/extract.h"
+#include "repose/imaging/part_bones.h"
 #include "repose/imaging/volume_filter.h"
+#include "repose/scene/landmarks.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/write.h"
@@ -31,6 +36,14 @@ std::vector<base::Option> option_table() {
           {"otsu", OptionKind::flag, "", "The level by Otsu's method, from the values."},
           {"label", OptionKind::integer, "", "Surface of one label of a label map.", {1, 100000}},
           {"labels", OptionKind::flag, "", "One mesh for every label: NAME_LABEL.ply."},
+          {"apart",
+           OptionKind::path,
+           "",
+           "Points in one bone, and in another that touches it: NAME_1.ply, NAME_2.ply.",
+           {},
+           "",
+           {},
+           2},
           {"box",
            OptionKind::number,
            "",
@@ -125,19 +138,44 @@ void write_one(const imaging::Volume& volume, const imaging::Extraction& wanted,
   std::printf("%s: %s\n", file.c_str(), summary.c_str());
 }
 
+std::vector<Vec3> points_in(const std::string& file) {
+  std::vector<Vec3> points;
+  for (const scene::Landmark& landmark : scene::read_landmarks(file))
+    points.push_back(landmark.position);
+  return points;
+}
+
+/// A surface of each of two bones that touch.
+void write_apart(const imaging::Volume& volume, imaging::Extraction wanted,
+                 const std::vector<std::string>& files, const std::string& output) {
+  if (wanted.otsu) wanted.level = imaging::otsu_level(volume);
+  wanted.otsu = false;
+  base::Progress progress(MPI_COMM_WORLD);
+  progress.show("parting the bones", -1);
+  const imaging::PartedBones bones =
+      imaging::part_bones(volume, *wanted.level, {points_in(files[0]), points_in(files[1])});
+  progress.clear();
+  std::printf("  parted where voxels share %.0f mm²\n", bones.cut_area);
+  for (int part = 0; part < 2; ++part)
+    write_one(bones.parts[part], wanted, numbered(output, part + 1));
+}
+
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
   imaging::Extraction wanted = wanted_of(options);
-  const bool all = options.flag("labels");
+  const bool all = options.flag("labels"), apart = options.has("apart");
   if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
     base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
+  if (apart && (all || wanted.label))
+    base::refuse("repose-isosurface: -apart goes with -level or -otsu: labels are apart already");
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("reading", -1);
   const imaging::Volume volume = imaging::read_volume(
       options.arguments()[0], [&](double done) { progress.show("reading slices", done); });
   progress.clear();
   print_volume(volume);
+  if (apart) return write_apart(volume, wanted, options.texts("apart"), output);
   if (!all) return write_one(volume, wanted, output);
   const auto labels = imaging::labels_of(volume);
   if (labels.empty()) base::refuse("{}: holds no label, only 0", volume.name);
