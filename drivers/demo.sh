@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing (apt), builds, solves the shipped head on two MPI ranks, recomputes every
-# number of the result independently and says where to look. With --ct the head is that of the CT in
-# Debian's package invesalius-examples, from its voxels to the solved face.
+# number of the result independently, writes a page about it with a head to turn, and says how long
+# each took. With --ct the head is that of the CT in Debian's package invesalius-examples, from its
+# voxels to the solved face.
 # REPOSE_BUILD=FOLDER takes the programs of a build folder that is already there instead.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -12,13 +13,20 @@ case "$*" in
   *) echo "demo.sh: unknown argument: $*; it takes none, or --ct" >&2 && exit 1 ;;
 esac
 
+laps= landmarks=() since=$SECONDS
+lap() { # what has been done since the last
+  laps+="${laps:+, }$1 $((SECONDS - since)) s" since=$SECONDS
+}
+
 if [ -n "${REPOSE_BUILD:-}" ]; then
   build=$REPOSE_BUILD
 else
   build=build
-  install_packages "${build_packages[@]}"
+  install_packages "${build_packages[@]}" "${report_packages[@]}"
+  lap packages
   cmake --preset release
   cmake --build --preset release
+  lap build
 fi
 
 mpi_environment
@@ -45,17 +53,25 @@ unpack_ct() {
 if [ -n "$ct" ]; then
   unpack_ct "$build/demo/ct"
   scene=$build/demo/ct/ct_maxilla.yaml
+  lap surfaces
 else
   scene=meshes/head_solid.yaml
+  landmarks=(-landmarks meshes/head.mrk.json)
 fi
 result=$build/demo/$(basename "$scene" .yaml)
 mpirun -n 2 "$build/bin/repose-solve" "$scene" -output "$result"
+lap solve
 "$build/bin/repose-check" "$result.h5" | tee "${result}_check.txt" | tail -n 1
+lap check
+/usr/bin/python3 drivers/report.py "$result" -scene "$scene" "${landmarks[@]}"
+lap page
 
 cat <<TEXT
 
 The result is in $build/demo: every load step, displacement, force and volume ratio,
 and what the check recomputed (${result}_check.txt).
+Look at it in any browser:  $result.html
 Look at it in ParaView:   paraview ${result}_skin.xdmf ${result}_bones.xdmf
 A picture of it, before and after:   drivers/render.py $result
+Time: $laps.
 TEXT

@@ -44,4 +44,4 @@ def test_command_runs(folder, environment, command):
 def test_the_demo_leaves_what_it_names(folder):
     left = {path.name for path in (folder / "build" / "demo").iterdir()}
     assert {f"head_solid{end}" for end in (
-        ".h5", "_skin.xdmf", "_bones.xdmf", "_tissue.xdmf")} <= left
+        ".h5", ".html", "_skin.xdmf", "_bones.xdmf", "_tissue.xdmf")} <= left
