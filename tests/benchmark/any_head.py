@@ -5,6 +5,7 @@
 
 Makes the skins of tests/program/heads.py from the CT in ../shared/data/head; builds a model of each
 with edges of 2, 4 and 8 mm, solves those of 4 mm, and compares the displacements on the given skins.
+One more skin is large, with a table and a tube, and is solved on 1, 2 and 3 ranks.
 Needs: apt-get install --no-install-recommends python3-h5py python3-meshio python3-scipy
 """
 
@@ -22,6 +23,8 @@ BUILT = ("| skin | edge, mm | vertices | least angle | to the given skin, mm: 95
          "| columns bent | shortened |\n|---" + "|--:" * 6 + "|")
 APART = ("| skin | CPU, s | memory, MiB | displacement from the CT's, mm: 50 % | 95 % | all |\n|---"
          + "|--:" * 5 + "|")
+
+RANKS = "| ranks | CPU, s | displacement from that on one, mm: 95 % | all |\n|---" + "|--:" * 3 + "|"
 
 
 def number(pattern, text):
@@ -47,7 +50,7 @@ def built_rows(options, folder):
 def apart_rows(options, folder):
     heads.make_scenes(folder)
     faces = {}
-    for variant in heads.VARIANTS:
+    for variant in [*heads.VARIANTS, heads.LARGE]:
         done = run([options.bin / "repose-solve", f"{variant}.yaml", "-output", variant], folder,
                    ends=(0,))
         faces[variant] = heads.face_of(folder, variant)
@@ -57,6 +60,16 @@ def apart_rows(options, folder):
                f"| {largest:.2f} |")
 
 
+def ranks_rows(options, folder):
+    one = heads.face_of(folder, heads.LARGE)
+    for ranks in (2, 3):
+        done = run([options.bin / "repose-solve", f"{heads.LARGE}.yaml", "-output", "ranks"], folder,
+                   ranks, ends=(0,))
+        distances = np.linalg.norm(heads.face_of(folder, "ranks")[1] - one[1], axis=1)
+        most, largest = np.quantile(distances, [0.95, 1])
+        yield f"| {ranks} | {done.seconds:.0f} | {most:.4f} | {largest:.4f} |"
+
+
 def main():
     options = option_parser(__doc__).parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -64,7 +77,9 @@ def main():
         heads.make_surfaces(folder, lambda program, *arguments: run(
             [options.bin / program, *map(str, arguments)], folder, ends=(0,)))
         print_table(BUILT, built_rows(options, folder), options.output, "built")
+        heads.make_large(folder)
         print_table(APART, apart_rows(options, folder), options.output, "apart")
+        print_table(RANKS, ranks_rows(options, folder), options.output, "ranks")
 
 
 if __name__ == "__main__":

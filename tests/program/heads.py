@@ -14,6 +14,7 @@ SCENE = PROJECT / "meshes/real_head_ct.yaml"
 BONES = {"skull": 1, "mandible": 2}
 AXIS, CENTER = np.array([0.9995, 0.0038, -0.0327]), np.array([2.4, -208.2, 398.3])
 VARIANTS = ["volume", "raw", "decimated", "turned", "noise", "soup"]
+LARGE = "clinic"  # 2.5 million triangles, with a table and a tube: too long for a test
 
 
 def turn():
@@ -37,6 +38,52 @@ def soup(points, triangles, random):
     flipped = random.random(len(triangles)) < 0.1
     triangles[flipped] = triangles[flipped][:, ::-1]
     return triangles
+
+
+def box(low, high):
+    """Triangles of a box, [12, 3, 3]."""
+    corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners[[(f[0], f[2 + k], f[1 + k]) for f in faces for k in (0, 1)]]
+
+
+def tube(begin, end, radius, sides=48):
+    """Triangles of an open tube, [2 sides, 3, 3]."""
+    along = np.subtract(end, begin) / np.linalg.norm(np.subtract(end, begin))
+    across = np.cross(along, [1, 0, 0]) / np.linalg.norm(np.cross(along, [1, 0, 0]))
+    angle = np.linspace(0, 2 * np.pi, sides + 1)[:, None]
+    ring = radius * (np.cos(angle) * across + np.sin(angle) * np.cross(along, across))
+    a, b, c, d = ring[:-1] + begin, ring[1:] + begin, ring[:-1] + end, ring[1:] + end
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])
+
+
+def in_nine(corners):
+    """Every triangle as nine, [9 n, 3, 3]."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+
+    def at(i, j):
+        return a + i / 3 * (b - a) + j / 3 * (c - a)
+    parts = [(at(i, j), at(i + 1, j), at(i, j + 1)) for i in range(3) for j in range(3 - i)]
+    parts += [(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)) for i in range(2) for j in range(2 - i)]
+    return np.concatenate([np.stack(part, 1) for part in parts])
+
+
+def write_stl(file, corners):
+    """Binary STL of loose triangles [n, 3, 3], as 3D Slicer writes it."""
+    rows = np.zeros(len(corners), [("normal", "<3f4"), ("corners", "<9f4"), ("more", "<u2")])
+    rows["corners"] = corners.reshape(-1, 9)
+    file.write_bytes(bytes(80) + np.uint32(len(rows)).tobytes() + rows.tobytes())
+
+
+def make_large(top):
+    """The raw skin of make_surfaces, finer, with the table it lies on and a tube in its mouth."""
+    mesh = meshio.read(top / "raw.ply")
+    low, high = mesh.points.min(0), mesh.points.max(0)
+    table = box((low[0] - 50, high[1] - 3, low[2]), (high[0] + 50, high[1] + 20, high[2]))
+    corners = in_nine(mesh.points[mesh.cells_dict["triangle"]])
+    write_stl(top / f"{LARGE}.stl", np.concatenate(
+        [corners, table, tube((2, -285, 369), (2, -380, 380), 4.5)]))
+    (top / f"{LARGE}.yaml").write_text(scene_of(f"{LARGE}.stl"))
 
 
 def scene_of(skin, edge=4, prefix="", axis=AXIS, center=CENTER):
