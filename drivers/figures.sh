@@ -22,7 +22,7 @@ solve "$project/meshes/head_genioplasty.yaml" chin && render chin fig7_chin_forw
 solve "$project/meshes/head_instrument.yaml" instrument && render instrument fig8_instrument
 for turgor in 02 05 10 20; do
   sed -E "s|turgor: [0-9.]+|turgor: 0.$turgor|; s|: head_|: $project/meshes/head_|" \
-    "$project/meshes/head_incision.yaml" >"turgor_$turgor.yaml"
+    "$project/meshes/head_springs_incision.yaml" >"turgor_$turgor.yaml"
   solve "turgor_$turgor.yaml" "turgor_$turgor"
 done
 python3 "$project/drivers/plot_incision.py" fig9_incision.png turgor_{02,05,10,20}.h5

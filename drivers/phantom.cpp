@@ -1,6 +1,6 @@
 /// repose-phantom: writes a synthetic head of any resolution, with scenes to solve.
 ///
-///     repose-phantom -skin_vertices 477 -output paper
+///     repose-phantom -skin_vertices 477 -springs -output paper
 ///     repose-phantom -skin_vertices 20000 -bone_edge 2 -output fine
 ///
 /// Writes NAME_skin.ply, NAME_skull.ply, NAME_mandible.ply, NAME_landmarks.json, NAME.mrk.json
@@ -30,6 +30,7 @@ std::vector<base::Option> option_table() {
            {meshtools::phantom_bone_edge_min, meshtools::phantom_bone_edge_max},
            "mm",
            {"auto"}},
+          {"springs", OptionKind::flag, "", "Scenes of springs, as the paper's, not of a solid."},
           {"output", OptionKind::path, "head", "Path of the files without ending."}};
 }
 
@@ -41,7 +42,9 @@ void write_head(const base::Options& options) {
   for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
     std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),
                 part->triangles.size());
-  for (const auto& file : meshtools::write_phantom(options.text("output"), head))
+  const auto tissue =
+      options.flag("springs") ? meshtools::PhantomTissue::springs : meshtools::PhantomTissue::solid;
+  for (const auto& file : meshtools::write_phantom(options.text("output"), head, tissue))
     std::printf("  wrote %s\n", file.c_str());
 }
 

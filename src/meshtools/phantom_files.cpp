@@ -61,7 +61,20 @@ constexpr SceneText advance{
     "# The synthetic head after surgery that brings the lower jaw forward.\n",
     "  - {bone: mandible, translate: [0, -6, 0]}   # forward is −y\n"};
 
-std::string scene_yaml(const SceneText& scene, std::string_view stem) {
+struct TissueText {
+  const char *kind, *solve;
+};
+
+constexpr TissueText solid{
+    "  material: {preset: face}   # a neo-Hookean solid, docs/guide/materials.md\n", ""};
+
+constexpr TissueText springs{
+    "  springs:\n"
+    "    default: {stiffness: 1.0, law: quartic, reference: 1.0}   # N/mm, mm\n",
+    "solve:\n"
+    "  volume: {form: penalty, poisson: 0.4967}   # the tissue keeps its volume, nearly\n"};
+
+std::string scene_yaml(const SceneText& scene, const TissueText& tissue, std::string_view stem) {
   return fmt::format(
       "{0}"
       "# Axes LPS, mm: +x patient left, +y posterior (the face looks to −y), +z up.\n"
@@ -71,19 +84,18 @@ std::string scene_yaml(const SceneText& scene, std::string_view stem) {
       "  - {{name: mandible, file: {1}_mandible.ply}}\n"
       "tissue:\n"
       "  layers: 4                  # skin and deepest included\n"
-      "  springs:\n"
-      "    default: {{stiffness: 1.0, law: quartic, reference: 1.0}}   # N/mm, mm\n"
+      "{3}"
       "moves:\n"
       "{2}"
-      "solve:\n"
-      "  volume: {{form: penalty, poisson: 0.4967}}   # the tissue keeps its volume, nearly\n",
-      scene.title, stem, scene.move);
+      "{4}",
+      scene.title, stem, scene.move, tissue.kind, tissue.solve);
 }
 
 }  // namespace
 
 std::vector<std::filesystem::path> write_phantom(const std::filesystem::path& prefix,
-                                                 const Phantom& phantom) {
+                                                 const Phantom& phantom, PhantomTissue kind) {
+  const TissueText& tissue = kind == PhantomTissue::springs ? springs : solid;
   std::vector<std::filesystem::path> written;
   const auto named = [&](std::string_view ending) {
     return written.emplace_back(prefix.string() + std::string(ending));
@@ -94,8 +106,8 @@ std::vector<std::filesystem::path> write_phantom(const std::filesystem::path& pr
   base::write_whole_file(named("_landmarks.json"), landmarks_json(phantom.landmarks));
   base::write_whole_file(named(".mrk.json"), fiducials_json(phantom.landmarks));
   const std::string stem = prefix.filename().string();
-  base::write_whole_file(named("_jaw_opening.yaml"), scene_yaml(opening, stem));
-  base::write_whole_file(named("_jaw_advance.yaml"), scene_yaml(advance, stem));
+  base::write_whole_file(named("_jaw_opening.yaml"), scene_yaml(opening, tissue, stem));
+  base::write_whole_file(named("_jaw_advance.yaml"), scene_yaml(advance, tissue, stem));
   return written;
 }
 

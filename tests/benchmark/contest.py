@@ -235,7 +235,8 @@ class Contest:
         return done.stdout
 
     def synthetic_head(self):
-        self.run("repose-phantom", "-skin_vertices", LARGE, "-output", "large")
+        self.run("repose-phantom", "-skin_vertices", LARGE, "-springs",
+                 "-output", "large")
         return self.folder / "large_jaw_advance.yaml"
 
     def of_program(self, method, *options):

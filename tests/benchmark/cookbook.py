@@ -2,7 +2,7 @@
 """What options of the solver cost on two shipped scenes: the table of the solver cookbook.
 
     tests/benchmark/cookbook.py [-bin build/bin] [-recipes "-load_steps 4;-tao_type ntr;…"]
-                                [-scenes head_solid,head_genioplasty]
+                                [-scenes head_solid,head_springs_genioplasty]
                                 [-output docs/guide/solver.md]
 
 The first recipe, no options, is what the CPU time of the others is compared with. Counts are those
@@ -55,7 +55,7 @@ def rows_of(chosen):
 
 def main():
     chosen = option_parser(__doc__, recipes=";".join(RECIPES),
-                           scenes="head_solid,head_genioplasty").parse_args()
+                           scenes="head_solid,head_springs_genioplasty").parse_args()
     scenes = chosen.scenes.split(",")
     head = "| options |" + "".join(f" {scene}: evaluations | Hessian products | preconditioner | CPU |"
                                    for scene in scenes) + "\n|---|" + "--:|" * 4 * len(scenes)

@@ -8,7 +8,7 @@ import pytest
 from conftest import PROJECT
 from tissue import apart, last, model_of, steps
 
-CHIN = "head_genioplasty.yaml"
+CHIN = "head_springs_genioplasty.yaml"
 
 
 def number(text, name):

@@ -50,7 +50,7 @@ def test_force_and_energy_meet(solved, small, scene, weight):
 
 def test_force_and_energy_meet_after_the_whole_move_of_the_finer_head(solved, tmp_path):
     """With weight and without volume term; the opening has many minima there, the advance one."""
-    text = (PROJECT / "meshes/head_jaw_advance.yaml").read_text()
+    text = (PROJECT / "meshes/head_springs_advance.yaml").read_text()
     text = text.replace(": head_", f": {PROJECT}/meshes/head_")
     text = text.replace("  layers: 4 ", "  density: 1.0e-6\n  layers: 4 ")
     scene = tmp_path / "advance.yaml"

@@ -9,7 +9,7 @@ from tissue import apart, last, model_of, same_face
 
 PATH = "[[47, -80, 8], [49, -75, -8], [46.5, -70, -24]]"
 # The shipped scene on the coarser head.
-SCENE = (PROJECT / "meshes/head_incision.yaml").read_text().replace("head_", "paper_")
+SCENE = (PROJECT / "meshes/head_springs_incision.yaml").read_text().replace("head_", "paper_")
 BALL = """instruments:
   - {sphere: {center: [57, -90, -10], radius: 20}, push: [-9, 12, 0]}
 """

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
-from tissue import Tissue, apart, last, model_of, prism_volumes, steps
+from tissue import Tissue, apart, as_springs, last, model_of, prism_volumes, steps
 
-SHIPPED = (PROJECT / "meshes/head_instrument.yaml").read_text()
+SHIPPED = as_springs((PROJECT / "meshes/head_instrument.yaml").read_text()).replace(
+    "stiffness: 1.0", "modulus: 0.05")
 SHAPE = "sphere: {center: [63, -98, -10], radius: 20}"
 # The coarser head, and a ball large enough for it.
 SCENE = SHIPPED.replace("head_", "paper_").replace("sphere: {center: [57, -90, -10], radius: 10}",

@@ -11,7 +11,7 @@ import pytest
 from conftest import PROJECT, programs
 from tissue import apart, last, steps
 
-SCENE = PROJECT / "meshes/head_jaw_opening.yaml"
+SCENE = PROJECT / "meshes/head_springs_opening.yaml"
 
 
 def begin(folder, environment, *arguments, ranks=1):

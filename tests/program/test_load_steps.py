@@ -28,7 +28,7 @@ def test_twice_as_many_steps(solved, scene):
 
 
 def test_twice_as_many_steps_on_the_finer_head(solved):
-    check(solved, "head_jaw_advance.yaml", 1e-6, [2], ranks=2)
+    check(solved, "head_springs_advance.yaml", 1e-6, [2], ranks=2)
 
 
 def test_loads_rise_to_one(solved):

@@ -48,7 +48,7 @@ def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ran
 
 
 def test_a_search_of_one_load_step_tells_the_time_left(environment, tmp_path):
-    text = seen([programs() / "repose-solve", PROJECT / "meshes/head_jaw_advance.yaml", "-tao_type",
+    text = seen([programs() / "repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-tao_type",
                  "lmvm", "-accuracy", "1e-6", "-load_steps", "1"], tmp_path, environment)
     assert "load 1.000" in text and "load 0.5" not in text
     assert " s left" in text

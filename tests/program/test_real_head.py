@@ -21,7 +21,7 @@ def folder(tmp_path_factory):
     top = tmp_path_factory.mktemp("real_head")
     for name in ("face.ply", "skull.ply", "mandible.ply"):
         (top / name).symlink_to(DATA / name)
-    (top / "scene.yaml").symlink_to(PROJECT / "meshes/real_head_jaw.yaml")
+    (top / "scene.yaml").symlink_to(PROJECT / "meshes/real_head_springs.yaml")
     return top
 
 
@@ -88,7 +88,7 @@ def test_the_skin_is_smooth(face):
 
 
 def test_a_face_scanned_lying_is_in_equilibrium_and_hangs_upright(folder, run, tmp_path):
-    (folder / "posture.yaml").symlink_to(PROJECT / "meshes/real_head_posture.yaml")
+    (folder / "posture.yaml").symlink_to(PROJECT / "meshes/real_head_springs_posture.yaml")
     result = run("repose-solve", folder / "posture.yaml", "-stability", ranks=2)
     assert (result.returncode, result.stderr) == (0, ""), result
     row = next(line for line in result.stdout.splitlines() if "initial equilibrium" in line)

@@ -9,7 +9,7 @@ from tissue import apart, last, same_face, steps
 
 ACCURACY = 1e-6  # mm; two answers this near to the truth are twice as far apart at most
 ADVANCE, OPENING = "paper_jaw_advance.yaml", "paper_jaw_opening.yaml"
-FINER = "head_jaw_advance.yaml"
+FINER = "head_springs_advance.yaml"
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 """Result files read with h5py, and the model of docs/theory/model.md in numpy, which shares nothing with
 the programs."""
 
+import re
+
 import h5py
 import numpy as np
 
@@ -39,6 +41,15 @@ def write_model(file, model):
             else:
                 h5[f"model/{name}"] = values
     return file
+
+
+def as_springs(scene):
+    """The text of a scene of a solid, with the paper's springs for its tissue."""
+    text, found = re.subn(
+        "^  material: .*$", "  springs: {default: {stiffness: 1.0, law: quartic, reference: 1.0}}",
+        scene, flags=re.MULTILINE)
+    assert found == 1
+    return text + "solve: {volume: {form: penalty, poisson: 0.4967}}\n"
 
 
 def apart(one, other):

@@ -11,7 +11,7 @@ namespace {
 /// The shipped head whose jaw advances: 2000 skin vertices, 4 layers.
 model::Anatomy head() {
   return model::load_anatomy(
-      scene::read_scene(std::filesystem::path(REPOSE_MESHES) / "head_jaw_advance.yaml"));
+      scene::read_scene(std::filesystem::path(REPOSE_MESHES) / "head_springs_advance.yaml"));
 }
 
 void give(model::Anatomy& anatomy, const scene::SpringRule& rule) {
