@@ -17,7 +17,7 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
 
 std::filesystem::path begin_part(const std::filesystem::path& file) {
   for (int64_t number = getpid();; ++number) {
-    const std::filesystem::path part = fmt::format("{}.{}.part", file.string(), number);
+    std::filesystem::path part = fmt::format("{}.{}.part", file.string(), number);
     const int descriptor = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor >= 0) {
       close(descriptor);

@@ -126,7 +126,7 @@ void ColumnLevel::factor() {
       pivot += damping_[i] * Mat3::Identity();
       above = pivot.inverse();
       above = (0.5 * (above + above.transpose())).eval();
-      Eigen::Map<Eigen::Matrix3f>(inverse_.data() + 9 * i) = above.cast<float>();
+      Eigen::Map<Eigen::Matrix3f>(inverse_.data() + int64_t{9} * i) = above.cast<float>();
     }
   }
 }

@@ -34,11 +34,11 @@ struct SweepLoops {
     for (int32_t i = begin; i < end; ++i) {
       const int64_t above = level.begin[i] + level.left[i];
       if (i > begin) x[i] -= row_product(level, above, above + 1, x);
-      x[i] = times(level.inverse + 9 * i, x[i]);
+      x[i] = times(level.inverse + int64_t{9} * i, x[i]);
     }
     for (int32_t i = end - 2; i >= begin; --i) {
       const int64_t right = level.begin[i] + level.left[i] + level.within[i];
-      x[i] -= times(level.inverse + 9 * i, row_product(level, right - 1, right, x));
+      x[i] -= times(level.inverse + int64_t{9} * i, row_product(level, right - 1, right, x));
     }
   }
 

@@ -8,6 +8,7 @@
 /// folder. Exit status 1 where anything did.
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -71,7 +72,7 @@ struct Progress {
 /// Reads inputs from progress.next on; a way out that is none of those allowed ends the process.
 void read_on(const Target& target, uint64_t number, uint64_t seed, uint64_t inputs,
              const std::filesystem::path& folder, Progress& progress) {
-  constexpr unsigned patience = 10;  // seconds
+  constexpr itimerval patience{{0, 0}, {10, 0}};  // of the processor's time, ends by SIGPROF
 #ifndef __SANITIZE_ADDRESS__
   // The sanitizer's shadow takes terabytes of addresses.
   constexpr rlim_t memory = rlim_t{8} << 30;
@@ -81,7 +82,7 @@ void read_on(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
   const std::filesystem::path file = folder / ("input" + target.ending);
   for (; progress.next < inputs; ++progress.next) {
     write(file, Mutation(seed, number, progress.next).of(target.seeds));
-    alarm(patience);
+    setitimer(ITIMER_PROF, &patience, nullptr);
     try {
       target.read(file);
       ++progress.taken;

@@ -254,9 +254,9 @@ BREAKS = [
         r"^solve\.contact|^program\.(contact|instruments)",
     ),
     (
-        "the inside of an edge is outside",
-        "return way.dot(edge_.at(std::minmax(t[(k + 1) % 3], t[(k + 2) % 3]))) < 0;",
-        "return way.dot(edge_.at(std::minmax(t[(k + 1) % 3], t[(k + 2) % 3]))) > 0;",
+        "the inside of a body is outside",
+        "if (votes <= 0) return;",
+        "if (votes >= 0) return;",
         r"^surface\.distance_field",
     ),
     # mouth and cuts

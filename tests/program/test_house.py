@@ -292,3 +292,14 @@ def test_files_that_are_named_exist():
     faults = [f"{name}: {named}" for name, text in files(*TEXT) if name != me
               for named in sorted(set(NAMED.findall(text))) if not (PROJECT / named).exists()]
     assert not faults, "\n".join(faults)
+
+
+def test_promises_name_tests_that_exist():
+    text = (PROJECT / "docs/develop/promises.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([a-z]+\.[a-z_]+)`", text))
+    units = {f"{path.parent.name}.{path.stem.removesuffix('_test')}"
+             for path in PROJECT.glob("tests/unit/*/*.cpp")}
+    programs = {f"program.{path.stem.removeprefix('test_')}"
+                for path in PROJECT.glob("tests/program/test_*.py")}
+    other = {"extremes.fast", "extremes.kills", "fuzz.readers"}
+    assert len(named) > 20 and named <= units | programs | other, named - units - programs - other

@@ -92,6 +92,20 @@ TEST(TouchDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
     }
 }
 
+TEST(TouchLoop, PressesWithoutAJumpOfEnergy) {
+  constexpr double multiplier = 0.02, stiffness = 0.7, step = 1e-6;
+  double value[2];
+  for (const int after : {0, 1}) {
+    Touching made =
+        touching(multiplier / stiffness + (after ? -step : step), model::Binding::touches);
+    made.loop.set_multipliers(std::vector<double>(made.position.size(), multiplier));
+    std::vector<Vec3> gradient(made.position.size(), Vec3::Zero());
+    value[after] = made.loop.add_gradient(made.position, 1, gradient);
+    EXPECT_EQ(gradient[0].norm() > 0, after == 1);
+  }
+  EXPECT_NEAR(value[0], value[1], 1e-9);
+}
+
 TEST(WallDerivatives, AreThoseOfTheValue) {
   model::Walls walls;
   walls.point = {0, 1};

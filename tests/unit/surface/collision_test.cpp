@@ -246,6 +246,12 @@ double first_contact(Encounter& encounter, const std::function<Mat4(double)>& po
   return 2;
 }
 
+TEST(Collision, a_gap_within_the_margin_is_a_touch) {
+  const CollisionTree a(cube()), b(cube({0, 0, 100}, 100));
+  EXPECT_TRUE(touch(a, b, shifted({0, 0, 0.5 * contact_margin})));
+  EXPECT_FALSE(touch(a, b, shifted({0, 0, 4 * contact_margin})));
+}
+
 TEST(Encounter, cubes_that_approach) {
   const CollisionTree a(cube()), b(cube({110, 5, 5}, 50));
   const auto pose = [](double load) { return shifted({-20 * load, 0, 0}); };
