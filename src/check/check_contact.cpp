@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "repose/mechanics/rigid_body.h"
+#include "repose/mechanics/wall_contact.h"
 
 namespace repose::check {
 
@@ -47,8 +48,10 @@ std::vector<AtPoint> look(const model::Model& model, const model::PrescribedMoti
     point.normal = d.gradient;
   }
   for (const int64_t p : model.contact.walls.point) at[p].wall = true;
-  for (const auto& triangle : model.contact.walls.triangles)
-    for (const int64_t p : triangle) at[p].wall = true;
+  mechanics::WallLoop walls(model.contact.walls, model.contact.stiffness);
+  walls.look(position);
+  for (size_t w = 0; w < walls.size(); ++w)
+    at[walls.point(w)].gap = std::min(at[walls.point(w)].gap, walls.gap(w));
   return at;
 }
 
@@ -71,11 +74,10 @@ void check_contact(const model::Model& model, const model::PrescribedMotion& mot
     const double p = (*pressure)[i];
     if (!at[i].slides) pull = std::max(pull, -p);
     if (p > 0 && !at[i].slides) across = std::max(across, (*gap)[i]);
-    if (at[i].wall) continue;
     deepest = std::max(deepest, -at[i].gap);
     gaps.push_back((*gap)[i]);
     gaps_again.push_back(at[i].gap);
-    if (at[i].near != 1 || at[i].area == 0) continue;
+    if (at[i].wall || at[i].near != 1 || at[i].area == 0) continue;
     for (int a = 0; a < 3; ++a) {
       forces.push_back((*force)[3 * i + a]);
       forces_again.push_back(p * at[i].area * at[i].normal[a]);

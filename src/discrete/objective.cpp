@@ -98,7 +98,8 @@ std::vector<Objective::ContactBlock> Objective::contact_blocks(bool exact) {
     const auto p = static_cast<int32_t>(point);
     blocks.push_back({p, p, weights_.elastic * block});
   });
-  walls_.for_each_block(positions_.local(), [&](int32_t p, int32_t q, const Mat3& block) {
+  walls_.look(positions_.local());
+  walls_.for_each_block(exact, [&](int32_t p, int32_t q, const Mat3& block) {
     blocks.push_back({p, q, weights_.elastic * block});
   });
   return blocks;
@@ -213,13 +214,9 @@ ContactState contact_state(Objective& objective) {
   touches.look_at_all(objective.positions().local());
   for (size_t c = 0; c < touches.gaps().size(); ++c)
     add(touches.touches().point[c], touches.gaps()[c], touches.pressure(c));
-  const mechanics::WallLoop& walls = objective.walls();
-  for (const mechanics::WallPair& pair : walls.pairs()) {
-    if (pair.area == 0) continue;
-    const double gap = pair.gap(objective.positions().local());
-    add(pair.points[0], gap,
-        mechanics::press(gap, pair.multiplier, walls.stiffness(), false).pressure);
-  }
+  mechanics::WallLoop& walls = objective.walls();
+  walls.look(objective.positions().local());
+  for (size_t w = 0; w < walls.size(); ++w) add(walls.point(w), walls.gap(w), walls.pressure(w));
   return state;
 }
 

@@ -78,13 +78,10 @@ void plan_motion(Plan& plan) {
 /// The columns along cuts whose sides may meet go to one rank.
 void keep_cuts_whole(const ColumnGraph& graph, Plan& plan) {
   const model::Walls& walls = plan.model.contact.walls;
-  if (walls.point.empty()) return;
+  if (walls.empty()) return;
   const int owner = plan.owner[walls.point.front()];
   std::vector<char> moves(graph.columns(), 0);
-  const auto mark = [&](int64_t point) { moves[graph.column_of_point[point]] = 1; };
-  for (const int64_t point : walls.point) mark(point);
-  for (const auto& triangle : walls.triangles)
-    for (const int64_t point : triangle) mark(point);
+  for (const int64_t point : walls.point) moves[graph.column_of_point[point]] = 1;
   for (size_t p = 0; p < plan.owner.size(); ++p)
     if (moves[graph.column_of_point[p]]) plan.owner[p] = owner;
 }
@@ -207,17 +204,14 @@ model::Contact pick_contact(const Plan& plan, LocalNumbers& local, int rank) {
     for (int64_t& point : points) point = local.of(point);
   };
   model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
-  std::vector<int64_t> rows = mine(all.touches.point);
+  const std::vector<int64_t> rows = mine(all.touches.point);
   part.touches = {pick(all.touches.point, rows), pick(all.touches.body, rows),
                   pick(all.touches.binding, rows), pick(all.touches.area, rows),
                   pick(plan.touch_offset, rows)};
   number_all(part.touches.point);
-  rows = mine(all.walls.point);
-  if (rows.empty()) return part;
-  part.walls = {pick(all.walls.point, rows), pick(all.walls.area, rows), pick(all.walls.cut, rows),
-                all.walls.triangles, all.walls.triangle_cut};
+  if (all.walls.empty() || plan.owner[all.walls.point.front()] != rank) return part;
+  part.walls = all.walls;
   number_all(part.walls.point);
-  number(part.walls.triangles, local);
   return part;
 }
 
@@ -323,8 +317,8 @@ void pass(Archive& archive, Part& part) {
           m.bone_transform);
   model::Contact& c = m.contact;
   archive(c.stiffness, c.spacing, c.touches.point, c.touches.body, c.touches.binding,
-          c.touches.area, c.touches.offset, c.walls.point, c.walls.area, c.walls.cut,
-          c.walls.triangles, c.walls.triangle_cut, part.contact);
+          c.touches.area, c.touches.offset, c.walls.size, c.walls.begin, c.walls.point,
+          c.walls.weight, c.walls.area, part.contact);
   pass_bodies(archive, part.bodies);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
           part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);

@@ -182,13 +182,17 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
           for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
         }
       });
-  for (const auto& [p, q, block] : convex_contact_) {
-    const auto& layer = objective_.positions().part().model.points.layer;
+  // Sides of cuts: multigrid knows those that may come to face, and none that leap over a layer.
+  const auto& layer = objective_.positions().part().model.points.layer;
+  const auto links = objective_.walls().links();
+  const auto level = [&](int32_t p, int32_t q) { return std::abs(layer[p] - layer[q]) <= 1; };
+  for (const auto& [p, q] : links)
+    if (level(p, q)) visit(p, q, Mat3::Zero());
+  for (const auto& [p, q, block] : convex_contact_)
     if (p == q)
       diagonal[p] += block;
-    else if (std::abs(layer[p] - layer[q]) <= 1)  // what leaps over a layer is not multigrid's
+    else if (level(p, q) && std::binary_search(links.begin(), links.end(), std::array{p, q}))
       visit(p, q, block);
-  }
   for (size_t p = 0; p < diagonal.size(); ++p)
     visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
 }

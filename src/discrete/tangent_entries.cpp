@@ -1,6 +1,7 @@
 #include "repose/discrete/tangent_entries.h"
 
 #include <algorithm>
+#include <set>
 
 #include "countable.h"
 #include "repose/base/agreement.h"
@@ -26,17 +27,18 @@ bool TangentEntries::owns(int32_t point) const {
 
 namespace {
 
-/// Calls link(p, q) and link(q, p) for points of two sides of a cut, whichever may come to face.
+/// Calls link(p, q) for points of the sides of one cut, whichever may come to face.
 template <class Link>
 void for_each_facing_pair(const model::Walls& walls, Link&& link) {
-  for (size_t w = 0; w < walls.point.size(); ++w)
-    for (size_t t = 0; t < walls.triangles.size(); ++t) {
-      if (walls.triangle_cut[t] != walls.cut[w]) continue;
-      for (const int64_t corner : walls.triangles[t]) {
-        const auto p = static_cast<int32_t>(walls.point[w]), q = static_cast<int32_t>(corner);
-        link(p, q), link(q, p);
-      }
-    }
+  size_t control = 0;
+  for (const auto& [columns, rows] : walls.size) {
+    const auto first = walls.begin[control];
+    control += 2 * static_cast<size_t>(columns * rows);
+    const std::set<int64_t> points(walls.point.begin() + first,
+                                   walls.point.begin() + walls.begin[control]);
+    for (const int64_t p : points)
+      for (const int64_t q : points) link(static_cast<int32_t>(p), static_cast<int32_t>(q));
+  }
 }
 
 }  // namespace

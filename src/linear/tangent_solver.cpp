@@ -178,11 +178,10 @@ void TangentSolver::renew_columns() {
     check(PCSetOperators(factors_, hessian_.convex(), hessian_.convex()));
     give_room(factors_);
     check(PCSetUp(factors_));
-  } else if (columns_ && pattern_ == hessian_.pattern()) {
+  } else if (columns_) {
     columns_->refill(blocks);
   } else {
     columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
-    pattern_ = hessian_.pattern();
   }
 }
 

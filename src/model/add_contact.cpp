@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <type_traits>
 
@@ -140,96 +139,6 @@ void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachme
   contact.stiffness = penalty(scene, model, mesh.points.size());
 }
 
-namespace {
-
-/// The doubled part of a cut as a grid of points, path columns by layers.
-class Wall {
- public:
-  Wall(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, const Model& model)
-      : cut_(cut), model_(model), first_twin_(std::numeric_limits<int64_t>::max()) {
-    for (const auto& [row, twin] : pairs) {
-      twin_of_[row] = twin;
-      first_twin_ = std::min(first_twin_, twin);
-    }
-    for (size_t p = 0; p < model.points.position.size(); ++p)
-      if (!is_twin(static_cast<int64_t>(p)))
-        row_of_[{model.points.column[p], model.points.layer[p]}] = static_cast<int64_t>(p);
-  }
-
-  /// Triangles of the doubles' side and, for each doubled point, a third of the area around it.
-  void build(Walls& walls) const {
-    const int32_t number =
-        walls.cut.empty() ? 0 : 1 + *std::max_element(walls.cut.begin(), walls.cut.end());
-    std::vector<std::array<int64_t, 3>> triangles;
-    std::map<int64_t, double> area;
-    for (size_t i = 0; i + 1 < cut_.columns.size(); ++i)
-      for (int l = 0; l < cut_.layers; ++l) add_quad(i, l, triangles, area);
-    if (faces_away(triangles))
-      for (auto& t : triangles) std::swap(t[1], t[2]);
-    for (const auto& [row, twin] : twin_of_) {
-      walls.point.push_back(row);
-      walls.area.push_back(area.at(twin));
-      walls.cut.push_back(number);
-    }
-    walls.triangles.insert(walls.triangles.end(), triangles.begin(), triangles.end());
-    walls.triangle_cut.resize(walls.triangles.size(), number);
-  }
-
- private:
-  bool is_twin(int64_t row) const { return row >= first_twin_; }
-  /// The point of the doubles' side, −1 beneath the tissue.
-  int64_t node(size_t i, int layer) const {
-    const auto found = row_of_.find({cut_.columns[i], layer});
-    if (found == row_of_.end()) return -1;
-    const auto twin = twin_of_.find(found->second);
-    return twin == twin_of_.end() ? found->second : twin->second;
-  }
-  void add_quad(size_t i, int l, std::vector<std::array<int64_t, 3>>& triangles,
-                std::map<int64_t, double>& area) const {
-    const std::array<int64_t, 4> q{node(i, l), node(i + 1, l), node(i + 1, l + 1), node(i, l + 1)};
-    if (std::find(q.begin(), q.end(), -1) != q.end()) return;
-    if (std::none_of(q.begin(), q.end(), [&](int64_t p) { return is_twin(p); })) return;
-    for (const std::array<int64_t, 3>& t :
-         {std::array<int64_t, 3>{q[0], q[1], q[2]}, std::array<int64_t, 3>{q[0], q[2], q[3]}}) {
-      const auto& x = model_.points.position;
-      const double share = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).norm() / 6;
-      for (const int64_t p : t) area[p] += share;
-      triangles.push_back(t);
-    }
-  }
-  /// Whether the triangles' normals point into the tissue of the doubles.
-  bool faces_away(const std::vector<std::array<int64_t, 3>>& triangles) const {
-    const auto& x = model_.points.position;
-    std::map<int64_t, std::pair<Vec3, int>> middle;  // of the doubles' prisms
-    for (const auto& prism : model_.prisms.points) {
-      Vec3 mean = Vec3::Zero();
-      for (const int64_t p : prism) mean += x[p] / 6;
-      for (const int64_t p : prism)
-        if (is_twin(p)) {
-          auto& [sum, count] = middle.try_emplace(p, Vec3::Zero(), 0).first->second;
-          sum += mean;
-          ++count;
-        }
-    }
-    double outwards = 0;
-    for (const auto& t : triangles)
-      for (const int64_t p : t)
-        if (const auto found = middle.find(p); found != middle.end()) {
-          const auto& [sum, count] = found->second;
-          outwards += (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[p] - sum / count);
-        }
-    return outwards < 0;
-  }
-
-  const Cut& cut_;
-  const Model& model_;
-  int64_t first_twin_;  // they are the last points
-  std::map<int64_t, int64_t> twin_of_;
-  std::map<std::array<int64_t, 2>, int64_t> row_of_;  // column, layer
-};
-
-}  // namespace
-
 void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
   Touches& touches = model.contact.touches;
   std::map<int64_t, int64_t> twin_of;
@@ -241,10 +150,6 @@ void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& mode
     touches.area[c] /= 2;
     add(twin->second, touches.body[c], touches.binding[c], touches.area[c], touches);
   }
-}
-
-void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
-  Wall(cut, pairs, model).build(model.contact.walls);
 }
 
 }  // namespace repose::model

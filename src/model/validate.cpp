@@ -194,6 +194,49 @@ void validate_bones(const Model& m, const std::string& file) {
   }
 }
 
+void validate_walls(const Walls& walls, int64_t points, const std::string& file) {
+  int64_t places = 0;
+  for (size_t k = 0; k < walls.size.size(); ++k) {
+    for (const int64_t n : walls.size[k])
+      Array(file, "contact/wall/net").is_within(n, k, 2, points);
+    places += walls.size[k][0] * walls.size[k][1];
+    Array(file, "contact/wall/net").is_within(places, k, 4, points * points);
+  }
+  Array(file, "contact/wall/begin")
+      .has_rows(walls.begin.size(), walls.empty() ? 0 : static_cast<size_t>(2 * places + 1));
+  const auto shares = static_cast<int64_t>(walls.point.size());
+  for (size_t c = 1; c < walls.begin.size(); ++c)
+    Array(file, "contact/wall/begin")
+        .is_within(walls.begin[c], c, c == 1 ? 1 : walls.begin[c - 1] + 1, shares);
+  if (!walls.empty()) {
+    Array(file, "contact/wall/begin").is_within(walls.begin.front(), 0, 0, 0);
+    Array(file, "contact/wall/begin").is_within(walls.begin.back(), 2 * places, shares, shares);
+  }
+  Array(file, "contact/wall/point").all_within(walls.point, 0, points - 1);
+  Array(file, "contact/wall/weight").has_rows(walls.weight.size(), walls.point.size());
+  Array(file, "contact/wall/weight").is_finite(walls.weight);
+  Array(file, "contact/wall/area").has_rows(walls.area.size(), static_cast<size_t>(places));
+  Array(file, "contact/wall/area").is_not_negative(walls.area, "mm²");
+}
+
+void validate_contact(const Model& m, const std::string& file) {
+  if (m.contact.empty()) return;
+  const auto points = static_cast<int64_t>(m.points.position.size());
+  const Touches& touches = m.contact.touches;
+  Array(file, "contact attributes stiffness and grid")
+      .is_positive({m.contact.stiffness, m.contact.spacing}, "N/mm³ or mm", "both are");
+  Array(file, "contact/point").all_within(touches.point, 0, points - 1);
+  const auto bodies = static_cast<int64_t>(m.contact.bodies.size());
+  Array(file, "contact/body_row").all_within(touches.body, 0, bodies - 1);
+  for (size_t c = 0; c < touches.binding.size(); ++c)
+    Array(file, "contact/binding").is_within(static_cast<int64_t>(touches.binding[c]), c, 0, 1);
+  Array(file, "contact/area").is_not_negative(touches.area, "mm²");
+  for (size_t k = 0; k < m.contact.bodies.size(); ++k)
+    Array(file, "contact/body_bone")
+        .is_within(m.contact.bodies[k].bone, k, -1, static_cast<int64_t>(m.bones.size()) - 1);
+  validate_walls(m.contact.walls, points, file);
+}
+
 void refuse_unattached(const Model& m, const std::string& file) {
   std::vector<bool> held(m.points.position.size(), false);
   for (const auto& ends : m.springs.points)
@@ -260,6 +303,7 @@ void validate(const Model& model, const std::string& file) {
   validate_solid(model, file);
   Array(file, "skin/points").all_index(model.skin, points);
   validate_bones(model, file);
+  validate_contact(model, file);
   refuse_unattached(model, file);
   refuse_floating(model, file);
 }

@@ -110,13 +110,11 @@ model::Contact read_contact(const Reader& in) {
   touches.area = in.numbers(group + "/area", {c, {}});
   if (!in.has(group + "/wall")) return contact;
   model::Walls& walls = contact.walls;
+  walls.size = in.tuples<2>(group + "/wall/net", Shape::any);
+  walls.begin = in.integers<int64_t>(group + "/wall/begin", Shape::any);
   walls.point = in.integers<int64_t>(group + "/wall/point", Shape::any);
-  const auto w = static_cast<int64_t>(walls.point.size());
-  walls.area = in.numbers(group + "/wall/area", {w, {}});
-  walls.cut = in.integers<int32_t>(group + "/wall/cut", w);
-  walls.triangles = in.tuples<3>(group + "/wall/triangles", Shape::any);
-  walls.triangle_cut = in.integers<int32_t>(group + "/wall/triangle_cut",
-                                            static_cast<int64_t>(walls.triangles.size()));
+  walls.weight = in.numbers(group + "/wall/weight", {static_cast<int64_t>(walls.point.size()), {}});
+  walls.area = in.numbers(group + "/wall/area", {Shape::any, {}});
   return contact;
 }
 

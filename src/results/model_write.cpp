@@ -115,14 +115,13 @@ void write_contact(hid_t model, const model::Contact& contact) {
   write_array(group, "binding", {c}, binding.data());
   write_array(group, "area", {c}, touches.area.data());
   const model::Walls& walls = contact.walls;
-  if (walls.point.empty()) return;
+  if (walls.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
-  const hsize_t w = walls.point.size(), t = walls.triangles.size();
-  write_array(wall, "point", {w}, walls.point.data());
-  write_array(wall, "area", {w}, walls.area.data());
-  write_array(wall, "cut", {w}, walls.cut.data());
-  write_array(wall, "triangles", {t, 3}, flat(walls.triangles));
-  write_array(wall, "triangle_cut", {t}, walls.triangle_cut.data());
+  write_array(wall, "net", {walls.size.size(), 2}, flat(walls.size));
+  write_array(wall, "begin", {walls.begin.size()}, walls.begin.data());
+  write_array(wall, "point", {walls.point.size()}, walls.point.data());
+  write_array(wall, "weight", {walls.weight.size()}, walls.weight.data());
+  write_array(wall, "area", {walls.area.size()}, walls.area.data());
 }
 
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {

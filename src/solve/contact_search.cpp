@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace repose::solve {
 
@@ -27,16 +28,6 @@ void ContactSearch::set_stiffness(double stiffness) {
   tangent_.forget();
 }
 
-void ContactSearch::pair(Vec displacement, double anew) {
-  int any = objective_.walls().empty() ? 0 : 1;
-  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, objective_.positions().comm());
-  tangent_.forget();
-  if (!any) return;
-  objective_.positions().update(displacement);
-  objective_.walls().pair(objective_.positions().local(), anew);
-  tangent_.change_pattern();
-}
-
 /// mm, by which pressures differ from multipliers, over the penalty's stiffness: the gap where a
 /// point presses or slides, what a multiplier still pretends where it does not.
 double ContactSearch::violation() {
@@ -45,14 +36,10 @@ double ContactSearch::violation() {
   double most = 0;
   for (size_t c = 0; c < touches.multipliers().size(); ++c)
     most = std::max(most, std::abs(touches.pressure(c) - touches.multipliers()[c]));
-  const mechanics::WallLoop& walls = objective_.walls();
-  for (const mechanics::WallPair& pair : walls.pairs()) {
-    if (pair.area == 0) continue;
-    const double gap = pair.gap(objective_.positions().local());
-    const double pressure =
-        mechanics::press(gap, pair.multiplier, walls.stiffness(), false).pressure;
-    most = std::max(most, std::abs(pressure - pair.multiplier));
-  }
+  mechanics::WallLoop& walls = objective_.walls();
+  walls.look(objective_.positions().local());
+  for (size_t w = 0; w < walls.size(); ++w)
+    most = std::max(most, std::abs(walls.pressure(w) - walls.multipliers()[w]));
   return largest(objective_.positions().comm(), most / objective_.touches().stiffness());
 }
 
@@ -62,31 +49,26 @@ void ContactSearch::move_multipliers() {
   for (size_t c = 0; c < pressure.size(); ++c) pressure[c] = touches.pressure(c);
   touches.set_multipliers(pressure);
   mechanics::WallLoop& walls = objective_.walls();
-  const auto position = objective_.positions().local();
-  for (mechanics::WallPair& pair : walls.pairs())
-    if (pair.area > 0)
-      pair.multiplier =
-          mechanics::press(pair.gap(position), pair.multiplier, walls.stiffness(), false).pressure;
+  pressure.resize(walls.size());
+  for (size_t w = 0; w < pressure.size(); ++w) pressure[w] = walls.pressure(w);
+  walls.set_multipliers(pressure);
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int most_rounds = 30, rough_rounds = 2;
-  // Pairs of points that slide past each other come and go for ever if found anew in every round.
-  constexpr int paired_anew = 2;
-  constexpr double damped = 0.5;
   constexpr double softened = 0.25;  // of the penalty's stiffness, in rough rounds
   constexpr double rough = 0.25;     // mm
   constexpr double missed = 0.25;    // of the accuracy, by contact
-  constexpr double safety = 2;       // the estimate is so many times what is left
-  const auto p = objective_.touches().multipliers();
+  // Multipliers that go from one state to another and back do so no more under a stiffer penalty.
+  constexpr double slow = 0.9, stiffer = 2, stiffest = 16;
+  constexpr double safety = 2;  // the estimate is so many times what is left
+  const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
   before_.assign(p.begin(), p.end());
-  walls_before_.clear();
-  for (const auto& pair : objective_.walls().pairs()) walls_before_.push_back(pair.multiplier);
+  walls_before_.assign(q.begin(), q.end());
   Outcome outcome;
   int64_t iterations = 0;
   for (int round = 0; round < rough_rounds; ++round) {
     set_stiffness(softened * stiffness_);
-    pair(displacement, round == 0 ? 1 : damped);
     outcome = minimiser_.approach(displacement, std::max(rough, accuracy));
     iterations += outcome.iterations;
     if (outcome.stopped) break;
@@ -99,8 +81,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome.objective = objective_.evaluate(displacement, gradient);
     outcome.gradient_max = discrete::largest_block(gradient);
   }
+  double stiffness = stiffness_, least = std::numeric_limits<double>::infinity();
   for (int round = 0; round < most_rounds && !outcome.stopped; ++round) {
-    if (round < paired_anew) pair(displacement, damped);
     outcome = minimiser_.run(displacement, (1 - missed) * accuracy);
     iterations += outcome.iterations;
     objective_.positions().update(displacement);
@@ -109,7 +91,9 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     const bool over = outcome.converged && outcome.displacement_error <= accuracy;
     if (!outcome.converged || over) break;
     move_multipliers();
-    tangent_.forget();
+    if (left > slow * least && stiffness < stiffest * stiffness_) stiffness *= stiffer;
+    set_stiffness(stiffness);
+    least = std::min(least, left);
     outcome.converged = false;
     outcome.reason = fmt::format("contact comes to no end: {:.3g} mm of gaps remain", left);
   }
@@ -117,11 +101,10 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   return outcome;
 }
 
-void ContactSearch::go_back(Vec displacement) {
+void ContactSearch::go_back(Vec) {
   objective_.touches().set_multipliers(before_);
-  for (size_t w = 0; w < walls_before_.size(); ++w)
-    objective_.walls().pairs()[w].multiplier = walls_before_[w];
-  pair(displacement, 1);
+  objective_.walls().set_multipliers(walls_before_);
+  tangent_.forget();
 }
 
 double penetration(discrete::Objective& objective) {
@@ -130,10 +113,9 @@ double penetration(discrete::Objective& objective) {
   touches.look_at_all(position);
   double deepest = 0;
   for (const double gap : touches.gaps()) deepest = std::max(deepest, -gap);
-  mechanics::WallLoop now = objective.walls();
-  if (!now.empty()) now.pair(position);
-  for (const mechanics::WallPair& pair : now.pairs())
-    if (pair.area > 0) deepest = std::max(deepest, -pair.gap(position));
+  mechanics::WallLoop& walls = objective.walls();
+  walls.look(position);
+  for (size_t w = 0; w < walls.size(); ++w) deepest = std::max(deepest, -walls.gap(w));
   return largest(objective.positions().comm(), deepest);
 }
 

@@ -8,7 +8,7 @@ namespace repose::solve {
 /// (Hestenes 1969; Powell 1969; Simo & Laursen 1992 for contact), minimisation after minimisation,
 /// the multipliers moved to the pressures of each, until what passes or lifts off is below the
 /// accuracy. The first are rough and their penalty is soft: then few points change sides at once.
-/// Sides of cuts are paired anew before each. The multipliers of a load are where the next begins.
+/// The multipliers of a load are where the next begins.
 class ContactSearch : public RestSearch {
  public:
   /// `tangent` is the objective's Hessian, `minimiser` minimises it.
@@ -17,7 +17,6 @@ class ContactSearch : public RestSearch {
   void go_back(Vec displacement) override;
 
  private:
-  void pair(Vec displacement, double anew);
   void set_stiffness(double stiffness);
   double violation();
   void move_multipliers();

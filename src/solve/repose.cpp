@@ -229,14 +229,12 @@ std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
     ++on.points;
     on.force -= pressure * touches.touches().area[c] * touches.normal(c);
   }
-  const mechanics::WallLoop& walls = objective.walls();
-  for (const mechanics::WallPair& pair : walls.pairs()) {
-    const double gap = pair.gap(objective.positions().local());
-    const double pressure =
-        mechanics::press(gap, pair.multiplier, walls.stiffness(), false).pressure;
-    if (pressure == 0 || pair.area == 0) continue;
+  mechanics::WallLoop& walls = objective.walls();
+  walls.look(objective.positions().local());
+  for (size_t w = 0; w < walls.size(); ++w) {
+    if (walls.pressure(w) == 0) continue;
     ++contacts.back().points;
-    contacts.back().force -= pressure * pair.area * pair.normal;
+    contacts.back().force -= walls.pressure(w) * walls.area(w) * walls.normal(w);
   }
   add_inside(part, touches.touches(), contacts);
   for (BodyContact& on : contacts) sum_over_ranks(objective.positions().comm(), on);

@@ -56,11 +56,14 @@ void press(discrete::Objective& objective, const std::vector<Vec3>& pressure) {
   touches.look_at_all(position);
   for (size_t c = 0; c < multiplier.size(); ++c)
     offer(touches.touches().point[c], touches.gaps()[c], multiplier[c]);
-  for (mechanics::WallPair& pair : objective.walls().pairs())
-    if (pair.area > 0) offer(pair.points[0], pair.gap(position), pair.multiplier);
+  mechanics::WallLoop& walls = objective.walls();
+  std::vector<double> wall_multiplier(walls.size(), 0.0);
+  walls.look(position);
+  for (size_t w = 0; w < walls.size(); ++w) offer(walls.point(w), walls.gap(w), wall_multiplier[w]);
   for (size_t i = 0; i < pressure.size(); ++i)
     if (nearest[i]) *nearest[i] = pressure[i].x();
   touches.set_multipliers(multiplier);
+  walls.set_multipliers(wall_multiplier);
 }
 
 /// Contact as it is at rest, at the positions' state. Collective.
@@ -72,9 +75,8 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
   for (const double p : rest.pressure) rows.emplace_back(p, 0, 0);
   if (base::rank(comm) == 0) rows.resize(rest.position.size(), Vec3::Zero());
   const std::vector<Vec3> pressure = natural.owned(base::scatter(comm, rows));
-  if (!objective.walls().empty()) objective.walls().pair(objective.positions().local());
   press(objective, pressure);
-  problem.tangent().change_pattern();
+  problem.tangent().forget();
 }
 
 /// Lets points press that a step takes into bodies, and those go that it takes off them; whether

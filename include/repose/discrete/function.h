@@ -61,8 +61,6 @@ class Hessian {
   /// Shows all blocks of the relative that touch this rank's points, at the state of the last
   /// assemble(). Not collective.
   virtual void visit_convex(const BlockVisitor&) const {}
-  /// Another number where other points are coupled than before.
-  virtual int64_t pattern() const { return 0; }
   int64_t assemblies() const { return assemblies_; }
 
  protected:

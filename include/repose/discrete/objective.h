@@ -1,7 +1,7 @@
 #pragma once
 #include "repose/discrete/function.h"
-#include "repose/mechanics/contact.h"
 #include "repose/mechanics/energy.h"
+#include "repose/mechanics/wall_contact.h"
 
 namespace repose::discrete {
 
@@ -27,6 +27,7 @@ class Objective : public Function {
                          std::span<Vec3> product);
   mechanics::TouchLoop& touches() { return touches_; }
   mechanics::WallLoop& walls() { return walls_; }
+  const mechanics::WallLoop& walls() const { return walls_; }
   /// Contact's value, at the last update, summed over ranks, N·mm.
   double contact_value();
   /// N, of what is touched on each owned point, at the last update. Not collective.

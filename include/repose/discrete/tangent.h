@@ -17,12 +17,6 @@ class Tangent : public Hessian {
   void assemble(Vec displacement) override;
   /// The next assembly is done in any case: the elements have changed.
   void forget() { at_.clear(); }
-  /// Changes where points become neighbours that were none: those of cuts' sides.
-  int64_t pattern() const override { return pattern_; }
-  void change_pattern() {
-    forget();
-    ++pattern_;
-  }
 
   base::MatHandle make_third();  ///< a matrix for third(); collective
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
@@ -49,8 +43,7 @@ class Tangent : public Hessian {
   std::vector<Objective::ContactBlock> contact_, convex_contact_;  // at the last assembly
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<Vec3> direction_, work_;  // [local points]
-  int64_t pattern_ = 0;
-  int64_t filled_at_ = -1;  // assemblies() when exact_ was filled
+  int64_t filled_at_ = -1;              // assemblies() when exact_ was filled
 };
 
 }  // namespace repose::discrete

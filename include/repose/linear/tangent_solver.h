@@ -103,7 +103,6 @@ class TangentSolver {
   discrete::Hessian& hessian_;
   int64_t unknowns_;  // scalar, of all ranks
   std::unique_ptr<ColumnMultigrid> columns_;
-  int64_t pattern_ = 0;  // that it was made for
   PcHandle factors_;     // in the place of columns_
   bool given_way_ = false;
   KspHandle krylov_;

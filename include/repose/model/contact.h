@@ -38,13 +38,19 @@ struct Touches {
   std::vector<double> offset = {};
 };
 
-/// The two sides of cuts, which do not pass one another: points of one, the other as triangles.
+/// The two sides of cuts, which do not pass one another: of each cut two nets of controls of smooth
+/// surfaces (docs/theory/contact.md), one of the first side, whose places stay off the second's
+/// surface. A net has columns along the cut and rows from the skin inwards; a control is a weighted
+/// sum of points.
 struct Walls {
-  std::vector<int64_t> point;                     ///< [W]
-  std::vector<double> area;                       ///< [W] mm²
-  std::vector<int32_t> cut;                       ///< [W] which cut the point is of
-  std::vector<std::array<int64_t, 3>> triangles;  ///< [T] seen counter-clockwise from the points
-  std::vector<int32_t> triangle_cut;              ///< [T] which cut the triangle is of
+  std::vector<std::array<int64_t, 2>> size;  ///< [K] columns and rows of a cut's nets
+  /// [controls + 1] where a control's points begin: of each cut those of the first side, column by
+  /// column, then those of the second.
+  std::vector<int64_t> begin;
+  std::vector<int64_t> point;  ///< rows of points; of a place that touches, first one nearest to it
+  std::vector<double> weight;  ///< [points of controls]; those of a control add up to 1
+  std::vector<double> area;    ///< [controls of first sides] mm²; 0: not a place that touches
+  bool empty() const { return size.empty(); }
 };
 
 struct Contact {
@@ -53,7 +59,7 @@ struct Contact {
   std::vector<Body> bodies;
   Touches touches;
   Walls walls;
-  bool empty() const { return touches.point.empty() && walls.point.empty(); }
+  bool empty() const { return touches.point.empty() && walls.empty(); }
 };
 
 }  // namespace repose::model

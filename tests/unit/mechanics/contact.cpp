@@ -1,4 +1,4 @@
-#include "repose/mechanics/contact.h"
+#include "repose/mechanics/wall_contact.h"
 
 #include <gtest/gtest.h>
 
@@ -106,32 +106,74 @@ TEST(TouchLoop, PressesWithoutAJumpOfEnergy) {
   EXPECT_NEAR(value[0], value[1], 1e-9);
 }
 
-TEST(WallDerivatives, AreThoseOfTheValue) {
+/// Two sides of a bent cut, 5 × 4 controls of which the first and the last of a column are means of
+/// two points, the first side `distance` mm from the second and slid along it by more than a patch.
+struct Facing {
   model::Walls walls;
-  walls.point = {0, 1};
-  walls.area = {2, 3};
-  walls.cut = {0, 0};
-  walls.triangles = {{2, 3, 4}, {3, 5, 4}};
-  walls.triangle_cut = {0, 0};
-  const std::vector<Vec3> position = {{1, 1, -0.3}, {3, 3, -0.2}, {0, 0, 0},
-                                      {5, 0, 0.1},  {0, 5, 0},    {5, 5, 0.2}};
-  WallLoop loop(walls, 0.7);
-  loop.pair(position);
-  for (WallPair& pair : loop.pairs()) {
-    EXPECT_GT(pair.area, 0);
-    EXPECT_LT(pair.gap(position), 0);
-    pair.multiplier = 0.05;
-  }
-  expect_taylor(
-      position,
-      [&](std::span<const Vec3> x, std::span<Vec3> g) { return loop.add_gradient(x, 1, g); },
-      [&](const std::vector<Vec3>& way) {
-        double sum = 0;
-        loop.for_each_block(position, [&](int32_t p, int32_t q, const Mat3& block) {
-          sum += (p == q ? 1 : 2) * way[p].dot(block * way[q]);
+  std::vector<Vec3> position;
+};
+Facing facing(double distance) {
+  Facing made;
+  made.walls.size = {{5, 4}};
+  made.walls.begin = {0};
+  const std::vector<Vec3> noise = random_points(80, 0.05, 3);
+  for (int side = 0; side < 2; ++side)
+    for (int i = 0; i < 5; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const bool wrap = j == 0 || j == 3;
+        for (int k = 0; k < (wrap ? 2 : 1); ++k) {
+          const double u = 3 * i + (side == 0 ? 3.7 : 0), v = 3 * j + (side == 0 ? 0.8 : 0);
+          made.walls.point.push_back(static_cast<int64_t>(made.position.size()));
+          made.walls.weight.push_back(wrap ? 0.5 : 1);
+          made.position.push_back(Vec3(u, v + 0.2 * k, 0.02 * u * u - 0.03 * v * v + 0.4 * k) +
+                                  (side == 0 ? distance : 0) * Vec3::UnitZ() +
+                                  noise[made.position.size()]);
+        }
+        made.walls.begin.push_back(static_cast<int64_t>(made.walls.point.size()));
+        if (side == 0) made.walls.area.push_back(wrap ? 0 : 2 + i);
+      }
+  return made;
+}
+
+TEST(WallDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
+  for (const double distance : {0.8, 0.0, -0.9}) {
+    SCOPED_TRACE(distance);
+    const Facing made = facing(distance);
+    WallLoop loop(made.walls, 0.7);
+    EXPECT_EQ(loop.size(), 10u);
+    loop.set_multipliers(std::vector<double>(loop.size(), 1.5));
+    loop.look(made.position);
+    int acting = 0;
+    for (size_t w = 0; w < loop.size(); ++w) acting += loop.pressure(w) > 0 ? 1 : 0;
+    EXPECT_GE(acting, 6);
+    expect_taylor(
+        made.position,
+        [&](std::span<const Vec3> x, std::span<Vec3> g) { return loop.add_gradient(x, 1, g); },
+        [&](const std::vector<Vec3>& way) {
+          double sum = 0;
+          loop.look(made.position);
+          loop.for_each_block(true, [&](int32_t p, int32_t q, const Mat3& block) {
+            sum += (p == q ? 1 : 2) * way[p].dot(block * way[q]);
+          });
+          return sum;
         });
-        return sum;
-      });
+  }
+}
+
+TEST(SplineWeights, ReproduceStraightLinesAndGoOnStraight) {
+  for (const int controls : {2, 3, 4, 7})
+    for (double at = -1; at <= controls; at += 0.37) {
+      const SplineWeights weights = spline_weights(at, controls);
+      double place = 0, slope = 0, bend = 0;
+      for (int k = 0; k < weights.count; ++k) {
+        place += weights.of[0][k] * (3 + 2 * (weights.first + k));
+        slope += weights.of[1][k] * (3 + 2 * (weights.first + k));
+        bend += weights.of[2][k] * (3 + 2 * (weights.first + k));
+      }
+      EXPECT_NEAR(place, 3 + 2 * at, 1e-12);
+      EXPECT_NEAR(slope, 2, 1e-12);
+      EXPECT_NEAR(bend, 0, 1e-12);
+    }
 }
 
 TEST(TouchLoop, LooksAgainAsSoonAsAPointMayHaveComeNear) {

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -309,6 +310,61 @@ INSTANTIATE_TEST_SUITE_P(
               f.replace("/model/spring/points", H5T_NATIVE_INT8, {0, 2});
             },
             "/model/point: row 4 is soft tissue and no spring or edge holds it"}),
+    name_of);
+
+/// The small model with a point that touches a bone, and two sides of a cut.
+model::Model touching_model() {
+  model::Model m = small_model();
+  m.contact.stiffness = 0.1;
+  m.contact.bodies = {{m.bones[0], 0}};
+  m.contact.touches = {{4}, {0}, {model::Binding::touches}, {2.0}};
+  m.contact.walls = {{{2, 2}}, {0}, {}, std::vector<double>(8, 1.0), {0, 1, 0, 0}};
+  for (int64_t c = 0; c < 8; ++c) {
+    m.contact.walls.point.push_back(c % static_cast<int64_t>(m.points.position.size()));
+    m.contact.walls.begin.push_back(c + 1);
+  }
+  return m;
+}
+
+class ContactDefect : public ::testing::TestWithParam<Defect> {};
+
+TEST_P(ContactDefect, IsRefusedByName) {
+  const Folder folder;
+  write_small_result(folder.path("a"), touching_model());
+  model::Model back;
+  ASSERT_EQ(refusal([&] { back = read_model(folder.path("a.h5")); }), "accepted");
+  EXPECT_EQ(back.contact.walls.begin, touching_model().contact.walls.begin);
+  GetParam().spoil(Spoiler(folder.path("a.h5")));
+  const std::string text = refusal([&] { read_model(folder.path("a.h5")); });
+  EXPECT_EQ(text.rfind(folder.path("a.h5").string() + ": ", 0), 0u) << text;
+  EXPECT_NE(text.find(GetParam().message), std::string::npos) << text;
+}
+
+Defect wrong_index(const char* name, const char* array, int64_t row, int64_t value) {
+  static std::deque<std::string> messages;
+  messages.push_back(fmt::format("{}: row {} is {}, expected ", array, row, value));
+  return {name, [=](const Spoiler& f) { f.set<int64_t>(array, row, value); },
+          messages.back().c_str()};
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Contact, ContactDefect,
+    ::testing::Values(
+        wrong_index("TouchOfNoPoint", "/model/contact/point", 0, 999),
+        wrong_index("TouchOfNoBody", "/model/contact/body_row", 0, 1),
+        wrong_index("NoSuchBinding", "/model/contact/binding", 0, 2),
+        wrong_index("BodyOfNoBone", "/model/contact/body_bone", 0, 99),
+        wrong_index("HugeNet", "/model/contact/wall/net", 0, int64_t{1} << 40),
+        wrong_index("NetOfOneRow", "/model/contact/wall/net", 0, 1),
+        wrong_index("ControlOfNothing", "/model/contact/wall/begin", 3, 2),
+        wrong_index("ControlsBeyondTheirPoints", "/model/contact/wall/begin", 8, 9),
+        wrong_index("SideOfNoPoint", "/model/contact/wall/point", 5, -1),
+        Defect{"WeightNotFinite",
+               [](const Spoiler& f) { f.set<double>("/model/contact/wall/weight", 2, nan); },
+               "/model/contact/wall/weight: "},
+        Defect{"AreaBelowZero",
+               [](const Spoiler& f) { f.set<double>("/model/contact/wall/area", 1, -1.0); },
+               "/model/contact/wall/area: row 1 is -1 mm²"}),
     name_of);
 
 class Acceptable : public ::testing::TestWithParam<Defect> {};

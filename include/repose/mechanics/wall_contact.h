@@ -1,0 +1,105 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "repose/mechanics/contact.h"
+
+namespace repose::mechanics {
+
+/// A uniform cubic B-spline's weights at one parameter: of value, slope and second derivative, of
+/// at most four controls. Beyond its ends the spline goes on straight.
+struct SplineWeights {
+  int first = 0, count = 0;
+  std::array<std::array<double, 4>, 3> of = {};  ///< [derivative][control − first]
+};
+SplineWeights spline_weights(double at, int controls);
+
+/// The sides of cuts against one another: places of one side, the other as a bicubic B-spline
+/// surface through which they do not pass (docs/theory/contact.md). The gap is the signed distance
+/// to the surface where it is now, so that all of it is a function of the positions alone.
+class WallLoop {
+ public:
+  WallLoop() = default;
+  WallLoop(const model::Walls& walls, double stiffness);  ///< with local point numbers
+  bool empty() const { return places_.empty(); }
+  double stiffness() const { return stiffness_; }
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }
+  std::span<const double> multipliers() const { return multiplier_; }  ///< [W] N/mm²
+  void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }
+
+  /// Adds scale · gradient; returns the value, N·mm, unscaled.
+  double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
+  /// Finds the feet of all places, for all functions below.
+  void look(std::span<const Vec3> position);
+  /// Calls visit(p, q, block) for every two points of each place that acts, p before q or the same,
+  /// at the latest look: the Hessian, or a semidefinite relative.
+  template <class Visit>
+  void for_each_block(bool exact, Visit&& visit) const {
+    for (size_t w = 0; w < places_.size(); ++w) {
+      if (!acts(w)) continue;
+      const Eigen::Matrix<double, 5, 5> form = bilinear(w, exact);
+      const int ranks = exact ? 5 : 1;
+      for (size_t i = 0; i < feet_[w].touched.size(); ++i)
+        for (size_t j = i; j < feet_[w].touched.size(); ++j) {
+          const auto& [p, at_p] = feet_[w].touched[i];
+          const auto& [q, at_q] = feet_[w].touched[j];
+          visit(p, q,
+                Mat3(at_p.leftCols(ranks) * form.topLeftCorner(ranks, ranks) *
+                     at_q.leftCols(ranks).transpose()));
+        }
+    }
+  }
+  /// Points that may come to face each other, one before the other, sorted.
+  std::span<const std::array<int32_t, 2>> links() const { return links_; }
+  /// Gaps (mm; where nothing is opposite the distance) and pressures p − k g (N/mm²) at the latest
+  /// look.
+  double gap(size_t w) const { return feet_[w].gap; }
+  double pressure(size_t w) const { return now(w).pressure; }
+  const Vec3& normal(size_t w) const { return feet_[w].normal; }  ///< out of the other side
+  double area(size_t w) const { return places_[w].area; }         ///< mm²
+  int64_t point(size_t w) const { return places_[w].point; }  ///< the point nearest to the place
+  size_t size() const { return places_.size(); }              ///< W
+
+ private:
+  using Share = std::pair<int32_t, double>;
+  /// A point's part in ∂g, T_1·∂r, T_2·∂r, n·∂r_,1 and n·∂r_,2, r = place − foot, as columns.
+  using Touched = std::pair<int32_t, Eigen::Matrix<double, 3, 5>>;
+  struct Net {
+    int columns, rows;
+    std::vector<std::vector<Share>> controls;  // column by column
+  };
+  struct Place {
+    size_t net;  // the other side
+    int64_t point;
+    double area;
+    std::vector<Share> shares;
+  };
+  struct Foot {
+    double gap = 0;
+    bool opposite = false;  // the surface is, not its end
+    Vec3 normal = Vec3::Zero();
+    std::vector<Touched> touched;                // of one that acts, by point
+    Eigen::Matrix2d metric, curvature, tangent;  // m, κ and m − g κ
+  };
+  struct Patch;
+
+  Pressing now(size_t w) const;
+  bool acts(size_t w) const { return now(w).stiffness > 0; }
+  void add_net(const model::Walls& walls, size_t cut, size_t first);
+  void add_place(int64_t point, double area, const Eigen::Vector2d& at);
+  void link(const Net& own, const Net& other);
+  Foot foot_of(const Place& place, const Patch& patch, const Vec3& at, bool opposite) const;
+  Eigen::Matrix<double, 5, 5> bilinear(size_t w, bool exact) const;
+
+  double stiffness_ = 1;
+  std::vector<Net> nets_;
+  std::vector<Place> places_;
+  std::vector<double> multiplier_;
+  std::vector<Foot> feet_;
+  std::vector<std::array<int32_t, 2>> links_;
+};
+
+}  // namespace repose::mechanics

@@ -1,0 +1,277 @@
+#include "repose/mechanics/wall_contact.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace repose::mechanics {
+
+namespace {
+
+/// Adds a weight to a control, those beyond the ends in a straight line with the last two.
+void fold(int control, int controls, double weight, int first, std::array<double, 4>& of) {
+  const int beyond = control < 0 ? -control : control - (controls - 1);
+  if (beyond <= 0 || (control >= 0 && control < controls)) {
+    of[control - first] += weight;
+    return;
+  }
+  const int end = control < 0 ? 0 : controls - 1, next = control < 0 ? 1 : controls - 2;
+  of[end - first] += (beyond + 1) * weight;
+  of[next - first] -= beyond * weight;
+}
+
+}  // namespace
+
+SplineWeights spline_weights(double at, int controls) {
+  const int span = static_cast<int>(std::floor(at));
+  const double s = at - span, t = 1 - s;
+  const std::array<std::array<double, 4>, 3> uniform = {{
+      {t * t * t / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, (4 - 6 * t * t + 3 * t * t * t) / 6,
+       s * s * s / 6},
+      {-t * t / 2, (3 * s - 4) * s / 2, (4 - 3 * t) * t / 2, s * s / 2},
+      {t, 3 * s - 2, 3 * t - 2, s},
+  }};
+  SplineWeights weights;
+  weights.count = std::min(4, controls);
+  weights.first = std::clamp(span - 1, 0, controls - weights.count);
+  for (int order = 0; order < 3; ++order)
+    for (int k = 0; k < 4; ++k)
+      fold(span - 1 + k, controls, uniform[order][k], weights.first, weights.of[order]);
+  return weights;
+}
+
+/// A net's surface around one place on it.
+struct WallLoop::Patch {
+  int rows;
+  SplineWeights along, inwards;
+  Vec3 point, first, second, first_first, first_second, second_second;
+
+  Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at)
+      : rows(net.rows),
+        along(spline_weights(at[0], net.columns)),
+        inwards(spline_weights(at[1], net.rows)),
+        point(sum(controls, 0, 0)),
+        first(sum(controls, 1, 0)),
+        second(sum(controls, 0, 1)),
+        first_first(sum(controls, 2, 0)),
+        first_second(sum(controls, 1, 1)),
+        second_second(sum(controls, 0, 2)) {}
+
+  /// Calls visit(control, weight) for a derivative of the surface.
+  template <class Visit>
+  void for_each(int d_along, int d_inwards, Visit&& visit) const {
+    for (int i = 0; i < along.count; ++i)
+      for (int j = 0; j < inwards.count; ++j)
+        visit((along.first + i) * rows + inwards.first + j,
+              along.of[d_along][i] * inwards.of[d_inwards][j]);
+  }
+  Vec3 sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const {
+    Vec3 total = Vec3::Zero();
+    for_each(d_along, d_inwards,
+             [&](int control, double weight) { total += weight * controls[control]; });
+    return total;
+  }
+  Eigen::Matrix2d metric() const {
+    Eigen::Matrix2d m;
+    m << first.dot(first), first.dot(second), first.dot(second), second.dot(second);
+    return m;
+  }
+  /// Second derivatives in a direction.
+  Eigen::Matrix2d bend(const Vec3& way) const {
+    Eigen::Matrix2d b;
+    b << way.dot(first_first), way.dot(first_second), way.dot(first_second), way.dot(second_second);
+    return b;
+  }
+};
+
+WallLoop::WallLoop(const model::Walls& walls, double stiffness) : stiffness_(stiffness) {
+  size_t first = 0, place = 0;
+  for (size_t cut = 0; cut < walls.size.size(); ++cut) {
+    const auto rows = static_cast<size_t>(walls.size[cut][1]);
+    const size_t count = static_cast<size_t>(walls.size[cut][0]) * rows;
+    add_net(walls, cut, first);
+    add_net(walls, cut, first + count);
+    for (size_t c = 0; c < count; ++c, ++place)
+      if (walls.area[place] > 0)
+        add_place(walls.point[walls.begin[first + c]], walls.area[place],
+                  {static_cast<double>(c / rows), static_cast<double>(c % rows)});
+    link(nets_[nets_.size() - 2], nets_.back());
+    first += 2 * count;
+  }
+  std::sort(links_.begin(), links_.end());
+  links_.erase(std::unique(links_.begin(), links_.end()), links_.end());
+  multiplier_.assign(places_.size(), 0.0);
+  feet_.resize(places_.size());
+}
+
+void WallLoop::add_net(const model::Walls& walls, size_t cut, size_t first) {
+  Net& net = nets_.emplace_back();
+  net.columns = static_cast<int>(walls.size[cut][0]);
+  net.rows = static_cast<int>(walls.size[cut][1]);
+  for (size_t c = first; c < first + static_cast<size_t>(net.columns) * net.rows; ++c) {
+    auto& shares = net.controls.emplace_back();
+    for (auto k = walls.begin[c]; k < walls.begin[c + 1]; ++k)
+      shares.emplace_back(static_cast<int32_t>(walls.point[k]), walls.weight[k]);
+  }
+}
+
+/// A place of the last net but one, against the last.
+void WallLoop::add_place(int64_t point, double area, const Eigen::Vector2d& at) {
+  const Net& own = nets_[nets_.size() - 2];
+  const std::vector<Vec3> nowhere(own.controls.size(), Vec3::Zero());
+  std::map<int32_t, double> shares;
+  Patch(own, nowhere, at).for_each(0, 0, [&](int control, double weight) {
+    if (weight != 0)
+      for (const auto& [p, share] : own.controls[control]) shares[p] += weight * share;
+  });
+  places_.push_back({nets_.size() - 1, point, area, {shares.begin(), shares.end()}});
+}
+
+void WallLoop::link(const Net& own, const Net& other) {
+  constexpr int reach = 4;  // columns, by which sides slide along each other
+  for (const Net* a : {&own, &other})
+    for (const Net* b : {&own, &other})
+      for (int c = 0; c < own.columns * own.rows; ++c)
+        for (int d = std::max(0, c / own.rows - reach) * own.rows;
+             d < std::min(own.columns, c / own.rows + reach + 1) * own.rows; ++d)
+          for (const auto& [p, of_p] : a->controls[c])
+            for (const auto& [q, of_q] : b->controls[d])
+              if (p < q) links_.push_back({p, q});
+}
+
+namespace {
+
+/// Where on a surface of `columns` × `rows` controls `at` is nearest to, by Newton's method;
+/// whether that is not its end. `look` gives the surface at a place.
+template <class Look>
+auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& most, const Vec3& at,
+                   Look&& look) {
+  constexpr int most_steps = 60, most_halved = 20;
+  constexpr double longest = 0.5, exact = 1e-13;  // of a patch
+  const Eigen::Vector2d least(-1, -1);
+  auto patch = look(where);
+  for (int n = 0; n < most_steps; ++n) {
+    const Vec3 way = at - patch.point;
+    Eigen::Matrix2d bend = patch.metric() - patch.bend(way);
+    if (!(bend(0, 0) > 0 && bend.determinant() > 0)) bend = patch.metric();
+    Eigen::Vector2d step =
+        bend.inverse() * Eigen::Vector2d(patch.first.dot(way), patch.second.dot(way));
+    if (!step.allFinite()) break;
+    step *= std::min(1.0, longest / std::max(step.cwiseAbs().maxCoeff(), exact));
+    Eigen::Vector2d next = (where + step).cwiseMax(least).cwiseMin(most);
+    auto there = look(next);
+    for (int k = 0; k < most_halved && (at - there.point).squaredNorm() > way.squaredNorm(); ++k) {
+      next = (where + next) / 2;
+      there = look(next);
+    }
+    const double moved = (next - where).cwiseAbs().maxCoeff();
+    where = next;
+    patch = there;
+    if (moved < exact) break;
+  }
+  return std::pair(patch, (where - least).minCoeff() > 0 && (most - where).minCoeff() > 0);
+}
+
+}  // namespace
+
+WallLoop::Foot WallLoop::foot_of(const Place& place, const Patch& patch, const Vec3& at,
+                                 bool opposite) const {
+  Foot foot;
+  const Vec3 across = patch.first.cross(patch.second), way = at - patch.point;
+  foot.normal = across.normalized();
+  foot.opposite = opposite && across.norm() > 0;
+  foot.gap = foot.opposite ? foot.normal.dot(way) : way.norm();
+  foot.metric = patch.metric();
+  foot.curvature = patch.bend(foot.normal);
+  foot.tangent = foot.metric - foot.gap * foot.curvature;
+  std::map<int32_t, Eigen::Matrix<double, 3, 5>> touched;
+  const auto at_point = [&](int32_t p) -> Eigen::Matrix<double, 3, 5>& {
+    return touched.try_emplace(p, Eigen::Matrix<double, 3, 5>::Zero()).first->second;
+  };
+  Eigen::Matrix3d ways;
+  ways << foot.normal, patch.first, patch.second;
+  const auto& controls = nets_[place.net].controls;
+  for (const auto& [p, share] : place.shares) at_point(p).leftCols<3>() += share * ways;
+  patch.for_each(0, 0, [&](int control, double weight) {
+    for (const auto& [p, share] : controls[control])
+      at_point(p).leftCols<3>() -= weight * share * ways;
+  });
+  for (int d = 0; d < 2; ++d)
+    patch.for_each(1 - d, d, [&](int control, double weight) {
+      for (const auto& [p, share] : controls[control])
+        at_point(p).col(3 + d) += weight * share * foot.normal;
+    });
+  foot.touched.assign(touched.begin(), touched.end());
+  return foot;
+}
+
+void WallLoop::look(std::span<const Vec3> position) {
+  const auto mean = [&](const std::vector<Share>& shares) {
+    Vec3 sum = Vec3::Zero();
+    for (const auto& [p, share] : shares) sum += share * position[p];
+    return sum;
+  };
+  std::vector<Vec3> controls, samples;
+  for (size_t w = 0; w < places_.size(); ++w) {
+    const Place& place = places_[w];
+    const Net& net = nets_[place.net];
+    const auto patch_at = [&](const Eigen::Vector2d& where) { return Patch(net, controls, where); };
+    if (w == 0 || places_[w - 1].net != place.net) {
+      controls.clear(), samples.clear();
+      for (const auto& shares : net.controls) controls.push_back(mean(shares));
+      for (int i = 0; i < net.columns; ++i)
+        for (int j = 0; j < net.rows; ++j) samples.push_back(patch_at({i, j}).point);
+    }
+    const Vec3 at = mean(place.shares);
+    const auto nearest =
+        std::min_element(samples.begin(), samples.end(), [&](const Vec3& a, const Vec3& b) {
+          return (a - at).squaredNorm() < (b - at).squaredNorm();
+        });
+    const auto number = static_cast<int>(nearest - samples.begin());
+    const auto [patch, opposite] =
+        nearest_place(Eigen::Vector2d(number / net.rows, number % net.rows),
+                      Eigen::Vector2d(net.columns, net.rows), at, patch_at);
+    feet_[w] = foot_of(place, patch, at, opposite);
+  }
+}
+
+Pressing WallLoop::now(size_t w) const {
+  const double far = std::numeric_limits<double>::max();
+  return press(feet_[w].opposite ? feet_[w].gap : far, multiplier_[w], stiffness_, false);
+}
+
+double WallLoop::add_gradient(std::span<const Vec3> position, double scale,
+                              std::span<Vec3> gradient) {
+  look(position);
+  double value = 0;
+  for (size_t w = 0; w < places_.size(); ++w) {
+    const Pressing pressing = now(w);
+    value += places_[w].area * pressing.value;
+    if (pressing.pressure == 0) continue;
+    for (const auto& [p, part] : feet_[w].touched)
+      gradient[p] -= scale * places_[w].area * pressing.pressure * part.col(0);
+  }
+  return value;
+}
+
+/// Of the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r and e =
+/// n·∂r_,
+///     ∂²g = −aᵀ m⁻¹ κ A⁻¹ a − aᵀ A⁻¹ e − eᵀ A⁻¹ a − g eᵀ A⁻¹ e,   A = m − g κ.
+Eigen::Matrix<double, 5, 5> WallLoop::bilinear(size_t w, bool exact) const {
+  const Foot& foot = feet_[w];
+  const Pressing pressing = now(w);
+  Eigen::Matrix<double, 5, 5> form = Eigen::Matrix<double, 5, 5>::Zero();
+  form(0, 0) = pressing.stiffness;
+  if (exact) {
+    const Eigen::Matrix2d inverse = foot.tangent.inverse();
+    form.block<2, 2>(1, 1) = pressing.pressure * foot.metric.inverse() * foot.curvature * inverse;
+    form.block<2, 2>(1, 3) = form.block<2, 2>(3, 1) = pressing.pressure * inverse;
+    form.block<2, 2>(3, 3) = pressing.pressure * foot.gap * inverse;
+  }
+  return places_[w].area * form;
+}
+
+}  // namespace repose::mechanics

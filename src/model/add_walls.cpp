@@ -1,0 +1,179 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "add_contact.h"
+
+namespace repose::model {
+
+namespace {
+
+/// The sides of a cut as nets: a column for each of the path's, a row for each layer and two more
+/// round either edge, on the skin and, of a cut through all layers, inside.
+class Wall {
+ public:
+  Wall(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, const Model& model)
+      : cut_(cut), model_(model) {
+    const Points& points = model.points;
+    for (const auto& [row, twin] : pairs) twin_of_[row] = twin;
+    for (size_t p = 0; p < points.position.size(); ++p)
+      row_of_.try_emplace({points.column[p], points.layer[p]}, static_cast<int64_t>(p));
+    const int layers = 1 + *std::max_element(points.layer.begin(), points.layer.end());
+    deepest_ = std::min(cut.layers, layers - 1);
+    Vec3 before = Vec3::Zero();
+    for (const int64_t column : cut.columns) {
+      through_ = through_ || twin_of_.contains(node(column, deepest_));
+      const Vec3& x = position(node(column, 0));
+      along_.push_back(along_.empty() ? 0 : along_.back() + (x - before).norm());
+      before = x;
+    }
+    find_skin_beside();
+  }
+
+  void build(Walls& walls) const {
+    const auto columns = static_cast<int64_t>(cut_.columns.size());
+    const int64_t rows = deepest_ + 1 + beyond + (through_ ? beyond : 0);
+    walls.size.push_back({columns, rows});
+    if (walls.begin.empty()) walls.begin.push_back(0);
+    const bool swapped = faces_away();
+    for (const bool left : {swapped, !swapped})
+      for (int64_t c = 0; c < columns * rows; ++c) {
+        for (const auto& [point, weight] :
+             control(c / rows, static_cast<int>(c % rows) - beyond, left)) {
+          walls.point.push_back(point);
+          walls.weight.push_back(weight);
+        }
+        walls.begin.push_back(static_cast<int64_t>(walls.point.size()));
+      }
+    for (int64_t c = 0; c < columns * rows; ++c)
+      walls.area.push_back(area(c / rows, static_cast<int>(c % rows) - beyond));
+  }
+
+ private:
+  static constexpr int beyond = 2;  // rows, round either edge
+  using Shares = std::vector<std::pair<int64_t, double>>;
+
+  int64_t node(int64_t column, int layer) const { return row_of_.at({column, layer}); }
+  int64_t side_of(int64_t row, bool left) const {
+    const auto twin = twin_of_.find(row);
+    return left && twin != twin_of_.end() ? twin->second : row;
+  }
+  const Vec3& position(int64_t row) const { return model_.points.position[row]; }
+
+  /// Next to each parted point of the skin the skin's points that are not in the cut.
+  void find_skin_beside() {
+    std::set<int64_t> in_cut;
+    for (const int64_t column : cut_.columns)
+      for (const bool left : {false, true}) in_cut.insert(side_of(node(column, 0), left));
+    double sum = 0;
+    for (const Triangle& t : model_.skin)
+      for (int k = 0; k < 3; ++k) {
+        const int64_t p = t[k], q = t[(k + 1) % 3];
+        sum += (position(p) - position(q)).norm() / (3 * static_cast<double>(model_.skin.size()));
+        if (in_cut.contains(p) && !in_cut.contains(q)) beside_[p].insert(q);
+        if (in_cut.contains(q) && !in_cut.contains(p)) beside_[q].insert(p);
+      }
+    edge_ = sum;
+  }
+
+  /// Layers −1 and −2, and as many beyond the deepest, go round the edge: the first is the edge
+  /// once more, so that the surface turns beyond it, the second lies on the skin or what is inside.
+  Shares control(size_t i, int layer, bool left) const {
+    constexpr double edges_round = 1.5;
+    const int inner = std::clamp(layer, 0, deepest_);
+    Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
+    if (std::abs(layer - inner) < beyond) return shares;
+    const Shares way = way_round(i, inner, left);
+    Vec3 length = Vec3::Zero();
+    for (const auto& [point, weight] : way) length += weight * position(point);
+    for (const auto& [point, weight] : way)
+      shares.emplace_back(point, edges_round * edge_ / length.norm() * weight);
+    return shares;
+  }
+  /// The way from an edge's points to those beside them, as a mean over the columns nearby.
+  Shares way_round(size_t i, int layer, bool left) const {
+    constexpr double reach = 1.5;  // edges
+    Shares way;
+    double sum = 0;
+    for (size_t k = 0; k < along_.size(); ++k) {
+      const double weight = 1 - std::abs(along_[k] - along_[i]) / (reach * edge_);
+      const int64_t row = node(cut_.columns[k], 0);
+      const auto beside = beside_.find(side_of(row, left));
+      if (weight <= 0 || !twin_of_.contains(row) || beside == beside_.end()) continue;
+      for (const int64_t p : beside->second)
+        way.emplace_back(layer == 0 ? p : node(model_.points.column[p], layer),
+                         weight / static_cast<double>(beside->second.size()));
+      way.emplace_back(side_of(node(cut_.columns[k], layer), left), -weight);
+      sum += weight;
+    }
+    for (auto& share : way) share.second /= sum;
+    return way;
+  }
+
+  /// mm², what a place stands for; 0 where the sides hang together.
+  double area(int64_t column, int layer) const {
+    const auto at = [&](int64_t i, int l) -> const Vec3& {
+      return position(node(cut_.columns[i], l));
+    };
+    if (layer < 0 || layer > deepest_ || !twin_of_.contains(node(cut_.columns[column], layer)))
+      return 0;
+    double area = 0;
+    for (const int i : {-1, 1})
+      for (const int l : {-1, 1}) {
+        const auto last = static_cast<int64_t>(cut_.columns.size()) - 1;
+        if (column + i < 0 || column + i > last || layer + l < 0 || layer + l > deepest_) continue;
+        const Vec3& x = at(column, layer);
+        area += (at(column + i, layer) - x).cross(at(column, layer + l) - x).norm() / 4;
+      }
+    return area;
+  }
+
+  /// Whether a net's normal, along the cut × inwards, points into the tissue of the doubles.
+  bool faces_away() const {
+    const auto& x = model_.points.position;
+    std::map<int64_t, std::pair<Vec3, int>> middle;  // of the doubles' prisms, by what is doubled
+    std::map<int64_t, int64_t> row_of;
+    for (const auto& [row, twin] : twin_of_) row_of[twin] = row;
+    for (const auto& prism : model_.prisms.points) {
+      Vec3 mean = Vec3::Zero();
+      for (const int64_t p : prism) mean += x[p] / 6;
+      for (const int64_t p : prism)
+        if (const auto found = row_of.find(p); found != row_of.end()) {
+          auto& [sum, count] = middle.try_emplace(found->second, Vec3::Zero(), 0).first->second;
+          sum += mean;
+          ++count;
+        }
+    }
+    double outwards = 0;
+    for (size_t i = 0; i + 1 < cut_.columns.size(); ++i)
+      for (int l = 0; l < deepest_; ++l) {
+        const int64_t row = node(cut_.columns[i], l);
+        const auto found = middle.find(row);
+        if (found == middle.end()) continue;
+        const auto& [sum, count] = found->second;
+        outwards += (x[node(cut_.columns[i + 1], l)] - x[row])
+                        .cross(x[node(cut_.columns[i], l + 1)] - x[row])
+                        .dot(x[row] - sum / count);
+      }
+    return outwards < 0;
+  }
+
+  const Cut& cut_;
+  const Model& model_;
+  int deepest_ = 0;
+  bool through_ = false;
+  double edge_ = 1;            // mm, the skin's mean
+  std::vector<double> along_;  // mm, of the path's columns
+  std::map<int64_t, int64_t> twin_of_;
+  std::map<std::array<int64_t, 2>, int64_t> row_of_;  // column, layer
+  std::map<int64_t, std::set<int64_t>> beside_;
+};
+
+}  // namespace
+
+void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
+  Wall(cut, pairs, model).build(model.contact.walls);
+}
+
+}  // namespace repose::model
