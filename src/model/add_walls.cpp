@@ -77,18 +77,17 @@ class Wall {
     edge_ = sum;
   }
 
-  /// Layers −1 and −2, and as many beyond the deepest, go round the edge: the first is the edge
-  /// once more, so that the surface turns beyond it, the second lies on the skin or what is inside.
+  /// Layers −1 and −2, and as many beyond the deepest, lie round the edge, on the skin or inside.
   Shares control(size_t i, int layer, bool left) const {
-    constexpr double edges_round = 1.5;
+    constexpr double step = 0.75;  // edges of the skin
     const int inner = std::clamp(layer, 0, deepest_);
     Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
-    if (std::abs(layer - inner) < beyond) return shares;
+    if (layer == inner) return shares;
     const Shares way = way_round(i, inner, left);
     Vec3 length = Vec3::Zero();
     for (const auto& [point, weight] : way) length += weight * position(point);
     for (const auto& [point, weight] : way)
-      shares.emplace_back(point, edges_round * edge_ / length.norm() * weight);
+      shares.emplace_back(point, std::abs(layer - inner) * step * edge_ / length.norm() * weight);
     return shares;
   }
   /// The way from an edge's points to those beside them, as a mean over the columns nearby.
