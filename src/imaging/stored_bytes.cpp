@@ -141,19 +141,21 @@ void check_nifti_spacing(const std::filesystem::path& file) {
 
 void check_meta_dimensions(const std::filesystem::path& file) {
   constexpr int64_t most = 10;
+  // ITK takes ':' for '=', several of them for one, and goes on behind a data file's name.
+  std::string begin(size_t{1} << 16, '\0');
   std::ifstream in(file, std::ios::binary);
-  for (std::string line; std::getline(in, line);) {
-    const std::string_view text = line;
-    const size_t sign = std::min(text.find('='), text.size());
-    const auto key = base::words(text.substr(0, sign));
-    if (key.size() != 1 || sign == text.size()) continue;
-    const auto value = base::words(text.substr(sign + 1));
-    if (key[0] == "ElementDataFile") return;
-    if (key[0] != "NDims") continue;
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(in.gcount()));
+  constexpr std::string_view name = "NDims";
+  for (size_t at = begin.find(name); at != std::string::npos; at = begin.find(name, at + 1)) {
+    const std::string text = begin.substr(at + name.size(), 100);
+    const std::string line = text.substr(0, text.find('\n'));
+    const auto value =
+        base::words(line.substr(std::min(line.find_first_not_of(" \t:="), line.size())));
     const auto number = value.size() == 1 ? base::parse_integer(value[0]) : std::nullopt;
     if (!number || *number < 1 || *number > most)
       base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
-                   base::shown(text.substr(sign + 1)), most);
+                   base::shown(line), most);
   }
 }
 
