@@ -177,8 +177,7 @@ auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& most, const Vec
 
 }  // namespace
 
-WallLoop::Foot WallLoop::foot_of(const Place& place, const Patch& patch, const Vec3& at,
-                                 bool opposite) const {
+WallLoop::Foot WallLoop::foot_of(const Patch& patch, const Vec3& at, bool opposite) {
   Foot foot;
   const Vec3 across = patch.first.cross(patch.second), way = at - patch.point;
   foot.normal = across.normalized();
@@ -187,6 +186,11 @@ WallLoop::Foot WallLoop::foot_of(const Place& place, const Patch& patch, const V
   foot.metric = patch.metric();
   foot.curvature = patch.bend(foot.normal);
   foot.tangent = foot.metric - foot.gap * foot.curvature;
+  return foot;
+}
+
+std::vector<WallLoop::Touched> WallLoop::touched(const Place& place, const Patch& patch,
+                                                 const Foot& foot) const {
   std::map<int32_t, Eigen::Matrix<double, 3, 5>> touched;
   const auto at_point = [&](int32_t p) -> Eigen::Matrix<double, 3, 5>& {
     return touched.try_emplace(p, Eigen::Matrix<double, 3, 5>::Zero()).first->second;
@@ -204,8 +208,7 @@ WallLoop::Foot WallLoop::foot_of(const Place& place, const Patch& patch, const V
       for (const auto& [p, share] : controls[control])
         at_point(p).col(3 + d) += weight * share * foot.normal;
     });
-  foot.touched.assign(touched.begin(), touched.end());
-  return foot;
+  return {touched.begin(), touched.end()};
 }
 
 void WallLoop::look(std::span<const Vec3> position) {
@@ -234,7 +237,8 @@ void WallLoop::look(std::span<const Vec3> position) {
     const auto [patch, opposite] =
         nearest_place(Eigen::Vector2d(number / net.rows, number % net.rows),
                       Eigen::Vector2d(net.columns, net.rows), at, patch_at);
-    feet_[w] = foot_of(place, patch, at, opposite);
+    feet_[w] = foot_of(patch, at, opposite);
+    if (acts(w)) feet_[w].touched = touched(place, patch, feet_[w]);
   }
 }
 

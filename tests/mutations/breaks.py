@@ -267,6 +267,18 @@ BREAKS = [
         r"^solve\.contact|^program\.(contact|incisions)",
     ),
     (
+        "a surface of a cut bends nowhere",
+        "foot.tangent = foot.metric - foot.gap * foot.curvature;",
+        "foot.tangent = foot.metric;",
+        r"^mechanics\.contact",
+    ),
+    (
+        "splines end where their controls do",
+        "of[end - first] += (beyond + 1) * weight;",
+        "of[end - first] += weight;",
+        r"^mechanics\.contact",
+    ),
+    (
         "both sides of a cut have the whole area",
         "touches.area[c] /= 2;",
         "",

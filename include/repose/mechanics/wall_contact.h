@@ -91,7 +91,8 @@ class WallLoop {
   void add_net(const model::Walls& walls, size_t cut, size_t first);
   void add_place(int64_t point, double area, const Eigen::Vector2d& at);
   void link(const Net& own, const Net& other);
-  Foot foot_of(const Place& place, const Patch& patch, const Vec3& at, bool opposite) const;
+  static Foot foot_of(const Patch& patch, const Vec3& at, bool opposite);
+  std::vector<Touched> touched(const Place& place, const Patch& patch, const Foot& foot) const;
   Eigen::Matrix<double, 5, 5> bilinear(size_t w, bool exact) const;
 
   double stiffness_ = 1;
