@@ -103,7 +103,7 @@ class TangentSolver {
   discrete::Hessian& hessian_;
   int64_t unknowns_;  // scalar, of all ranks
   std::unique_ptr<ColumnMultigrid> columns_;
-  PcHandle factors_;     // in the place of columns_
+  PcHandle factors_;  // in the place of columns_
   bool given_way_ = false;
   KspHandle krylov_;
   base::VecHandle next_;             // the Newton step at a trial
