@@ -14,7 +14,7 @@ namespace {
 /// Adds a weight to a control, those beyond the ends in a straight line with the last two.
 void fold(int control, int controls, double weight, int first, std::array<double, 4>& of) {
   const int beyond = control < 0 ? -control : control - (controls - 1);
-  if (beyond <= 0 || (control >= 0 && control < controls)) {
+  if (beyond <= 0) {
     of[control - first] += weight;
     return;
   }
@@ -43,49 +43,35 @@ SplineWeights spline_weights(double at, int controls) {
   return weights;
 }
 
-/// A net's surface around one place on it.
-struct WallLoop::Patch {
-  int rows;
-  SplineWeights along, inwards;
-  Vec3 point, first, second, first_first, first_second, second_second;
+WallLoop::Patch::Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at)
+    : rows(net.rows),
+      along(spline_weights(at[0], net.columns)),
+      inwards(spline_weights(at[1], net.rows)),
+      point(sum(controls, 0, 0)),
+      first(sum(controls, 1, 0)),
+      second(sum(controls, 0, 1)),
+      first_first(sum(controls, 2, 0)),
+      first_second(sum(controls, 1, 1)),
+      second_second(sum(controls, 0, 2)) {}
 
-  Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at)
-      : rows(net.rows),
-        along(spline_weights(at[0], net.columns)),
-        inwards(spline_weights(at[1], net.rows)),
-        point(sum(controls, 0, 0)),
-        first(sum(controls, 1, 0)),
-        second(sum(controls, 0, 1)),
-        first_first(sum(controls, 2, 0)),
-        first_second(sum(controls, 1, 1)),
-        second_second(sum(controls, 0, 2)) {}
+Vec3 WallLoop::Patch::sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const {
+  Vec3 total = Vec3::Zero();
+  for_each(d_along, d_inwards,
+           [&](int control, double weight) { total += weight * controls[control]; });
+  return total;
+}
 
-  /// Calls visit(control, weight) for a derivative of the surface.
-  template <class Visit>
-  void for_each(int d_along, int d_inwards, Visit&& visit) const {
-    for (int i = 0; i < along.count; ++i)
-      for (int j = 0; j < inwards.count; ++j)
-        visit((along.first + i) * rows + inwards.first + j,
-              along.of[d_along][i] * inwards.of[d_inwards][j]);
-  }
-  Vec3 sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const {
-    Vec3 total = Vec3::Zero();
-    for_each(d_along, d_inwards,
-             [&](int control, double weight) { total += weight * controls[control]; });
-    return total;
-  }
-  Eigen::Matrix2d metric() const {
-    Eigen::Matrix2d m;
-    m << first.dot(first), first.dot(second), first.dot(second), second.dot(second);
-    return m;
-  }
-  /// Second derivatives in a direction.
-  Eigen::Matrix2d bend(const Vec3& way) const {
-    Eigen::Matrix2d b;
-    b << way.dot(first_first), way.dot(first_second), way.dot(first_second), way.dot(second_second);
-    return b;
-  }
-};
+Eigen::Matrix2d WallLoop::Patch::metric() const {
+  Eigen::Matrix2d m;
+  m << first.dot(first), first.dot(second), first.dot(second), second.dot(second);
+  return m;
+}
+
+Eigen::Matrix2d WallLoop::Patch::bend(const Vec3& way) const {
+  Eigen::Matrix2d b;
+  b << way.dot(first_first), way.dot(first_second), way.dot(first_second), way.dot(second_second);
+  return b;
+}
 
 WallLoop::WallLoop(const model::Walls& walls, double stiffness) : stiffness_(stiffness) {
   size_t first = 0, place = 0;
@@ -177,34 +163,22 @@ auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& most, const Vec
 
 }  // namespace
 
-WallLoop::Foot WallLoop::foot_of(const Patch& patch, const Vec3& at, bool opposite) {
-  Foot foot;
-  const Vec3 across = patch.first.cross(patch.second), way = at - patch.point;
-  foot.normal = across.normalized();
-  foot.opposite = opposite && across.norm() > 0;
-  foot.gap = foot.opposite ? foot.normal.dot(way) : way.norm();
-  foot.metric = patch.metric();
-  foot.curvature = patch.bend(foot.normal);
-  foot.tangent = foot.metric - foot.gap * foot.curvature;
-  return foot;
-}
-
-std::vector<WallLoop::Touched> WallLoop::touched(const Place& place, const Patch& patch,
-                                                 const Foot& foot) const {
+std::vector<WallLoop::Touched> WallLoop::touched(size_t w) const {
   std::map<int32_t, Eigen::Matrix<double, 3, 5>> touched;
   const auto at_point = [&](int32_t p) -> Eigen::Matrix<double, 3, 5>& {
     return touched.try_emplace(p, Eigen::Matrix<double, 3, 5>::Zero()).first->second;
   };
+  const Foot& foot = feet_[w];
   Eigen::Matrix3d ways;
-  ways << foot.normal, patch.first, patch.second;
-  const auto& controls = nets_[place.net].controls;
-  for (const auto& [p, share] : place.shares) at_point(p).leftCols<3>() += share * ways;
-  patch.for_each(0, 0, [&](int control, double weight) {
+  ways << foot.normal, foot.patch.first, foot.patch.second;
+  const auto& controls = nets_[places_[w].net].controls;
+  for (const auto& [p, share] : places_[w].shares) at_point(p).leftCols<3>() += share * ways;
+  foot.patch.for_each(0, 0, [&](int control, double weight) {
     for (const auto& [p, share] : controls[control])
       at_point(p).leftCols<3>() -= weight * share * ways;
   });
   for (int d = 0; d < 2; ++d)
-    patch.for_each(1 - d, d, [&](int control, double weight) {
+    foot.patch.for_each(1 - d, d, [&](int control, double weight) {
       for (const auto& [p, share] : controls[control])
         at_point(p).col(3 + d) += weight * share * foot.normal;
     });
@@ -237,8 +211,12 @@ void WallLoop::look(std::span<const Vec3> position) {
     const auto [patch, opposite] =
         nearest_place(Eigen::Vector2d(number / net.rows, number % net.rows),
                       Eigen::Vector2d(net.columns, net.rows), at, patch_at);
-    feet_[w] = foot_of(patch, at, opposite);
-    if (acts(w)) feet_[w].touched = touched(place, patch, feet_[w]);
+    const Vec3 across = patch.first.cross(patch.second), way = at - patch.point;
+    Foot& foot = feet_[w];
+    foot.patch = patch;
+    foot.normal = across.normalized();
+    foot.opposite = opposite && across.norm() > 0;
+    foot.gap = foot.opposite ? foot.normal.dot(way) : way.norm();
   }
 }
 
@@ -255,14 +233,18 @@ double WallLoop::add_gradient(std::span<const Vec3> position, double scale,
     const Pressing pressing = now(w);
     value += places_[w].area * pressing.value;
     if (pressing.pressure == 0) continue;
-    for (const auto& [p, part] : feet_[w].touched)
-      gradient[p] -= scale * places_[w].area * pressing.pressure * part.col(0);
+    const Vec3 push = scale * places_[w].area * pressing.pressure * feet_[w].normal;
+    for (const auto& [p, share] : places_[w].shares) gradient[p] -= share * push;
+    feet_[w].patch.for_each(0, 0, [&](int control, double weight) {
+      for (const auto& [p, share] : nets_[places_[w].net].controls[control])
+        gradient[p] += weight * share * push;
+    });
   }
   return value;
 }
 
-/// Of the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r and e =
-/// n·∂r_,
+/// Of the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r,
+/// e = n·∂S₂,
 ///     ∂²g = −aᵀ m⁻¹ κ A⁻¹ a − aᵀ A⁻¹ e − eᵀ A⁻¹ a − g eᵀ A⁻¹ e,   A = m − g κ.
 Eigen::Matrix<double, 5, 5> WallLoop::bilinear(size_t w, bool exact) const {
   const Foot& foot = feet_[w];
@@ -270,8 +252,9 @@ Eigen::Matrix<double, 5, 5> WallLoop::bilinear(size_t w, bool exact) const {
   Eigen::Matrix<double, 5, 5> form = Eigen::Matrix<double, 5, 5>::Zero();
   form(0, 0) = pressing.stiffness;
   if (exact) {
-    const Eigen::Matrix2d inverse = foot.tangent.inverse();
-    form.block<2, 2>(1, 1) = pressing.pressure * foot.metric.inverse() * foot.curvature * inverse;
+    const Eigen::Matrix2d metric = foot.patch.metric(), curvature = foot.patch.bend(foot.normal);
+    const Eigen::Matrix2d inverse = (metric - foot.gap * curvature).inverse();
+    form.block<2, 2>(1, 1) = pressing.pressure * metric.inverse() * curvature * inverse;
     form.block<2, 2>(1, 3) = form.block<2, 2>(3, 1) = pressing.pressure * inverse;
     form.block<2, 2>(3, 3) = pressing.pressure * foot.gap * inverse;
   }

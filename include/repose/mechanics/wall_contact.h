@@ -42,10 +42,11 @@ class WallLoop {
       if (!acts(w)) continue;
       const Eigen::Matrix<double, 5, 5> form = bilinear(w, exact);
       const int ranks = exact ? 5 : 1;
-      for (size_t i = 0; i < feet_[w].touched.size(); ++i)
-        for (size_t j = i; j < feet_[w].touched.size(); ++j) {
-          const auto& [p, at_p] = feet_[w].touched[i];
-          const auto& [q, at_q] = feet_[w].touched[j];
+      const std::vector<Touched> points = touched(w);
+      for (size_t i = 0; i < points.size(); ++i)
+        for (size_t j = i; j < points.size(); ++j) {
+          const auto& [p, at_p] = points[i];
+          const auto& [q, at_q] = points[j];
           visit(p, q,
                 Mat3(at_p.leftCols(ranks) * form.topLeftCorner(ranks, ranks) *
                      at_q.leftCols(ranks).transpose()));
@@ -77,22 +78,39 @@ class WallLoop {
     double area;
     std::vector<Share> shares;
   };
+  /// A net's surface around one place on it, and its derivatives along the cut and inwards.
+  struct Patch {
+    Patch() = default;
+    Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at);
+    /// Calls visit(control, weight) for a derivative of the surface.
+    template <class Visit>
+    void for_each(int d_along, int d_inwards, Visit&& visit) const {
+      for (int i = 0; i < along.count; ++i)
+        for (int j = 0; j < inwards.count; ++j)
+          visit((along.first + i) * rows + inwards.first + j,
+                along.of[d_along][i] * inwards.of[d_inwards][j]);
+    }
+    Vec3 sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const;
+    Eigen::Matrix2d metric() const;
+    Eigen::Matrix2d bend(const Vec3& way) const;  ///< second derivatives in a direction
+
+    int rows = 0;
+    SplineWeights along, inwards;
+    Vec3 point, first, second, first_first, first_second, second_second;
+  };
   struct Foot {
+    Patch patch;
+    Vec3 normal = Vec3::Zero();
     double gap = 0;
     bool opposite = false;  // the surface is, not its end
-    Vec3 normal = Vec3::Zero();
-    std::vector<Touched> touched;                // of one that acts, by point
-    Eigen::Matrix2d metric, curvature, tangent;  // m, κ and m − g κ
   };
-  struct Patch;
 
   Pressing now(size_t w) const;
   bool acts(size_t w) const { return now(w).stiffness > 0; }
   void add_net(const model::Walls& walls, size_t cut, size_t first);
   void add_place(int64_t point, double area, const Eigen::Vector2d& at);
   void link(const Net& own, const Net& other);
-  static Foot foot_of(const Patch& patch, const Vec3& at, bool opposite);
-  std::vector<Touched> touched(const Place& place, const Patch& patch, const Foot& foot) const;
+  std::vector<Touched> touched(size_t w) const;  // of a place that acts, by point
   Eigen::Matrix<double, 5, 5> bilinear(size_t w, bool exact) const;
 
   double stiffness_ = 1;
