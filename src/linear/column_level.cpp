@@ -2,8 +2,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-
-#include "column_sweeps.h"
+#include <cmath>
+#include <cstring>
 
 namespace repose::linear {
 
@@ -11,12 +11,15 @@ using base::check;
 
 namespace {
 
-const Sweeps& sweeps_for(mechanics::Kernels kernels) {
-#ifdef __x86_64__
-  if (kernels == mechanics::Kernels::avx512) return avx512_sweeps;
-  if (kernels == mechanics::Kernels::avx2) return avx2_sweeps;
-#endif
-  return plain_sweeps;
+/// Four numbers from anywhere, the last of which belongs to what follows and is not used.
+Lanes load(const float* numbers) {
+  Lanes lanes;
+  std::memcpy(&lanes, numbers, sizeof lanes);
+  return lanes;
+}
+
+Lanes times(const float* block, Lanes x) {
+  return load(block) * x[0] + load(block + 3) * x[1] + load(block + 6) * x[2];
 }
 
 }  // namespace
@@ -27,9 +30,8 @@ FloatsType::FloatsType(int count) {
 }
 
 ColumnLevel::ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
-                         BlockPattern pattern, mechanics::Kernels kernels)
-    : sweeps_(&sweeps_for(kernels)),
-      place_(std::move(place)),
+                         BlockPattern pattern)
+    : place_(std::move(place)),
       ghost_(std::move(ghost)),
       pattern_(std::move(pattern)),
       block_(pattern_.column.size() + 1),
@@ -94,16 +96,16 @@ void ColumnLevel::fill(const UpperSums& sums) {
   for (int32_t i = 0; i < own(); ++i) {
     int64_t k = diagonal(i);
     for (const Eigen::Matrix3f& sum : sums.row(i)) {
-      block_[k] = PackedBlock::of(sum);
+      block_[k] = std::isnormal(sum.cwiseAbs().maxCoeff()) ? sum : Eigen::Matrix3f::Zero();
       const int32_t j = pattern_.column[k];
-      if (j > i && j < own()) block_[next[j]++] = block_[k].transposed();
+      if (j > i && j < own()) block_[next[j]++] = block_[k].transpose();
       ++k;
     }
   }
 }
 
 void ColumnLevel::damp() {
-  constexpr float lift = 1e-4f;  // of the mean diagonal: above what packing rounds off
+  constexpr float lift = 1e-4f;  // of the mean diagonal: semidefinite columns become definite
   for (int32_t i = 0; i < own(); ++i) {
     const float stiffness = block(diagonal(i)).trace() / 3;
     float beyond = 0;
@@ -131,29 +133,49 @@ void ColumnLevel::factor() {
   }
 }
 
-SweptLevel ColumnLevel::swept() const {
-  return {own(),
-          static_cast<int64_t>(chain_.size()) - 1,
-          chain_.data(),
-          pattern_.begin.data(),
-          pattern_.column.data(),
-          left_.data(),
-          within_.data(),
-          block_.data(),
-          damping_.data(),
-          inverse_.data()};
+Lanes ColumnLevel::row_product(int64_t k, int64_t end, std::span<const Lanes> x) const {
+  Lanes sum{};
+  for (; k < end; ++k) sum += times(block_[k].data(), x[pattern_.column[k]]);
+  return sum;
+}
+
+void ColumnLevel::solve_column(int64_t column, std::span<Lanes> x) const {
+  const int32_t begin = chain_[column], end = chain_[column + 1];
+  for (int32_t i = begin; i < end; ++i) {
+    const int64_t above = pattern_.begin[i] + left_[i];
+    if (i > begin) x[i] -= row_product(above, above + 1, x);
+    x[i] = times(inverse_.data() + int64_t{9} * i, x[i]);
+  }
+  for (int32_t i = end - 2; i >= begin; --i) {
+    const int64_t right = pattern_.begin[i] + left_[i] + within_[i];
+    x[i] -= times(inverse_.data() + int64_t{9} * i, row_product(right - 1, right, x));
+  }
 }
 
 void ColumnLevel::forward(std::span<const Lanes> b, std::span<Lanes> x) const {
-  sweeps_->forward(swept(), b.data(), x.data());
+  for (size_t c = 0; c + 1 < chain_.size(); ++c) {
+    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i)
+      x[i] = b[i] - row_product(pattern_.begin[i], pattern_.begin[i] + left_[i], x);
+    solve_column(c, x);
+  }
 }
 
 void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const {
-  sweeps_->residual_of_forward(swept(), x.data(), r.data());
+  for (int32_t i = 0; i < own(); ++i) {
+    const int64_t right = pattern_.begin[i] + left_[i] + within_[i];
+    r[i] = damping_[i] * x[i] - row_product(right, pattern_.begin[i + 1], x);
+  }
 }
 
 void ColumnLevel::backward(std::span<const Lanes> b, std::span<Lanes> x) const {
-  sweeps_->backward(swept(), b.data(), x.data());
+  for (size_t c = chain_.size() - 1; c-- > 0;) {
+    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
+      const int64_t column = pattern_.begin[i] + left_[i];
+      x[i] = b[i] + damping_[i] * x[i] - row_product(pattern_.begin[i], column, x) -
+             row_product(column + within_[i], pattern_.begin[i + 1], x);
+    }
+    solve_column(c, x);
+  }
 }
 
 UpperSums::UpperSums(const ColumnLevel& level) : level_(level), begin_(level.own() + 1, 0) {

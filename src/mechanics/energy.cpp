@@ -3,70 +3,14 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "repose/mechanics/hessian.h"
 #include "repose/model/material.h"
-#include "run_kernels.h"
 
 namespace repose::mechanics {
 
 namespace {
-
-/// The kernels of runs, nullptr for the plain way.
-const RunKernels* run_kernels(Kernels kernels) {
-#ifdef __x86_64__
-  if (kernels == Kernels::avx512) return &avx512_kernels;
-  if (kernels == Kernels::avx2) return &avx2_kernels;
-#endif
-  return nullptr;
-}
-
-/// Elements [begin, end) of a loop, of which the first may lie in runs.
-template <class Run>
-struct Section {
-  int64_t begin, end;
-  const Runs<Run>& in_runs;
-
-  /// From where on elements go one by one.
-  int64_t singles(Kernels kernels) const {
-    return run_kernels(kernels) ? begin + in_runs.elements : begin;
-  }
-};
-
-template <class Loop>
-auto counted(const Loop& loop) {
-  return Section{0, loop.counted, loop.counted_runs};
-}
-template <class Loop>
-auto others(const Loop& loop) {
-  return Section{loop.counted, loop.size(), loop.other_runs};
-}
-
-SpringsInRuns in_runs(const SpringLoop& loop, const Section<SpringRun>& section) {
-  const int64_t first = section.begin;
-  return {loop.exponent,
-          section.in_runs.runs.data(),
-          static_cast<int64_t>(section.in_runs.runs.size()),
-          loop.stiffness.data() + first,
-          loop.rest_length.data() + first,
-          loop.inverse_reference.data() + first};
-}
-
-PrismsInRuns in_runs(const PrismLoop& loop, const Section<PrismRun>& section) {
-  return {section.in_runs.runs.data(), static_cast<int64_t>(section.in_runs.runs.size()),
-          loop.compliance.data() + section.begin, loop.target_volume.data() + section.begin};
-}
-
-EdgesInRuns in_runs(const EdgeLoop& loop, const Section<SpringRun>& section) {
-  return {section.in_runs.runs.data(), static_cast<int64_t>(section.in_runs.runs.size()),
-          loop.weight.data() + section.begin};
-}
-
-/// The numbers of the vectors, three a vector.
-const double* numbers(std::span<const Vec3> vectors) {
-  return reinterpret_cast<const double*>(vectors.data());
-}
-double* numbers(std::span<Vec3> vectors) { return reinterpret_cast<double*>(vectors.data()); }
 
 std::array<Vec3, 6> corners_of(const PrismLoop& loop, int64_t e, std::span<const Vec3> position) {
   std::array<Vec3, 6> corners;
@@ -95,10 +39,9 @@ double spring_gradient(const SpringLoop& loop, int64_t begin, int64_t end,
 
 /// K w for the spring's exact block K, without forming it: across · w + (along − across) u (u·w).
 template <int p>
-void spring_action(const SpringLoop& loop, int64_t begin, int64_t end,
-                   std::span<const Vec3> position, double scale, std::span<const Vec3> direction,
-                   std::span<Vec3> product) {
-  for (int64_t e = begin; e < end; ++e) {
+void spring_action(const SpringLoop& loop, std::span<const Vec3> position, double scale,
+                   std::span<const Vec3> direction, std::span<Vec3> product) {
+  for (int64_t e = 0; e < loop.size(); ++e) {
     const auto [i, j] = loop.points[e];
     const auto [along, across, u] =
         spring_stiffness<p>(position[j] - position[i], loop.stiffness[e], loop.rest_length[e],
@@ -110,18 +53,45 @@ void spring_action(const SpringLoop& loop, int64_t begin, int64_t end,
   }
 }
 
+/// A vector in two registers, x and y in one.
+struct Halves {
+  Pair xy{};
+  double z = 0;
+};
+
+Halves halves(const Vec3& v) {
+  Halves two{{}, v.z()};
+  std::memcpy(&two.xy, v.data(), sizeof two.xy);
+  return two;
+}
+
+void add(const Halves& h, Vec3& sum) {
+  const Pair xy = halves(sum).xy + h.xy;
+  std::memcpy(sum.data(), &xy, sizeof xy);
+  sum.z() += h.z;
+}
+
+/// The edges of one first point after the other: its sum stays in registers.
 double edge_gradient(const EdgeLoop& loop, int64_t begin, int64_t end,
                      std::span<const Vec3> position, double scale, std::span<Vec3> gradient) {
-  double energy = 0;
-  for (int64_t e = begin; e < end; ++e) {
-    const auto [i, j] = loop.points[e];
-    const Vec3 d = position[j] - position[i];
-    const Vec3 force = scale * loop.weight[e] * d;
-    gradient[i] -= force;
-    gradient[j] += force;
-    energy += 0.5 * loop.weight[e] * d.squaredNorm();
+  Halves squares;
+  for (int64_t e = begin; e < end;) {
+    const int32_t i = loop.points[e][0];
+    const Halves here = halves(position[i]);
+    Halves sum;
+    for (; e < end && loop.points[e][0] == i; ++e) {
+      const int32_t j = loop.points[e][1];
+      const Halves there = halves(position[j]);
+      const Halves d = {there.xy - here.xy, there.z - here.z};
+      const double w = loop.weight[e];
+      const Halves force = {scale * w * d.xy, scale * w * d.z};
+      add(force, gradient[j]);
+      sum = {sum.xy - force.xy, sum.z - force.z};
+      squares = {squares.xy + w * d.xy * d.xy, squares.z + w * d.z * d.z};
+    }
+    add(sum, gradient[i]);
   }
-  return energy;
+  return 0.5 * (squares.xy[0] + squares.xy[1] + squares.z);
 }
 
 /// The prisms e and e + 1 of a range that ends at `end`: two, or the last one twice.
@@ -183,11 +153,10 @@ double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
   return value;
 }
 
-void prism_action(const PrismLoop& loop, int64_t begin, int64_t end, std::span<const Vec3> position,
-                  const Weights& weights, std::span<const Vec3> direction,
-                  std::span<Vec3> product) {
-  for (int64_t e = begin; e < end; e += 2) {
-    const TwoPrisms prisms(loop, e, end);
+void prism_action(const PrismLoop& loop, std::span<const Vec3> position, const Weights& weights,
+                  std::span<const Vec3> direction, std::span<Vec3> product) {
+  for (int64_t e = 0; e < loop.size(); e += 2) {
+    const TwoPrisms prisms(loop, e, loop.size());
     const PrismEdges<Pair> edges(prisms.gather(position));
     const PrismTriples<Pair> moves = prisms.gather(direction);
     const PrismSlope<Pair> v(edges);
@@ -215,35 +184,18 @@ void set_block(Mat3& block, const Triple<double>& x, const Triple<double>& y,
 }  // namespace
 
 double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> position, double scale,
-                           std::span<Vec3> gradient, Kernels kernels) {
+                           std::span<Vec3> gradient) {
   return with_exponent(loop.exponent, [&]<int p>() {
-    const auto add = [&](const Section<SpringRun>& section) {
-      const int64_t singles = section.singles(kernels);
-      double energy = 0;
-      if (singles > section.begin)
-        energy = run_kernels(kernels)->spring_gradient(in_runs(loop, section), numbers(position),
-                                                       scale, numbers(gradient));
-      return energy + spring_gradient<p>(loop, singles, section.end, position, scale, gradient);
-    };
-    const double energy = add(counted(loop));
-    add(others(loop));
+    const double energy = spring_gradient<p>(loop, 0, loop.counted, position, scale, gradient);
+    spring_gradient<p>(loop, loop.counted, loop.size(), position, scale, gradient);
     return energy;
   });
 }
 
 double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, double scale,
-                         std::span<Vec3> gradient, Kernels kernels) {
-  const auto add = [&](const Section<SpringRun>& section) {
-    const int64_t singles = section.singles(kernels);
-    double energy = 0;
-    if (singles > section.begin)
-      energy = run_kernels(kernels)->edge_gradient(in_runs(loop, section), numbers(position), scale,
-                                                   numbers(gradient)) /
-               scale;
-    return energy + edge_gradient(loop, singles, section.end, position, scale, gradient);
-  };
-  const double energy = add(counted(loop));
-  add(others(loop));
+                         std::span<Vec3> gradient) {
+  const double energy = edge_gradient(loop, 0, loop.counted, position, scale, gradient);
+  edge_gradient(loop, loop.counted, loop.size(), position, scale, gradient);
   return energy;
 }
 
@@ -254,66 +206,31 @@ VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
 }
 
 double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
-                          const Weights& weights, std::span<Vec3> gradient, Kernels kernels) {
+                          const Weights& weights, std::span<Vec3> gradient) {
   if (weights.volume == VolumeTerm::none) return 0;
-  const auto add = [&](const Section<PrismRun>& section) {
-    const int64_t singles = section.singles(kernels);
-    double value = 0;
-    if (singles > section.begin)
-      value = run_kernels(kernels)->prism_gradient(in_runs(loop, section), numbers(position),
-                                                   weights, numbers(gradient));
-    return value + prism_gradient(loop, singles, section.end, position, weights, gradient);
-  };
-  const double value = add(counted(loop));
-  add(others(loop));
+  const double value = prism_gradient(loop, 0, loop.counted, position, weights, gradient);
+  prism_gradient(loop, loop.counted, loop.size(), position, weights, gradient);
   return value;
 }
 
 double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
-                           const Weights& weights, std::span<Vec3> gradient, Kernels kernels) {
-  double value = add_prism_gradient(loops.prisms, position, weights, gradient, kernels);
+                           const Weights& weights, std::span<Vec3> gradient) {
+  double value = add_prism_gradient(loops.prisms, position, weights, gradient);
   if (!loops.nodal.empty())
     value += weights.volume_weight *
              add_nodal_gradient(loops.nodal, position, weights.volume_weight, gradient);
   return value;
 }
 
-namespace {
-
-void add_spring_action(const SpringLoop& loop, const Section<SpringRun>& section,
-                       std::span<const Vec3> position, double scale,
-                       std::span<const Vec3> direction, std::span<Vec3> product, Kernels kernels) {
-  const int64_t singles = section.singles(kernels);
-  if (singles > section.begin)
-    run_kernels(kernels)->spring_action(in_runs(loop, section), numbers(position), scale,
-                                        numbers(direction), numbers(product));
-  with_exponent(loop.exponent, [&]<int p>() {
-    spring_action<p>(loop, singles, section.end, position, scale, direction, product);
-  });
-}
-
-void add_prism_action(const PrismLoop& loop, const Section<PrismRun>& section,
-                      std::span<const Vec3> position, const Weights& weights,
-                      std::span<const Vec3> direction, std::span<Vec3> product, Kernels kernels) {
-  const int64_t singles = section.singles(kernels);
-  if (singles > section.begin)
-    run_kernels(kernels)->prism_action(in_runs(loop, section), numbers(position), weights,
-                                       numbers(direction), numbers(product));
-  prism_action(loop, singles, section.end, position, weights, direction, product);
-}
-
-}  // namespace
-
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
-                        std::span<const Vec3> direction, std::span<Vec3> product, Kernels kernels) {
+                        std::span<const Vec3> direction, std::span<Vec3> product) {
   for (const SpringLoop& loop : loops.springs)
-    for (const auto& section : {counted(loop), others(loop)})
-      add_spring_action(loop, section, position, weights.elastic, direction, product, kernels);
-  if (loops.edges.size() > 0)
-    add_edge_gradient(loops.edges, direction, weights.elastic, product, kernels);
+    with_exponent(loop.exponent, [&]<int p>() {
+      spring_action<p>(loop, position, weights.elastic, direction, product);
+    });
+  if (loops.edges.size() > 0) add_edge_gradient(loops.edges, direction, weights.elastic, product);
   if (weights.volume == VolumeTerm::none) return;
-  for (const auto& section : {counted(loops.prisms), others(loops.prisms)})
-    add_prism_action(loops.prisms, section, position, weights, direction, product, kernels);
+  prism_action(loops.prisms, position, weights, direction, product);
   add_nodal_action(loops.nodal, position, weights.volume_weight, direction, product);
 }
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "find_runs.h"
-
 namespace repose::mechanics {
 
 namespace {
@@ -19,7 +17,7 @@ struct Chosen {
   std::vector<int64_t> counted, others;
 };
 
-/// Those that touch soft tissue, or those that do not.
+/// Those that touch soft tissue, or those that do not, in the order of their points in memory.
 template <size_t n, class Wanted>
 Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>>& elements,
               int64_t owned, Wanted&& wanted, bool soft = true) {
@@ -27,42 +25,22 @@ Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>
   for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
     if (wanted(e) && touches_soft_tissue(part.points, elements[e]) == soft)
       (e < owned ? chosen.counted : chosen.others).push_back(e);
+  const auto first = [&](int64_t e) { return *std::ranges::min_element(elements[e]); };
+  std::ranges::stable_sort(chosen.counted, {}, first);
+  std::ranges::stable_sort(chosen.others, {}, first);
   return chosen;
 }
 
-void set_first(const std::array<int32_t, 2>& points, SpringRun& run) {
-  run.first = points[0], run.second = points[1];
-}
-void set_first(const std::array<int32_t, 6>& points, PrismRun& run) {
-  std::copy_n(points.begin(), 3, run.top);
-}
-
-bool may_run(const std::array<int32_t, 2>&) { return true; }
-bool may_run(const std::array<int32_t, 6>& c) {
-  return c[3] == c[0] + 1 && c[4] == c[1] + 1 && c[5] == c[2] + 1;
-}
-
-/// Appends the rows to the loop's points, in order of runs, which are returned; calls add(row).
-template <class Run, class Loop, size_t n, class Add>
-Runs<Run> append(const std::vector<std::array<int64_t, n>>& elements,
-                 const std::vector<int64_t>& rows, int64_t points, Loop& loop, Add&& add) {
-  std::vector<std::array<int32_t, n>> chosen(rows.size());
-  for (size_t k = 0; k < rows.size(); ++k)
-    std::copy_n(elements[rows[k]].begin(), n, chosen[k].begin());
-  const Arrangement arranged = arrange(std::span<const std::array<int32_t, n>>(chosen),
-                                       {Run::most, points}, [](auto& c) { return may_run(c); });
-  Runs<Run> runs;
-  for (const int32_t length : arranged.lengths) {
-    Run& run = runs.runs.emplace_back();
-    set_first(chosen[arranged.order[runs.elements]], run);
-    run.count = length;
-    runs.elements += length;
-  }
-  for (const int64_t k : arranged.order) {
-    loop.points.push_back(chosen[k]);
-    add(rows[k]);
-  }
-  return runs;
+/// Appends the rows to the loop's points; calls add(row).
+template <class Loop, size_t n, class Add>
+void append(const std::vector<std::array<int64_t, n>>& elements, const Chosen& chosen, Loop& loop,
+            Add&& add) {
+  loop.counted = static_cast<int64_t>(chosen.counted.size());
+  for (const auto* rows : {&chosen.counted, &chosen.others})
+    for (const int64_t row : *rows) {
+      std::copy_n(elements[row].begin(), n, loop.points.emplace_back().begin());
+      add(row);
+    }
 }
 
 SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owned) {
@@ -71,7 +49,6 @@ SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owne
   const model::Springs& springs = part.springs;
   const Chosen chosen = choose(part, springs.points, owned,
                                [&](int64_t e) { return springs.exponent[e] == exponent; });
-  const auto points = static_cast<int64_t>(part.points.position.size());
   const size_t size = chosen.counted.size() + chosen.others.size();
   loop.points.reserve(size);
   for (auto* values : {&loop.stiffness, &loop.rest_length, &loop.inverse_reference})
@@ -81,9 +58,7 @@ SpringLoop make_spring_loop(const model::Model& part, int exponent, int64_t owne
     loop.rest_length.push_back(springs.rest_length[row]);
     loop.inverse_reference.push_back(1.0 / springs.reference[row]);
   };
-  loop.counted = static_cast<int64_t>(chosen.counted.size());
-  loop.counted_runs = append<SpringRun>(springs.points, chosen.counted, points, loop, add);
-  loop.other_runs = append<SpringRun>(springs.points, chosen.others, points, loop, add);
+  append(springs.points, chosen, loop, add);
   return loop;
 }
 
@@ -92,14 +67,13 @@ EdgeLoop make_edge_loop(const model::Model& part, int64_t owned, bool soft) {
   const model::Edges& edges = part.edges;
   const Chosen chosen = choose(
       part, edges.points, owned, [](int64_t) { return true; }, soft);
-  const auto points = static_cast<int64_t>(part.points.position.size());
   const size_t size = chosen.counted.size() + chosen.others.size();
   loop.points.reserve(size);
   loop.weight.reserve(size);
   const auto add = [&](int64_t row) { loop.weight.push_back(edges.weight[row]); };
-  loop.counted = static_cast<int64_t>(chosen.counted.size());
-  loop.counted_runs = append<SpringRun>(edges.points, chosen.counted, points, loop, add);
-  loop.other_runs = append<SpringRun>(edges.points, chosen.others, points, loop, add);
+  append(edges.points, chosen, loop, add);
+  for (auto& [first, second] : loop.points)
+    if (first > second) std::swap(first, second);
   return loop;
 }
 
@@ -123,7 +97,6 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned, bool soft) {
   const model::Prisms& prisms = part.prisms;
   const Chosen chosen = choose(
       part, prisms.points, owned, [](int64_t) { return true; }, soft);
-  const auto points = static_cast<int64_t>(part.points.position.size());
   const size_t size = chosen.counted.size() + chosen.others.size();
   loop.points.reserve(size);
   loop.rest_volume.reserve(size);
@@ -132,9 +105,7 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned, bool soft) {
     loop.rest_volume.push_back(prisms.rest_volume[row]);
     loop.row.push_back(row);
   };
-  loop.counted = static_cast<int64_t>(chosen.counted.size());
-  loop.counted_runs = append<PrismRun>(prisms.points, chosen.counted, points, loop, add);
-  loop.other_runs = append<PrismRun>(prisms.points, chosen.others, points, loop, add);
+  append(prisms.points, chosen, loop, add);
   loop.target_volume = loop.rest_volume;
   loop.compliance = loop.rest_volume;
   if (model::is_solid(part)) add_material(prisms, loop);

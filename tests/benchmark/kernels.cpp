@@ -1,6 +1,5 @@
-/// Time of each kernel per spring and per prism, by instruction set, in the cache and out of it,
-/// beside STREAM's triad and copy in the same run; writes the table. One core, best on an idle
-/// machine; a minute or two:
+/// Time of each kernel per spring and per prism, in the cache and out of it, beside STREAM's triad
+/// and copy in the same run; writes the table. One core, best on an idle machine; a minute or two:
 ///     benchmark_kernels [docs/measurements/kernels.md] [--benchmark_repetitions=5]
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -24,7 +23,6 @@ namespace {
 
 using namespace repose;
 using mechanics::Curvature;
-using mechanics::Kernels;
 using mechanics::VolumeTerm;
 using mechanics::Weights;
 
@@ -83,7 +81,7 @@ struct Kernel {
   const char* name;
   int64_t (*elements)(const Workload&);
   double vectors;  ///< read or written once a point
-  std::function<void(Workload&, Kernels)> work;
+  std::function<void(Workload&)> work;
 };
 
 int64_t springs(const Workload& w) { return w.spring_loop().size(); }
@@ -92,71 +90,58 @@ int64_t edges(const Workload& w) { return w.solid.edges.size(); }
 
 const Kernel kernels[] = {
     {"spring energy and gradient", springs, 3,
-     [](Workload& w, Kernels k) {
+     [](Workload& w) {
        benchmark::DoNotOptimize(
-           mechanics::add_spring_gradient(w.spring_loop(), w.position, 1.0, w.result, k));
+           mechanics::add_spring_gradient(w.spring_loop(), w.position, 1.0, w.result));
      }},
     {"spring Hessian action", springs, 4,
-     [](Workload& w, Kernels k) {
-       mechanics::add_hessian_action(w.springs, w.position, springs_only, w.direction, w.result, k);
+     [](Workload& w) {
+       mechanics::add_hessian_action(w.springs, w.position, springs_only, w.direction, w.result);
      }},
     {"prism energy and gradient", prisms, 3,
-     [](Workload& w, Kernels k) {
+     [](Workload& w) {
        benchmark::DoNotOptimize(
-           mechanics::add_prism_gradient(w.prism_loop(), w.position, with_penalty, w.result, k));
+           mechanics::add_prism_gradient(w.prism_loop(), w.position, with_penalty, w.result));
      }},
     {"prism Hessian action", prisms, 4,
-     [](Workload& w, Kernels k) {
-       mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result, k);
+     [](Workload& w) {
+       mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result);
      }},
     {"solid edge energy and gradient", edges, 3,
-     [](Workload& w, Kernels k) {
+     [](Workload& w) {
        benchmark::DoNotOptimize(
-           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result, k));
+           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result));
      }},
     {"solid prism with its edges, energy and gradient", prisms, 3,
-     [](Workload& w, Kernels k) {
+     [](Workload& w) {
        benchmark::DoNotOptimize(
-           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result, k) +
-           mechanics::add_prism_gradient(w.solid.prisms, w.position, of_solid, w.result, k));
+           mechanics::add_edge_gradient(w.solid.edges, w.position, 1.0, w.result) +
+           mechanics::add_prism_gradient(w.solid.prisms, w.position, of_solid, w.result));
      }},
     {"solid prism with its edges, Hessian action", prisms, 4,
-     [](Workload& w, Kernels k) {
-       mechanics::add_hessian_action(w.solid, w.position, of_solid, w.direction, w.result, k);
+     [](Workload& w) {
+       mechanics::add_hessian_action(w.solid, w.position, of_solid, w.direction, w.result);
      }},
 };
 
-/// Bytes of the places of a loop's elements: of runs, or of each element's points.
+/// Bytes of a loop's elements: their points, and some numbers for each.
 template <class Loop>
-double bytes_of_places(const Loop& loop, Kernels kernels) {
-  const auto& [runs, in_runs] = loop.counted_runs;
-  const auto point_bytes = static_cast<double>(sizeof loop.points[0]);
-  if (kernels == Kernels::plain) return point_bytes * static_cast<double>(loop.size());
-  return static_cast<double>(runs.size() * sizeof runs[0]) +
-         point_bytes * static_cast<double>(loop.size() - in_runs);
-}
-
-/// Bytes of a loop's elements: their places, and some numbers for each.
-template <class Loop>
-double bytes_of_elements(const Loop& loop, int numbers, Kernels kernels) {
-  return bytes_of_places(loop, kernels) +
-         static_cast<double>(numbers * sizeof(double)) * static_cast<double>(loop.size());
+double bytes_of_elements(const Loop& loop, int numbers) {
+  return static_cast<double>((sizeof loop.points[0] + numbers * sizeof(double)) * loop.size());
 }
 
 /// Bytes that go over a kernel's arrays once, for all elements.
-double bytes(const Kernel& kernel, const Workload& w, Kernels kernels) {
+double bytes(const Kernel& kernel, const Workload& w) {
   double elements = 0;
   const bool solid = std::string_view(kernel.name).starts_with("solid");
-  if (kernel.elements == springs) elements = bytes_of_elements(w.spring_loop(), 3, kernels);
-  if (kernel.elements == prisms) elements = bytes_of_elements(w.prism_loop(), 2, kernels);
-  if (solid) elements += bytes_of_elements(w.solid.edges, 1, kernels);
+  if (kernel.elements == springs) elements = bytes_of_elements(w.spring_loop(), 3);
+  if (kernel.elements == prisms) elements = bytes_of_elements(w.prism_loop(), 2);
+  if (solid) elements += bytes_of_elements(w.solid.edges, 1);
   return elements + kernel.vectors * sizeof(Vec3) * static_cast<double>(w.position.size());
 }
 
 /// Bytes of the springs' arrays, a size that STREAM is measured at, too.
-double stream_bytes(int64_t columns) {
-  return bytes(kernels[0], workload(columns), Kernels::plain);
-}
+double stream_bytes(int64_t columns) { return bytes(kernels[0], workload(columns)); }
 
 void triad(benchmark::State& state, double bytes) {
   const auto n = static_cast<size_t>(bytes / 24);
@@ -198,13 +183,8 @@ void prism_blocks(benchmark::State& state, int64_t columns) {
                                     });
 }
 
-const char* name_of(Kernels kernels) {
-  constexpr const char* names[] = {"plain", "AVX2", "AVX-512"};
-  return names[static_cast<int>(kernels)];
-}
-
-std::string name_of(const Kernel& kernel, int64_t columns, Kernels kernels) {
-  return fmt::format("{}/{}/{}", kernel.name, name_of(kernels), columns);
+std::string name_of(const Kernel& kernel, int64_t columns) {
+  return fmt::format("{}/{}", kernel.name, columns);
 }
 
 std::string name_of_stream(const char* which, double bytes) {
@@ -219,15 +199,14 @@ void register_stream(double bytes) {
 void register_size(int64_t columns) {
   register_stream(stream_bytes(columns));
   for (const Kernel& kernel : kernels)
-    for (const Kernels set : mechanics::available_kernels())
-      benchmark::RegisterBenchmark(name_of(kernel, columns, set).c_str(),
-                                   [&kernel, columns, set](benchmark::State& state) {
-                                     Workload& work = workload(columns);
-                                     for (auto _ : state) {
-                                       kernel.work(work, set);
-                                       benchmark::ClobberMemory();
-                                     }
-                                   });
+    benchmark::RegisterBenchmark(name_of(kernel, columns).c_str(),
+                                 [&kernel, columns](benchmark::State& state) {
+                                   Workload& work = workload(columns);
+                                   for (auto _ : state) {
+                                     kernel.work(work);
+                                     benchmark::ClobberMemory();
+                                   }
+                                 });
   benchmark::RegisterBenchmark(fmt::format("spring blocks/{}", columns).c_str(), spring_blocks,
                                columns);
   benchmark::RegisterBenchmark(fmt::format("prism blocks/{}", columns).c_str(), prism_blocks,
@@ -262,14 +241,13 @@ std::string rows(const Times& times, int64_t columns) {
   const double triad = bandwidth(times, "triad", stream_bytes(columns));
   const double memory = bandwidth(times, "triad", out_of_all_caches);
   std::string text;
-  for (const Kernel& kernel : kernels)
-    for (const Kernels set : mechanics::available_kernels()) {
-      const double seconds = times.of(name_of(kernel, columns, set));
-      const double all = bytes(kernel, w, set), n = static_cast<double>(kernel.elements(w));
-      text += fmt::format("| {} | {} | {} | {:.2f} | {:.0f} | {:.1f} | {:.1f} |\n", kernel.name,
-                          w.position.size(), name_of(set), 1e9 * seconds / n, all / n,
-                          seconds * triad / all, seconds * memory / all);
-    }
+  for (const Kernel& kernel : kernels) {
+    const double seconds = times.of(name_of(kernel, columns));
+    const double all = bytes(kernel, w), n = static_cast<double>(kernel.elements(w));
+    text += fmt::format("| {} | {} | {:.2f} | {:.0f} | {:.1f} | {:.1f} |\n", kernel.name,
+                        w.position.size(), 1e9 * seconds / n, all / n, seconds * triad / all,
+                        seconds * memory / all);
+  }
   return text;
 }
 
@@ -293,8 +271,8 @@ void write_page(const std::string& path, const Times& times) {
   text += mark + fmt::format("\nOne core of a machine with {} cores, {:.0f} GiB of memory.\n\n",
                              std::thread::hardware_concurrency(), memory);
   text += stream_rows(times) +
-          "\n| kernel | points | instructions | ns/element | bytes/element | × triad |"
-          " × triad of memory |\n|---|--:|---|--:|--:|--:|--:|\n";
+          "\n| kernel | points | ns/element | bytes/element | × triad |"
+          " × triad of memory |\n|---|--:|--:|--:|--:|--:|\n";
   for (const int64_t columns : sizes) text += rows(times, columns);
   std::ofstream(path) << text;
 }

@@ -7,14 +7,10 @@
 
 #include "repose/base/geometry.h"
 #include "repose/base/petsc.h"
-#include "repose/linear/packed_block.h"
-#include "repose/mechanics/runs.h"
 
 /// Matrices of layered tissue for preconditioners (column_multigrid.h).
 namespace repose::linear {
 
-struct SweptLevel;
-struct Sweeps;
 class UpperSums;
 
 /// The numbers of a point, and one of padding.
@@ -55,7 +51,7 @@ class ColumnLevel {
   /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
   /// pattern couples points of a column to their neighbours in it only. Collective.
   ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
-              BlockPattern pattern, mechanics::Kernels kernels = mechanics::best_kernels());
+              BlockPattern pattern);
 
   int32_t own() const { return static_cast<int32_t>(place_.size()); }
   int32_t ghosts() const { return static_cast<int32_t>(ghost_.size()); }
@@ -70,7 +66,7 @@ class ColumnLevel {
   const std::vector<int32_t>& columns() const { return chain_; }
 
   /// The block at this place of the pattern.
-  Eigen::Matrix3f block(int64_t place) const { return block_[place].unpacked(); }
+  const Eigen::Matrix3f& block(int64_t place) const { return block_[place]; }
   /// The place of the diagonal block of an own row, which those right of it follow.
   int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
   /// Takes all blocks anew; those left of the diagonal are mirror images. Not collective.
@@ -94,11 +90,12 @@ class ColumnLevel {
  private:
   using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
   void damp();
-  SweptLevel swept() const;
+  /// Σ of the blocks [k, end) of a row with x.
+  Lanes row_product(int64_t k, int64_t end, std::span<const Lanes> x) const;
+  void solve_column(int64_t column, std::span<Lanes> x) const;
   void find_columns();
   void connect(MPI_Comm comm);
 
-  const Sweeps* sweeps_;
   std::vector<Place> place_;
   std::vector<int64_t> ghost_;
   int64_t first_ = 0, total_ = 0;
@@ -106,7 +103,7 @@ class ColumnLevel {
   std::vector<int32_t> chain_;          // [columns + 1] first points
   std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
   std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
-  std::vector<PackedBlock> block_;      // [blocks + 1]
+  std::vector<Eigen::Matrix3f> block_;  // [blocks + 1]
   std::vector<float> damping_;          // [own] added to the columns' blocks
   std::vector<float> inverse_;          // [9 own + 1] of what elimination down columns leaves
   StarForest forest_;

@@ -6,29 +6,26 @@
 /// Energies and their gradients as kernels on plain arrays, the same code for one rank, many, the
 /// tests and the benchmark. `position` is [P] mm over the local points; gradients are added to
 /// `gradient` [P] (N), for every local point, fixed or not: the caller keeps the rows it wants.
-/// What lies in runs goes through `kernels`, which the processor must have; they agree to rounding.
 namespace repose::mechanics {
 
 /// Adds scale · ∂f_e/∂x to `gradient` and returns Σ E(s) over the counted springs (N·mm, unscaled).
 double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> position, double scale,
-                           std::span<Vec3> gradient, Kernels kernels = best_kernels());
+                           std::span<Vec3> gradient);
 
 /// Adds scale · ∂/∂x of ½ Σ w |x_i − x_j|², a solid's edges, to `gradient`; returns the sum over
 /// the counted ones (N·mm, unscaled). As the function is quadratic, this is also its Hessian's
 /// action on `position`.
 double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, double scale,
-                         std::span<Vec3> gradient, Kernels kernels = best_kernels());
+                         std::span<Vec3> gradient);
 
 /// Adds the volume term's gradient; returns its value over the counted prisms (N·mm or mm⁶ ·
 /// weight).
 double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
-                          const Weights& weights, std::span<Vec3> gradient,
-                          Kernels kernels = best_kernels());
+                          const Weights& weights, std::span<Vec3> gradient);
 
 /// The same, and that of averaged volumes.
 double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
-                           const Weights& weights, std::span<Vec3> gradient,
-                           Kernels kernels = best_kernels());
+                           const Weights& weights, std::span<Vec3> gradient);
 
 /// Value of a prism's volume term and its first two derivatives by v.
 struct VolumeLaw {
@@ -39,8 +36,7 @@ VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
 
 /// Σ scale · (∂²Φ/∂x²) d of all terms, added to `product`: the action of the exact Hessian.
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
-                        std::span<const Vec3> direction, std::span<Vec3> product,
-                        Kernels kernels = best_kernels());
+                        std::span<const Vec3> direction, std::span<Vec3> product);
 
 /// What a state of the tissue amounts to, over the counted elements (to be summed over ranks).
 struct Totals {

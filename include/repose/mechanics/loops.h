@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "repose/mechanics/nodal_volumes.h"
-#include "repose/mechanics/runs.h"
 #include "repose/model/model.h"
 
 /// Springs and prisms laid out for the kernels: one loop a law, no branch inside.
@@ -19,17 +18,15 @@ struct SpringLoop {
   std::vector<double> rest_length;             ///< [S] mm
   std::vector<double> inverse_reference;       ///< [S] 1/s_ref, 1/mm
   int64_t counted = 0;  ///< springs [0, counted) add to energies here, the rest elsewhere
-  Runs<SpringRun> counted_runs = {};  ///< among [0, counted)
-  Runs<SpringRun> other_runs = {};    ///< among [counted, size)
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
-/// Edges of a solid: pairs of points with a weight of either sign. An edge is a run of springs too.
+/// Edges of a solid: pairs of points with a weight of either sign. Edges with the same first point
+/// follow each other.
 struct EdgeLoop {
-  std::vector<std::array<int32_t, 2>> points;  ///< [E]
+  std::vector<std::array<int32_t, 2>> points;  ///< [E] ascending in each edge
   std::vector<double> weight;                  ///< [E] N/mm
   int64_t counted = 0;                         ///< as in SpringLoop
-  Runs<SpringRun> counted_runs = {}, other_runs = {};
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
@@ -45,7 +42,6 @@ struct PrismLoop {
   std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
   std::vector<int64_t> row;           ///< [M] the prism's row in the part
   int64_t counted = 0;                ///< as in SpringLoop
-  Runs<PrismRun> counted_runs, other_runs;
   int64_t size() const { return static_cast<int64_t>(points.size()); }
 };
 
@@ -61,8 +57,8 @@ struct Loops {
 };
 
 /// The loops over the springs, prisms and edges of `part` with a soft-tissue point. Of its rows,
-/// and of its points, the first `owned_…` are counted here. What lies in runs comes first, by
-/// blocks of points that fit into the cache together.
+/// and of its points, the first `owned_…` are counted here. Elements come in the order of their
+/// points in memory.
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
                  int64_t owned_edges = 0, int64_t owned_points = 0);
 

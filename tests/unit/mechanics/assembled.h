@@ -25,16 +25,15 @@ struct ValueAndGradient {
 };
 
 inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics::Weights& weights,
-                                 const std::vector<Vec3>& x,
-                                 mechanics::Kernels kernels = mechanics::best_kernels()) {
+                                 const std::vector<Vec3>& x) {
   ValueAndGradient result;
   std::vector<Vec3> gradient(x.size(), Vec3::Zero());
   for (const mechanics::SpringLoop& loop : loops.springs)
-    result.value += weights.elastic *
-                    mechanics::add_spring_gradient(loop, x, weights.elastic, gradient, kernels);
-  result.value += weights.elastic *
-                  mechanics::add_edge_gradient(loops.edges, x, weights.elastic, gradient, kernels);
-  result.value += mechanics::add_volume_gradient(loops, x, weights, gradient, kernels);
+    result.value +=
+        weights.elastic * mechanics::add_spring_gradient(loop, x, weights.elastic, gradient);
+  result.value +=
+      weights.elastic * mechanics::add_edge_gradient(loops.edges, x, weights.elastic, gradient);
+  result.value += mechanics::add_volume_gradient(loops, x, weights, gradient);
   result.gradient = flattened(gradient);
   return result;
 }
@@ -95,10 +94,9 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
 
 inline Eigen::VectorXd hessian_action(const mechanics::Loops& loops,
                                       const mechanics::Weights& weights, const std::vector<Vec3>& x,
-                                      const std::vector<Vec3>& d,
-                                      mechanics::Kernels kernels = mechanics::best_kernels()) {
+                                      const std::vector<Vec3>& d) {
   std::vector<Vec3> product(x.size(), Vec3::Zero());
-  mechanics::add_hessian_action(loops, x, weights, d, product, kernels);
+  mechanics::add_hessian_action(loops, x, weights, d, product);
   return flattened(product);
 }
 

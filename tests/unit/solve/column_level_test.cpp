@@ -21,8 +21,7 @@ struct Level {
   linear::ColumnLevel level;
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * points, 3 * points);
 
-  explicit Level(mechanics::Kernels kernels)
-      : level(PETSC_COMM_SELF, place(), {}, pattern(), kernels) {
+  Level() : level(PETSC_COMM_SELF, place(), {}, pattern()) {
     engine.seed(3);
     linear::UpperSums sums(level);
     for (int32_t i = 0; i < points; ++i)
@@ -75,15 +74,15 @@ Vector vector(const std::vector<Lanes>& lanes) {
   return all;
 }
 
-class SweepsOfALevel : public testing::TestWithParam<mechanics::Kernels> {
+class SweepsOfALevel : public testing::Test {
  protected:
-  Level s_{GetParam()};
+  Level s_;
   const Vector some_ = Vector::LinSpaced(3 * Level::points, -1, 2).array().sin();
 };
 
-TEST_P(SweepsOfALevel, MatrixIsSymmetric) { EXPECT_EQ(s_.matrix, s_.matrix.transpose()); }
+TEST_F(SweepsOfALevel, MatrixIsSymmetric) { EXPECT_EQ(s_.matrix, s_.matrix.transpose()); }
 
-TEST_P(SweepsOfALevel, ForwardSolvesWithTheLowerPart) {
+TEST_F(SweepsOfALevel, ForwardSolvesWithTheLowerPart) {
   std::vector<Lanes> x(Level::points);
   s_.level.forward(lanes(some_), x);
   Eigen::MatrixXd lower = s_.matrix;
@@ -94,20 +93,20 @@ TEST_P(SweepsOfALevel, ForwardSolvesWithTheLowerPart) {
   EXPECT_LT((lower * vector(x) - some_).norm(), lift * some_.norm());
 }
 
-TEST_P(SweepsOfALevel, ResidualIsWhatForwardLeaves) {
+TEST_F(SweepsOfALevel, ResidualIsWhatForwardLeaves) {
   std::vector<Lanes> x(Level::points), r = x;
   s_.level.forward(lanes(some_), x);
   s_.level.residual_of_forward(x, r);
   EXPECT_LT((some_ - s_.matrix * vector(x) - vector(r)).norm(), 1e-5 * some_.norm());
 }
 
-TEST_P(SweepsOfALevel, BackwardKeepsTheSolution) {
+TEST_F(SweepsOfALevel, BackwardKeepsTheSolution) {
   std::vector<Lanes> x = lanes(some_);
   s_.level.backward(lanes(s_.matrix * some_), x);
   EXPECT_LT((vector(x) - some_).norm(), 1e-5 * some_.norm());
 }
 
-TEST_P(SweepsOfALevel, BackwardIsForwardTransposed) {
+TEST_F(SweepsOfALevel, BackwardIsForwardTransposed) {
   const Vector other = some_.reverse();
   std::vector<Lanes> down(Level::points), up = down;
   s_.level.forward(lanes(some_), down);
@@ -115,26 +114,15 @@ TEST_P(SweepsOfALevel, BackwardIsForwardTransposed) {
   EXPECT_NEAR(other.dot(vector(down)), some_.dot(vector(up)), 1e-5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, SweepsOfALevel,
-                         testing::ValuesIn(mechanics::available_kernels()));
-
-TEST(PackedBlock, IsNearToWhatIsPacked) {
-  for (const float size : {1e-30f, 1e-3f, 1.0f, 7e8f})
-    for (int k = 0; k < 100; ++k) {
-      const Eigen::Matrix3f exact =
-          size * Eigen::Matrix3f::NullaryExpr([] { return random_number(); });
-      const auto packed = linear::PackedBlock::of(exact);
-      const float most = exact.cwiseAbs().maxCoeff() / 32768;
-      EXPECT_LE((packed.unpacked() - exact).cwiseAbs().maxCoeff(), most);
-      EXPECT_EQ(packed.transposed().unpacked(), packed.unpacked().transpose());
-    }
-}
-
-TEST(PackedBlock, IsNothingWhereTheNumbersAreNone) {
+TEST(ColumnLevel, WhatIsNoNumberCouplesNothing) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
-  for (const float number : {0.0f, 1e-42f, infinity, std::nanf("")})
-    EXPECT_EQ(linear::PackedBlock::of(Eigen::Matrix3f::Constant(number)).unpacked(),
-              Eigen::Matrix3f::Zero());
+  for (const float number : {1e-42f, infinity, std::nanf("")}) {
+    linear::ColumnLevel level(PETSC_COMM_SELF, Level::place(), {}, Level::pattern());
+    linear::UpperSums sums(level);
+    sums.add(0, 1, Eigen::Matrix3f::Constant(number));
+    level.fill(sums);
+    EXPECT_EQ(level.block(1), Eigen::Matrix3f::Zero());
+  }
 }
 
 }  // namespace
