@@ -95,7 +95,10 @@ tradeoff::Plan read_plan(const base::Options& options) {
   tradeoff::Plan plan;
   plan.methods = choices_of(options, "methods", {"ntr", "nls", "lmvm", "cg", "bnls", "bntr"});
   plan.accuracies = numbers_of(options, "accuracies", Range::between(1e-12, 100));
-  plan.volumes = choices_of(options, "volumes", {"none", "paper", "penalty"});
+  const std::vector<std::string> volumes = {"none", "paper", "penalty"};  // as they are numbered
+  for (const std::string& word : choices_of(options, "volumes", volumes))
+    plan.volumes.push_back(static_cast<scene::VolumeTerm>(
+        std::find(volumes.begin(), volumes.end(), word) - volumes.begin()));
   plan.load_steps = integers_of(options, "load_steps", Range::between(1, 100000));
   plan.layers = integers_of(options, "layers", Range::between(2, 64));
   if (options.has("edges")) plan.edges = numbers_of(options, "edges", Range::between(0.1, 100));

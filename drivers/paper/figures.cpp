@@ -71,7 +71,7 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
 bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   const model::Model model = model::build_model(scene).model;
   scene::Solve wanted = scene.solve;
-  wanted.volume = scene::VolumeForm::penalty;
+  wanted.volume = scene::VolumeTerm::penalty;
   wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, wanted, model);
   const solve::Settings settings = app::settings_of(wanted, false);
   results::ResultFile file(alone, name, model);

@@ -7,7 +7,7 @@ namespace repose::paper {
 solve::Settings settings_of(const Functional& functional, double accuracy) {
   scene::Solve wanted;
   wanted.functional = functional.force ? scene::Functional::force : scene::Functional::energy;
-  wanted.volume = functional.volume ? scene::VolumeForm::paper : scene::VolumeForm::none;
+  wanted.volume = functional.volume ? scene::VolumeTerm::paper : scene::VolumeTerm::none;
   wanted.accuracy = accuracy;
   return app::settings_of(wanted, false);
 }

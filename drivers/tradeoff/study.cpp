@@ -63,7 +63,7 @@ class Study {
   }
 
  private:
-  using Key = std::tuple<int, double, std::string>;  // layers, edge, volume term
+  using Key = std::tuple<int, double, scene::VolumeTerm>;  // layers, edge, volume term
   static Key key_of(const Way& way) { return {way.layers, way.edge, way.volume}; }
 
   /// The anatomy and the scene's own model, of whose material the others are made. On rank 0.
@@ -95,7 +95,7 @@ class Study {
   /// The scene's tissue, or springs that resemble its material.
   scene::Tissue tissue_of(const Way& way) const {
     scene::Tissue tissue = plan_.scene.tissue;
-    if (tissue.material && way.volume != "material") {
+    if (tissue.material && way.volume != scene::VolumeTerm::material) {
       tissue.isotropic = tissue.material->deep;
       tissue.material.reset();
     }
@@ -104,7 +104,7 @@ class Study {
 
   /// The scene's own model, or one of the same material at another resolution. On rank 0.
   model::Model build(const Way& way) const {
-    const bool own = way.volume == "material" || !plan_.scene.tissue.material;
+    const bool own = way.volume == scene::VolumeTerm::material || !plan_.scene.tissue.material;
     if (own && way.edge == 0 && way.layers == plan_.scene.tissue.layers) return own_;
     model::Anatomy anatomy = anatomy_;
     anatomy.scene.tissue = tissue_of(way);
@@ -155,11 +155,12 @@ class Study {
 
   solve::Settings settings_of(const Way& way, double bulk_modulus) const {
     scene::Solve wanted = plan_.scene.solve;
-    wanted.volume = volume_form(way.volume);
+    const bool solid = way.volume == scene::VolumeTerm::material;
+    if (!solid) wanted.volume = way.volume;
     wanted.bulk_modulus = bulk_modulus;
     wanted.accuracy = way.accuracy;
     wanted.load_steps = way.load_steps;
-    return app::settings_of(wanted, way.volume == "material");
+    return app::settings_of(wanted, solid);
   }
 
   Run solve_as(const Way& way, const Discretisation& made, double limit) const {

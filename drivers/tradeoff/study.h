@@ -15,7 +15,7 @@ struct Way {
   std::string study;   ///< what is varied: solver, load steps, volume, layers, springs, mesh
   std::string method;  ///< -tao_type
   double accuracy;     ///< mm asked for
-  std::string volume;  ///< none, paper, penalty; material of a solid
+  scene::VolumeTerm volume;
   int load_steps = 0;  ///< 0: automatic
   int layers = 0;      ///< point layers
   double edge = 0;     ///< mm, mean edge of the remeshed skin; 0: the skin as it is
@@ -42,7 +42,7 @@ struct Plan {
   scene::Scene scene;
   std::vector<std::string> methods;
   std::vector<double> accuracies;  ///< mm
-  std::vector<std::string> volumes;
+  std::vector<scene::VolumeTerm> volumes;
   std::vector<int> load_steps, layers;
   /// mm, of the remeshed skin; nothing: one and a half and two times the skin's own.
   std::optional<std::vector<double>> edges;

@@ -13,7 +13,7 @@ std::string table(const std::vector<Measurement>& measurements) {
   for (const Measurement& m : measurements) {
     const Way& w = m.way;
     text += fmt::format("{},{},{:g},{},{},{},{:g},{},{},{},", w.study, w.method, w.accuracy,
-                        w.volume, w.load_steps > 0 ? std::to_string(w.load_steps) : "auto",
+                        word(w.volume), w.load_steps > 0 ? std::to_string(w.load_steps) : "auto",
                         w.layers, w.edge, m.points, m.unknowns, m.converged ? 1 : 0);
     text += fmt::format("{:.4g},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},\"{}\"\n", m.seconds,
                         m.evaluations, m.assemblies, m.iterations, m.estimate, m.error, m.skin_rms,

@@ -7,8 +7,5 @@ namespace repose::tradeoff {
 Way usual_way(const Plan& plan);
 /// All ways of a plan, those of one model one after another.
 std::vector<Way> ways_of(const Plan& plan);
-/// The word of a scene's volume term, and back; nothing of a solid.
-std::string volume_word(const scene::Scene& scene);
-std::optional<scene::VolumeForm> volume_form(const std::string& word);
 
 }  // namespace repose::tradeoff

@@ -116,10 +116,6 @@ std::optional<double> accuracy_of(const std::string& profile) {
 
 }  // namespace
 
-const std::vector<std::string>& volume_words() {
-  return scene::find_key("solve.volume.form").choices;
-}
-
 std::vector<base::Option> solve_options() {
   std::vector<base::Option> table = method_options();
   for (const auto& more : {model_options(), run_options()})
@@ -129,7 +125,7 @@ std::vector<base::Option> solve_options() {
 
 void override_by(const base::Options& options, scene::Solve& wanted) {
   choose<scene::Functional>(options, "functional", "solve.functional", wanted.functional);
-  choose<scene::VolumeForm>(options, "volume", "solve.volume.form", wanted.volume);
+  choose<scene::VolumeTerm>(options, "volume", "solve.volume.form", wanted.volume);
   wanted.accuracy = accuracy_of(options.text("profile")).value_or(wanted.accuracy);
   if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
   if (options.has("lambda")) wanted.lambda = options.number("lambda");

@@ -1,13 +1,12 @@
 #include "repose/app/settings.h"
 
-#include "repose/app/options.h"
 #include "repose/base/error.h"
 
 namespace repose::app {
 
 namespace {
 
-using scene::VolumeForm;
+using scene::VolumeTerm;
 
 /// A solid's energy is its material's: nothing of how springs are minimised applies to it.
 solve::Settings solid_settings(const scene::Solve& wanted) {
@@ -18,29 +17,23 @@ solve::Settings solid_settings(const scene::Solve& wanted) {
         "solve.volume is of tissue.springs, and the tissue is a solid, whose Poisson's ratio says "
         "how it keeps its volume (tissue.material.poisson); remove it");
   solve::Settings settings;
-  settings.volume = "material";
   settings.weights = mechanics::solid_weights;
   return settings;
 }
 
 solve::Settings spring_settings(const scene::Solve& wanted) {
   solve::Settings settings;
-  settings.force = wanted.functional == scene::Functional::force;
-  const VolumeForm form =
-      wanted.volume.value_or(settings.force ? VolumeForm::none : VolumeForm::penalty);
-  settings.volume = volume_words()[static_cast<size_t>(form)];
-  if (settings.force && form != VolumeForm::none && form != VolumeForm::paper)
+  settings.functional = wanted.functional;
+  const bool force = wanted.functional == scene::Functional::force;
+  const VolumeTerm volume = wanted.volume.value_or(force ? VolumeTerm::none : VolumeTerm::penalty);
+  if (force && volume != VolumeTerm::none && volume != VolumeTerm::paper)
     base::refuse(
         "functional force takes volume none or paper, not {}: a penalty or a constraint belongs to "
         "the energy; choose -functional energy or another -volume",
-        settings.volume);
-  settings.exact_volume = form == VolumeForm::exact;
-  if (form == VolumeForm::penalty || form == VolumeForm::exact)
-    settings.weights = {1, mechanics::VolumeTerm::penalty, wanted.bulk_modulus.value()};
-  if (form == VolumeForm::paper) {
-    settings.lambda = wanted.lambda;
-    settings.weights = {wanted.lambda, mechanics::VolumeTerm::paper, 1 - wanted.lambda};
-  }
+        word(volume));
+  if (volume == VolumeTerm::penalty || volume == VolumeTerm::exact)
+    settings.weights = {1, volume, wanted.bulk_modulus.value()};
+  if (volume == VolumeTerm::paper) settings.weights = {wanted.lambda, volume, 1 - wanted.lambda};
   return settings;
 }
 

@@ -16,6 +16,8 @@ namespace {
 
 using Coarse = Strategy::Coarse;
 
+bool is_force(const Strategy& s) { return s.settings.functional == scene::Functional::force; }
+
 /// Why parts of a strategy cannot go with what a job or its options hold.
 struct Obstacle {
   bool given;
@@ -27,8 +29,8 @@ struct Obstacle {
 
 std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
   return {
-      {s.settings.force, true, true, false, "the functional is force"},
-      {s.settings.exact_volume, true, true, false, "the volume term is exact"},
+      {is_force(s), true, true, false, "the functional is force"},
+      {s.settings.weights.volume == scene::VolumeTerm::exact, true, true, false, "the volume term is exact"},
       {options.has("restart"), true, true, true, "the run goes on from another result"},
       {options.flag("stability"), true, false, false, "the stability of the whole is asked for"},
       {!job.anatomy, false, true, false,
@@ -114,7 +116,8 @@ std::string describe_minimum(const Strategy& s, const Job& job) {
   const std::string minimised =
       job.solid ? "the energy of a solid"
                 : fmt::format("the {} of springs, volume term {}",
-                              s.settings.force ? "forces" : "energy", s.settings.volume);
+                              is_force(s) ? "forces" : "energy",
+                              word(s.settings.weights.volume));
   return fmt::format("{}, to {:g} mm", minimised, s.settings.path.accuracy);
 }
 

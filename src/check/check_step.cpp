@@ -29,12 +29,6 @@ void check_ranges(const model::StepNumbers& n, bool gradient_known, base::Compar
   comparison.range("evaluations", static_cast<double>(n.evaluations), 0, unlimited);
   comparison.range("seconds", n.seconds, 0, unlimited);
   if (!gradient_known) comparison.range("gradient_max", n.gradient_max, 0, unlimited);
-  const auto one_of = [](const std::string& word, std::initializer_list<const char*> words) {
-    return std::find(words.begin(), words.end(), word) != words.end();
-  };
-  comparison.statement("functional is energy or force", one_of(n.functional, {"energy", "force"}));
-  comparison.statement("volume is none, paper, penalty, exact or material",
-                       one_of(n.volume, {"none", "paper", "penalty", "exact", "material"}));
 }
 
 void check_numbers(const model::StepNumbers& stored, const RecomputedStep& again,

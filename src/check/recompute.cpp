@@ -9,6 +9,8 @@
 
 namespace repose::check {
 
+using model::VolumeTerm;
+
 namespace {
 
 constexpr double rounding = 1e-14;  // of a sum's terms: 45 units in the last place
@@ -52,7 +54,7 @@ class Recomputation {
         fields_(rows.point_fields) {}
 
   RecomputedStep run() {
-    elastic_ = claimed_.volume == "paper" ? claimed_.lambda : 1.0;
+    elastic_ = claimed_.volume == VolumeTerm::paper ? claimed_.lambda : 1.0;
     points();
     springs();
     edges();
@@ -314,10 +316,10 @@ void Recomputation::prism(int64_t j) {
   step_.inverted_prisms += v <= 0;
   if (model::is_solid(model_)) return;
   double slope = 0, curvature = 0;
-  if (claimed_.volume == "paper") {
+  if (claimed_.volume == VolumeTerm::paper) {
     slope = 2 * (1 - claimed_.lambda) * change;
     curvature = 2 * (1 - claimed_.lambda);
-  } else if (claimed_.volume == "penalty") {
+  } else if (claimed_.volume == VolumeTerm::penalty) {
     slope = kappa * change / v0;
     curvature = kappa / v0;
   } else if (!pressure_.empty()) {
@@ -339,17 +341,17 @@ void Recomputation::prisms() {
 
 void Recomputation::objective() {
   Recomputed f{smooth_force_, scale_of(smooth_force_, tolerance * step_.f_f.scale)};
-  if (claimed_.functional == "energy")
+  if (claimed_.functional == model::Functional::energy)
     f = {step_.f_e.value + step_.potential.value, step_.f_e.scale + step_.potential.scale};
   step_.objective = {elastic_ * f.value, elastic_ * f.scale};
-  const double volume_weight = claimed_.volume == "paper" ? 1 - elastic_ : 0;
+  const double volume_weight = claimed_.volume == VolumeTerm::paper ? 1 - elastic_ : 0;
   step_.objective.value += volume_weight * step_.f_v.value;
   step_.objective.scale += volume_weight * step_.f_v.scale;
   if (std::isfinite(claimed_.contact_energy)) {
     step_.objective.value += elastic_ * claimed_.contact_energy;
     step_.objective.scale += std::abs(claimed_.contact_energy);
   }
-  if (claimed_.volume != "penalty") return;
+  if (claimed_.volume != VolumeTerm::penalty) return;
   step_.objective.value += step_.penalty.value;
   step_.objective.scale += step_.penalty.scale;
 }
@@ -381,8 +383,8 @@ void Recomputation::force_functional_gradient() {
 }
 
 void Recomputation::gradient() {
-  step_.gradient_known = claimed_.volume != "exact" || !pressure_.empty();
-  if (claimed_.functional == "energy")
+  step_.gradient_known = claimed_.volume != VolumeTerm::exact || !pressure_.empty();
+  if (claimed_.functional == model::Functional::energy)
     for (size_t i = 0; i < x_.size(); ++i) {
       gradient_[i] -= elastic_ * step_.rows.residual_force[i];
       noise_[i] += elastic_ * at_point_[i];

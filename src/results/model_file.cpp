@@ -1,5 +1,8 @@
 #include "repose/results/model_file.h"
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <fstream>
 
 #include "reader.h"
@@ -213,6 +216,17 @@ struct ReadAttribute {
   }
   void operator()(const char* name, int64_t& value) const { value = in.integer(group, name); }
   void operator()(const char* name, std::string& value) const { value = in.text(group, name); }
+  template <class Choice>
+    requires std::is_enum_v<Choice>
+  void operator()(const char* name, Choice& value) const {
+    const auto known = words(value);
+    const std::string text = in.text(group, name);
+    const auto found = std::find(known.begin(), known.end(), text);
+    if (found == known.end())
+      in.refuse(fmt::format("{} attribute {}", group, name),
+                fmt::format("is \"{}\", expected one of {}", text, fmt::join(known, ", ")));
+    value = static_cast<Choice>(found - known.begin());
+  }
   void operator()(const char* name, bool& value) const { value = in.integer(group, name) != 0; }
 };
 

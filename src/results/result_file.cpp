@@ -100,6 +100,11 @@ struct WriteAttribute {
   void operator()(const char* name, double value) const {
     if (!std::isnan(value) || !model::is_optional(name)) write_attribute(group, name, value);
   }
+  template <class Choice>
+    requires std::is_enum_v<Choice>
+  void operator()(const char* name, Choice value) const {
+    write_attribute(group, name, std::string(word(value)));
+  }
   template <class Value>
   void operator()(const char* name, const Value& value) const {
     write_attribute(group, name, value);
@@ -326,7 +331,7 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   const model::StepNumbers same = of_first_rank(s.comm, numbers);
   const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
   s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
-  s.counts.pressure = same.volume == "exact" || s.counts.stress;
+  s.counts.pressure = same.volume == model::VolumeTerm::exact || s.counts.stress;
   s.write_points(step, rows);
   s.write_elements(step, rows);
   s.moved.push_back(s.write_bones(step, same.load));

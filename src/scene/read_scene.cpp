@@ -243,7 +243,7 @@ Solve read_solve(const Value& value) {
   set_choice<Functional>(solve.functional, map, "functional");
   if (const auto volume = map.find("volume")) {
     const Map term(*volume);
-    set_choice<VolumeForm>(solve.volume, term, "form");
+    set_choice<VolumeTerm>(solve.volume, term, "form");
     set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
     set(solve.poisson, term, "poisson", &Value::number);
   }

@@ -9,6 +9,9 @@
 #include "repose/mechanics/spring_law.h"
 
 namespace repose::solve {
+
+using model::VolumeTerm;
+
 namespace {
 
 /// Sums forces on points by the group that they belong to.
@@ -65,8 +68,8 @@ void add_edges(const model::Model& model, const std::vector<double>& x, Groups& 
 
 /// Φ_v'(v) of prism m.
 double slope(const model::StepNumbers& n, double change, double rest, double pressure) {
-  if (n.volume == "paper") return 2 * (1 - n.lambda) * change;
-  if (n.volume == "penalty") return n.bulk_modulus * change / rest;
+  if (n.volume == VolumeTerm::paper) return 2 * (1 - n.lambda) * change;
+  if (n.volume == VolumeTerm::penalty) return n.bulk_modulus * change / rest;
   return -pressure;
 }
 
@@ -107,10 +110,10 @@ std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
       discrete::gather(comm, rows.pressure.data(), rows.pressure.size());
   if (base::rank(comm) != 0) return {};
   Groups groups(model.points.position.size(), held);
-  const bool energy = numbers.functional == "energy";
-  add_springs(model, x, energy && numbers.volume == "paper" ? numbers.lambda : 1, groups);
+  const bool energy = numbers.functional == model::Functional::energy;
+  add_springs(model, x, energy && numbers.volume == VolumeTerm::paper ? numbers.lambda : 1, groups);
   add_edges(model, x, groups);
-  if (energy && numbers.volume != "none") add_prisms(model, x, pressure, numbers, groups);
+  if (energy && numbers.volume != VolumeTerm::none) add_prisms(model, x, pressure, numbers, groups);
   return groups.forces();
 }
 

@@ -22,19 +22,22 @@
 namespace repose::solve {
 
 using base::check;
+using model::VolumeTerm;
 
 namespace {
+
+bool is_exact(const Settings& settings) { return settings.weights.volume == VolumeTerm::exact; }
 
 model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& settings,
                               const Outcome& outcome, double load) {
   model::StepNumbers n;
   n.load = load;
-  n.functional = settings.force ? "force" : "energy";
-  n.volume = settings.volume;
-  n.lambda = settings.lambda;
+  n.functional = settings.functional;
+  n.volume = settings.weights.volume;
+  n.lambda = settings.weights.elastic;
   measure(objective, n);
   // What is fixed stores energy, too, that no search knows of.
-  const bool whole = settings.exact_volume || objective.positions().part().solid;
+  const bool whole = is_exact(settings) || objective.positions().part().solid;
   const double contact = std::isfinite(n.contact_energy) ? n.contact_energy : 0;
   n.objective = whole ? n.f_e + n.potential + contact : outcome.objective;
   n.gradient_max = outcome.gradient_max;
@@ -107,14 +110,14 @@ class Watcher {
 class Searcher {
  public:
   Searcher(discrete::Positions& positions, const Settings& settings)
-      : problem_(positions, settings.weights, settings.force),
+      : problem_(positions, settings.weights, settings.functional == model::Functional::force),
         watcher_(positions.comm(), settings),
         minimiser_(problem_.function(), problem_.solver(), problem_.error_estimate(),
                    std::ref(watcher_)) {
-    if (settings.force) force_search_.emplace(*problem_.force(), minimiser_);
+    if (problem_.force()) force_search_.emplace(*problem_.force(), minimiser_);
     if (positions.part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), minimiser_);
-    if (settings.exact_volume)
+    if (is_exact(settings))
       exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                             minimiser_);
   }
@@ -148,7 +151,7 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
   const bool solid = objective.positions().part().solid;
-  if (weights.volume == mechanics::VolumeTerm::penalty && !solid)
+  if (weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact)
     numbers.bulk_modulus = weights.volume_weight;
   numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
   numbers.potential = objective.potential();
@@ -182,7 +185,7 @@ void show_states(Searcher& searcher, const Settings& settings,
       outcome.reason = "the search is under way";
       model::StepNumbers numbers = numbers_of(objective, settings, outcome, i.load);
       numbers.epsilon = searcher.epsilon();
-      receive(numbers, natural.rows(objective, settings.exact_volume));
+      receive(numbers, natural.rows(objective, is_exact(settings)));
     });
   });
 }
@@ -295,7 +298,7 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
         summary.last.seconds = seconds;
         summary.last.evaluations = searcher.evaluations() - evaluations_before;
         evaluations_before = searcher.evaluations();
-        model::StepRows rows = natural.rows(objective, settings.exact_volume);
+        model::StepRows rows = natural.rows(objective, is_exact(settings));
         if (stability && !std::isnan(stability->spectrum.smallest))
           rows.point_fields.push_back(natural.field("stability_mode", stability->mode));
         receive(summary.last, rows);

@@ -112,8 +112,6 @@ class Liblbfgs {
 /// A result file's model, what was minimised and where it came to rest.
 struct Task {
   model::Model model;
-  std::string volume;
-  double lambda = 1;
   mechanics::Weights weights;
   std::vector<Vec3> rest;  // [N] mm
 };
@@ -125,18 +123,15 @@ Task read_task(const std::string& file) {
   if (steps == 0) base::refuse("{}: /step holds no step; solve the model first", file);
   results::StoredStep last = results::read_step(file, steps - 1, task.model);
   const model::StepNumbers& numbers = last.numbers;
-  if (numbers.functional != "energy" || numbers.volume == "exact")
+  using model::VolumeTerm;
+  if (numbers.functional != model::Functional::energy || numbers.volume == VolumeTerm::exact)
     base::refuse(
         "{}: functional {}, volume {}: the contest takes an energy with volume none, paper, "
         "penalty or material",
-        file, numbers.functional, numbers.volume);
-  task.volume = numbers.volume;
-  task.lambda = numbers.lambda;
-  if (numbers.volume == "penalty")
-    task.weights = {1, mechanics::VolumeTerm::penalty, numbers.bulk_modulus};
-  if (numbers.volume == "paper")
-    task.weights = {numbers.lambda, mechanics::VolumeTerm::paper, 1 - numbers.lambda};
-  if (numbers.volume == "material") task.weights = {1, mechanics::VolumeTerm::penalty, 1};
+        file, word(numbers.functional), word(numbers.volume));
+  task.weights = {numbers.lambda, numbers.volume, 1};
+  if (numbers.volume == VolumeTerm::penalty) task.weights.volume_weight = numbers.bulk_modulus;
+  if (numbers.volume == VolumeTerm::paper) task.weights.volume_weight = 1 - numbers.lambda;
   task.rest = std::move(last.rows.position);
   return task;
 }

@@ -138,8 +138,7 @@ void measure(int64_t skin_vertices, const std::string& name) {
   const TaoHandle tao = search(objective, at);
   clock.end("search");
   model::StepNumbers numbers;
-  numbers.functional = "energy";
-  numbers.volume = "penalty";
+  numbers.volume = model::VolumeTerm::penalty;
   file.append(numbers, natural.rows(objective));
   file.commit();
   clock.end("result");

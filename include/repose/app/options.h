@@ -8,9 +8,6 @@
 /// The options of repose-solve, and what they change of a scene.
 namespace repose::app {
 
-/// Of the volume term's forms, in the order of scene::VolumeForm.
-const std::vector<std::string>& volume_words();
-
 std::vector<base::Option> solve_options();
 
 /// The command line beats the scene, and an option of its own the profile.

@@ -6,6 +6,7 @@
 
 #include "repose/mechanics/nodal_volumes.h"
 #include "repose/model/model.h"
+#include "repose/model/step.h"
 
 /// Springs and prisms laid out for the kernels: one loop a law, no branch inside.
 namespace repose::mechanics {
@@ -62,20 +63,21 @@ struct Loops {
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
                  int64_t owned_edges = 0, int64_t owned_points = 0);
 
-/// The volume term of an objective, a quadratic of each prism's v − t with t its target volume:
-///     paper    weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)
-///     penalty  weight ½ (v − t)² / v_0     (weight = κ; 1 of a solid, whose prisms have their own)
-/// t = v_0 but in a solid, and where multipliers move it (exact volume).
-enum class VolumeTerm { none, paper, penalty };
+using model::VolumeTerm;
 
-/// Which parts of an objective are on: Φ = elastic (f_e + W) + volume term.
+/// An objective: Φ = elastic (f_e + W) + volume term, the latter but for `none` a quadratic of each
+/// prism's v − t with t its target volume:
+///     paper     weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)
+///     penalty   weight ½ (v − t)² / v_0     (weight = κ)
+///     exact     likewise; multipliers move t from v_0
+///     material  likewise of a solid         (weight = 1: its prisms have moduli of their own)
 struct Weights {
-  double elastic = 1;
+  double elastic = 1;  ///< λ of `paper`, else 1
   VolumeTerm volume = VolumeTerm::none;
   double volume_weight = 0;
 };
 
 /// Of a solid: its edges, and its prisms with moduli of their own.
-inline constexpr Weights solid_weights{1, VolumeTerm::penalty, 1};
+inline constexpr Weights solid_weights{1, VolumeTerm::material, 1};
 
 }  // namespace repose::mechanics

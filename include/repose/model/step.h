@@ -6,14 +6,18 @@
 #include <vector>
 
 #include "repose/base/geometry.h"
+#include "repose/scene/scene.h"
 
 namespace repose::model {
+
+using scene::Functional;
+using scene::VolumeTerm;
 
 /// The numbers of one load step, one attribute each in the result file (names as there).
 struct StepNumbers {
   double load = 0;
-  std::string functional = "energy";
-  std::string volume = "none";
+  Functional functional = Functional::energy;
+  VolumeTerm volume = VolumeTerm::none;
   double lambda = 0;
   double bulk_modulus = 0;
   double epsilon = 0;

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -157,7 +158,18 @@ struct Tissue {
 enum class Rim { fixed, free, automatic };
 
 enum class Functional { energy, force };
-enum class VolumeForm { none, paper, penalty, exact };
+/// Of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no scene's: its
+/// moduli say how it keeps its volume.
+enum class VolumeTerm { none, paper, penalty, exact, material };
+/// As scenes, options and results spell them.
+inline constexpr std::array<std::string_view, 2> words(Functional) { return {"energy", "force"}; }
+inline constexpr std::array<std::string_view, 5> words(VolumeTerm) {
+  return {"none", "paper", "penalty", "exact", "material"};
+}
+template <class Choice>
+constexpr std::string_view word(Choice choice) {
+  return words(choice)[static_cast<size_t>(choice)];
+}
 
 struct Force {
   Vec3 at;        ///< mm, on or near the skin
@@ -214,7 +226,7 @@ struct Incision {
 
 struct Solve {
   Functional functional = Functional::energy;
-  std::optional<VolumeForm> volume;    ///< unset: penalty; with functional force none
+  std::optional<VolumeTerm> volume;    ///< unset: penalty; with functional force none
   std::optional<double> bulk_modulus;  ///< N/mm²; unset: by `poisson`
   double poisson = 0.45;               ///< of springs with a penalty
   double lambda = 0.5;

@@ -23,11 +23,8 @@ using Look = std::function<void(const Receiver&)>;
 
 /// What is asked of a run.
 struct Settings {
-  mechanics::Weights weights;   ///< the objective; for exact volume the penalty it starts with
-  bool force = false;           ///< minimises the force functional, not the energy
-  bool exact_volume = false;    ///< v = v_0, by multipliers
-  std::string volume = "none";  ///< name of the volume term, for the result
-  double lambda = 1;            ///< paper's weight, for the result
+  mechanics::Weights weights;  ///< the objective; for exact volume the penalty it starts with
+  model::Functional functional = model::Functional::energy;  ///< what is minimised
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
   bool monitor = false;                  ///< print a line for every iteration
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …

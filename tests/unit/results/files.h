@@ -53,8 +53,7 @@ inline model::StepRows small_rows(const model::Model& m, double load) {
 inline model::StepNumbers small_numbers(double load) {
   model::StepNumbers n;
   n.load = load;
-  n.functional = "energy";
-  n.volume = "penalty";
+  n.volume = model::VolumeTerm::penalty;
   n.lambda = 0.5;
   n.bulk_modulus = 0.25;
   n.epsilon = 1e-6;

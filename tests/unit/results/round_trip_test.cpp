@@ -63,7 +63,13 @@ TEST(RoundTrip, StepComesBackBitForBit) {
     EXPECT_EQ(step.displacement[i], Vec3(rows.position[i] - m.points.position[i]));
   std::ostringstream stored, given;
   const auto print_to = [](std::ostringstream& out) {
-    return [&out](const char* name, const auto& value) { out << name << '=' << value << '\n'; };
+    return [&out](const char* name, const auto& value) {
+      out << name << '=';
+      if constexpr (std::is_enum_v<std::decay_t<decltype(value)>>)
+        out << word(value) << '\n';
+      else
+        out << value << '\n';
+    };
   };
   model::for_each_number(step.numbers, print_to(stored));
   const model::StepNumbers expected = small_numbers(1);

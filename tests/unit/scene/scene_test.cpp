@@ -154,7 +154,7 @@ TEST(Scene, FullRest) {
   EXPECT_EQ(scene.forces[0].radius, 5);
   EXPECT_EQ(scene.forces[0].force, Vec3(0, 0, -2));
   EXPECT_EQ(scene.solve.functional, Functional::force);
-  EXPECT_EQ(scene.solve.volume, VolumeForm::exact);
+  EXPECT_EQ(scene.solve.volume, VolumeTerm::exact);
   EXPECT_EQ(scene.solve.bulk_modulus, 0.1);
   EXPECT_EQ(scene.solve.lambda, 1);
   EXPECT_EQ(scene.solve.accuracy, 1e-3);

@@ -37,7 +37,6 @@ model::Model strip(int columns = 50) {
 solve::Settings wanted(Extent extent, double accuracy = 0.01) {
   solve::Settings settings;
   settings.weights = {1, mechanics::VolumeTerm::penalty, 0.5};
-  settings.volume = "penalty";
   settings.path.accuracy = accuracy;
   settings.extent = extent;
   return settings;

@@ -12,9 +12,7 @@ using model::PointSet;
 
 solve::Settings exact(double bulk_modulus, double accuracy) {
   solve::Settings settings;
-  settings.weights = {1, mechanics::VolumeTerm::penalty, bulk_modulus};
-  settings.exact_volume = true;
-  settings.volume = "exact";
+  settings.weights = {1, mechanics::VolumeTerm::exact, bulk_modulus};
   settings.path.accuracy = accuracy;
   return settings;
 }
