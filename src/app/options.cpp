@@ -55,14 +55,7 @@ std::vector<base::Option> model_options() {
        "Solve the coarsest model whose skin is within the accuracy: of springs of the scene's own "
        "model, of a solid, which may be refined too, of the continuum."},
       {"discretisation", OptionKind::flag, "",
-       "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."},
-      {"active_region",
-       OptionKind::choice,
-       "auto",
-       "Search only the tissue that feels what moves; auto: where it pays.",
-       {},
-       "",
-       {"off", "auto", "on"}}};
+       "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."}};
 }
 
 /// How the run goes on, ends and tells of itself.

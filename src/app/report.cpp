@@ -57,14 +57,6 @@ std::string stability(const solve::Spectrum& s) {
   return text;
 }
 
-std::string region_row(const solve::RegionSummary& r) {
-  return report_row(
-      "active region",
-      fmt::format("{} of {} columns in {} rounds; up to {:.3g} N hold its border, which is "
-                  "{:.3g} mm of the accuracy",
-                  r.active, r.columns, r.rounds, r.force, r.error));
-}
-
 /// Why a run that did not come to rest did not, as far as that is known, and what to change.
 std::string remedy(const solve::Summary& s, bool stretched) {
   if (!s.path.last.stable && stretched)
@@ -250,7 +242,6 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
   text += report_row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
   text += report_row("unknowns",
                      fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
-  if (s.region) text += region_row(*s.region);
   text += work_rows(s);
   return text + describe_stages(stages);
 }

@@ -70,7 +70,6 @@ class Run {
   base::Exit solve(double checkpoint_interval, bool folds_allowed);
 
  private:
-  void start_from(double load, const std::vector<Vec3>& position);
   solve::Tearing tear();
   Coarser solve_coarser();
   solve::Summary search(Writer& writer);
@@ -87,22 +86,15 @@ class Run {
   solve::Start start_;
 };
 
-/// The search begins with a state that the rounds left.
-void Run::start_from(double load, const std::vector<Vec3>& position) {
-  solve::Settings& settings = strategy_.settings;
-  start_ = {position, false};
-  settings.path.start_load = load;
-  if (load == 0) return;
-  settings.initial_equilibrium = false;
-  settings.extent = solve::Extent::whole;
-}
-
-/// Springs tear, in rounds of searches.
+/// Springs tear, in rounds of searches; the run then begins with the state that these left.
 solve::Tearing Run::tear() {
   const solve::Tearing tearing =
       solve::tear(comm, job_.model, job_.tearing, strategy_.settings, start_.position);
   if (tearing.rounds > 0) stages_.end("tear");
-  if (tearing.torn) start_from(1, tearing.position);
+  if (!tearing.torn) return tearing;
+  start_ = {tearing.position, false};
+  strategy_.settings.path.start_load = 1;
+  strategy_.settings.initial_equilibrium = false;
   return tearing;
 }
 

@@ -8,7 +8,6 @@
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/solve/active_search.h"
 
 namespace repose::app {
 
@@ -18,28 +17,28 @@ using Coarse = Strategy::Coarse;
 
 bool is_force(const Strategy& s) { return s.settings.functional == scene::Functional::force; }
 
-/// Why parts of a strategy cannot go with what a job or its options hold.
+/// Why a part of a strategy cannot go with what a job or its options hold.
 struct Obstacle {
   bool given;
-  bool to_region;  ///< solving a part of the tissue only
-  bool to_coarse;  ///< solving coarser models
-  bool to_path;    ///< verifying the path
   const char* what;
+  bool to_coarse = true;  ///< solving coarser models
+  bool to_path = false;   ///< verifying the path
 };
 
 std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
+  const bool exact = s.settings.weights.volume == scene::VolumeTerm::exact;
   return {
-      {is_force(s), true, true, false, "the functional is force"},
-      {s.settings.weights.volume == scene::VolumeTerm::exact, true, true, false, "the volume term is exact"},
-      {options.has("restart"), true, true, true, "the run goes on from another result"},
-      {options.flag("stability"), true, false, false, "the stability of the whole is asked for"},
-      {!job.anatomy, false, true, false,
-       "the input is a model, which does not tell what it was made from"},
-      {s.settings.path.load_steps > 0, false, true, false, "load_steps are asked for"},
-      {!job.cuts.empty(), false, true, false, "the scene has incisions"},
-      {job.touches, true, false, false, "tissue touches bone, instruments or itself"},
-      {s.tears, false, true, true, "the tissue may tear"},
-      {s.verifies_path, false, true, false, "the path is to be verified"},
+      {.given = is_force(s), .what = "the functional is force"},
+      {.given = exact, .what = "the volume term is exact"},
+      {.given = options.has("restart"),
+       .what = "the run goes on from another result",
+       .to_path = true},
+      {.given = !job.anatomy,
+       .what = "the input is a model, which does not tell what it was made from"},
+      {.given = s.settings.path.load_steps > 0, .what = "load_steps are asked for"},
+      {.given = !job.cuts.empty(), .what = "the scene has incisions"},
+      {.given = s.tears, .what = "the tissue may tear", .to_path = true},
+      {.given = s.verifies_path, .what = "the path is to be verified"},
   };
 }
 
@@ -98,14 +97,6 @@ void choose_coarse(const Wish& wish, const std::string& obstacle, const Job& job
   if (!s.resolutions.empty()) s.coarse = wish.coarse;
 }
 
-void choose_region(const base::Options& options, const std::string& obstacle, Strategy& s) {
-  const std::string wanted = options.text("active_region");
-  if (wanted == "on" && !obstacle.empty())
-    base::refuse("-active_region on: {}; leave the option out", obstacle);
-  if (wanted == "off" || !obstacle.empty()) return;
-  s.settings.extent = wanted == "on" ? solve::Extent::region : solve::Extent::automatic;
-}
-
 /// Refuses to verify a path that is not a matter of load steps.
 void require_path(const std::string& obstacle, const Strategy& s) {
   if (s.verifies_path && !obstacle.empty())
@@ -139,14 +130,10 @@ std::string describe_coarse(const Wish& wish, const std::string& obstacle, const
 
 /// A row for each choice.
 std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Job& job,
-                    const solve::RegionChoice& region, const Strategy& s) {
-  const std::string to_region = first_obstacle(all, &Obstacle::to_region);
+                    const Strategy& s) {
   std::string text =
       report_row("minimises", describe_minimum(s, job)) +
       report_row("load steps", describe_steps(s)) +
-      report_row("searches", region.part          ? "the active region: " + region.why
-                             : !to_region.empty() ? "the whole: " + to_region
-                                                  : "the whole: " + region.why) +
       report_row("coarser models",
                  describe_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), s));
   if (s.verifies_path) text += report_row("verified", "by a second run in twice the load steps");
@@ -181,7 +168,6 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   const Wish wish = wish_of(options);
   const std::vector<Obstacle> all = obstacles(options, job, s);
   require_path(first_obstacle(all, &Obstacle::to_path), s);
-  choose_region(options, first_obstacle(all, &Obstacle::to_region), s);
   base::on_first_rank(comm, [&] {
     choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s);
     choose_sensitivity(options, job, s);
@@ -191,9 +177,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   MPI_Bcast(&models, 1, MPI_INT, 0, comm);
   s.resolutions.resize(models);
   for (bool* flag : {&s.preview, &s.sensitivity}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
-  if (!options.flag("dry_run")) return s;
-  const auto region = solve::choose_region(comm, job.model, s.settings);
-  if (base::rank(comm) == 0) s.explanation = explain(wish, all, job, region, s);
+  if (base::rank(comm) == 0 && options.flag("dry_run")) s.explanation = explain(wish, all, job, s);
   return s;
 }
 

@@ -39,7 +39,7 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
 }
 
 void Writer::look_in(double load, const solve::Look& look) {
-  const bool news = !saved_ || (look && load == 1);
+  const bool news = !saved_ || load == 1;
   if (reached_ && news && due()) write_checkpoint(load == 1 ? look : nullptr);
 }
 

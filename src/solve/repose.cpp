@@ -14,7 +14,6 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
-#include "repose/solve/active_search.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
@@ -315,15 +314,11 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive) {
-  if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
-    return *summary;
   return find_in_whole(comm, discrete::distribute(comm, model), settings, start, stages, receive);
 }
 
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive) {
-  if (const auto summary = find_in_region(comm, model, settings, start, stages, receive))
-    return *summary;
   const discrete::Part part = discrete::distribute(comm, model);
   model = {};
   return find_in_whole(comm, part, settings, start, stages, receive);

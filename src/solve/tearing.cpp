@@ -92,7 +92,6 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
       result.position = position;
     }
     search.path.start_load = 1;
-    search.extent = Extent::whole;
     result.settled = !more;
   }
   if (base::rank(comm) == 0) rupture.measure();

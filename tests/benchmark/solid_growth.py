@@ -40,7 +40,7 @@ def rows_of(size, poisson, chosen):
         first = None
         for method in chosen.methods.split(","):
             solved = run([chosen.bin / "repose-solve", "scene.yaml", "-tao_type", method,
-                          "-active_region", "off", "-output", method], folder, chosen.ranks)
+                          "-output", method], folder, chosen.ranks)
             with h5py.File(folder / f"{method}.h5") as h5:
                 step = h5["step"][max(h5["step"])]
                 position, inverted = step["point/position"][()], step.attrs["inverted_prisms"]

@@ -55,7 +55,7 @@ def rows_of(scene, poisson, chosen):
             (folder / file.name).symlink_to(file.resolve())
         (folder / "scene.yaml").write_text(without_contact(scene, poisson))
         solve = [chosen.bin / "repose-solve"]
-        common = ["-accuracy", 0.01, "-time_limit", chosen.seconds, "-active_region", "off"]
+        common = ["-accuracy", 0.01, "-time_limit", chosen.seconds]
         made = run([*solve, "scene.yaml", *common, "-output", "model"], folder, ends=[0])
         unknowns = int(made.said["unknowns"].split()[0])
         first = None

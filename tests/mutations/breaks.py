@@ -37,8 +37,8 @@ BREAKS = [
     ),
     (
         "energy of an edge",
-        "energy += 0.5 * loop.weight[e] * d.squaredNorm();",
-        "energy += 0.25 * loop.weight[e] * d.squaredNorm();",
+        "return 0.5 * (squares.xy[0]",
+        "return 0.25 * (squares.xy[0]",
         MECHANICS,
     ),
     (

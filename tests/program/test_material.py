@@ -110,7 +110,7 @@ def solve(run, tmp_path, name, text, *options, ranks=1):
     ("  - {bone: chin, translate: [0, -8, 0]}", CHIN, "  release: 5")])
 def test_one_face_whatever_the_load_steps_and_the_ranks(run, tmp_path, moves, more, tissue):
     text, accuracy = scene(tissue, moves, more), 0.001
-    options = "-accuracy", accuracy, "-active_region", "off"
+    options = "-accuracy", accuracy
     one = last(solve(run, tmp_path, "one", text, *options)[0])
     assert one["inverted_prisms"] == 0
     assert one["evaluations"] <= 120
@@ -130,18 +130,14 @@ def test_every_method_finds_the_face(run, tmp_path):
         assert apart(default, last(other)) <= 2 * accuracy, method
 
 
-def test_averaged_volumes_make_one_face_on_any_ranks_and_in_a_region(run, tmp_path):
+def test_averaged_volumes_make_one_face_on_any_ranks(run, tmp_path):
     text, accuracy = scene("  material: {poisson: 0.49, dilatation: nodal}", JAW_OPENS), 0.001
-    options = "-accuracy", accuracy, "-active_region", "off"
-    one, told = solve(run, tmp_path, "one", text, *options, "-stability")
+    options = "-accuracy", accuracy
+    one = solve(run, tmp_path, "one", text, *options, "-stability")[0]
     assert run("repose-check", "one.h5").returncode == 0
     for ranks in 2, 3, 5:
         other = solve(run, tmp_path, "other", text, *options, ranks=ranks)[0]
         assert apart(last(one), last(other)) <= 2 * accuracy
-    alone = text + "\ncontact: {bones: off}\n"  # which a region would need to know of
-    whole = solve(run, tmp_path, "whole", alone, *options)[0]
-    region = solve(run, tmp_path, "region", alone, "-accuracy", accuracy, "-active_region", "on")[0]
-    assert apart(last(whole), last(region)) <= 2 * accuracy
     plain = solve(run, tmp_path, "plain", text.replace(", dilatation: nodal", ""), *options)[0]
     assert apart(last(one), last(plain)) > 0.01
     assert last(one)["smallest_eigenvalue"] > 0
@@ -162,16 +158,6 @@ def test_a_region_painted_on_the_skin(run, tmp_path):
     near = np.linalg.norm(middle - above, axis=1) <= 4
     nearest = painted[np.linalg.norm(above[:, None] - skin[None], axis=2).argmin(1)]
     assert np.array_equal(changed, near & nearest) and changed.sum() > 10
-
-
-def test_what_a_move_is_not_felt_by_need_not_be_searched(run, tmp_path):
-    text = scene("  release: 5", "  - {bone: chin, translate: [0, -8, 0]}",
-                 CHIN + "\ncontact: {bones: off}\n")
-    options = "-accuracy", 0.01
-    whole = last(solve(run, tmp_path, "whole", text, *options, "-active_region", "off")[0])
-    part, told = solve(run, tmp_path, "part", text, *options, "-active_region", "on")
-    assert "active region" in told
-    assert apart(whole, last(part)) <= 0.02
 
 
 def test_strata_regions_and_depths(run, tmp_path):

@@ -11,10 +11,6 @@
 
 namespace repose::solve {
 
-/// Which soft-tissue points are unknowns: all, those that feel what moves (solve/active_region.h),
-/// or these where that pays.
-enum class Extent { whole, automatic, region };
-
 /// Receives each step: its numbers and this rank's rows of its arrays. Called on all ranks.
 using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
 
@@ -29,19 +25,9 @@ struct Settings {
   bool monitor = false;                  ///< print a line for every iteration
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene asks for one
-  Extent extent = Extent::whole;         ///< what is searched
-  /// Called at each iteration, on all ranks; with an empty look where a part of the tissue is
-  /// searched.
+  /// Called at each iteration, on all ranks.
   std::function<void(double load, const Look&)> under_way;
   PathSettings path;
-};
-
-/// What a search in a part of the tissue left out.
-struct RegionSummary {
-  int64_t columns = 0, active = 0;  ///< of the model, and those with unknowns in the end
-  int rounds = 0;                   ///< rest positions found, each of a larger region
-  double force = 0;                 ///< N, largest of those that hold the border
-  double error = 0;                 ///< mm, its share of the displacement error
 };
 
 /// What the tissue presses on.
@@ -64,7 +50,6 @@ struct Summary {
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
   std::vector<BodyContact>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
-  std::optional<RegionSummary> region;  ///< where not the whole was searched
 };
 
 /// Where a search begins.
@@ -78,8 +63,7 @@ struct Start {
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
 /// position along the load path, hands every step to `receive`. Ends the stages "distribute" and
-/// "solve". Throws InputError where nothing is free to move. With an extent other than the whole
-/// the search is left to find_in_region (solve/active_search.h) where that takes it. Collective.
+/// "solve". Throws InputError where nothing is free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, base::Stages& stages, const Receiver& receive);
 /// The same for a model that nobody needs any more: its memory is free once it is shared out.
