@@ -75,9 +75,8 @@ bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, wanted, model);
   const solve::Settings settings = app::settings_of(wanted, false);
   results::ResultFile file(alone, name, model);
-  base::Stages stages(alone);
   const solve::Summary summary =
-      solve::find_repose(alone, model, settings, {}, stages,
+      solve::find_repose(alone, model, settings, {},
                          [&](const model::StepNumbers& numbers, const model::StepRows& rows) {
                            file.append(numbers, rows);
                          });

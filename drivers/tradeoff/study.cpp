@@ -167,13 +167,12 @@ class Study {
     const base::ScopedOption method("-tao_type", way.method);
     Run run;
     run.measurement.way = way;
-    base::Stages stages(comm);
     const double begin = base::cpu_seconds();
     base::Interrupt end(comm, limit, false);
     solve::Settings settings = settings_of(way, made.bulk_modulus);
     settings.interrupt = &end;
     const solve::Summary summary =
-        solve::find_repose(comm, made.model, settings, {}, stages,
+        solve::find_repose(comm, made.model, settings, {},
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              run.position = discrete::gather_points(comm, rows.position);
                            });

@@ -25,16 +25,14 @@ base::Exit run(const base::Options& options) {
   model::Model model;
   solve::Settings settings;
   settings.weights = {1, mechanics::VolumeTerm::penalty, 1.0};
-  settings.volume = "penalty";
   base::on_first_rank(MPI_COMM_WORLD, [&] {
     const scene::Scene scene = scene::read_scene(options.arguments()[0]);
     model = model::build_model(model::load_anatomy(scene)).model;
     press(model, options.number("pressure"));
   });
   results::ResultFile file(MPI_COMM_WORLD, "own_energy", model);
-  base::Stages stages(MPI_COMM_WORLD);
   const solve::Summary summary = solve::find_repose(
-      MPI_COMM_WORLD, model, settings, {}, stages,
+      MPI_COMM_WORLD, model, settings, {},
       [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
   file.commit();
   return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;

@@ -69,11 +69,10 @@ class SequenceSolver {
     model::BuiltModel built;
     base::on_first_rank(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
     if (wanted_.recording) solve::prestress(comm_, built.model, *wanted_.recording);
-    base::Stages unused(comm_);
     std::vector<Vec3> position;
     const solve::Settings settings = settings_for(built.model);
     const solve::Summary summary =
-        solve::find_repose(comm_, built.model, settings, start_for(built.model), unused,
+        solve::find_repose(comm_, built.model, settings, start_for(built.model),
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
                              position = discrete::gather_points(comm_, rows.position);
                            });
@@ -100,6 +99,7 @@ class SequenceSolver {
     settings.path.accuracy = wanted_.enough > 0 ? search_share * wanted_.enough
                                                 : std::max(settings.path.accuracy, loosest_guide);
     settings.monitor = settings.stability = false;
+    settings.stages = nullptr;
     double volume_ratio = 1;  // f_v of a strain grows with the volume of the prisms
     if (base::rank(comm_) == 0 && settings.weights.volume == mechanics::VolumeTerm::paper)
       volume_ratio = mean_volume(fine_) / mean_volume(model);

@@ -59,6 +59,7 @@ class Run {
         stages_(stages),
         interrupt_(comm, deadline, true) {
     strategy_.settings.interrupt = &interrupt_;
+    strategy_.settings.stages = &stages_;
   }
 
   /// Begins where another run left off.
@@ -139,9 +140,8 @@ solve::Summary Run::search(Writer& writer) {
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
                       strategy_.sensitivity || !job_.held.empty();
   solve::Summary summary =
-      needed ? solve::find_repose(comm, job_.model, settings, start_, stages_, std::ref(writer))
-             : solve::find_repose(comm, std::move(job_.model), settings, start_, stages_,
-                                  std::ref(writer));
+      needed ? solve::find_repose(comm, job_.model, settings, start_, std::ref(writer))
+             : solve::find_repose(comm, std::move(job_.model), settings, start_, std::ref(writer));
   if (summary.path.complete() && !writer.unsettled().empty()) {
     summary.path.last.converged = false;
     summary.last.reason += "; " + writer.unsettled();

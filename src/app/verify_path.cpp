@@ -36,10 +36,10 @@ PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings 
   if (check.steps == 0) return check;
   settings.path.load_steps = static_cast<int>(2 * check.steps);
   settings.stability = false;
+  settings.stages = nullptr;
   std::vector<Vec3> slab;
-  base::Stages unheard(comm);
   check.again = solve::find_repose(
-      comm, model, settings, {}, unheard,
+      comm, model, settings, {},
       [&](const model::StepNumbers&, const model::StepRows& rows) { slab = rows.position; });
   const std::vector<Vec3> other = discrete::gather_points(comm, slab);
   if (!check.again.path.complete()) return check;

@@ -10,55 +10,37 @@ namespace {
 
 constexpr double lambda = 0.5, pass_band = 0.1, mu = -1 / (1 / lambda - pass_band);
 
-/// Neighbours of each point, row after row; none for points on a border, which stay.
-struct Neighbours {
-  std::vector<int64_t> begin, point;
-};
-
-Neighbours neighbours_of(const Surface& surface) {
-  const EdgeTable edges(surface.triangles);
-  std::vector<bool> border(surface.points.size(), false);
-  std::vector<int64_t> count(surface.points.size() + 1, 0);
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const HalfEdge& half = edges[e].front();
-    if (edges[e].size() == 1) border[half.low] = border[half.high] = true;
-    ++count[half.low];
-    ++count[half.high];
-  }
-  Neighbours all{std::vector<int64_t>(surface.points.size() + 1, 0), {}};
-  for (size_t p = 0; p < surface.points.size(); ++p)
-    all.begin[p + 1] = all.begin[p] + (border[p] ? 0 : count[p]);
-  all.point.resize(all.begin.back());
-  std::vector<int64_t> next(all.begin.begin(), all.begin.end() - 1);
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const HalfEdge& half = edges[e].front();
-    if (!border[half.low]) all.point[next[half.low]++] = half.high;
-    if (!border[half.high]) all.point[next[half.high]++] = half.low;
-  }
-  return all;
+std::vector<char> on_border(const EdgeTable& edges, size_t points) {
+  std::vector<char> border(points, 0);
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    if (edges[e].size() == 1) border[edges[e].front().low] = border[edges[e].front().high] = 1;
+  return border;
 }
 
-void step(const Neighbours& neighbours, double weight, const std::vector<Vec3>& from,
-          std::vector<Vec3>& to) {
+/// Moves all points that do not stay.
+void step(const VertexNeighbours& neighbours, const std::vector<char>& stays, double weight,
+          const std::vector<Vec3>& from, std::vector<Vec3>& to) {
   for (size_t p = 0; p < from.size(); ++p) {
-    const int64_t begin = neighbours.begin[p], end = neighbours.begin[p + 1];
+    const std::span<const int64_t> around = neighbours[static_cast<int64_t>(p)];
     to[p] = from[p];
-    if (begin == end) continue;
+    if (stays[p] || around.empty()) continue;
     Vec3 sum = Vec3::Zero();
-    for (int64_t n = begin; n < end; ++n) sum += from[neighbours.point[n]];
-    to[p] += weight * (sum / static_cast<double>(end - begin) - from[p]);
+    for (const int64_t other : around) sum += from[other];
+    to[p] += weight * (sum / static_cast<double>(around.size()) - from[p]);
   }
 }
 
 }  // namespace
 
 double smooth_taubin(Surface& surface, int64_t rounds, const Watch& watch) {
-  const Neighbours neighbours = neighbours_of(surface);
+  const EdgeTable edges(surface.triangles);
+  const VertexNeighbours neighbours(edges, surface.points.size());
+  const std::vector<char> stays = on_border(edges, surface.points.size());
   const std::vector<Vec3> before = surface.points;
   std::vector<Vec3> between(before.size());
   for (int64_t round = 0; round < rounds; ++round) {
-    step(neighbours, lambda, surface.points, between);
-    step(neighbours, mu, between, surface.points);
+    step(neighbours, stays, lambda, surface.points, between);
+    step(neighbours, stays, mu, between, surface.points);
     if (watch) watch(static_cast<double>(round + 1) / static_cast<double>(rounds));
   }
   double most = 0;

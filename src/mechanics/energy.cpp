@@ -18,12 +18,26 @@ std::array<Vec3, 6> corners_of(const PrismLoop& loop, int64_t e, std::span<const
   return corners;
 }
 
-/// Rows [begin, end) of a loop: the gradient, and the energy as a sum.
+/// Rows of a loop.
+struct Section {
+  int64_t begin, end;
+};
+
+/// Calls add(section) for the rows that count here and for the others; what it returns for the
+/// former.
+template <class Loop, class Add>
+double in_sections(const Loop& loop, Add&& add) {
+  const double counted = add(Section{0, loop.counted});
+  add(Section{loop.counted, loop.size()});
+  return counted;
+}
+
+/// Of some rows of a loop: the gradient, and the energy as a sum.
 template <int p>
-double spring_gradient(const SpringLoop& loop, int64_t begin, int64_t end,
-                       std::span<const Vec3> position, double scale, std::span<Vec3> gradient) {
+double spring_gradient(const SpringLoop& loop, const Section& rows, std::span<const Vec3> position,
+                       double scale, std::span<Vec3> gradient) {
   double energy = 0;
-  for (int64_t e = begin; e < end; ++e) {
+  for (int64_t e = rows.begin; e < rows.end; ++e) {
     const auto [i, j] = loop.points[e];
     const Vec3 d = position[j] - position[i];
     const double r = d.norm(), s = r - loop.rest_length[e];
@@ -72,14 +86,14 @@ void add(const Halves& h, Vec3& sum) {
 }
 
 /// The edges of one first point after the other: its sum stays in registers.
-double edge_gradient(const EdgeLoop& loop, int64_t begin, int64_t end,
-                     std::span<const Vec3> position, double scale, std::span<Vec3> gradient) {
+double edge_gradient(const EdgeLoop& loop, const Section& rows, std::span<const Vec3> position,
+                     double scale, std::span<Vec3> gradient) {
   Halves squares;
-  for (int64_t e = begin; e < end;) {
+  for (int64_t e = rows.begin; e < rows.end;) {
     const int32_t i = loop.points[e][0];
     const Halves here = halves(position[i]);
     Halves sum;
-    for (; e < end && loop.points[e][0] == i; ++e) {
+    for (; e < rows.end && loop.points[e][0] == i; ++e) {
       const int32_t j = loop.points[e][1];
       const Halves there = halves(position[j]);
       const Halves d = {there.xy - here.xy, there.z - here.z};
@@ -136,12 +150,11 @@ S volume_stiffness(const Weights& weights, const S& compliance) {
   return weights.volume_weight / compliance;
 }
 
-double prism_gradient(const PrismLoop& loop, int64_t begin, int64_t end,
-                      std::span<const Vec3> position, const Weights& weights,
-                      std::span<Vec3> gradient) {
+double prism_gradient(const PrismLoop& loop, const Section& rows, std::span<const Vec3> position,
+                      const Weights& weights, std::span<Vec3> gradient) {
   double value = 0;
-  for (int64_t e = begin; e < end; e += 2) {
-    const TwoPrisms prisms(loop, e, end);
+  for (int64_t e = rows.begin; e < rows.end; e += 2) {
+    const TwoPrisms prisms(loop, e, rows.end);
     const PrismSlope<Pair> v(PrismEdges<Pair>(prisms.gather(position)));
     const Pair stiffness = volume_stiffness(weights, prisms.compliance);
     const Pair change = v.volume - prisms.target_volume, slope = stiffness * change;
@@ -186,17 +199,17 @@ void set_block(Mat3& block, const Triple<double>& x, const Triple<double>& y,
 double add_spring_gradient(const SpringLoop& loop, std::span<const Vec3> position, double scale,
                            std::span<Vec3> gradient) {
   return with_exponent(loop.exponent, [&]<int p>() {
-    const double energy = spring_gradient<p>(loop, 0, loop.counted, position, scale, gradient);
-    spring_gradient<p>(loop, loop.counted, loop.size(), position, scale, gradient);
-    return energy;
+    return in_sections(loop, [&](const Section& rows) {
+      return spring_gradient<p>(loop, rows, position, scale, gradient);
+    });
   });
 }
 
 double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, double scale,
                          std::span<Vec3> gradient) {
-  const double energy = edge_gradient(loop, 0, loop.counted, position, scale, gradient);
-  edge_gradient(loop, loop.counted, loop.size(), position, scale, gradient);
-  return energy;
+  return in_sections(loop, [&](const Section& rows) {
+    return edge_gradient(loop, rows, position, scale, gradient);
+  });
 }
 
 VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
@@ -208,9 +221,9 @@ VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
 double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
                           const Weights& weights, std::span<Vec3> gradient) {
   if (weights.volume == VolumeTerm::none) return 0;
-  const double value = prism_gradient(loop, 0, loop.counted, position, weights, gradient);
-  prism_gradient(loop, loop.counted, loop.size(), position, weights, gradient);
-  return value;
+  return in_sections(loop, [&](const Section& rows) {
+    return prism_gradient(loop, rows, position, weights, gradient);
+  });
 }
 
 double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <queue>
 
+#include "repose/surface/component.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/intersections.h"
 
@@ -282,21 +283,10 @@ void Collapser::run(int64_t target, const Tolerance* tolerance,
 }
 
 Surface Collapser::result() const {
-  Surface result{surface_.name, {}, {}};
-  std::vector<int64_t> number(surface_.points.size(), -1);
-  for (size_t t = 0; t < surface_.triangles.size(); ++t) {
-    if (dead_[t]) continue;
-    Triangle triangle = surface_.triangles[t];
-    for (int64_t& vertex : triangle) {
-      if (number[vertex] < 0) {
-        number[vertex] = static_cast<int64_t>(result.points.size());
-        result.points.push_back(surface_.points[vertex]);
-      }
-      vertex = number[vertex];
-    }
-    result.triangles.push_back(triangle);
-  }
-  return result;
+  std::vector<Triangle> left;
+  for (size_t t = 0; t < surface_.triangles.size(); ++t)
+    if (!dead_[t]) left.push_back(surface_.triangles[t]);
+  return compact(surface_.name, surface_.points, std::move(left));
 }
 
 }  // namespace repose::meshtools

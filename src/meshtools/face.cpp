@@ -27,21 +27,12 @@ constexpr int unfoldings = 20;
 constexpr double folded = 0.2;  // cosine between a vertex' normal and that of a triangle around it
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// Neighbours of each vertex.
-using Neighbours = std::vector<std::vector<int64_t>>;
-
-Neighbours neighbours_of(const Surface& surface) {
-  Neighbours neighbours(surface.points.size());
-  const EdgeTable edges(surface.triangles);
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    neighbours[edges[e].front().low].push_back(edges[e].front().high);
-    neighbours[edges[e].front().high].push_back(edges[e].front().low);
-  }
-  return neighbours;
+VertexNeighbours neighbours_of(const Surface& surface) {
+  return {EdgeTable(surface.triangles), surface.points.size()};
 }
 
 /// mm along edges from the vertices within `near` of the bones, but for those at a scan's end.
-std::vector<double> way_from_bones(const Surface& skin, const Neighbours& neighbours,
+std::vector<double> way_from_bones(const Surface& skin, const VertexNeighbours& neighbours,
                                    const std::vector<char>& end, const FaceRequest& request) {
   using Entry = std::pair<double, int64_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
@@ -82,7 +73,8 @@ std::vector<char> ends_of(const OuterSkin& outer) {
 }
 
 /// Makes the parts outside that the face surrounds a part of it, but where the scan ends.
-void fill(const Neighbours& neighbours, const std::vector<char>& end, std::vector<double>& inside) {
+void fill(const VertexNeighbours& neighbours, const std::vector<char>& end,
+          std::vector<double>& inside) {
   std::vector<char> seen(inside.size(), 0);
   std::vector<std::vector<int64_t>> parts;
   for (size_t v = 0; v < inside.size(); ++v) {
@@ -106,7 +98,7 @@ void fill(const Neighbours& neighbours, const std::vector<char>& end, std::vecto
   }
 }
 
-void smooth(const Neighbours& neighbours, int rounds, std::vector<double>& values) {
+void smooth(const VertexNeighbours& neighbours, int rounds, std::vector<double>& values) {
   for (int round = 0; round < rounds; ++round) {
     const std::vector<double> old = values;
     for (size_t v = 0; v < values.size(); ++v) {
@@ -119,7 +111,7 @@ void smooth(const Neighbours& neighbours, int rounds, std::vector<double>& value
 
 /// The part of the outer skin that is solved.
 Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
-  const Neighbours neighbours = neighbours_of(outer.skin);
+  const VertexNeighbours neighbours = neighbours_of(outer.skin);
   const std::vector<char> end = ends_of(outer);
   std::vector<double> inside(end.size(), request.margin);
   if (!request.beneath.empty() || !request.places.empty()) {
@@ -185,7 +177,8 @@ Vec3 weights_at(const Corners& t, const Vec3& point) {
 }
 
 /// Draws the vertices along their normals to the samples within the tolerance.
-void fit(const Sampled& samples, double tolerance, const Neighbours& neighbours, Surface& face) {
+void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
+         Surface& face) {
   const TriangleTree tree(face);
   const std::vector<Vec3> normals = normals_of(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
@@ -206,7 +199,7 @@ void fit(const Sampled& samples, double tolerance, const Neighbours& neighbours,
 }
 
 /// Moves vertices on folds to the middle of their neighbours until none is.
-void unfold(const Neighbours& neighbours, Surface& face) {
+void unfold(const VertexNeighbours& neighbours, Surface& face) {
   for (int round = 0; round < unfoldings; ++round) {
     const std::vector<Vec3> normals = normals_of(face), old = face.points;
     std::vector<char> moved(old.size(), 0);
@@ -250,7 +243,7 @@ void measure(const Surface& given, Face& face) {
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
   face.skin = remesh(region_of(outer_skin(given, request.rolling), request), request.edge);
-  const Neighbours neighbours = neighbours_of(face.skin);
+  const VertexNeighbours neighbours = neighbours_of(face.skin);
   const Sampled samples =
       sample(given, TriangleTree(face.skin), request.edge / 2, request.tolerance);
   for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);

@@ -66,22 +66,14 @@ class Sorter {
 
   /// The border of the cells for which `inside` holds, outwards.
   Surface border(const std::function<bool(int64_t)>& inside, const std::string& name) const {
-    Surface surface{name, {}, {}};
-    std::map<int64_t, int64_t> row;
-    const auto number = [&](int64_t point) {
-      const auto [found, is_new] = row.try_emplace(point, surface.points.size());
-      if (is_new) surface.points.push_back(cells_.points[point]);
-      return found->second;
-    };
+    std::vector<Triangle> triangles;
     for (size_t t = 0; t < cells_.triangles.size(); ++t) {
       const bool ahead = inside(cells_.cells[t][0]), behind = inside(cells_.cells[t][1]);
       if (ahead == behind) continue;
-      Triangle triangle = cells_.triangles[t];
+      Triangle& triangle = triangles.emplace_back(cells_.triangles[t]);
       if (ahead) std::swap(triangle[1], triangle[2]);
-      for (int64_t& point : triangle) point = number(point);
-      surface.triangles.push_back(triangle);
     }
-    return surface;
+    return compact(name, cells_.points, std::move(triangles));
   }
 
   Surface border(Part part, const std::string& name) const {

@@ -1,6 +1,7 @@
-#include "repose/model/skin_mesh.h"
-
 #include <utility>
+
+#include "repose/model/skin_mesh.h"
+#include "repose/surface/component.h"
 
 namespace repose::model {
 namespace {
@@ -27,23 +28,12 @@ std::vector<std::vector<int64_t>> groups_of(const SkinMesh& mesh,
 }
 
 surface::Surface triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
-  surface::Surface places{"places", {}, {}};
+  std::vector<Triangle> triangles;
   std::vector<char> taken(mesh.triangles.size(), 0);
-  std::vector<int64_t> row(mesh.points.size(), -1);
   for (const int64_t v : vertices)
-    for (const int64_t f : mesh.triangles_of[v]) {
-      if (std::exchange(taken[f], 1)) continue;
-      Triangle triangle = mesh.triangles[f];
-      for (int64_t& corner : triangle) {
-        if (row[corner] < 0) {
-          row[corner] = static_cast<int64_t>(places.points.size());
-          places.points.push_back(mesh.points[corner]);
-        }
-        corner = row[corner];
-      }
-      places.triangles.push_back(triangle);
-    }
-  return places;
+    for (const int64_t f : mesh.triangles_of[v])
+      if (!std::exchange(taken[f], 1)) triangles.push_back(mesh.triangles[f]);
+  return surface::compact("places", mesh.points, std::move(triangles));
 }
 
 }  // namespace

@@ -150,8 +150,8 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
   const bool solid = objective.positions().part().solid;
-  if (weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact)
-    numbers.bulk_modulus = weights.volume_weight;
+  const bool kappa = weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact;
+  if (kappa && !solid) numbers.bulk_modulus = weights.volume_weight;
   numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
   numbers.potential = objective.potential();
   double force = 0;
@@ -261,7 +261,7 @@ Stability stability_of(linear::TangentSolver& solver, const discrete::Positions&
 }
 
 Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                      const Start& start, base::Stages& stages, const Receiver& receive) {
+                      const Start& start, const Receiver& receive) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   discrete::Positions positions(comm, part);
@@ -271,7 +271,7 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
   if (start.guess) guess = positions.make_vector();
   if (start.guess || settings.path.start_load > 0)
     natural.take(start.position, positions, start.guess ? guess : displacement);
-  stages.end("distribute");
+  if (settings.stages) settings.stages->end("distribute");
 
   const base::LogStage stage("Search");
   Searcher searcher(positions, settings);
@@ -306,22 +306,22 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();
-  stages.end("solve");
+  if (settings.stages) settings.stages->end("solve");
   return summary;
 }
 
 }  // namespace
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
-                    const Start& start, base::Stages& stages, const Receiver& receive) {
-  return find_in_whole(comm, discrete::distribute(comm, model), settings, start, stages, receive);
+                    const Start& start, const Receiver& receive) {
+  return find_in_whole(comm, discrete::distribute(comm, model), settings, start, receive);
 }
 
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
-                    const Start& start, base::Stages& stages, const Receiver& receive) {
+                    const Start& start, const Receiver& receive) {
   const discrete::Part part = discrete::distribute(comm, model);
   model = {};
-  return find_in_whole(comm, part, settings, start, stages, receive);
+  return find_in_whole(comm, part, settings, start, receive);
 }
 
 }  // namespace repose::solve

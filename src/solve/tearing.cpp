@@ -71,12 +71,12 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
   result.limit = newtons;
   Rupture rupture(model, result);
   Settings search = settings;
+  search.stages = nullptr;
   std::vector<Vec3> position = start;
   bool more = true;
   for (result.settled = false; more && result.rounds < most_rounds;) {
-    base::Stages unused(comm);
     std::vector<double> tension;
-    const Summary rest = find_repose(comm, model, search, {position}, unused,
+    const Summary rest = find_repose(comm, model, search, {position},
                                      [&](const model::StepNumbers&, const model::StepRows& rows) {
                                        position = rows.position;
                                        tension = rows.tension;

@@ -68,6 +68,21 @@ double volume_of(const Surface& surface) {
   return surface.points.empty() ? 0 : six_volumes(surface.points, surface.triangles) / 6;
 }
 
+Surface compact(std::string name, const std::vector<Vec3>& points,
+                std::vector<Triangle> triangles) {
+  Surface found{std::move(name), {}, std::move(triangles)};
+  std::vector<int64_t> row(points.size(), -1);
+  for (Triangle& triangle : found.triangles)
+    for (int64_t& vertex : triangle) {
+      if (row[vertex] < 0) {
+        row[vertex] = static_cast<int64_t>(found.points.size());
+        found.points.push_back(points[vertex]);
+      }
+      vertex = row[vertex];
+    }
+  return found;
+}
+
 std::vector<Surface> components(const Surface& surface) {
   std::vector<Surface> parts = split(surface);
   const bool by_area = is_open(surface);

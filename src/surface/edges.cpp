@@ -99,6 +99,21 @@ bool EdgeTable::contains(int64_t a, int64_t b) const {
   return found != half_edges_.end() && std::pair(found->low, found->high) == wanted;
 }
 
+VertexNeighbours::VertexNeighbours(const EdgeTable& edges, size_t vertices)
+    : begin_(vertices + 1, 0), vertex_(2 * edges.edges()) {
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    ++begin_[edges[e].front().low + 1];
+    ++begin_[edges[e].front().high + 1];
+  }
+  std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+  std::vector<int64_t> next(begin_.begin(), begin_.end() - 1);
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    const HalfEdge& half = edges[e].front();
+    vertex_[next[half.low]++] = half.high;
+    vertex_[next[half.high]++] = half.low;
+  }
+}
+
 std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
                                      const EdgeTable& edges) {
   const auto count = static_cast<int64_t>(triangles.size());

@@ -21,6 +21,7 @@ using Look = std::function<void(const Receiver&)>;
 struct Settings {
   mechanics::Weights weights;  ///< the objective; for exact volume the penalty it starts with
   model::Functional functional = model::Functional::energy;  ///< what is minimised
+  base::Stages* stages = nullptr;        ///< of which "distribute" and "solve" are ended
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
   bool monitor = false;                  ///< print a line for every iteration
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
@@ -62,12 +63,12 @@ struct Start {
 };
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
-/// position along the load path, hands every step to `receive`. Ends the stages "distribute" and
-/// "solve". Throws InputError where nothing is free to move. Collective.
+/// position along the load path, hands every step to `receive`. Throws InputError where nothing is
+/// free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
-                    const Start& start, base::Stages& stages, const Receiver& receive);
+                    const Start& start, const Receiver& receive);
 /// The same for a model that nobody needs any more: its memory is free once it is shared out.
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
-                    const Start& start, base::Stages& stages, const Receiver& receive);
+                    const Start& start, const Receiver& receive);
 
 }  // namespace repose::solve

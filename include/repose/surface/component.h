@@ -12,6 +12,9 @@ double area_of(const Surface& surface);  ///< mm²
 /// cavity. For an open surface that of the cone over its rim from the first point.
 double volume_of(const Surface& surface);
 
+/// These triangles with those of the points that they have, numbered as they come.
+Surface compact(std::string name, const std::vector<Vec3>& points, std::vector<Triangle> triangles);
+
 /// The parts connected by edges, the one of the largest |volume| first (of open ones the largest
 /// area). Points are renumbered, their order kept.
 std::vector<Surface> components(const Surface& surface);

@@ -64,6 +64,18 @@ class EdgeTable {
   std::vector<size_t> begin_;
 };
 
+/// The vertices that each vertex shares an edge with, in the order of the edges.
+class VertexNeighbours {
+ public:
+  VertexNeighbours(const EdgeTable& edges, size_t vertices);
+  std::span<const int64_t> operator[](int64_t vertex) const {
+    return std::span(vertex_).subspan(begin_[vertex], begin_[vertex + 1] - begin_[vertex]);
+  }
+
+ private:
+  std::vector<int64_t> begin_, vertex_;
+};
+
 /// The number of triangles of each part connected by edges, largest first; triangles that name a
 /// vertex twice are not counted.
 std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,

@@ -37,7 +37,6 @@ struct Rest {
 };
 
 inline Rest find_rest(const model::Model& model, const solve::Settings& settings) {
-  base::Stages stages(MPI_COMM_WORLD);
   Rest rest;
   const auto keep = [&](const model::StepNumbers&, const model::StepRows& slabs) {
     rest.rows.position = gather(slabs.position);
@@ -50,7 +49,7 @@ inline Rest find_rest(const model::Model& model, const solve::Settings& settings
     for (const model::PointField& field : slabs.point_fields)
       rest.rows.point_fields.push_back({field.name, field.vector, gather(field.values)});
   };
-  rest.summary = solve::find_repose(MPI_COMM_WORLD, model, settings, {}, stages, keep);
+  rest.summary = solve::find_repose(MPI_COMM_WORLD, model, settings, {}, keep);
   return rest;
 }
 

@@ -79,9 +79,8 @@ TEST(Sharing, AModelGivenAwayIsSolvedAndLetGoOf) {
   solve::Settings settings;
   settings.path.accuracy = 1e-6;
   const testing::Rest kept = testing::find_rest(m, settings);
-  base::Stages stages(MPI_COMM_WORLD);
   std::vector<Vec3> position;
-  solve::find_repose(MPI_COMM_WORLD, std::move(m), settings, {}, stages,
+  solve::find_repose(MPI_COMM_WORLD, std::move(m), settings, {},
                      [&](const model::StepNumbers&, const model::StepRows& slabs) {
                        position = testing::gather(slabs.position);
                      });
