@@ -18,18 +18,18 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  return {{"clearance",
-           OptionKind::number,
-           "",
-           "Distance to be kept between bones (default 0).",
-           {0, 50},
-           "mm"},
-          {"tolerance",
-           OptionKind::number,
-           "",
-           "How much sooner than at contact the moves may end (default 0.05).",
-           {1e-4, 10},
-           "mm"}};
+  return {{.name = "clearance",
+           .kind = OptionKind::number,
+           .default_text = "",
+           .help = "Distance to be kept between bones (default 0).",
+           .range = {0, 50},
+           .unit = "mm"},
+          {.name = "tolerance",
+           .kind = OptionKind::number,
+           .default_text = "",
+           .help = "How much sooner than at contact the moves may end (default 0.05).",
+           .range = {1e-4, 10},
+           .unit = "mm"}};
 }
 
 void report(const base::Options& options) {

@@ -18,18 +18,18 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  return {{"skin_vertices",
-           OptionKind::integer,
-           "2000",
-           "Vertices of the skin; 477 is the paper's mesh.",
-           {meshtools::phantom_vertices_min, meshtools::phantom_vertices_max}},
-          {"bone_edge",
-           OptionKind::number,
-           "auto",
-           "Edges of the bones at the face; auto: as the skin's, between 1 and 5.",
-           {meshtools::phantom_bone_edge_min, meshtools::phantom_bone_edge_max},
-           "mm",
-           {"auto"}},
+  return {{.name = "skin_vertices",
+           .kind = OptionKind::integer,
+           .default_text = "2000",
+           .help = "Vertices of the skin; 477 is the paper's mesh.",
+           .range = {meshtools::phantom_vertices_min, meshtools::phantom_vertices_max}},
+          {.name = "bone_edge",
+           .kind = OptionKind::number,
+           .default_text = "auto",
+           .help = "Edges of the bones at the face; auto: as the skin's, between 1 and 5.",
+           .range = {meshtools::phantom_bone_edge_min, meshtools::phantom_bone_edge_max},
+           .unit = "mm",
+           .choices = {"auto"}},
           {"springs", OptionKind::flag, "", "Scenes of springs, as the paper's, not of a solid."},
           {"output", OptionKind::path, "head", "Path of the files without ending."}};
 }

@@ -41,6 +41,10 @@ base::Exit run(const base::Options& options) {
 int main(int argc, char** argv) {
   base::Options options(argc, argv, "Solves a scene under a pressure on the skin.",
                         {{"SCENE", "scene (.yaml)"}},
-                        {{"pressure", base::OptionKind::number, "0", "Its size.", {}, "N/mm²"}});
+                        {{.name = "pressure",
+                          .kind = base::OptionKind::number,
+                          .default_text = "0",
+                          .help = "Its size.",
+                          .unit = "N/mm²"}});
   return base::run_program(options, [&] { return run(options); });
 }

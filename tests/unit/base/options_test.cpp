@@ -14,20 +14,35 @@ namespace repose::base {
 namespace {
 
 std::vector<Option> table() {
-  return {
-      {"accuracy", OptionKind::number, "0.1", "Stop within this.", Range::above(0), "mm"},
-      {"level", OptionKind::number, "", "Isovalue.", {}, "HU"},
-      {"load_steps", OptionKind::integer, "auto", "Steps.", Range::between(1, 1000), "", {"auto"}},
-      {"functional",
-       OptionKind::choice,
-       "energy",
-       "What is minimised.",
-       {},
-       "",
-       {"energy", "force"}},
-      {"output", OptionKind::path, "", "Where to write."},
-      {"landmarks", OptionKind::path, "", "Two lists.", {}, "", {}, 2},
-      {"dry_run", OptionKind::flag, "", "Build only."}};
+  return {{.name = "accuracy",
+           .kind = OptionKind::number,
+           .default_text = "0.1",
+           .help = "Stop within this.",
+           .range = Range::above(0),
+           .unit = "mm"},
+          {.name = "level",
+           .kind = OptionKind::number,
+           .default_text = "",
+           .help = "Isovalue.",
+           .unit = "HU"},
+          {.name = "load_steps",
+           .kind = OptionKind::integer,
+           .default_text = "auto",
+           .help = "Steps.",
+           .range = Range::between(1, 1000),
+           .choices = {"auto"}},
+          {.name = "functional",
+           .kind = OptionKind::choice,
+           .default_text = "energy",
+           .help = "What is minimised.",
+           .choices = {"energy", "force"}},
+          {"output", OptionKind::path, "", "Where to write."},
+          {.name = "landmarks",
+           .kind = OptionKind::path,
+           .default_text = "",
+           .help = "Two lists.",
+           .values = 2},
+          {"dry_run", OptionKind::flag, "", "Build only."}};
 }
 
 struct Line {
