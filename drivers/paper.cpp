@@ -31,7 +31,7 @@ std::vector<base::Option> option_table() {
           {.name = "accuracy",
            .kind = OptionKind::number,
            .default_text = "0.1",
-           .help = "Methods race to this distance from the rest position.",
+           .help = "Methods are stopped at this distance from the rest position.",
            .range = {1e-3, 10},
            .unit = "mm"},
           {.name = "limit",

@@ -8,7 +8,7 @@ namespace {
 
 using Filter = std::function<bool(const Functional&)>;
 
-/// How many races of the one-step methods were run and how many arrived at a minimum.
+/// How many of the one-step methods arrived at a minimum.
 struct Score {
   int64_t arrived = 0, other = 0, run = 0;
   double share() const { return run ? static_cast<double>(arrived) / static_cast<double>(run) : 0; }
@@ -17,10 +17,10 @@ struct Score {
 /// A functional without known rest position counts as not arrived at.
 Score score(const Findings& findings, const Filter& chosen) {
   Score s;
-  for (const Race& race : findings.races) {
-    if (!chosen(race.functional)) continue;
+  for (const Comparison& comparison : findings.comparisons) {
+    if (!chosen(comparison.functional)) continue;
     s.run += static_cast<int64_t>(tao_methods.size()) + 1;
-    for (const Entry& e : race.entries) {
+    for (const Entry& e : comparison.entries) {
       s.arrived += e.arrived();
       s.other += e.end == Entry::End::own_minimum;
     }
@@ -28,10 +28,11 @@ Score score(const Findings& findings, const Filter& chosen) {
   return s;
 }
 
-const Race* find(const Findings& findings, int layers, bool force, bool volume) {
-  for (const Race& race : findings.races)
-    if (race.layers == layers && race.functional.force == force && race.functional.volume == volume)
-      return &race;
+const Comparison* find(const Findings& findings, int layers, bool force, bool volume) {
+  for (const Comparison& comparison : findings.comparisons)
+    if (comparison.layers == layers && comparison.functional.force == force &&
+        comparison.functional.volume == volume)
+      return &comparison;
   return nullptr;
 }
 
@@ -41,11 +42,11 @@ std::string claim(const std::string& title, bool holds, const std::string& why) 
 
 std::string default_times(const Findings& findings, bool force) {
   std::string text;
-  for (const Race& race : findings.races) {
-    if (race.functional.force != force || race.functional.volume) continue;
+  for (const Comparison& comparison : findings.comparisons) {
+    if (comparison.functional.force != force || comparison.functional.volume) continue;
     text += fmt::format("{}{} ms{}", text.empty() ? "" : ", ",
-                        static_cast<int64_t>(1e3 * race.own.seconds),
-                        race.own.arrived() ? "" : " without convergence");
+                        static_cast<int64_t>(1e3 * comparison.own.seconds),
+                        comparison.own.arrived() ? "" : " without convergence");
   }
   return text;
 }
@@ -67,13 +68,13 @@ std::string energy_or_force(const Findings& findings) {
 /// Evaluations with f_v over those without, for every method that came to the same reference.
 std::string volume_ratios(const Findings& findings) {
   double least = 1e300, most = 0;
-  for (const Race& race : findings.races) {
-    const Race* with = find(findings, race.layers, false, true);
-    if (race.functional.force || race.functional.volume || !with) continue;
-    for (size_t k = 0; k < std::min(race.entries.size(), with->entries.size()); ++k) {
-      if (!race.entries[k].arrived() || !with->entries[k].arrived()) continue;
+  for (const Comparison& comparison : findings.comparisons) {
+    const Comparison* with = find(findings, comparison.layers, false, true);
+    if (comparison.functional.force || comparison.functional.volume || !with) continue;
+    for (size_t k = 0; k < std::min(comparison.entries.size(), with->entries.size()); ++k) {
+      if (!comparison.entries[k].arrived() || !with->entries[k].arrived()) continue;
       const double ratio = static_cast<double>(with->entries[k].evaluations) /
-                           static_cast<double>(race.entries[k].evaluations);
+                           static_cast<double>(comparison.entries[k].evaluations);
       least = std::min(least, ratio);
       most = std::max(most, ratio);
     }
@@ -85,9 +86,11 @@ std::string volume_ratios(const Findings& findings) {
 /// How near the paper's method came to rest by forces, for each number of layers.
 std::string closest(const Findings& findings, bool volume) {
   std::string text;
-  for (const Race& race : findings.races)
-    if (race.functional.force && race.functional.volume == volume && !race.entries.empty())
-      text += fmt::format("{}{:.2g} mm", text.empty() ? "" : ", ", race.entries.front().distance);
+  for (const Comparison& comparison : findings.comparisons)
+    if (comparison.functional.force && comparison.functional.volume == volume &&
+        !comparison.entries.empty())
+      text +=
+          fmt::format("{}{:.2g} mm", text.empty() ? "" : ", ", comparison.entries.front().distance);
   return text;
 }
 
@@ -151,14 +154,14 @@ std::string evaluations_text(const Entry& e) {
 std::string motion(const Findings& findings) {
   std::string text;
   bool paper_wins = true, ours_win = true;
-  for (const MotionRace& m : findings.motions) {
-    const Race* race = find(findings, m.layers, false, false);
+  for (const MotionRun& m : findings.motions) {
+    const Comparison* comparison = find(findings, m.layers, false, false);
     int64_t fewest = INT64_MAX, newton = INT64_MAX;
     for (const Entry& e : m.entries)
       if (e.arrived()) fewest = std::min(fewest, e.evaluations);
-    for (const Entry& e : race->entries)
+    for (const Entry& e : comparison->entries)
       if (e.arrived()) newton = std::min(newton, e.evaluations);
-    const Entry& paper = race->entries.front();
+    const Entry& paper = comparison->entries.front();
     paper_wins = paper_wins && paper.arrived() && paper.evaluations < fewest;
     ours_win = ours_win && newton < fewest;
     text += fmt::format(

@@ -89,25 +89,25 @@ double Contest::distance(Vec displacement) const {
   return discrete::largest_block(difference);
 }
 
-Entry Contest::race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
-  Referee referee(problem_.function(), goal, rules);
+Entry Contest::run_to(Vec goal, const Rules& rules, const Search& search, Vec displacement) {
+  StoppingTest test(problem_.function(), goal, rules);
   Entry entry;
   const int64_t assembled = problem_.assemblies(), renewed = logged("PCRenew"),
                 acted = logged("MatMult"), applied = logged("PCApply");
   try {
-    search(referee, displacement);
+    search(test, displacement);
     entry.end = Entry::End::elsewhere;
-  } catch (const RaceOver& over) {
+  } catch (const SearchOver& over) {
     entry.end = over.reached ? Entry::End::reached : Entry::End::limit;
   }
-  entry.seconds = referee.seconds();
-  entry.evaluations = referee.evaluations();
+  entry.seconds = test.seconds();
+  entry.evaluations = test.evaluations();
   entry.assemblies = problem_.assemblies() - assembled;
   entry.renewals = logged("PCRenew") - renewed;
   entry.actions = logged("MatMult") - acted;
   entry.applications = logged("PCApply") - applied;
   positions_.set_load(1);
-  entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : referee.closest();
+  entry.distance = entry.end == Entry::End::elsewhere ? distance(displacement) : test.closest();
   return entry;
 }
 
@@ -126,15 +126,15 @@ Entry Contest::follow_path() {
   bool complete = false;
   const Rules rules{.limit = INT64_MAX, .seconds = rules_.path_seconds};
   check(VecSet(reference_, 0));
-  Entry entry = race_to(nullptr, rules, path_search(0, complete), reference_);
+  Entry entry = run_to(nullptr, rules, path_search(0, complete), reference_);
   entry.method = "default";
   if (complete) entry.end = Entry::End::reached;
   return entry;
 }
 
-Entry Contest::race_path(int load_steps) {
+Entry Contest::run_path(int load_steps) {
   bool complete = false;
-  return race("default", path_search(load_steps, complete));
+  return run("default", path_search(load_steps, complete));
 }
 
 bool Contest::refine(double accuracy, Vec start) {
@@ -145,7 +145,7 @@ bool Contest::refine(double accuracy, Vec start) {
     WatchedSearch search(problem_, watched);
     known = search.search().run(displacement, accuracy).converged;
   };
-  race_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.seconds}, settle, reference_);
+  run_to(nullptr, {.limit = INT64_MAX, .seconds = rules_.seconds}, settle, reference_);
   if (problem_.force()) problem_.force()->set_epsilon(epsilon);
   return known;
 }
@@ -162,14 +162,14 @@ bool Contest::find_own_minimum(Vec displacement) {
   return outcome.converged && discrete::largest_block(moved) < nearby;
 }
 
-Entry Contest::race(const std::string& method, const Search& search) {
+Entry Contest::run(const std::string& method, const Search& search) {
   const base::VecHandle end = positions_.make_vector(), again = positions_.make_vector();
-  Entry entry = race_to(reference_, rules_, search, end);
+  Entry entry = run_to(reference_, rules_, search, end);
   entry.method = method;
   if (entry.end == Entry::End::reached || !find_own_minimum(end)) return entry;
   if (distance(end) <= rules_.accuracy)
     return entry;  // of the same minimum, which it did not reach
-  Entry own = race_to(end, rules_, search, again);
+  Entry own = run_to(end, rules_, search, again);
   if (own.end != Entry::End::reached) return entry;
   own.method = method;
   own.end = Entry::End::own_minimum;
@@ -179,15 +179,15 @@ Entry Contest::race(const std::string& method, const Search& search) {
   return own;
 }
 
-Entry Contest::race_polak_ribiere() {
-  return race("Polak–Ribière, Brent", [](discrete::Function& function, Vec displacement) {
+Entry Contest::run_polak_ribiere() {
+  return run("Polak–Ribière, Brent", [](discrete::Function& function, Vec displacement) {
     polak_ribiere(function, displacement);
   });
 }
 
-Entry Contest::race_tao(const std::string& type) {
+Entry Contest::run_tao(const std::string& type) {
   const base::ScopedOption chosen("-tao_type", type);
-  return race("TAO " + type, [&](discrete::Function& function, Vec displacement) {
+  return run("TAO " + type, [&](discrete::Function& function, Vec displacement) {
     solve::Minimiser minimiser(function, problem_.solver(), nullptr);
     minimiser.run(displacement, 0);
   });

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "functional.h"
-#include "referee.h"
 #include "repose/solve/problem.h"
+#include "stopping_test.h"
 
 namespace repose::paper {
 
@@ -54,17 +54,17 @@ class Contest {
   base::VecHandle displacement_to(const std::vector<Vec3>& position) const;
   double distance(Vec displacement) const;  ///< mm from the reference
 
-  /// follow_path, raced to the reference like the others; `load_steps` 0: as many as needed.
-  Entry race_path(int load_steps = 0);
+  /// follow_path, run to the reference like the others; `load_steps` 0: as many as needed.
+  Entry run_path(int load_steps = 0);
 
   // The others, in one load step.
-  Entry race_polak_ribiere();
-  Entry race_tao(const std::string& type);  ///< a TAO method: cg, lmvm, nls, ntr, …
+  Entry run_polak_ribiere();
+  Entry run_tao(const std::string& type);  ///< a TAO method: cg, lmvm, nls, ntr, …
   /// Any search: `search` minimises the function it is given from the displacement it is given.
   /// One that does not come to the reference is followed to an energy minimum near where it ended
-  /// and, if there is one, raced again to that.
+  /// and, if there is one, run again to that.
   using Search = std::function<void(discrete::Function&, Vec)>;
-  Entry race(const std::string& method, const Search& search);
+  Entry run(const std::string& method, const Search& search);
 
   /// Smallest and largest eigenvalue of the Hessian at the reference, N/mm.
   struct Curvature {
@@ -74,7 +74,7 @@ class Contest {
 
  private:
   Search path_search(int load_steps, bool& complete);
-  Entry race_to(Vec goal, const Rules& rules, const Search& search, Vec displacement);
+  Entry run_to(Vec goal, const Rules& rules, const Search& search, Vec displacement);
   bool find_own_minimum(Vec displacement);
 
   discrete::Part part_;

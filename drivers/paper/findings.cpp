@@ -1,6 +1,6 @@
 #include "findings.h"
 
-#include "motion_race.h"
+#include "motion_methods.h"
 #include "repose/model/build.h"
 
 namespace repose::paper {
@@ -15,39 +15,40 @@ class Series {
   Series(const model::Model& model, int layers, const Rules& rules, Findings& findings)
       : model_(model), layers_(layers), rules_(rules), findings_(findings) {}
 
-  void race(const Functional& functional) {
-    Race race;
-    race.layers = layers_;
-    race.functional = functional;
+  void compare(const Functional& functional) {
+    Comparison comparison;
+    comparison.layers = layers_;
+    comparison.functional = functional;
     Contest contest(model_, functional, rules_);
-    race.own = contest.follow_path();
-    find_reference(contest, race);
-    if (race.own.arrived() || race.from_energy) run_methods(contest, race);
-    findings_.races.push_back(race);
+    comparison.own = contest.follow_path();
+    find_reference(contest, comparison);
+    if (comparison.own.arrived() || comparison.from_energy) run_methods(contest, comparison);
+    findings_.comparisons.push_back(comparison);
   }
 
  private:
   /// From where the path ended, or, for forces, from the energy's rest position.
-  void find_reference(Contest& contest, Race& race) {
-    const base::VecHandle& energy = energy_rest_[race.functional.volume];
-    race.from_energy = race.functional.force && !race.own.arrived();
-    race.from_energy = race.from_energy && energy;
-    if (!race.own.arrived() && !race.from_energy) return;
+  void find_reference(Contest& contest, Comparison& comparison) {
+    const base::VecHandle& energy = energy_rest_[comparison.functional.volume];
+    comparison.from_energy = comparison.functional.force && !comparison.own.arrived();
+    comparison.from_energy = comparison.from_energy && energy;
+    if (!comparison.own.arrived() && !comparison.from_energy) return;
     // Forces with f_v come to rest too slowly for more.
-    const bool hard = race.functional.force && race.functional.volume;
+    const bool hard = comparison.functional.force && comparison.functional.volume;
     const double accuracy = hard ? 0.1 * rules_.accuracy : reference_accuracy;
     const base::VecHandle end = contest.copy_of_reference();
-    race.reference_known =
-        contest.refine(accuracy, race.from_energy ? static_cast<Vec>(energy) : nullptr);
-    race.own.distance = contest.distance(end);
-    if (!race.functional.force) energy_rest_[race.functional.volume] = contest.copy_of_reference();
+    comparison.reference_known =
+        contest.refine(accuracy, comparison.from_energy ? static_cast<Vec>(energy) : nullptr);
+    comparison.own.distance = contest.distance(end);
+    if (!comparison.functional.force)
+      energy_rest_[comparison.functional.volume] = contest.copy_of_reference();
   }
 
-  void run_methods(Contest& contest, Race& race) {
-    race.entries.push_back(contest.race_polak_ribiere());
-    for (const std::string& type : tao_methods) race.entries.push_back(contest.race_tao(type));
-    if (!race.functional.force && !race.functional.volume)
-      findings_.motions.push_back({layers_, race_motion(contest, rules_.accuracy)});
+  void run_methods(Contest& contest, Comparison& comparison) {
+    comparison.entries.push_back(contest.run_polak_ribiere());
+    for (const std::string& type : tao_methods) comparison.entries.push_back(contest.run_tao(type));
+    if (!comparison.functional.force && !comparison.functional.volume)
+      findings_.motions.push_back({layers_, run_motion(contest, rules_.accuracy)});
   }
 
   const model::Model& model_;
@@ -69,7 +70,7 @@ Findings measure(const Plan& plan, const std::function<void(const std::string&)>
     Series series(model, layers, plan.rules, findings);
     for (const Functional& functional : functionals) {
       tell(fmt::format("{} layers, {}", layers, functional.name));
-      series.race(functional);
+      series.compare(functional);
     }
   }
   return findings;

@@ -8,7 +8,7 @@
 namespace repose::paper {
 
 /// The methods of Tables 2 and 3 on one functional.
-struct Race {
+struct Comparison {
   int layers = 0;
   Functional functional;
   Entry own;                     ///< as repose-solve does it
@@ -18,7 +18,7 @@ struct Race {
 };
 
 /// The equations of motion of the springs alone, and the direct methods beside them.
-struct MotionRace {
+struct MotionRun {
   int layers = 0;
   std::vector<Entry> entries;
 };
@@ -33,8 +33,8 @@ struct Plan {
 struct Findings {
   Plan plan;
   std::vector<Size> sizes;
-  std::vector<Race> races;
-  std::vector<MotionRace> motions;
+  std::vector<Comparison> comparisons;
+  std::vector<MotionRun> motions;
 };
 
 /// TAO's methods in the tables.

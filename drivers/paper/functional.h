@@ -9,13 +9,14 @@ namespace repose::paper {
 
 struct Functional {
   const char* name;
-  bool force, volume;
+  bool force = false, volume = false;
 };
 
-inline constexpr std::array<Functional, 4> functionals = {{{"f_e", false, false},
-                                                           {"f_e + f_v", false, true},
-                                                           {"f_f", true, false},
-                                                           {"f_f + f_v", true, true}}};
+inline constexpr std::array<Functional, 4> functionals = {
+    {{.name = "f_e"},
+     {.name = "f_e + f_v", .volume = true},
+     {.name = "f_f", .force = true},
+     {.name = "f_f + f_v", .force = true, .volume = true}}};
 
 /// What repose-solve would be asked for, with automatic load steps.
 solve::Settings settings_of(const Functional& functional, double accuracy);

@@ -59,33 +59,33 @@ std::string cell(const Entry& entry, double unit_seconds) {
   }
 }
 
-std::string own_cell(const Race& race) {
-  const double milliseconds = 1e3 * race.own.seconds;
-  if (!race.own.arrived())
-    return fmt::format("> {} ({:.0f} ms)", race.own.evaluations, milliseconds);
-  return fmt::format("{} · {:.0f} ms ({:.2g} mm)", race.own.evaluations, milliseconds,
-                     race.own.distance);
+std::string own_cell(const Comparison& comparison) {
+  const double milliseconds = 1e3 * comparison.own.seconds;
+  if (!comparison.own.arrived())
+    return fmt::format("> {} ({:.0f} ms)", comparison.own.evaluations, milliseconds);
+  return fmt::format("{} · {:.0f} ms ({:.2g} mm)", comparison.own.evaluations, milliseconds,
+                     comparison.own.distance);
 }
 
-std::string race_table(const Findings& findings, bool force) {
+std::string run_table(const Findings& findings, bool force) {
   std::string text = "| functional | layers | Polak–Ribière, Brent |";
   for (const std::string& type : tao_methods) text += fmt::format(" TAO {} |", type);
   text += " our default |\n|---|--:|--:|--:|";
   for (size_t k = 0; k < tao_methods.size(); ++k) text += "--:|";
   text += "\n";
-  for (const Race& race : findings.races) {
-    if (race.functional.force != force) continue;
-    text += fmt::format("| {}{} | {} |", race.functional.name, race.reference_known ? "" : " *",
-                        race.layers);
-    for (const Entry& entry : race.entries)
-      text += fmt::format(" {} |", cell(entry, race.own.seconds));
-    for (size_t k = race.entries.size(); k <= tao_methods.size(); ++k) text += " – |";
-    text += fmt::format(" {} |\n", own_cell(race));
+  for (const Comparison& comparison : findings.comparisons) {
+    if (comparison.functional.force != force) continue;
+    text += fmt::format("| {}{} | {} |", comparison.functional.name,
+                        comparison.reference_known ? "" : " *", comparison.layers);
+    for (const Entry& entry : comparison.entries)
+      text += fmt::format(" {} |", cell(entry, comparison.own.seconds));
+    for (size_t k = comparison.entries.size(); k <= tao_methods.size(); ++k) text += " – |";
+    text += fmt::format(" {} |\n", own_cell(comparison));
   }
   return text + "\n";
 }
 
-std::string how_raced(const Rules& rules) {
+std::string how_compared(const Rules& rules) {
   return fmt::format(
       R"(Evaluations (with or without gradient) until the largest distance of a point from the rest
 position of the same functional is {0} mm, and CPU time relative to our default in the same row.
@@ -109,11 +109,11 @@ brackets its true distance. Forces are smoothed by ε = {2} N (our default lower
       rules.accuracy, rules.limit);
 }
 
-std::string race_tables(const Findings& findings) {
+std::string run_tables(const Findings& findings) {
   const Rules& rules = findings.plan.rules;
   return fmt::format("## Tables 2 and 3: evaluations and time to {} mm\n\n", rules.accuracy) +
-         how_raced(rules) + "Table 2, energy:\n\n" + race_table(findings, false) +
-         "Table 3, force:\n\n" + race_table(findings, true);
+         how_compared(rules) + "Table 2, energy:\n\n" + run_table(findings, false) +
+         "Table 3, force:\n\n" + run_table(findings, true);
 }
 
 std::string motion_table(const Findings& findings) {
@@ -125,12 +125,14 @@ std::string motion_table(const Findings& findings) {
       "for Euler, time\nsteps h; a user would have to find both first. One evaluation of the "
       "forces counts as one.\n\n"
       "| layers | method | evaluations · time |\n|--:|---|--:|\n";
-  for (const MotionRace& motion : findings.motions)
-    for (const Race& race : findings.races) {
-      if (race.layers != motion.layers || race.functional.force || race.functional.volume) continue;
+  for (const MotionRun& motion : findings.motions)
+    for (const Comparison& comparison : findings.comparisons) {
+      if (comparison.layers != motion.layers || comparison.functional.force ||
+          comparison.functional.volume)
+        continue;
       for (const Entry& entry : motion.entries)
         text += fmt::format("| {} | {} | {} |\n", motion.layers, entry.method,
-                            cell(entry, race.own.seconds));
+                            cell(entry, comparison.own.seconds));
     }
   return text + "\n";
 }
@@ -161,7 +163,7 @@ std::string page(const Findings& findings, const std::string& command, const std
              "Made by `{}` in one run, on one core of a machine with {};\n"
              "pictures by `drivers/plot_paper.py`. Times vary by machine and by run.\n\n",
              findings.plan.scene.file.filename().string(), command, machine()) +
-         size_table(findings) + race_tables(findings) + motion_table(findings) + claims(findings) +
+         size_table(findings) + run_tables(findings) + motion_table(findings) + claims(findings) +
          figures(images);
 }
 

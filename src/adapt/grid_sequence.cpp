@@ -84,7 +84,7 @@ class SequenceSolver {
     level.unknowns = summary.unknowns;
     level.evaluations = summary.evaluations;
     level.assemblies = summary.assemblies;
-    base::on_first_rank(comm_, [&] { take(std::move(built), std::move(position), level); });
+    base::on_first_rank(comm_, [&] { store(std::move(built), std::move(position), level); });
     MPI_Bcast(&level.discretisation_error, 1, MPI_DOUBLE, 0, comm_);
     level.seconds = MPI_Wtime() - begin;
     sequence_.levels.push_back(level);
@@ -120,7 +120,7 @@ class SequenceSolver {
   }
 
   /// Carries the answer of a level to the scene's points. On rank 0.
-  void take(model::BuiltModel&& built, std::vector<Vec3>&& position, Level& level) {
+  void store(model::BuiltModel&& built, std::vector<Vec3>&& position, Level& level) {
     level.points = static_cast<int64_t>(position.size());
     if (level.resolution.edge == 0) level.resolution.edge = meshtools::even_edge(anatomy_.skin);
     const auto moved = sum(position, built.model.points.position, -1);

@@ -65,9 +65,9 @@ Wish wish_of(const base::Options& options) {
   for (const char* name : {"adapt", "discretisation"})
     if (options.flag(name) && profile == "exact")
       base::refuse("-{} solves coarser models; leave -profile exact out", name);
-  if (compare) return {Coarse::compare, "-discretisation", true};
-  if (adapt) return {Coarse::instead, "-adapt", true};
-  if (profile == "preview") return {Coarse::instead, "-profile preview", false};
+  if (compare) return {.coarse = Coarse::compare, .option = "-discretisation", .insisted = true};
+  if (adapt) return {.coarse = Coarse::instead, .option = "-adapt", .insisted = true};
+  if (profile == "preview") return {.coarse = Coarse::instead, .option = "-profile preview"};
   return {};
 }
 
@@ -107,8 +107,7 @@ std::string describe_minimum(const Strategy& s, const Job& job) {
   const std::string minimised =
       job.solid ? "the energy of a solid"
                 : fmt::format("the {} of springs, volume term {}",
-                              is_force(s) ? "forces" : "energy",
-                              word(s.settings.weights.volume));
+                              is_force(s) ? "forces" : "energy", word(s.settings.weights.volume));
   return fmt::format("{}, to {:g} mm", minimised, s.settings.path.accuracy);
 }
 

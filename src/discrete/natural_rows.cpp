@@ -175,8 +175,8 @@ std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
   return rows;
 }
 
-void NaturalRows::take(const std::vector<Vec3>& slab, const Positions& positions,
-                       Vec displacement) const {
+void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& positions,
+                               Vec displacement) const {
   std::vector<Vec3> rows = owned(slab);
   for (size_t i = 0; i < rows.size(); ++i) rows[i] -= part_.model.points.position[i];
   positions.keep_owned(rows, displacement);

@@ -105,7 +105,7 @@ class LocalNumbers {
     return local_[row];
   }
   /// Forgets all, in time proportional to what was met.
-  std::vector<int64_t> take() {
+  std::vector<int64_t> release() {
     for (int64_t row : rows_) local_[row] = -1;
     return std::exchange(rows_, {});
   }
@@ -245,7 +245,7 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   part.model.contact = pick_contact(plan, local, rank);
   part.contact = !model.contact.empty();
   part.bodies = plan.bodies;
-  part.point_row = local.take();
+  part.point_row = local.release();
   pick_points(plan, part);
   part.solid = model::is_solid(model);
   part.model.gravity = model.gravity;

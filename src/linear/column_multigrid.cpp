@@ -36,7 +36,7 @@ class Couplings {
  public:
   Couplings(const std::vector<int32_t>& number, const std::vector<int32_t>& layer, int32_t own)
       : number_(number), layer_(layer), right_(own), diagonal_(own, 0.0) {}
-  void take(int32_t p, int32_t q, const Mat3& block) {
+  void add(int32_t p, int32_t q, const Mat3& block) {
     const auto [i, j] = std::minmax(number_[p], number_[q]);
     if (i < 0 || i >= own()) return;
     if (i == j) diagonal_[i] += block.trace();
@@ -187,7 +187,7 @@ ColumnMultigrid::~ColumnMultigrid() = default;
 
 void ColumnMultigrid::make_fine(const discrete::Part& part, const BlockSource& blocks) {
   Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.owned_unknowns));
-  blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.take(p, q, block); });
+  blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.add(p, q, block); });
   int layered = couplings.layered;
   MPI_Allreduce(MPI_IN_PLACE, &layered, 1, MPI_INT, MPI_MIN, comm_);
   double stiffest = couplings.stiffest();

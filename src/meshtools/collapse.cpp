@@ -197,7 +197,7 @@ bool Collapser::attempt(const Candidate& c) {
     for (int pull = 0; pull <= most_pulls; ++pull) {
       Vec3 outside = Vec3::Constant(NAN);
       if (fits(star, c.kept, c.removed, at, &outside)) {
-        take(star, c.kept, c.removed, at);
+        collapse(star, c.kept, c.removed, at);
         return true;
       }
       if (locks(c.kept) || !tolerance_ || !outside.allFinite() || pull == most_pulls) break;
@@ -224,7 +224,7 @@ Vec3 Collapser::pulled(int64_t kept, const Vec3& at, const Vec3& outside) const 
   return at + inward / std::min(share, 1.0) * (nearest - outside);
 }
 
-void Collapser::take(const Star& star, int64_t kept, int64_t removed, const Vec3& at) {
+void Collapser::collapse(const Star& star, int64_t kept, int64_t removed, const Vec3& at) {
   ++steps_;
   surface_.points[kept] = at;
   quadric_[kept] = quadric_[kept] + quadric_[removed];

@@ -53,7 +53,7 @@ class Collapser {
   bool within(Vec3* outside) const;
   bool meets_another(const Star& star) const;
   Vec3 pulled(int64_t kept, const Vec3& at, const Vec3& outside) const;
-  void take(const Star& star, int64_t kept, int64_t removed, const Vec3& at);
+  void collapse(const Star& star, int64_t kept, int64_t removed, const Vec3& at);
   int64_t pass(int64_t target, uint64_t since, const std::function<void()>& report);
 
   Surface surface_;

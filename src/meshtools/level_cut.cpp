@@ -27,7 +27,7 @@ class Cut {
       part_.triangles.push_back({corners[0], corners[k - 1], corners[k]});
   }
 
-  Surface take() { return std::move(part_); }
+  Surface result() { return std::move(part_); }
 
  private:
   bool inside(int64_t v) const { return values_[v] >= 0; }
@@ -62,7 +62,7 @@ class Cut {
 Surface cut_at_zero(const Surface& surface, const std::vector<double>& values) {
   Cut cut(surface, values);
   for (const Triangle& triangle : surface.triangles) cut.add(triangle);
-  return cut.take();
+  return cut.result();
 }
 
 }  // namespace repose::meshtools

@@ -57,7 +57,7 @@ class PathCutter {
       if (stops.empty() || stops.back() != vertex) stops.push_back(vertex);
     }
     if (stops.size() < 2) refuse_short(path);
-    take(stops.front());
+    append(stops.front());
     for (size_t i = 0; i + 1 < stops.size(); ++i) run(stops[i], stops[i + 1]);
     if (chain_.size() < 3) refuse_short(path);
     return chain_;
@@ -135,7 +135,7 @@ class PathCutter {
            shown(at));
   }
 
-  void take(int64_t vertex) {
+  void append(int64_t vertex) {
     if (mesh_.on_border(vertex))
       refuse("the path comes to the rim of the skin near {}; keep it inside",
              shown(mesh_.point(vertex)));
@@ -151,9 +151,9 @@ class PathCutter {
     const size_t most = chain_.size() + skin_.triangles.size();
     while (!mesh_.has_edge(chain_.back(), to)) {
       if (chain_.size() > most) refuse_lost(mesh_.point(from), mesh_.point(to));
-      take(next(chain_.back(), to, normal));
+      append(next(chain_.back(), to, normal));
     }
-    take(to);
+    append(to);
   }
 
   /// Where the plane through two vertices along `normal` leaves the triangles around the first.

@@ -51,7 +51,7 @@ bool is_ending(const std::string& rest) {
 NameLock::NameLock(const std::filesystem::path& name)
     : name_(name), file_(name.string() + ".lock") {
   base::require_writable(name.string() + ".h5");
-  while (!take()) {
+  while (!acquire()) {
   }
   write_holder(descriptor_);
   remove_leftovers();
@@ -63,7 +63,7 @@ NameLock::~NameLock() {
   close(descriptor_);
 }
 
-bool NameLock::take() {
+bool NameLock::acquire() {
   descriptor_ = open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0)
     base::refuse("{}: cannot be written: {}; choose another -output", file_.string(),

@@ -17,6 +17,10 @@ std::vector<std::string> moving_points(size_t steps) {
   return paths;
 }
 
+XdmfArray point_vector(const char* name, const char* path) {
+  return {.name = name, .path = path, .at_points = true, .vector = true};
+}
+
 void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
   for (const OptionalField& field : fields)
     block.arrays.push_back({.name = field.name,
@@ -27,25 +31,31 @@ void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
 }
 
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
-  XdmfBlock block{.name = "tissue",
-                  .topology = "TopologyType=\"Wedge\"",
-                  .vtk_cell = 13,
-                  .corners = 6,
-                  .connectivity = "/model/prism/points",
-                  .points = counts.points,
-                  .cells = counts.prisms,
-                  .geometry = moving_points(steps),
-                  .arrays = {{"displacement", "step/point/displacement", true, true},
-                             {"residual_force", "step/point/residual_force", true, true},
-                             {"initial_position", "/model/point/position", true, true},
-                             {"set", "/model/point/set", true, false, small_integer},
-                             {"layer", "/model/point/layer", true, false, short_integer},
-                             {"column", "/model/point/column", true, false, long_integer},
-                             {"volume_ratio", "step/prism/volume_ratio"}}};
+  XdmfBlock block{
+      .name = "tissue",
+      .topology = "TopologyType=\"Wedge\"",
+      .vtk_cell = 13,
+      .corners = 6,
+      .connectivity = "/model/prism/points",
+      .points = counts.points,
+      .cells = counts.prisms,
+      .geometry = moving_points(steps),
+      .arrays = {
+          point_vector("displacement", "step/point/displacement"),
+          point_vector("residual_force", "step/point/residual_force"),
+          point_vector("initial_position", "/model/point/position"),
+          {.name = "set", .path = "/model/point/set", .at_points = true, .type = small_integer},
+          {.name = "layer", .path = "/model/point/layer", .at_points = true, .type = short_integer},
+          {.name = "column",
+           .path = "/model/point/column",
+           .at_points = true,
+           .type = long_integer},
+          {"volume_ratio", "step/prism/volume_ratio"}}};
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
   if (counts.stress) {
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});
-    block.arrays.push_back({"principal_stretch", "step/prism/principal_stretch", false, true});
+    block.arrays.push_back(
+        {.name = "principal_stretch", .path = "step/prism/principal_stretch", .vector = true});
   }
   return block;
 }
@@ -62,7 +72,7 @@ XdmfBlock springs(const FileCounts& counts, size_t steps) {
           .arrays = {{"elongation", "step/spring/elongation"},
                      {"tension", "step/spring/tension"},
                      {"rest_length", "/model/spring/rest_length"},
-                     {"set", "/model/spring/set", false, false, short_integer}}};
+                     {.name = "set", .path = "/model/spring/set", .type = short_integer}}};
 }
 
 XdmfBlock skin(const FileCounts& counts, size_t steps) {
@@ -74,21 +84,22 @@ XdmfBlock skin(const FileCounts& counts, size_t steps) {
           .points = counts.points,
           .cells = counts.skin,
           .geometry = moving_points(steps),
-          .arrays = {{"displacement", "step/point/displacement", true, true},
-                     {"initial_position", "/model/point/position", true, true}}};
+          .arrays = {point_vector("displacement", "step/point/displacement"),
+                     point_vector("initial_position", "/model/point/position")}};
 }
 
 XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
-  XdmfBlock block{.name = "bones",
-                  .topology = "TopologyType=\"Triangle\"",
-                  .vtk_cell = 5,
-                  .corners = 3,
-                  .connectivity = "/model/bone_surfaces/triangles",
-                  .points = counts.bone_points,
-                  .cells = counts.bone_triangles,
-                  .geometry = {},
-                  .arrays = {{"bone", "/model/bone_surfaces/bone", false, false, short_integer},
-                             {"initial_position", "/model/bone_surfaces/points", true, true}}};
+  XdmfBlock block{
+      .name = "bones",
+      .topology = "TopologyType=\"Triangle\"",
+      .vtk_cell = 5,
+      .corners = 3,
+      .connectivity = "/model/bone_surfaces/triangles",
+      .points = counts.bone_points,
+      .cells = counts.bone_triangles,
+      .geometry = {},
+      .arrays = {{.name = "bone", .path = "/model/bone_surfaces/bone", .type = short_integer},
+                 point_vector("initial_position", "/model/bone_surfaces/points")}};
   for (size_t step = 0; step < moved.size(); ++step)
     block.geometry.push_back(moved[step] ? fmt::format("/step/{:04}/bone_surface/points", step)
                                          : "/model/bone_surfaces/points");

@@ -270,7 +270,7 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
   base::VecHandle guess;
   if (start.guess) guess = positions.make_vector();
   if (start.guess || settings.path.start_load > 0)
-    natural.take(start.position, positions, start.guess ? guess : displacement);
+    natural.set_unknowns(start.position, positions, start.guess ? guess : displacement);
   if (settings.stages) settings.stages->end("distribute");
 
   const base::LogStage stage("Search");

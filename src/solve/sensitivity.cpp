@@ -139,7 +139,7 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
   share_rows(comm, way, part.total_points);
   const base::VecHandle displacement = positions.make_vector(), force = positions.make_vector(),
                         step = positions.make_vector();
-  natural.take(base::scatter(comm, rest.position), positions, displacement);
+  natural.set_unknowns(base::scatter(comm, rest.position), positions, displacement);
   positions.set_load(1);
   Problem problem(positions, weights, false);
   problem.function().evaluate(displacement, force);

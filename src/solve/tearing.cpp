@@ -20,7 +20,7 @@ class Rupture {
   }
 
   /// Removes what is above the limit; returns whether anything was.
-  bool take(const std::vector<double>& tension) {
+  bool tear(const std::vector<double>& tension) {
     const model::Springs& springs = model_.springs;
     std::vector<char> torn(springs.points.size(), 0);
     std::vector<int64_t> ends;
@@ -85,7 +85,7 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
     result.stopped = rest.path.last.stopped;
     if (result.stopped || !rest.path.complete()) break;
     tension = discrete::gather(comm, tension.data(), tension.size());
-    base::on_first_rank(comm, [&] { more = rupture.take(tension); });
+    base::on_first_rank(comm, [&] { more = rupture.tear(tension); });
     MPI_Bcast(&more, 1, MPI_C_BOOL, 0, comm);
     if (more) {
       result.torn = true;

@@ -61,15 +61,15 @@ class Orienter {
   void grow(int64_t seed) {
     Part part;
     std::vector<bool> turned;
-    const auto take = [&](int64_t triangle, bool turn_it) {
+    const auto add = [&](int64_t triangle, bool turn_it) {
       part_of_[triangle] = static_cast<int64_t>(parts_.size());
       part.triangles.push_back(triangle);
       turned.push_back(turn_it);
     };
-    take(seed, false);
+    add(seed, false);
     for (size_t i = 0; i < part.triangles.size(); ++i)
       for (const auto& next : neighbours_[part.triangles[i]])
-        if (part_of_[next.triangle] < 0) take(next.triangle, turned[i] == next.agrees);
+        if (part_of_[next.triangle] < 0) add(next.triangle, turned[i] == next.agrees);
     const auto count = std::count(turned.begin(), turned.end(), true);
     const bool majority = 2 * count > static_cast<std::ptrdiff_t>(turned.size());
     for (size_t i = 0; i < turned.size(); ++i) {

@@ -36,13 +36,13 @@ class HeaderParser {
         header_.bytes = position;
         return header_;
       }
-      if (!line.empty()) take(line);
+      if (!line.empty()) parse(line);
     }
     fail("the header has no end_header: the file is truncated");
   }
 
  private:
-  void take(const std::vector<std::string_view>& line) {
+  void parse(const std::vector<std::string_view>& line) {
     const auto keyword = line[0];
     if (keyword == "ply" || keyword == "comment" || keyword == "obj_info") return;
     if (keyword == "format" && line.size() >= 2)

@@ -35,7 +35,7 @@ PlyValues::PlyValues(const Content& content, const PlyHeader& header)
       big_endian_(header.format == "binary_big_endian") {}
 
 void PlyValues::read(const PlyElement& element,
-                     const std::function<void(uint64_t row, const Row&)>& take) {
+                     const std::function<void(uint64_t row, const Row&)>& receive) {
   Row row(element.properties.size());
   for (uint64_t number = 0; number < element.count; ++number) {
     place_ = fmt::format("{} {} of {}", base::shown(element.name), number, element.count);
@@ -47,7 +47,7 @@ void PlyValues::read(const PlyElement& element,
       for (auto left = static_cast<size_t>(entries); left > 0; --left)
         row[p].push_back(value(property.type));
     }
-    take(number, row);
+    receive(number, row);
   }
 }
 

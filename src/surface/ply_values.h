@@ -15,7 +15,8 @@ class PlyValues {
   using Row = std::vector<std::vector<double>>;
   /// Reads the next element whole. Throws InputError naming the row where the file ends or holds no
   /// number.
-  void read(const PlyElement& element, const std::function<void(uint64_t row, const Row&)>& take);
+  void read(const PlyElement& element,
+            const std::function<void(uint64_t row, const Row&)>& receive);
 
  private:
   double text_value();

@@ -10,7 +10,7 @@
 #include <map>
 
 #include "paper/contest.h"
-#include "paper/motion_race.h"
+#include "paper/motion_methods.h"
 #include "paper/polak_ribiere.h"
 #include "repose/base/options.h"
 #include "repose/base/program.h"
@@ -165,12 +165,12 @@ class Runner {
   }
 
   void run(const std::string& method) {
-    if (method == "default" || method == "default_end") return race_default(method);
-    if (method == "stiffness" || method == "stiffness_step") return race_stiffness(method);
-    if (method == "polak_ribiere") return race_polak_ribiere();
-    if (method == "motion") return race_motion();
-    if (method == "liblbfgs") return race_liblbfgs();
-    Line line{contest_.race_tao(method)};
+    if (method == "default" || method == "default_end") return run_default(method);
+    if (method == "stiffness" || method == "stiffness_step") return run_stiffness(method);
+    if (method == "polak_ribiere") return run_polak_ribiere();
+    if (method == "motion") return run_motion();
+    if (method == "liblbfgs") return run_liblbfgs();
+    Line line{contest_.run_tao(method)};
     line.entry.method = method;
     print(line);
   }
@@ -185,10 +185,10 @@ class Runner {
   }
 
   /// As repose-solve does it, until the rest position is near or, `default_end`, until it says so.
-  void race_default(const std::string& method) {
+  void run_default(const std::string& method) {
     Line line;
     if (method != "default_end") {
-      line.entry = contest_.race_path();
+      line.entry = contest_.run_path();
     } else {
       const base::VecHandle rest = contest_.copy_of_reference();
       line.entry = contest_.follow_path();
@@ -199,37 +199,36 @@ class Runner {
   }
 
   /// The same with L-BFGS from the stiffness, with its load steps or in one predicted step.
-  void race_stiffness(const std::string& method) {
+  void run_stiffness(const std::string& method) {
     const base::ScopedOption type("-tao_type", "lmvm"), initial("-tao_lmvm_initial", "stiffness");
-    if (method == "stiffness") return race_default(method);
-    Line line{contest_.race_path(1)};
+    if (method == "stiffness") return run_default(method);
+    Line line{contest_.run_path(1)};
     line.entry.method = method;
     print(line);
   }
 
-  void race_polak_ribiere() {
+  void run_polak_ribiere() {
     Line line;
-    line.entry =
-        contest_.race("polak_ribiere", [&](discrete::Function& function, Vec displacement) {
-          Counter counter(function);
-          try {
-            paper::polak_ribiere(counter, displacement);
-          } catch (...) {
-            line.values = counter.values();
-            throw;
-          }
-        });
+    line.entry = contest_.run("polak_ribiere", [&](discrete::Function& function, Vec displacement) {
+      Counter counter(function);
+      try {
+        paper::polak_ribiere(counter, displacement);
+      } catch (...) {
+        line.values = counter.values();
+        throw;
+      }
+    });
     print(line);
   }
 
-  void race_motion() {
-    for (const Entry& entry : paper::race_motion(contest_, options_.number("accuracy")))
+  void run_motion() {
+    for (const Entry& entry : paper::run_motion(contest_, options_.number("accuracy")))
       print({entry});
   }
 
-  void race_liblbfgs() {
+  void run_liblbfgs() {
 #ifdef REPOSE_LIBLBFGS
-    print({contest_.race("liblbfgs", [](discrete::Function& function, Vec displacement) {
+    print({contest_.run("liblbfgs", [](discrete::Function& function, Vec displacement) {
       Liblbfgs(function).minimise(displacement);
     })});
 #else
@@ -287,7 +286,7 @@ std::vector<base::Option> option_table() {
   return {{"scene", OptionKind::path, "", "The result's scene, for coarser models."},
           {"accuracy", OptionKind::number, "0.01", "Distance from rest.", {1e-6, 10}, "mm"},
           {"limit", OptionKind::integer, "200000", "Evaluations.", {1, 1000000000}},
-          {"seconds", OptionKind::number, "60", "CPU time of a race.", {1e-3, 1e6}, "s"},
+          {"seconds", OptionKind::number, "60", "CPU time of a search.", {1e-3, 1e6}, "s"},
           {"count", OptionKind::flag, "",
            "Count preconditioners and actions too, which takes a little time."}};
 }
@@ -308,8 +307,8 @@ base::Exit run(const base::Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  base::Options options(argc, argv, "Races one method to a known rest position.",
-                        {{"RESULT.h5", "a result of repose-solve"}, {"METHOD", "what races"}},
+  base::Options options(argc, argv, "Takes one method to a known rest position.",
+                        {{"RESULT.h5", "a result of repose-solve"}, {"METHOD", "a method"}},
                         option_table());
   return base::run_program(options, [&] { return run(options); });
 }

@@ -149,12 +149,12 @@ class Evaluation:
         return value, gradient[self.soft].ravel()
 
 
-class RaceOver(Exception):
+class SearchOver(Exception):
     pass
 
 
-class Referee:
-    """Ends a race at the first state within the accuracy of the goal; its looks are not timed."""
+class StoppingTest:
+    """Ends a search at the first state within the accuracy of the goal; its looks are not timed."""
 
     def __init__(self, function, goal, accuracy, seconds):
         self.function, self.goal, self.accuracy, self.limit = function, goal, accuracy, seconds
@@ -172,21 +172,21 @@ class Referee:
         self.closest = min(self.closest, away)
         self.looking += time.process_time() - look
         if self.closest <= self.accuracy or self.seconds() > self.limit:
-            raise RaceOver
+            raise SearchOver
         return found
 
 
 def race_scipy(function, start, goal, method, chosen):
     """One entry like those of benchmark_contest, and the state where the method stopped by itself."""
-    referee = Referee(function, goal, chosen.accuracy, chosen.seconds)
+    test = StoppingTest(function, goal, chosen.accuracy, chosen.seconds)
     entry, stopped = {"method": method, "values": 0, "assemblies": 0, "excess": 0}, None
     try:
-        stopped = minimize(referee, start, jac=True, method=method, options=SCIPY[method]).x
+        stopped = minimize(test, start, jac=True, method=method, options=SCIPY[method]).x
         entry["end"] = "elsewhere"
-    except RaceOver:
-        entry["end"] = "reached" if referee.closest <= chosen.accuracy else "limit"
-    return entry | {"evaluations": referee.evaluations, "seconds": referee.seconds(),
-                    "distance": referee.closest}, stopped
+    except SearchOver:
+        entry["end"] = "reached" if test.closest <= chosen.accuracy else "limit"
+    return entry | {"evaluations": test.evaluations, "seconds": test.seconds(),
+                    "distance": test.closest}, stopped
 
 
 def scipy_entry(function, step, method, chosen):
@@ -255,7 +255,7 @@ class Contest:
             known = self.entries.setdefault((method, place), entry)
             known["seconds"] = min(known["seconds"], entry["seconds"])
 
-    def race(self, method):
+    def enter(self, method):
         """Counts first where that takes time of its own, then so many rounds."""
         measure = self.of_scipy if method in SCIPY else self.of_program
         if method in COUNTED:
@@ -280,7 +280,7 @@ class Contest:
                 self.left_out.append(f"{METHODS[method]}: SciPy is not there")
                 continue
             try:
-                self.race(method)
+                self.enter(method)
             except RuntimeError as refusal:
                 self.left_out.append(f"{METHODS[method]}: {refusal}")
             print(f"  {method} after {time.time() - self.begin:.0f} s", flush=True)

@@ -44,7 +44,7 @@ def limit_cpu():
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT))
 
 
-class Race:
+class Comparison:
     def __init__(self, mesh, programs, folder):
         self.mesh, self.programs, self.folder = mesh, programs, folder
         self.cgal = programs / "benchmark_decimation"
@@ -96,11 +96,11 @@ def main():
     programs = pathlib.Path(sys.argv[3] if len(sys.argv) > 3 else "build/bin").resolve()
     start = time.time()
     with tempfile.TemporaryDirectory() as folder:
-        race = Race(mesh, programs, pathlib.Path(folder))
+        comparison = Comparison(mesh, programs, pathlib.Path(folder))
         for distance in sys.argv[4:] or DISTANCES:
-            race.run(distance)
+            comparison.run(distance)
     note = "" if has_vtk() else "\nVTK was not there to compare with.\n"
-    write(page, HEAD + "".join(race.rows) + note)
+    write(page, HEAD + "".join(comparison.rows) + note)
     print(f"{page} written after {time.time() - start:.0f} s")
 
 

@@ -55,7 +55,7 @@ def problems(chosen, folder):
             for name, scene in scenes for volume in estimate.VOLUMES]
 
 
-def race(chosen, folder):
+def compare(chosen, folder):
     """Solves of each way, nothing for one that did not come to rest; how many problems had no end of
     many steps."""
     ways, unknown = {name: [] for name in WAYS}, 0
@@ -84,7 +84,7 @@ def main():
     parser = option_parser(__doc__, seeds=30)
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        ways, unknown = race(chosen, pathlib.Path(folder))
+        ways, unknown = compare(chosen, pathlib.Path(folder))
     head = (f"| load steps | runs | at the end of {MANY} steps | elsewhere, mm | no rest "
             "| evaluations, median | CPU, median | CPU, all |\n|---|--:|--:|---|--:|--:|--:|--:|")
     rows = [row(name, runs, ways["automatic"]) for name, runs in ways.items()]

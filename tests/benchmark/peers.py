@@ -8,7 +8,7 @@
 FILE.h5 is a model or a result of repose-solve; one of springs gets the moduli given. -part 0.1
 makes a tenth of the move. Who stops how:
 
-- repose: by its own certificate, at -accuracy. CPU s of its search alone, the model in memory
+- repose: by its own estimate, at -accuracy. CPU s of its search alone, the model in memory
   (benchmark_contest), and of the whole program.
 - liblbfgs (benchmark_contest, in C++ on Repose's energy), scipy_* and polysolve_* (on the energy in
   NumPy): from the initial positions with the fixed points in place at once, by an oracle, at the
@@ -134,7 +134,7 @@ class Energy:
         self.actions += 1
         return self.bent[1] @ way
 
-    def race(self, name, method):
+    def time(self, name, method):
         """method(self, start) until the oracle stops it."""
         self.begin = time.process_time()
         try:
@@ -223,7 +223,7 @@ METHODS = ["repose", "liblbfgs", *MINIMISERS, "dolfinx_mumps", "dolfinx_gamg", "
            "ccx_cholesky", "wedges"]
 
 
-class Race:
+class Comparison:
     """All methods on one file's model."""
 
     def __init__(self, file, options, folder):
@@ -251,14 +251,14 @@ class Race:
 
     def least(self, method):
         """A method's rows, with the least times of the rounds where they are short."""
-        rows = self.race(method)
+        rows = self.measure(method)
         for _ in range(self.options.rounds - 1):
             if rows[0].seconds is None or rows[0].seconds > LONG:
                 break
-            rows = [min(pair, key=lambda row: row.seconds) for pair in zip(rows, self.race(method))]
+            rows = [min(pair, key=lambda row: row.seconds) for pair in zip(rows, self.measure(method))]
         return rows
 
-    def race(self, method):
+    def measure(self, method):
         if method == "repose":
             return self.repose()
         if method == "liblbfgs":
@@ -273,7 +273,7 @@ class Race:
             return [Row(method, remark="not installed")]
         title, how = MINIMISERS[method]
         energy = Energy(self.solid, self.rest, self.options.accuracy, self.options.seconds)
-        return [energy.race(title, how)]
+        return [energy.time(title, how)]
 
     def contest(self, method, *options):
         """What benchmark_contest says of a method, by its names."""
@@ -323,22 +323,22 @@ class Race:
                    f"{best.solves} linear systems", best.position)
 
 
-def calculix(race, solver):
+def calculix(comparison, solver):
     """CalculiX with SPOOLES' factor or its conjugate gradients with incomplete Cholesky."""
     title = f"CalculiX, C3D6, {'SPOOLES' if solver == 'spooles' else 'iterative'}"
     if not shutil.which("ccx"):
         return Row(title, remark="not installed")
     rows = []
     for first in (0.25, 1):  # with which conjugate gradients need not end
-        (race.folder / "peer.inp").write_text(calculix_deck(race.model, solver, first))
-        limit = 10 * rows[0].seconds + 10 if rows else race.options.seconds
+        (comparison.folder / "peer.inp").write_text(calculix_deck(comparison.model, solver, first))
+        limit = 10 * rows[0].seconds + 10 if rows else comparison.options.seconds
         try:
-            done = run(["ccx", "-i", "peer"], race.folder, ends=None, timeout=limit)
+            done = run(["ccx", "-i", "peer"], comparison.folder, ends=None, timeout=limit)
         except subprocess.TimeoutExpired:
             continue
-        found = calculix_positions(race.folder / "peer.dat", race.model)
+        found = calculix_positions(comparison.folder / "peer.dat", comparison.model)
         if done.status == 0 and found is not None:
-            increments = len((race.folder / "peer.sta").read_text().splitlines()) - 2
+            increments = len((comparison.folder / "peer.sta").read_text().splitlines()) - 2
             iterations = done.text.count("iteration ")
             rows.append(Row(title, done.seconds, None,
                             f"{increments} increments, {iterations} iterations", found))
@@ -384,27 +384,28 @@ def calculix_positions(file, model):
     return model["point/position"] + found[np.argsort(found[:, 0]), 1:]
 
 
-def head(race):
-    moved = np.linalg.norm(race.quadratic - race.model["point/position"], axis=1)
-    return (f"{race.name}: {3 * len(race.solid.soft)} unknowns, {len(race.solid.prisms)} prisms, "
-            f"{race.options.part:g} of the move, to {race.options.accuracy:g} mm; "
+def head(comparison):
+    moved = np.linalg.norm(comparison.quadratic - comparison.model["point/position"], axis=1)
+    return (f"{comparison.name}: {3 * len(comparison.solid.soft)} unknowns, "
+            f"{len(comparison.solid.prisms)} prisms, "
+            f"{comparison.options.part:g} of the move, to {comparison.options.accuracy:g} mm; "
             f"largest motion {moved.max():.2f} mm\n\n"
             "| method | CPU s | own | with Repose's evaluation | times Repose's | counts "
             "| skin | |\n"
             "|---|--:|--:|--:|--:|---|--:|---|")
 
 
-def lines(race):
+def lines(comparison):
     base = None
-    for row in race.rows():
+    for row in comparison.rows():
         base = base or (row.seconds if "Repose" in row.name else None)
         fair = row.own
-        if row.evaluations and race.evaluation:
-            fair = row.own + row.evaluations * race.evaluation
+        if row.evaluations and comparison.evaluation:
+            fair = row.own + row.evaluations * comparison.evaluation
         ratio = fair if fair is not None else row.seconds
         yield "| " + " | ".join([
             row.name, number(row.seconds), number(row.own), number(fair),
-            f"{ratio / base:.2g}×" if base and ratio else "–", row.counts, skin(race, row),
+            f"{ratio / base:.2g}×" if base and ratio else "–", row.counts, skin(comparison, row),
             row.remark]) + " |"
 
 
@@ -412,11 +413,11 @@ def number(seconds):
     return "–" if seconds is None else f"{seconds:.3g}"
 
 
-def skin(race, row):
+def skin(comparison, row):
     if row.position is None:
         return "–"
-    mean, _, motion = finite_elements.difference(race.model, row.position, race.model,
-                                                 race.quadratic, race.options.moving)
+    mean, _, motion = finite_elements.difference(comparison.model, row.position, comparison.model,
+                                                 comparison.quadratic, comparison.options.moving)
     return f"{mean:.4f} mm, {100 * mean / motion:.2f} %"
 
 
@@ -429,8 +430,8 @@ def main():
     options = parser.parse_args()
     for file in options.files:
         with tempfile.TemporaryDirectory() as folder:
-            race = Race(file, options, pathlib.Path(folder))
-            print_table(head(race), lines(race), options.output, race.mark)
+            comparison = Comparison(file, options, pathlib.Path(folder))
+            print_table(head(comparison), lines(comparison), options.output, comparison.mark)
             print()
 
 

@@ -23,7 +23,8 @@ class NaturalRows {
   /// [owned points] the values of this rank's points, of which `slab` has this rank's natural rows.
   std::vector<Vec3> owned(const std::vector<Vec3>& slab) const;
   /// Sets the unknowns to the displacements that take the initial positions to those of `slab`, mm.
-  void take(const std::vector<Vec3>& slab, const Positions& positions, Vec displacement) const;
+  void set_unknowns(const std::vector<Vec3>& slab, const Positions& positions,
+                    Vec displacement) const;
 
  private:
   struct Rows {

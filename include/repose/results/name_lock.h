@@ -17,7 +17,7 @@ class NameLock {
   NameLock& operator=(const NameLock&) = delete;
 
  private:
-  bool take();
+  bool acquire();
   void remove_leftovers() const;
 
   std::filesystem::path name_, file_;

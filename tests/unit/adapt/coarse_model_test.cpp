@@ -51,7 +51,7 @@ TEST(CoarseModel, at_the_resolution_of_the_scene_is_its_model) {
   }
 }
 
-TEST(Rungs, get_coarser_to_a_least_number_of_columns) {
+TEST(Resolutions, get_coarser_to_a_least_number_of_columns) {
   const model::Anatomy anatomy = head();
   const std::vector<Resolution> levels = compared_resolutions(anatomy, 100000);
   ASSERT_EQ(levels.size(), 1U);

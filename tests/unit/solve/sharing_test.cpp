@@ -54,7 +54,7 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   const base::VecHandle displacement = positions.make_vector();
   for (const int64_t at_once : {7, 1000000}) {
     const discrete::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
-    natural.take(base::scatter(MPI_COMM_WORLD, moved), positions, displacement);
+    natural.set_unknowns(base::scatter(MPI_COMM_WORLD, moved), positions, displacement);
     positions.update(displacement);
     const model::StepRows rows = natural.rows(objective);
     const std::vector<Vec3> position = testing::gather(rows.position);

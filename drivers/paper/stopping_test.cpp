@@ -1,4 +1,4 @@
-#include "referee.h"
+#include "stopping_test.h"
 
 #include <algorithm>
 #include <limits>
@@ -9,7 +9,7 @@ namespace repose::paper {
 
 using base::check, base::cpu_seconds;
 
-Referee::Referee(discrete::Function& inner, Vec goal, const Rules& rules)
+StoppingTest::StoppingTest(discrete::Function& inner, Vec goal, const Rules& rules)
     : Function(inner.positions()),
       inner_(inner),
       goal_(goal),
@@ -18,18 +18,18 @@ Referee::Referee(discrete::Function& inner, Vec goal, const Rules& rules)
       closest_(std::numeric_limits<double>::infinity()),
       begin_(cpu_seconds()) {}
 
-double Referee::seconds() const { return cpu_seconds() - begin_ - looking_; }
+double StoppingTest::seconds() const { return cpu_seconds() - begin_ - looking_; }
 
-double Referee::value_and_gradient(Vec displacement, Vec gradient) {
+double StoppingTest::value_and_gradient(Vec displacement, Vec gradient) {
   const double value = inner_.evaluate(displacement, gradient);
   if (goal_) {
     const double look = cpu_seconds();
     check(VecWAXPY(difference_, -1, goal_, displacement));
     closest_ = std::min(closest_, discrete::largest_block(difference_));
     looking_ += cpu_seconds() - look;
-    if (closest_ <= rules_.accuracy) throw RaceOver{true};
+    if (closest_ <= rules_.accuracy) throw SearchOver{true};
   }
-  if (evaluations() >= rules_.limit || seconds() > rules_.seconds) throw RaceOver{false};
+  if (evaluations() >= rules_.limit || seconds() > rules_.seconds) throw SearchOver{false};
   return value;
 }
 

@@ -7,6 +7,6 @@ namespace repose::paper {
 /// position: semi-implicit Euler and Runge–Kutta 3(2), with the damping, and for Euler the step,
 /// that do best of a scan. Damping: 1, 2 and 4 times the critical one of the softest mode at rest;
 /// steps: 1, ½, … of Euler's largest stable one there. One evaluation is one of the forces.
-std::vector<Entry> race_motion(Contest& contest, double accuracy);
+std::vector<Entry> run_motion(Contest& contest, double accuracy);
 
 }  // namespace repose::paper

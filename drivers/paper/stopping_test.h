@@ -3,7 +3,7 @@
 
 namespace repose::paper {
 
-/// When a race is over.
+/// When a search is over.
 struct Rules {
   double accuracy = 0.1;     ///< mm, largest distance from the goal
   int64_t limit = 10000;     ///< evaluations
@@ -11,17 +11,17 @@ struct Rules {
   double seconds = 3;        ///< CPU; for methods whose evaluations are few and dear
 };
 
-/// What a referee throws to stop a search: near enough, or no evaluation or time left.
-struct RaceOver {
+/// What a test throws to stop a search: near enough, or no evaluation or time left.
+struct SearchOver {
   bool reached = false;
 };
 
-/// A function that watches the search that minimises it: throws RaceOver at the first evaluated
+/// A function that watches the search that minimises it: throws SearchOver at the first evaluated
 /// state within the accuracy of the goal, and at the limits. Its looks are not timed.
-class Referee : public discrete::Function {
+class StoppingTest : public discrete::Function {
  public:
   /// `goal` may be null: then the limits alone count.
-  Referee(discrete::Function& inner, Vec goal, const Rules& rules);
+  StoppingTest(discrete::Function& inner, Vec goal, const Rules& rules);
 
   double closest() const { return closest_; }  ///< mm, of all states so far
   double seconds() const;                      ///< CPU time since construction

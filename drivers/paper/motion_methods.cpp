@@ -1,4 +1,4 @@
-#include "motion_race.h"
+#include "motion_methods.h"
 
 #include <cmath>
 #include <optional>
@@ -28,10 +28,10 @@ void scan_steps(Contest& contest, double damping, double longest, std::optional<
   for (int k = 0; k <= most_halvings; ++k, step /= 2) {
     if (damping * step >= 2) continue;  // the damping alone is unstable
     const Entry tried =
-        contest.race(fmt::format("semi-implicit Euler, c = {:.2g}, h = {:.2g}", damping, step),
-                     [&](discrete::Function& function, Vec displacement) {
-                       move_by_euler(function, displacement, {damping}, step, unlimited);
-                     });
+        contest.run(fmt::format("semi-implicit Euler, c = {:.2g}, h = {:.2g}", damping, step),
+                    [&](discrete::Function& function, Vec displacement) {
+                      move_by_euler(function, displacement, {damping}, step, unlimited);
+                    });
     keep_better(best, tried);
     if (tried.end != Entry::End::elsewhere) return;
   }
@@ -39,7 +39,7 @@ void scan_steps(Contest& contest, double damping, double longest, std::optional<
 
 }  // namespace
 
-std::vector<Entry> race_motion(Contest& contest, double accuracy) {
+std::vector<Entry> run_motion(Contest& contest, double accuracy) {
   const Contest::Curvature curvature = contest.curvature();
   const double critical = 2 * std::sqrt(curvature.least);
   const double longest = 2 / std::sqrt(curvature.largest);
@@ -48,11 +48,11 @@ std::vector<Entry> race_motion(Contest& contest, double accuracy) {
     const double damping = factor * critical;
     scan_steps(contest, damping, longest, euler);
     const Entry tried =
-        contest.race(fmt::format("Runge–Kutta 3(2), c = {:.2g}", damping),
-                     [&](discrete::Function& function, Vec displacement) {
-                       move_by_runge_kutta(function, displacement, {damping},
-                                           {.tolerance = accuracy, .first_step = longest});
-                     });
+        contest.run(fmt::format("Runge–Kutta 3(2), c = {:.2g}", damping),
+                    [&](discrete::Function& function, Vec displacement) {
+                      move_by_runge_kutta(function, displacement, {damping},
+                                          {.tolerance = accuracy, .first_step = longest});
+                    });
     keep_better(runge_kutta, tried);
   }
   return {*euler, *runge_kutta};
