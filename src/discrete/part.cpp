@@ -215,12 +215,8 @@ model::Contact pick_contact(const Plan& plan, LocalNumbers& local, int rank) {
   return part;
 }
 
-Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
+void pick_springs(const Plan& plan, LocalNumbers& local, int rank, Part& part) {
   const Model& model = plan.model;
-  Part part;
-  part.owned_points = plan.rank_begin[rank + 1] - plan.rank_begin[rank];
-  for (int64_t k = plan.rank_begin[rank]; k < plan.rank_begin[rank + 1]; ++k)
-    local.of(plan.order[k]);
   auto rows = element_rows(plan, model.springs.points, rank, part.owned_springs);
   part.model.springs = {pick_elements(model.springs.points, rows, local),
                         pick(model.springs.set, rows),
@@ -230,9 +226,14 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
                         pick(model.springs.reference, rows)};
   rows.resize(part.owned_springs);
   part.spring_row = std::move(rows);
+}
+
+/// Prisms, and edges.
+void pick_solid(const Plan& plan, LocalNumbers& local, int rank, Part& part) {
+  const Model& model = plan.model;
   std::vector<char> averaged;
   if (!model.prisms.nodal_modulus.empty()) averaged = averaged_points(plan, rank);
-  rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms, averaged);
+  auto rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms, averaged);
   part.model.prisms = model::pick_prisms(model.prisms, rows);
   number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);
@@ -242,6 +243,16 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
                       pick(model.edges.weight, rows)};
   rows.resize(part.owned_edges);
   part.edge_row = std::move(rows);
+}
+
+Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
+  const Model& model = plan.model;
+  Part part;
+  part.owned_points = plan.rank_begin[rank + 1] - plan.rank_begin[rank];
+  for (int64_t k = plan.rank_begin[rank]; k < plan.rank_begin[rank + 1]; ++k)
+    local.of(plan.order[k]);
+  pick_springs(plan, local, rank, part);
+  pick_solid(plan, local, rank, part);
   part.model.contact = pick_contact(plan, local, rank);
   part.contact = !model.contact.empty();
   part.bodies = plan.bodies;

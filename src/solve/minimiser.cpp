@@ -229,40 +229,46 @@ double Minimiser::at_balance(Vec displacement) {
   return estimate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
 }
 
+/// An estimate costs the solution of a linear system: only where the force that went with a
+/// distance at the last one says that it is worth it. A Newton method's steps go further, but one
+/// cut off by the trust region or negative curvature hardly comes to a convex place.
+bool Minimiser::worth_estimating(double largest_force) const {
+  if (softest_ == 0 || rough_) return true;
+  const double hopeful = newton_ ? 20 : 2;
+  constexpr int64_t seldom = 20;  // evaluations: it costs other methods as much as many of them
+  const bool far = largest_force > hopeful * softest_ * accuracy_;
+  const bool soon = !newton_ && !initial_ && function_.evaluations() - looked_at_ < seldom;
+  return !far && !soon && !cut_;
+}
+
+/// By the preconditioned gradient alone; nothing where the estimate has to tell.
+std::optional<bool> Minimiser::near_enough_at_a_step(Vec gradient) {
+  const bool preconditioned = newton_ || initial_;
+  if (!preconditioned || &estimate_.function != &function_) return {};
+  const double step = estimate_.solver.preconditioned_step(gradient);
+  const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
+  std::optional<bool> answer;
+  if (rough_)
+    answer = step <= accuracy_;
+  else if (step > (may_close_ ? near : accuracy_))
+    answer = false;
+  else if (closes_ && step < negligible * accuracy_)
+    answer = true;
+  if (answer) error_ = safety * step;
+  return answer;
+}
+
 bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
   if (largest_force == 0) {
     error_ = at_balance(displacement);
     return error_ == 0;
   }
   if (accuracy_ == 0) return false;
-  // A look costs the solution of a linear system, so it is taken only where the force that went
-  // with a distance at the last look says that it is worth it; a Newton method's steps go further,
-  // but one cut off by the trust region or negative curvature hardly comes to a convex place.
-  const double hopeful = newton_ ? 20 : 2;
-  constexpr int64_t seldom = 20;  // evaluations: a look costs other methods as much as many of them
-  const bool far = largest_force > hopeful * softest_ * accuracy_;
-  const bool quick = newton_ || initial_;
-  const bool soon = !quick && function_.evaluations() - looked_at_ < seldom;
-  if (softest_ > 0 && !rough_ && (far || soon || cut_)) {
+  if (!worth_estimating(largest_force)) {
     error_ = largest_force / softest_;
     return false;
   }
-  if (quick && &estimate_.function == &function_) {
-    const double step = estimate_.solver.preconditioned_step(gradient);
-    if (rough_) {
-      error_ = safety * step;
-      return step <= accuracy_;
-    }
-    const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
-    if (step > (may_close_ ? near : accuracy_)) {
-      error_ = safety * step;
-      return false;
-    }
-    if (closes_ && step < negligible * accuracy_) {
-      error_ = safety * step;
-      return true;
-    }
-  }
+  if (const auto answer = near_enough_at_a_step(gradient)) return *answer;
   looked_at_ = function_.evaluations();
   error_ = strict_estimate(displacement, gradient, false);
   if (std::isfinite(error_))

@@ -323,15 +323,7 @@ Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
   return result;
 }
 
-}  // namespace
-
-Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
-  static const PetscLogEvent event = base::log_event("RpPrestress");
-  const base::Logged logged(event);
-  MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
-  bool solid = model::is_solid(model);
-  MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
-  if (solid) return balance_solid(comm, model, as.gravity);
+Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
   discrete::Part part = discrete::distribute(comm, model);
   const std::vector<char> skin = skin_springs(comm, model, part);
   for (size_t j = 0; j < skin.size(); ++j)
@@ -362,6 +354,17 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   result.least_rest_ratio = least_rest_ratio(part.model);
   MPI_Allreduce(MPI_IN_PLACE, &result.least_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
   return result;
+}
+
+}  // namespace
+
+Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
+  static const PetscLogEvent event = base::log_event("RpPrestress");
+  const base::Logged logged(event);
+  MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
+  bool solid = model::is_solid(model);
+  MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
+  return solid ? balance_solid(comm, model, as.gravity) : balance_springs(comm, model, as);
 }
 
 }  // namespace repose::solve

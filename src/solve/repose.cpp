@@ -260,8 +260,56 @@ Stability stability_of(linear::TangentSolver& solver, const discrete::Positions&
   return found;
 }
 
-Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                      const Start& start, const Receiver& receive) {
+/// Hands on each step that the load path comes to, and sums up.
+class Steps {
+ public:
+  Steps(Searcher& searcher, const Settings& settings, const discrete::NaturalRows& natural,
+        const Receiver& receive, Summary& summary)
+      : searcher_(searcher),
+        settings_(settings),
+        natural_(natural),
+        receive_(receive),
+        summary_(summary) {}
+
+  void add(const Outcome& outcome, double load, double seconds, Vec displacement) {
+    discrete::Objective& objective = searcher_.objective();
+    model::StepNumbers& last = summary_.last;
+    last = numbers_of(objective, settings_, outcome, load);
+    last.epsilon = searcher_.epsilon();
+    const bool start = load == 0 && settings_.initial_equilibrium;
+    const bool end = load == 1 || !outcome.converged;
+    std::optional<Stability> stability;
+    if (settings_.stability && (start || end)) {
+      stability = stability_of(searcher_.elastic_solver(), objective.positions(), displacement);
+      if (start) summary_.initial_spectrum = stability->spectrum;
+      if (end) summary_.final_spectrum = stability->spectrum;
+      last.smallest_eigenvalue = stability->spectrum.smallest;
+      last.largest_eigenvalue = stability->spectrum.largest;
+    }
+    last.seconds = seconds;
+    last.evaluations = searcher_.evaluations() - evaluations_;
+    evaluations_ = searcher_.evaluations();
+    model::StepRows rows = natural_.rows(objective, is_exact(settings_));
+    if (stability && !std::isnan(stability->spectrum.smallest))
+      rows.point_fields.push_back(natural_.field("stability_mode", stability->mode));
+    receive_(last, rows);
+  }
+
+ private:
+  Searcher& searcher_;
+  const Settings& settings_;
+  const discrete::NaturalRows& natural_;
+  const Receiver& receive_;
+  Summary& summary_;
+  int64_t evaluations_ = 0;  // up to the step before
+};
+
+void end_stage(const Settings& settings, const char* name) {
+  if (settings.stages) settings.stages->end(name);
+}
+
+Summary find_in_part(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
+                     const Start& start, const Receiver& receive) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   discrete::Positions positions(comm, part);
@@ -271,42 +319,23 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
   if (start.guess) guess = positions.make_vector();
   if (start.guess || settings.path.start_load > 0)
     natural.set_unknowns(start.position, positions, start.guess ? guess : displacement);
-  if (settings.stages) settings.stages->end("distribute");
+  end_stage(settings, "distribute");
 
   const base::LogStage stage("Search");
   Searcher searcher(positions, settings);
   if (settings.under_way) show_states(searcher, settings, natural);
-  discrete::Objective& objective = searcher.objective();
   Summary summary;
-  int64_t evaluations_before = 0;
+  Steps steps(searcher, settings, natural, receive, summary);
   LoadPath path(searcher.problem(), searcher.search(), settings.path);
   summary.path =
       path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
-        summary.last = numbers_of(objective, settings, outcome, load);
-        summary.last.epsilon = searcher.epsilon();
-        const bool start = load == 0 && settings.initial_equilibrium;
-        const bool end = load == 1 || !outcome.converged;
-        std::optional<Stability> stability;
-        if (settings.stability && (start || end)) {
-          stability = stability_of(searcher.elastic_solver(), positions, displacement);
-          if (start) summary.initial_spectrum = stability->spectrum;
-          if (end) summary.final_spectrum = stability->spectrum;
-          summary.last.smallest_eigenvalue = stability->spectrum.smallest;
-          summary.last.largest_eigenvalue = stability->spectrum.largest;
-        }
-        summary.last.seconds = seconds;
-        summary.last.evaluations = searcher.evaluations() - evaluations_before;
-        evaluations_before = searcher.evaluations();
-        model::StepRows rows = natural.rows(objective, is_exact(settings));
-        if (stability && !std::isnan(stability->spectrum.smallest))
-          rows.point_fields.push_back(natural.field("stability_mode", stability->mode));
-        receive(summary.last, rows);
+        steps.add(outcome, load, seconds, displacement);
       });
-  summary.contacts = contacts_of(objective);
+  summary.contacts = contacts_of(searcher.objective());
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();
-  if (settings.stages) settings.stages->end("solve");
+  end_stage(settings, "solve");
   return summary;
 }
 
@@ -314,14 +343,14 @@ Summary find_in_whole(MPI_Comm comm, const discrete::Part& part, const Settings&
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
-  return find_in_whole(comm, discrete::distribute(comm, model), settings, start, receive);
+  return find_in_part(comm, discrete::distribute(comm, model), settings, start, receive);
 }
 
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
   const discrete::Part part = discrete::distribute(comm, model);
   model = {};
-  return find_in_whole(comm, part, settings, start, receive);
+  return find_in_part(comm, part, settings, start, receive);
 }
 
 }  // namespace repose::solve

@@ -4,6 +4,7 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "repose/linear/tangent_solver.h"
 #include "repose/solve/rest_search.h"
@@ -61,6 +62,8 @@ class Minimiser : public RestSearch {
   bool step_was_cut() const;
   /// Where no force is left: 0, or infinite at a saddle.
   double at_balance(Vec displacement);
+  bool worth_estimating(double largest_force) const;
+  std::optional<bool> near_enough_at_a_step(Vec gradient);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
   double farthest_correction() const;  ///< mm, of a Newton step that ends a search
   bool stalled(int64_t iteration, double value);
