@@ -235,7 +235,8 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
   if (s.initial_spectrum) text += report_row("at the start", stability(*s.initial_spectrum));
   if (s.final_spectrum) text += report_row("where it ended", stability(*s.final_spectrum));
   text += report_row("objective",
-                     fmt::format("{:.12g} {}", s.last.objective, settings.functional == model::Functional::force ? "N" : "N mm"));
+                     fmt::format("{:.12g} {}", s.last.objective,
+                                 settings.functional == model::Functional::force ? "N" : "N mm"));
   text += report_row("inverted prisms",
                      fmt::format("{}{}", s.last.inverted_prisms,
                                  s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));

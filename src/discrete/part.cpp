@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "countable.h"
+#include "partition.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
 #include "repose/discrete/message.h"
-#include "repose/discrete/partition.h"
 #include "repose/model/motion.h"
 
 namespace repose::discrete {

@@ -1,4 +1,4 @@
-#include "repose/discrete/partition.h"
+#include "partition.h"
 
 #include <petscmat.h>
 

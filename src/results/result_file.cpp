@@ -102,7 +102,7 @@ struct WriteAttribute {
   }
   template <class Choice>
     requires std::is_enum_v<Choice>
-  void operator()(const char* name, Choice value) const {
+  void operator()(const char* name, const Choice& value) const {
     write_attribute(group, name, std::string(word(value)));
   }
   template <class Value>

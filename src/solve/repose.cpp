@@ -27,6 +27,28 @@ namespace {
 
 bool is_exact(const Settings& settings) { return settings.weights.volume == VolumeTerm::exact; }
 
+/// What a state amounts to.
+void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
+  const mechanics::Totals totals = objective.totals();
+  const mechanics::Weights& weights = objective.weights();
+  const bool solid = objective.positions().part().solid;
+  const bool kappa = weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact;
+  if (kappa && !solid) numbers.bulk_modulus = weights.volume_weight;
+  numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
+  numbers.potential = objective.potential();
+  double force = 0;
+  for (const Vec3& f : objective.residual_force()) force += f.norm();
+  MPI_Allreduce(&force, &numbers.f_f, 1, MPI_DOUBLE, MPI_SUM, objective.positions().comm());
+  numbers.f_v = totals.volume_squares;
+  numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
+  numbers.volume_error_max = totals.volume_error_max;
+  numbers.inverted_prisms = totals.inverted;
+  if (objective.positions().part().contact) {
+    numbers.penetration = penetration(objective);
+    numbers.contact_energy = objective.contact_value();
+  }
+}
+
 model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& settings,
                               const Outcome& outcome, double load) {
   model::StepNumbers n;
@@ -143,31 +165,6 @@ class Searcher {
   std::optional<ExactVolume> exact_volume_;
   std::optional<ContactSearch> contact_;
 };
-
-}  // namespace
-
-void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
-  const mechanics::Totals totals = objective.totals();
-  const mechanics::Weights& weights = objective.weights();
-  const bool solid = objective.positions().part().solid;
-  const bool kappa = weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact;
-  if (kappa && !solid) numbers.bulk_modulus = weights.volume_weight;
-  numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
-  numbers.potential = objective.potential();
-  double force = 0;
-  for (const Vec3& f : objective.residual_force()) force += f.norm();
-  MPI_Allreduce(&force, &numbers.f_f, 1, MPI_DOUBLE, MPI_SUM, objective.positions().comm());
-  numbers.f_v = totals.volume_squares;
-  numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
-  numbers.volume_error_max = totals.volume_error_max;
-  numbers.inverted_prisms = totals.inverted;
-  if (objective.positions().part().contact) {
-    numbers.penetration = penetration(objective);
-    numbers.contact_energy = objective.contact_value();
-  }
-}
-
-namespace {
 
 /// Lets the one who asks for it look at the state of each iteration.
 void show_states(Searcher& searcher, const Settings& settings,

@@ -8,7 +8,7 @@
 #include "repose/base/error.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
-#include "repose/discrete/partition.h"
+#include "discrete/partition.h"
 #include "rest.h"
 
 namespace repose {
