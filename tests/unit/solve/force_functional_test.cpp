@@ -242,7 +242,7 @@ TEST_P(ForceLaws, ChainHangsWhereTheEnergyIsLeast) {
   solve::Settings settings;
   settings.path.accuracy = 1e-9;
   const testing::Rest energy = testing::find_rest(m, settings);
-  settings.force = true;
+  settings.functional = model::Functional::force;
   const testing::Rest force = testing::find_rest(m, settings);
   EXPECT_TRUE(energy.summary.path.complete()) << energy.summary.last.reason;
   EXPECT_TRUE(force.summary.path.complete()) << force.summary.last.reason;

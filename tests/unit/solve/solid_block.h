@@ -10,7 +10,6 @@ namespace repose::testing {
 inline solve::Settings settings(double accuracy, int load_steps = 0) {
   solve::Settings s;
   s.weights = {1, mechanics::VolumeTerm::material, 1};
-  s.volume = "material";
   s.path.accuracy = accuracy;
   s.path.load_steps = load_steps;
   return s;
