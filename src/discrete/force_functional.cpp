@@ -52,7 +52,6 @@ std::span<const Vec3> ForceFunctional::directions() {
 }
 
 double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
-  constexpr double huge = 1e100;  // stands for a value that overflows
   positions_.update(displacement);
   double value = 0;
   for_each_force(elastic_, [&](int64_t, const Vec3& force) {
@@ -70,9 +69,9 @@ double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
         volume_->evaluate(displacement, gradient ? static_cast<Vec>(volume_gradient_) : nullptr);
     if (gradient) check(VecAXPY(gradient, 1, volume_gradient_));
   }
-  if (std::isfinite(value) && value < huge) return value;
+  if (std::isfinite(value) && value < overflown) return value;
   if (gradient) check(VecSet(gradient, 0));
-  return huge;
+  return overflown;
 }
 
 ForceHessian::ForceHessian(ForceFunctional& functional, Tangent& elastic)

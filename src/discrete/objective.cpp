@@ -4,14 +4,13 @@
 #include <cmath>
 
 #include "flops.h"
+#include "repose/base/error.h"
 #include "repose/base/log.h"
 #include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {
 
 namespace {
-
-constexpr double huge = 1e100;  // stands for an energy that overflows
 
 double sum(MPI_Comm comm, double mine) {
   double all = 0;
@@ -50,6 +49,13 @@ void make_finite(std::span<Vec3> gradient) {
 }
 
 }  // namespace
+
+void refuse_overflow(const char* what, double load) {
+  base::refuse(
+      "{} at load {:.4g} are too large for floating-point numbers: elongations are huge beside "
+      "s_ref, or the moduli are; check the units, tissue.springs and how far bones move",
+      what, load);
+}
 
 Objective::Objective(Positions& positions, const mechanics::Weights& weights)
     : Function(positions),
@@ -135,8 +141,8 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
   if (loaded_) value += weights_.elastic * potential();
-  if (!std::isfinite(value) || value > huge) {
-    value = huge;
+  if (!std::isfinite(value) || value > overflown) {
+    value = overflown;
     make_finite(work_);
   }
   if (gradient) positions_.keep_owned(work_, gradient);

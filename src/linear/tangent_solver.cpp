@@ -205,11 +205,7 @@ void TangentSolver::give_up() {
     if (!block.allFinite()) finite = 0;
   });
   MPI_Allreduce(MPI_IN_PLACE, &finite, 1, MPI_INT, MPI_MIN, positions_.comm());
-  if (!finite)
-    base::refuse(
-        "stiffnesses at load {:.4g} are too large for floating-point numbers: elongations are huge "
-        "beside s_ref, or the moduli are; check the units, tissue.springs and how far bones move",
-        positions_.load());
+  if (!finite) discrete::refuse_overflow("stiffnesses", positions_.load());
   throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
 }
 

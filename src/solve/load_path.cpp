@@ -19,6 +19,11 @@ constexpr double trusted_miss = 0.5;  // of the predicted increment; beyond, a s
 constexpr double spring_stride = 5, solid_stride = 20;
 constexpr double most_steps = 1000;  // without halvings: a motion of kilometres is no longer path
 
+/// A state whose energy overflows is none to write.
+void require_value(const Outcome& outcome, double load) {
+  if (outcome.objective >= discrete::overflown) discrete::refuse_overflow("energies", load);
+}
+
 class Stopwatch {
  public:
   double seconds() const {
@@ -94,12 +99,14 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   objective_.positions().set_load(result_.load);
   result_.last = search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
+  require_value(result_.last, result_.load);
   ++result_.steps;
   objective_.positions().update(displacement);
   on_step(result_.last, result_.load, watch.seconds());
 }
 
 void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
+  require_value(outcome, load);
   result_.last = outcome;
   result_.load = load;
   ++result_.steps;

@@ -5,6 +5,11 @@
 
 namespace repose::discrete {
 
+constexpr double overflown = 1e100;  ///< stands for a value that is more, or none
+
+/// Refuses a state at a load, `what` of which overflow, saying what to check.
+[[noreturn]] void refuse_overflow(const char* what, double load);
+
 /// A function of the displacements of the unknowns that a solver minimises.
 class Function {
  public:
@@ -14,7 +19,7 @@ class Function {
   virtual ~Function() = default;
 
   /// Φ at `displacement` and, if `gradient` is not null, ∇Φ. A value that overflows comes back as
-  /// a large finite number so that a line search can retreat from it. Collective.
+  /// `overflown`, so that a line search can retreat from it. Collective.
   double evaluate(Vec displacement, Vec gradient) {
     ++evaluations_;
     return value_and_gradient(displacement, gradient);

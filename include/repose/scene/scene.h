@@ -158,8 +158,8 @@ struct Tissue {
 enum class Rim { fixed, free, automatic };
 
 enum class Functional { energy, force };
-/// Of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no scene's: its
-/// moduli say how it keeps its volume.
+/// Of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no scene's:
+/// its moduli say how it keeps its volume.
 enum class VolumeTerm { none, paper, penalty, exact, material };
 /// As scenes, options and results spell them.
 inline constexpr std::array<std::string_view, 2> words(Functional) { return {"energy", "force"}; }
