@@ -217,7 +217,7 @@ struct ReadAttribute {
   void operator()(const char* name, int64_t& value) const { value = in.integer(group, name); }
   void operator()(const char* name, std::string& value) const { value = in.text(group, name); }
   template <class Choice>
-    requires std::is_enum_v<Choice>
+  requires std::is_enum_v<Choice>
   void operator()(const char* name, Choice& value) const {
     const auto known = words(value);
     const std::string text = in.text(group, name);

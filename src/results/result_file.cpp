@@ -101,7 +101,7 @@ struct WriteAttribute {
     if (!std::isnan(value) || !model::is_optional(name)) write_attribute(group, name, value);
   }
   template <class Choice>
-    requires std::is_enum_v<Choice>
+  requires std::is_enum_v<Choice>
   void operator()(const char* name, const Choice& value) const {
     write_attribute(group, name, std::string(word(value)));
   }

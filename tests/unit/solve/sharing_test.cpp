@@ -4,11 +4,11 @@
 
 #include "../../layered_patch.h"
 #include "discrete/countable.h"
+#include "discrete/partition.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
-#include "discrete/partition.h"
 #include "rest.h"
 
 namespace repose {
