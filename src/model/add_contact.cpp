@@ -80,7 +80,8 @@ Body::Shape shape_of(const scene::Instrument& instrument) {
       instrument.shape);
 }
 
-/// Free points of the skin against an instrument that they slide on.
+/// Free points of the skin against an instrument: those that slide on it, or those around what it
+/// holds.
 void touch_instrument(const scene::Scene& scene, size_t number, const std::vector<double>& area,
                       Model& model) {
   const scene::Instrument& instrument = scene.instruments[number];
@@ -88,7 +89,7 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
   model.contact.bodies.push_back(
       {fmt::format("instruments[{}]", number), -1, shape_of(instrument), instrument.push});
   const PushedShape pushed(instrument);
-  bool met = false;
+  bool met = !instrument.slide;
   for (size_t p = 0; p < area.size(); ++p) {
     if (model.points.layer[p] != 0 || model.points.set[p] != PointSet::soft_tissue) continue;
     add(static_cast<int64_t>(p), body, Binding::touches, area[p], model.contact.touches);
@@ -133,7 +134,8 @@ void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachme
     contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
   touch_bones(scene, attachment, area, model);
   for (size_t i = 0; i < scene.instruments.size(); ++i)
-    if (scene.instruments[i].slide) touch_instrument(scene, i, area, model);
+    if (scene.instruments[i].slide || (scene.contact && scene.contact->bones))
+      touch_instrument(scene, i, area, model);
   if (contact.touches.point.empty()) contact.bodies.clear();
   contact.spacing = grid_spacing(scene, mesh);
   contact.stiffness = penalty(scene, model, mesh.points.size());

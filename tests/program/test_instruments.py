@@ -115,10 +115,15 @@ def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):
     assert np.linalg.norm(force) < np.linalg.norm(stuck)
 
 
-def test_the_shipped_scene_presses_a_cheek(run):
+def test_the_shipped_scene_presses_a_cheek(run, tmp_path):
+    """Skin around the held points, which pull it along, does not enter the ball either."""
     result = run("repose-solve", PROJECT / "meshes/head_instrument.yaml", "-output", "press")
     assert (result.returncode, result.stderr) == (0, ""), result
     assert "instrument 0           holds 12 points" in result.stdout
+    model, step = model_of(tmp_path / "press.h5"), last(tmp_path / "press.h5")
+    skin = step["point/position"][model["point/layer"] == 0]
+    assert np.linalg.norm(skin - [48, -78, -10], axis=1).min() > 10 - 0.05
+    assert run("repose-check", "press.h5").returncode == 0
 
 
 BAD = {

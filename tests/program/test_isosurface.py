@@ -2,6 +2,8 @@
 that others can read; bad volumes are refused in one line."""
 
 import gzip
+import json
+import re
 import shutil
 
 import meshio
@@ -75,6 +77,38 @@ def test_labels_give_one_mesh_each(run, tmp_path):
     assert result.returncode == 0, result
     assert sorted(path.name for path in tmp_path.glob("bone*")) == ["bone_1.stl", "bone_3.stl"]
     assert result.stdout.count("manifold; closed, 1 component, no defect") == 2
+
+
+def write_points(file, points, system):
+    """As 3D Slicer writes a list of points; given in LPS."""
+    flip = np.array([-1, -1, 1]) if system == "RAS" else np.ones(3)
+    controls = [{"label": f"F-{n}", "position": (flip * p).tolist()} for n, p in enumerate(points)]
+    markup = {"type": "Fiducial", "coordinateSystem": system, "controlPoints": controls}
+    file.write_text(json.dumps({"markups": [markup]}))
+    return file
+
+
+def test_bones_that_touch_are_parted_at_the_bridge_between_them(run, tmp_path):
+    """Two balls on one axis and a bar from the one to the other."""
+    axis, half, radius, bar = v.TURN[:, 2], 17.0, 13.0, 4.0
+    k, j, i = np.meshgrid(*(np.arange(n) for n in v.SIZE[::-1]), indexing="ij")
+    place = v.ORIGIN + np.stack([i, j, k], axis=-1) * v.SPACING @ v.TURN.T - v.CENTER
+    along = place @ axis
+    across = np.linalg.norm(place - along[..., None] * axis, axis=-1)
+    bone = np.hypot(np.abs(along) - half, across) < radius
+    bone |= (np.abs(along) < half) & (across < bar)
+    ct = v.write_meta(tmp_path / "ct.mha", np.where(bone, 1000, -1000).astype("<i2"))
+    points = [write_points(tmp_path / f"{system}.mrk.json", [v.CENTER + side * half * axis], system)
+              for side, system in ((1, "LPS"), (-1, "RAS"))]
+    result = run("repose-isosurface", ct, "-level", 0, "-apart", *points, "-output", "bone.ply")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert result.stdout.count("manifold; closed, 1 component, no defect") == 2
+    shared = float(re.search(r"parted where voxels share (\d+) mm²", result.stdout)[1])
+    assert shared == pytest.approx(np.pi * bar**2, rel=0.2)
+    for number, side in ((1, 1), (2, -1)):
+        reach = side * (meshio.read(tmp_path / f"bone_{number}.ply").points - v.CENTER) @ axis
+        assert reach.max() == pytest.approx(half + radius, abs=2), "the whole ball"
+        assert reach.min() > radius - half - 2, "nothing of the other"
 
 
 def cut(file, share=0.5):
