@@ -111,7 +111,16 @@ def find_screen():
                    "--no-install-recommends python3-paraview python3-h5py xvfb xauth")
     os.environ["REPOSE_RENDER"] = json.dumps(sys.argv[1:])
     os.execvp("xvfb-run", ["xvfb-run", "-a", sys.executable if own else "pvbatch",
-                           os.path.abspath(__file__)])
+                           os.path.abspath(sys.argv[0])])
+
+
+def load_modules():
+    """After find_screen."""
+    global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    import h5py
+    import numpy as np
+    import vtkmodules.all as vtk
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
 
 # ----- what is drawn
@@ -140,7 +149,8 @@ class Result:
         self.bones_before = bones["points"][:] if bones else np.zeros((0, 3))
 
     def find_walls(self):
-        """Quadrilaterals at which tissue ends beside itself: sides of cuts, lips, the rim."""
+        """Quadrilaterals at which tissue ends beside other tissue: the sides of cuts and lips. The
+        rim has none beside it, and is not drawn."""
         prisms = self.model["prism/points"][:] if "prism/points" in self.model else []
         if not len(prisms):
             return np.zeros((0, 4), int)
@@ -148,7 +158,10 @@ class Result:
                                 ((0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))])
         _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True,
                                     return_counts=True)
-        return sides[first[count == 1]]
+        ends = sides[first[count == 1]]
+        middles = self.model["point/position"][:][ends].mean(axis=1).round(4)  # 0.1 µm
+        _, place, count = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
+        return ends[count[place.ravel()] > 1]
 
     def wall(self, step):
         return self.points(step)[self.walls.ravel()]
@@ -532,8 +545,5 @@ def main():
 if __name__ == "__main__":
     arguments()
     find_screen()
-    import h5py
-    import numpy as np
-    import vtkmodules.all as vtk
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    load_modules()
     main()

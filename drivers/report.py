@@ -568,7 +568,7 @@ table{border-collapse:collapse;margin:.8rem 0}
 td,th{padding:.2rem .7rem;text-align:left;vertical-align:top;border-bottom:1px solid #e4e4e4}
 td{overflow-wrap:anywhere}td:first-child{white-space:nowrap}
 .number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
-img,svg{max-width:100%}svg{max-height:36rem}text{font-size:15px}
+label{white-space:nowrap}img,svg{max-width:100%}svg{max-height:36rem}text{font-size:15px}
 pre{background:#f5f5f5;padding:.8rem;overflow:auto}
 .verdict{font-size:1.15rem}
 .warning{background:#fff1dc;border-left:4px solid #c60;padding:.4rem .8rem}
