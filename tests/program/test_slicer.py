@@ -189,11 +189,18 @@ def test_description_has_the_shape_that_slicer_reads():
     assert len(set(names)) == len(names) > 20
 
 
-def test_description_is_read_by_ctk_cli():
-    if importlib.util.find_spec("ctk_cli") is None:
-        pytest.skip("ctk-cli is not installed (pip install ctk-cli)")
-    import ctk_cli
-    module = ctk_cli.CLIModule(stream=io.StringIO(PANEL.with_suffix(".xml").read_text()))
+def ctk_cli_reads(text):
+    return pytest.importorskip("ctk_cli").CLIModule(stream=io.StringIO(text))
+
+
+def slicer_cli_web_reads(text):
+    return pytest.importorskip("slicer_cli_web.cli_utils").as_model(text)
+
+
+@pytest.mark.parametrize("read", [ctk_cli_reads, slicer_cli_web_reads])
+def test_others_read_the_description(read):
+    """pip install ctk-cli; pip install --no-deps girder-slicer-cli-web."""
+    module = read(PANEL.with_suffix(".xml").read_text())
     arguments, options, outputs = module.classifyParameters()
     assert module.title == "Repose" and not arguments
     assert {p.name for p in options} >= {"skin", "bone4", "transform4", "lips", "predictedSkin"}
@@ -246,6 +253,25 @@ def test_round_trip_is_the_scene_that_a_person_would_write(panel, head, run, tmp
     assert float(numbers["accuracyReached"]) == pytest.approx(step["displacement_error"], rel=1e-5)
     assert float(numbers["largestMovement"]) == pytest.approx(
         np.linalg.norm(step["point/displacement"][used], axis=1).max(), rel=1e-5)
+
+
+@pytest.mark.parametrize("ending", [".tfm", ".h5"])
+def test_transforms_that_itk_writes_move_the_bone(panel, head, tmp_path, ending):
+    """By the library that Slicer writes them with: pip install SimpleITK."""
+    itk = pytest.importorskip("SimpleITK")
+    transform = itk.AffineTransform(3)
+    transform.Rotate(1, 2, -0.05)
+    transform.SetTranslation([-1.0, 3.0, -0.5])
+    transform.SetCenter([0.0, -40.0, -20.0])
+    given = head(ending=ending)
+    itk.WriteTransform(transform, str(tmp_path / f"jaw{ending}"))
+    result = panel(*given, "--predictedSkin", tmp_path / "skin.vtp", "--movedBone2",
+                   tmp_path / "jaw.vtp")
+    assert (result.returncode, result.stderr) == (0, "")
+    before, _ = triangles_of(tmp_path / "bone2_vtkMRMLModelNodeLPS.ply")
+    back = transform.GetInverse()
+    expected = [back.TransformPoint(list(map(float, point))) for point in before]
+    assert np.abs(read_vtp(tmp_path / "jaw.vtp")["Points"] - expected).max() < 1e-3
 
 
 def test_vtk_reads_the_skin_and_slicers_turn_takes_its_vectors_along(panel, head, tmp_path):
