@@ -12,57 +12,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <functional>
-
 #include "mutation.h"
 #include "repose/base/petsc.h"
-#include "repose/imaging/volume.h"
-#include "repose/results/model_file.h"
-#include "repose/scene/landmarks.h"
-#include "repose/scene/scene.h"
-#include "repose/scene/transform_file.h"
-#include "repose/surface/read.h"
-#include "seeds.h"
+#include "targets.h"
 
 namespace repose::fuzz {
 namespace {
-
-struct Target {
-  std::string name, ending;
-  std::vector<std::string> seeds;
-  std::function<void(const std::filesystem::path&)> read;
-  double share = 1;  // of the inputs
-};
-
-void read_result(const std::filesystem::path& file) {
-  const model::Model model = results::read_model(file);
-  for (int64_t step = 0; step < results::step_count(file); ++step)
-    results::read_step(file, step, model);
-}
-
-std::vector<Target> targets(const std::filesystem::path& folder) {
-  using surface::ply_binary;
-  const auto surface = [](const auto& file) { surface::read_surface(file); };
-  const auto volume = [](const auto& file) { imaging::read_volume(file); };
-  const auto landmarks = [](const auto& file) { scene::read_landmarks(file); };
-  const surface::Surface s = tetrahedron();
-  return {
-      {"scene", ".yaml", shipped(".yaml"), [](const auto& file) { scene::read_scene(file); }, 0.5},
-      {"ply", ".ply", {ply_text(s), ply_binary(s, false), ply_binary(s, true)}, surface},
-      {"stl", ".stl", {surface::stl_text(s), surface::stl_binary(s)}, surface},
-      {"obj", ".obj", {obj_text(s) + "f -4/1/1 -3//2 -2 -1\n"}, surface},
-      {"off", ".off", {off_text(s)}, surface},
-      {"transform", ".tfm", transforms(), [](const auto& file) { scene::read_transform(file); }},
-      {"markups", ".mrk.json", shipped(".json"), landmarks, 0.5},
-      {"fcsv", ".fcsv", tables_of_landmarks(), landmarks},
-      {"model", ".h5", models(folder), read_result, 0.1},
-      {"meta", ".mha", metas(), volume},
-      {"nrrd", ".nrrd", nrrds(), volume},
-      {"nifti", ".nii", niftis(), volume},
-  };
-}
 
 /// What the processes share.
 struct Progress {
@@ -79,20 +34,11 @@ void read_on(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
   const rlimit limit{memory, memory};
   setrlimit(RLIMIT_AS, &limit);
 #endif
-  const std::filesystem::path file = folder / ("input" + target.ending);
+  const std::filesystem::path file = folder / target.file;
   for (; progress.next < inputs; ++progress.next) {
     write(file, Mutation(seed, number, progress.next).of(target.seeds));
     setitimer(ITIMER_PROF, &patience, nullptr);
-    try {
-      target.read(file);
-      ++progress.taken;
-    } catch (const base::InputError& refusal) {
-      if (std::string(refusal.what()).find('\n') != std::string::npos) {
-        std::fprintf(stderr, "refused in several lines: %s\n", refusal.what());
-        std::abort();
-      }
-      ++progress.refused;
-    }
+    ++(taken(target, file) ? progress.taken : progress.refused);
   }
 }
 
@@ -114,8 +60,9 @@ uint64_t run(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
     waitpid(child, &status, 0);
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) continue;
     ++findings;
-    const std::string kept =
-        fmt::format("fuzz_{}_{}{}", target.name, progress->next, target.ending);
+    const std::filesystem::path kept =
+        fmt::format("fuzz_{}_{}_{}", target.name, progress->next,
+                    std::filesystem::path(target.file).filename().string());
     std::printf("%s: input %llu ends with %s %d, kept as %s\n", target.name.c_str(),
                 static_cast<unsigned long long>(progress->next),
                 WIFSIGNALED(status) ? "signal" : "status",
@@ -131,15 +78,9 @@ uint64_t run(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
   return findings;
 }
 
-/// What scenes name is there.
-void link_shipped(const std::filesystem::path& folder) {
-  for (const auto& entry : std::filesystem::directory_iterator(REPOSE_MESHES))
-    std::filesystem::create_symlink(entry.path(), folder / entry.path().filename());
-}
-
 int run_all(uint64_t inputs, uint64_t seed, const std::string& only) {
   const results::Folder folder;
-  link_shipped(folder.path("."));
+  add_neighbours(folder.path("."));
   uint64_t findings = 0, number = 0;
   for (const Target& target : targets(folder.path("."))) {
     if (only.empty() || only == target.name)

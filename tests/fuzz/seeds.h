@@ -10,6 +10,7 @@
 
 #include "../unit/results/files.h"
 #include "../unit/surface/formats.h"
+#include "repose/base/hdf5.h"
 
 /// Valid inputs of every kind that is read, small, for the mutations to begin with.
 namespace repose::fuzz {
@@ -37,6 +38,14 @@ inline surface::Surface tetrahedron() {
   return {"",
           {{0, 0, 0}, {30, 0, 0}, {0, 30, 0}, {0, 0, 30}},
           {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+}
+
+/// A PLY file with a colour and a number at its vertices.
+inline std::string painted() {
+  return "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
+         "property double z\nproperty uchar red\nproperty float depth\nelement face 1\n"
+         "property list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n"
+         "0 0 0 255 1.5\n30 0 0 0 2\n0 30 0 7 1e-3\n3 0 1 2 2 0.5 0.25\n";
 }
 
 inline const char* tfm = "#Insight Transform File V1.0\n#Transform 0\n";
@@ -92,6 +101,72 @@ inline std::vector<std::string> niftis() {
   put(108, surface::bytes_of<float>(352));
   put(344, std::string("n+1\0", 4));
   return {header + numbers_of_a_volume()};
+}
+
+/// One data element of DICOM in explicit little endian.
+inline std::string element(uint16_t group, uint16_t number, const std::string& kind,
+                           std::string value) {
+  using surface::bytes_of;
+  if (value.size() % 2 == 1) value += kind == "UI" ? '\0' : ' ';
+  const auto size = static_cast<uint16_t>(value.size());
+  const std::string stored = kind == "OB" || kind == "OW"
+                                 ? std::string(2, '\0') + bytes_of<uint32_t>(size)
+                                 : bytes_of<uint16_t>(size);
+  return bytes_of(group) + bytes_of(number) + kind + stored + value;
+}
+
+/// A CT slice of 3 × 3 pixels, one of a series along z.
+inline std::string slice(int number) {
+  using surface::bytes_of;
+  const std::string ct = "1.2.840.10008.5.1.4.1.1.2", name = fmt::format("1.2.3.{}", number);
+  const auto count = [](uint16_t value) { return bytes_of(value); };
+  const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", ct) +
+                           element(2, 3, "UI", name) +
+                           element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  return std::string(128, '\0') + "DICM" +
+         element(2, 0, "UL", bytes_of<uint32_t>(static_cast<uint32_t>(meta.size()))) + meta +
+         element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", name) + element(8, 0x60, "CS", "CT") +
+         element(8, 0x103e, "LO", "bone") + element(0x20, 0xd, "UI", "1.2") +
+         element(0x20, 0xe, "UI", "1.2.3") + element(0x20, 0x13, "IS", std::to_string(number)) +
+         element(0x20, 0x32, "DS", fmt::format("0\\2.5\\{}", 1.5 * number)) +
+         element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + element(0x28, 2, "US", count(1)) +
+         element(0x28, 4, "CS", "MONOCHROME2") + element(0x28, 0x10, "US", count(3)) +
+         element(0x28, 0x11, "US", count(3)) + element(0x28, 0x30, "DS", "0.9\\0.9") +
+         element(0x28, 0x100, "US", count(16)) + element(0x28, 0x101, "US", count(16)) +
+         element(0x28, 0x102, "US", count(15)) + element(0x28, 0x103, "US", count(1)) +
+         element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "0.5") +
+         element(0x7fe0, 0x10, "OW", std::string(18, '\7'));
+}
+
+inline void write_numbers(hid_t group, const char* name, const std::vector<double>& numbers) {
+  const hsize_t size = numbers.size();
+  const base::Hdf5Space space(H5Screate_simple(1, &size, nullptr));
+  const base::Hdf5Dataset data(
+      H5Dcreate2(group, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+}
+
+/// ITK's transform in HDF5: one, or a composite of two.
+inline std::string hdf5_transform(const std::filesystem::path& file, int parts) {
+  {
+    const base::Hdf5File made = base::create_hdf5(file);
+    const base::Hdf5Group top = base::create_hdf5_group(made, "TransformGroup");
+    for (int k = parts > 1 ? 0 : 1; k <= parts; ++k) {
+      const std::string group = fmt::format("/TransformGroup/{}", parts > 1 ? k : 0);
+      const base::Hdf5Group entry = base::create_hdf5_group(made, group.c_str());
+      const std::string kind =
+          k == 0 ? "CompositeTransform_double_3_3" : "AffineTransform_double_3_3";
+      const base::Hdf5Type type(H5Tcopy(H5T_C_S1));
+      H5Tset_size(type, kind.size());
+      const base::Hdf5Space one(H5Screate(H5S_SCALAR));
+      const base::Hdf5Dataset text(
+          H5Dcreate2(entry, "TransformType", type, one, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+      H5Dwrite(text, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, kind.data());
+      write_numbers(entry, "TransformParameters", {0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 5});
+      write_numbers(entry, "TransformFixedParameters", {10, 0, 0});
+    }
+  }
+  return content_of(file);
 }
 
 /// A model and a result; they are written with what writes them.

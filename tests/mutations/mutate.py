@@ -4,15 +4,17 @@ catches it. A break that no test catches has survived, and wants a test.
 
     tests/mutations/mutate.py -scratch ../scratch                 # all
     tests/mutations/mutate.py -scratch ../scratch -breaks 'sign'  # those whose names match
-    tests/mutations/mutate.py -check                              # only that each break has its
-    place
+    tests/mutations/mutate.py -scratch ../scratch -named          # by the tests they name alone
+    tests/mutations/mutate.py -check                  # only that each break has its place
 
 The worktree is of the last commit; it is made if it is not there, and stays. After each break only
-what it touches is built again, and the tests end at the first that fails; where those that the list
-names pass, the wider ones have their turn. Exit status 1 where a break survived or has no place.
+what it touches is built again, and the tests end at the first that fails: unit tests that the list
+names, then programs that it names, then wider ones. Exit status 1 where a break survived or has no
+place.
 """
 
 import argparse
+import functools
 import pathlib
 import re
 import subprocess
@@ -30,14 +32,16 @@ WIDER = (
 )
 
 
+@functools.lru_cache
+def sources(project):
+    patterns = [f"{folder}.{ending}" for folder in ("src/**/*", "include/**/*", "drivers/*")
+                for ending in ("h", "cpp")]
+    return {path: path.read_text() for pattern in patterns for path in project.glob(pattern)}
+
+
 def place_of(old, project):
     """The one source that has these words, or why there is none."""
-    found = []
-    for path in sorted(
-        [*project.glob("src/**/*"), *project.glob("include/**/*"), *project.glob("drivers/*.cpp")]
-    ):
-        if path.suffix in (".h", ".cpp"):
-            found += [path] * path.read_text().count(old)
+    found = [path for path, text in sources(project).items() for _ in range(text.count(old))]
     return found[0] if len(found) == 1 else f"{len(found)} places"
 
 
@@ -66,6 +70,17 @@ def tests_of(pattern, build):
     return [name for name in re.findall(r"Test +#\d+: (\S+)", text) if "_ranks" not in name]
 
 
+def stages(pattern, build, named):
+    """Tests in the order of what they cost."""
+    tests = tests_of(pattern, build)
+    slow = [test for test in tests if test.startswith(("program.", "extremes."))]
+    return [
+        [test for test in tests if test not in slow],
+        slow,
+        [] if named else [test for test in tests_of(WIDER, build) if test not in tests],
+    ]
+
+
 def targets_of(tests):
     """What is to be built for tests: test_ROOM, and the programs for those that run programs."""
     rooms = {test.split(".")[0] for test in tests}
@@ -75,11 +90,8 @@ def targets_of(tests):
     )
 
 
-def caught_by(build, pattern, jobs):
+def caught_by(build, tests, jobs):
     """The first test that fails, or why there is none."""
-    tests = tests_of(pattern, build)
-    if not tests:
-        return "", f"no test matches {pattern}"
     built = run("cmake", "--build", ".", "-j", jobs, "--target", *targets_of(tests), cwd=build)
     if built.returncode != 0:
         return "", "does not compile: " + next(
@@ -90,22 +102,27 @@ def caught_by(build, pattern, jobs):
     tested = run("ctest", "-R", exactly, *options, cwd=build)
     failed = re.findall(r"^\s*\d+ - (\S+) \((\w+)\)", tested.stdout, re.M)
     words = [name + (" comes to no end" if how == "Timeout" else "") for name, how in failed]
-    return ", ".join(words), "" if failed else f"passes {len(tests)} tests"
+    return ", ".join(words), f"passes {', '.join(tests)}"
 
 
-def one(name, old, new, pattern, scratch, jobs):
+def one(old, new, pattern, scratch, arguments):
     path = place_of(old, scratch)
     if isinstance(path, str):
         return "NO PLACE", path
     text = path.read_text()
     try:
         path.write_text(text.replace(old, new))
-        caught, why = caught_by(scratch / "build-ci", pattern, jobs)
-        if not caught and why.startswith("passes"):
-            caught, why = caught_by(scratch / "build-ci", WIDER, jobs)
+        reasons = []
+        for tests in stages(pattern, scratch / "build-ci", arguments.named):
+            if not tests:
+                continue
+            caught, why = caught_by(scratch / "build-ci", tests, arguments.jobs)
+            if caught:
+                return "caught", caught
+            reasons.append(why)
     finally:
         path.write_text(text)
-    return ("caught", caught) if caught else ("SURVIVED", why)
+    return "SURVIVED", "; ".join(reasons) or f"no test matches {pattern}"
 
 
 def main():
@@ -113,13 +130,14 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("-check", action="store_true")
+    parser.add_argument("-named", action="store_true")
     parser.add_argument("-scratch", type=lambda name: pathlib.Path(name).resolve())
     parser.add_argument("-breaks", default="")
     parser.add_argument("-jobs", default="2")
     arguments = parser.parse_args()
     if not arguments.check and not arguments.scratch:
         parser.error("give -scratch FOLDER or -check")
-    if arguments.scratch:
+    if not arguments.check:
         make_scratch(arguments.scratch)
     faults = 0
     print("| break | where | outcome | by |\n|---|---|---|---|")
@@ -131,7 +149,7 @@ def main():
         if arguments.check:
             outcome, by = ("has its place", "") if where != path else ("NO PLACE", path)
         else:
-            outcome, by = one(name, old, new, pattern, arguments.scratch, arguments.jobs)
+            outcome, by = one(old, new, pattern, arguments.scratch, arguments)
         faults += outcome not in ("caught", "has its place")
         print(f"| {name} | {where} | {outcome} | {by} |", flush=True)
     print(f"\n{faults} breaks not caught")

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <random>
 
 /// Contact's derivatives by Taylor expansions, before, at and after touch; what is left out of
@@ -18,22 +19,28 @@ std::vector<Vec3> random_points(int count, double size, int seed) {
   return points;
 }
 
-/// Points at `distance` mm from a capsule and a ball, on all sides.
+/// Where bodies have gone.
+const Mat3 turn = Eigen::AngleAxisd(0.8, Vec3(1, 2, -1).normalized()).toRotationMatrix();
+const Vec3 shift(3, -4, 1);
+Vec3 gone(const Vec3& at) { return turn * at + shift; }
+
+/// Points at `distance` mm from a capsule and a ball that have moved, on all sides.
 struct Touching {
   TouchLoop loop;
   std::vector<Vec3> position;
 };
 Touching touching(double distance, model::Binding binding) {
-  const std::vector<RigidBody> bodies = {
+  std::vector<RigidBody> bodies = {
       RigidBody(scene::Capsule{{0, 0, 0}, {4, 1, 0}, 3}, -1, Vec3::Zero()),
       RigidBody(scene::Sphere{{30, 0, 0}, 2.5}, -1, Vec3::Zero())};
+  for (RigidBody& body : bodies) body.place(turn, shift);
   model::Touches touches;
   Touching made;
   for (const Vec3& way : random_points(20, 1, 7))
     for (int32_t b = 0; b < 2; ++b) {
-      Vec3 at = (b == 0 ? Vec3(2, 0.5, 0) : Vec3(30, 0, 0)) + 9 * way.normalized();
+      Vec3 at = gone(b == 0 ? Vec3(2, 0.5, 0) : Vec3(30, 0, 0)) + 9 * way.normalized();
       for (int n = 0; n < 50; ++n) {
-        const surface::Distance d = bodies[b].distance(at);
+        const surface::Distance d = bodies[b].distance(bodies[b].beside(at));
         at -= (d.value - distance) * d.gradient;
       }
       touches.point.push_back(static_cast<int64_t>(made.position.size()));
@@ -180,7 +187,8 @@ TEST(TouchLoop, LooksAgainAsSoonAsAPointMayHaveComeNear) {
   Touching made = touching(4.0, model::Binding::touches);
   std::vector<Vec3> gradient(made.position.size(), Vec3::Zero());
   EXPECT_EQ(made.loop.add_gradient(made.position, 1, gradient), 0);
-  for (Vec3& x : made.position) x = x.x() < 15 ? Vec3(2, 0.5, 2.9) : Vec3(30, 0, 2.4);
+  for (size_t i = 0; i < made.position.size(); ++i)
+    made.position[i] = gone(i % 2 == 0 ? Vec3(2, 0.5, 2.9) : Vec3(30, 0, 2.4));
   EXPECT_GT(made.loop.add_gradient(made.position, 1, gradient), 0);
   Touching fresh = touching(4.0, model::Binding::touches);
   EXPECT_DOUBLE_EQ(made.loop.add_gradient(made.position, 1, gradient),

@@ -99,6 +99,23 @@ TEST(Contact, APlateThatPressesAConfinedBlockMeetsTheSamePressureEverywhere) {
   EXPECT_LE(rest.summary.last.penetration, 1e-6);
 }
 
+// A penalty 80 times softer than the tissue leaves 80/81 of the gap after each round.
+TEST(Contact, APenaltyThatIsFarTooSoftIsStiffened) {
+  model::Model m = solid_block(4, 4, 4, 0, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  const Vec3 z = Vec3::UnitZ();
+  bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -0.9}), Binding::touches, face_areas(m, z, 0));
+  m.contact.stiffness = young / 9 / 80;
+  const Rest rest = testing::find_rest(m, settings(0.1));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  EXPECT_LE(rest.summary.last.penetration, 0.1);
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    const Vec3& at = m.points.position[i];
+    EXPECT_NEAR(rest.rows.position[i].z(), at.z() - 0.1 * (at.z() + 9), 0.1);
+  }
+}
+
 TEST(Contact, ABlockThatSlidesAlongAPlaneMeetsNoResistance) {
   model::Model m = solid_block(6, 5, 4, poisson, 0, [](int, int, int a) {
     return a == 0 ? PointSet::held : PointSet::soft_tissue;
