@@ -62,6 +62,18 @@ def test_a_picture_has_a_column_a_way_and_a_row_a_view(render, solved, tmp_path)
     assert four_wide == 4 * wide and two_high > 1.2 * high
 
 
+def test_sides_of_a_cut_are_drawn_and_those_of_the_rim_are_not(solved, monkeypatch):
+    pytest.importorskip("vtkmodules")
+    monkeypatch.syspath_prepend(SCRIPT.parent)
+    drawing = importlib.import_module("render")
+    drawing.load_modules()
+    cut = drawing.Result(solved("head_incision.yaml"))
+    places = cut.points(0)[cut.walls].reshape(-1, 3)
+    assert len(cut.walls) > 10
+    assert (abs(places - [45, -70, -8]) < [20, 25, 30]).all(), "beside the path"
+    assert len(drawing.Result(solved("paper_jaw_opening.yaml")).walls) == 0
+
+
 def test_instruments_of_the_scene_are_drawn(render, solved, tmp_path):
     needs_vtk()
     pytest.importorskip("yaml")
