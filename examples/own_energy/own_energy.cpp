@@ -1,40 +1,51 @@
-/// A face with an energy term of one's own: a pressure on the skin, W = −Σ f·(x − X), as of a mask.
-/// The scene is built and solved by the library and written as by repose-solve.
+/// A face with an energy term of one's own: a pressure that follows the skin, as of air in a mask.
+/// Derivatives are taken automatically; the scene is built and solved by the library, its result
+/// written as by repose-solve, and every number of it recomputed.
 ///
 ///     own_energy meshes/paper_jaw_advance.yaml -pressure 0.002        (writes own_energy.h5)
 #include <Eigen/Geometry>
 
+#include "repose/app/check_file.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/mechanics/term.h"
 #include "repose/model/build.h"
 #include "repose/results/result_file.h"
 #include "repose/solve/repose.h"
 
 using namespace repose;
 
-/// Each triangle of the skin is pressed against its normal, a third of it at each corner.
-void press(model::Model& model, double pressure) {
-  const std::vector<Vec3>& x = model.points.position;
-  for (const Triangle& t : model.skin) {
-    const Vec3 area = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]) / 2;
-    for (const int64_t corner : t) model.points.external_force[corner] -= pressure * area / 3;
+/// The energy of one triangle of the skin: the pressure times the volume between it and the origin.
+struct Pressure {
+  static constexpr int points = 3, numbers = 1;
+  template <class Number>
+  static Number energy(const mechanics::Corners<Number, points>& x, std::span<const double> n) {
+    return n[0] / 6 * x[0].dot(x[1].cross(x[2]));
   }
-}
+};
 
 base::Exit run(const base::Options& options) {
+  mechanics::add_term<Pressure>("pressure");
   model::Model model;
   solve::Settings settings;
   settings.weights = {1, mechanics::VolumeTerm::penalty, 1.0};
   base::on_first_rank(MPI_COMM_WORLD, [&] {
     const scene::Scene scene = scene::read_scene(options.arguments()[0]);
     model = model::build_model(model::load_anatomy(scene)).model;
-    press(model, options.number("pressure"));
+    model::TermElements skin{"pressure", Pressure::points, Pressure::numbers, {}, {}};
+    for (const Triangle& t : model.skin) skin.points.insert(skin.points.end(), t.begin(), t.end());
+    skin.numbers.assign(model.skin.size(), options.number("pressure"));
+    model.elements.push_back(std::move(skin));
   });
   results::ResultFile file(MPI_COMM_WORLD, "own_energy", model);
   const solve::Summary summary = solve::find_repose(
       MPI_COMM_WORLD, model, settings, {},
       [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
   file.commit();
+  base::on_first_rank(MPI_COMM_WORLD, [] {
+    const base::Comparison comparison = app::check_file("own_energy.h5");
+    if (comparison.disagreeing() > 0) base::refuse("{} is wrong", comparison.worst());
+  });
   return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;
 }
 

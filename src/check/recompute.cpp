@@ -5,6 +5,7 @@
 
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
+#include "repose/mechanics/term.h"
 #include "repose/model/prism_geometry.h"
 
 namespace repose::check {
@@ -58,6 +59,7 @@ class Recomputation {
     points();
     springs();
     edges();
+    terms();
     contact();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
@@ -78,6 +80,7 @@ class Recomputation {
   void points();
   void springs();
   void edges();
+  void terms();
   void contact();
   void forces();
   void nodal_volumes();
@@ -258,6 +261,31 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
   step_.stress_scale =
       std::max(step_.stress_scale, std::abs(state.pressure) + state.von_mises + 1e-4 * stress);
   step_.stretch_scale = std::max(step_.stretch_scale, state.stretch[0]);
+}
+
+// Their energies are from the initial state on.
+void Recomputation::terms() {
+  for (const model::TermElements& elements : model_.elements) {
+    const mechanics::Term& term = mechanics::term_of(elements);
+    double uncertain = 0;
+    for (size_t e = 0; e < elements.size(); ++e) {
+      const auto points = elements.points_of(e);
+      if (std::none_of(points.begin(), points.end(), [&](int64_t p) { return soft(p); })) continue;
+      Eigen::VectorXd slope;
+      const auto numbers = elements.numbers_of(e);
+      const double before =
+          term.gradient(base::pick(model_.points.position, points), numbers, slope);
+      const double now = term.gradient(base::pick(x_, points), numbers, slope);
+      step_.f_e.value += now - before;
+      uncertain += std::abs(now) + std::abs(before);
+      for (size_t i = 0; i < points.size(); ++i) {
+        const Vec3 part = slope.segment<3>(static_cast<Eigen::Index>(3 * i));
+        if (soft(points[i])) step_.rows.residual_force[points[i]] -= part;
+        at_point_[points[i]] += part.norm();
+      }
+    }
+    step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
+  }
 }
 
 // The forces are checked by themselves (check_contact.h).

@@ -87,6 +87,13 @@ double Objective::add_contact(double scale, std::span<Vec3> gradient) {
          walls_.add_gradient(positions_.local(), scale, gradient);
 }
 
+double Objective::add_terms(double scale, std::span<Vec3> gradient) const {
+  double value = 0;
+  for (const mechanics::TermLoop& loop : loops_.terms)
+    value += loop.add_gradient(positions_.local(), scale, gradient);
+  return value;
+}
+
 double Objective::contact_value() { return sum(positions_.comm(), add_contact(0.0, work_)); }
 
 std::vector<Vec3> Objective::contact_force() {
@@ -95,20 +102,34 @@ std::vector<Vec3> Objective::contact_force() {
   return {work_.begin(), work_.begin() + positions_.part().owned_points};
 }
 
-std::vector<Objective::ContactBlock> Objective::contact_blocks(bool exact) {
-  std::vector<ContactBlock> blocks;
+std::vector<Objective::Block> Objective::blocks(bool exact) {
+  std::vector<Block> blocks;
+  const auto add = [&](int32_t p, int32_t q, const Mat3& block) {
+    blocks.push_back({p, q, weights_.elastic * block});
+  };
+  for (const mechanics::TermLoop& loop : loops_.terms)
+    loop.for_each_block(positions_.local(), exact, add);
   if (!positions_.part().contact) return blocks;
   place_bodies();
   touches_.look(positions_.local());
   touches_.for_each_block(exact, [&](int64_t point, const Mat3& block) {
     const auto p = static_cast<int32_t>(point);
-    blocks.push_back({p, p, weights_.elastic * block});
+    add(p, p, block);
   });
   walls_.look(positions_.local());
-  walls_.for_each_block(exact, [&](int32_t p, int32_t q, const Mat3& block) {
-    blocks.push_back({p, q, weights_.elastic * block});
-  });
+  walls_.for_each_block(exact, add);
   return blocks;
+}
+
+std::vector<std::array<int32_t, 2>> Objective::links() const {
+  std::vector<std::array<int32_t, 2>> links(walls_.links().begin(), walls_.links().end());
+  for (const mechanics::TermLoop& loop : loops_.terms)
+    loop.for_each_link([&](int32_t p, int32_t q) {
+      if (p != q) links.push_back({p, q});
+    });
+  std::ranges::sort(links);
+  links.erase(std::unique(links.begin(), links.end()), links.end());
+  return links;
 }
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {
@@ -137,6 +158,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
                                                            weights_.elastic, work_) -
            initial_.solid_energy;
   value += mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
+  value += weights_.elastic * (add_terms(weights_.elastic, work_) - initial_.term_energy);
   value += weights_.elastic * add_contact(weights_.elastic, work_);
   subtract_loads(weights_.elastic, work_);
   value = sum(positions_.comm(), value);
@@ -149,7 +171,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   return value;
 }
 
-void Objective::add_blocks(std::span<const ContactBlock> blocks, std::span<const Vec3> direction,
+void Objective::add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                            std::span<Vec3> product) {
   for (const auto& [p, q, block] : blocks) {
     product[p] += block * direction[q];
@@ -160,7 +182,7 @@ void Objective::add_blocks(std::span<const ContactBlock> blocks, std::span<const
 void Objective::hessian_action(std::span<const Vec3> direction, Vec product) {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
-  add_blocks(contact_blocks(true), direction, work_);
+  add_blocks(blocks(true), direction, work_);
   positions_.keep_owned(work_, product);
 }
 
@@ -173,6 +195,7 @@ std::vector<Vec3> Objective::residual_force() {
     mechanics::add_edge_gradient(loops_.edges, positions_.local(), 1.0, work_);
     mechanics::add_volume_gradient(loops_, positions_.local(), weights_, work_);
   }
+  add_terms(1.0, work_);
   add_contact(1.0, work_);
   subtract_loads(1.0, work_);
   std::vector<Vec3> force(part.owned_points, Vec3::Zero());
@@ -187,6 +210,7 @@ mechanics::Totals Objective::totals() const {
   t.spring_energy = sum(comm, t.spring_energy);
   t.solid_energy = sum(comm, t.solid_energy - initial_.solid_energy);
   t.fixed_energy = sum(comm, t.fixed_energy - initial_.fixed_energy);
+  t.term_energy = sum(comm, t.term_energy - initial_.term_energy);
   t.volume_squares = sum(comm, t.volume_squares);
   t.penalty_unit = sum(comm, t.penalty_unit);
   MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);

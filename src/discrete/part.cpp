@@ -114,8 +114,7 @@ class LocalNumbers {
   std::vector<int64_t> local_, rows_;
 };
 
-template <size_t n>
-bool touches(const Plan& plan, const std::array<int64_t, n>& element, int rank) {
+bool touches(const Plan& plan, std::span<const int64_t> element, int rank) {
   return std::any_of(element.begin(), element.end(), [&](int64_t row) {
     return plan.owner[row] == rank && plan.unknown[row] >= 0;
   });
@@ -245,6 +244,20 @@ void pick_solid(const Plan& plan, LocalNumbers& local, int rank, Part& part) {
   part.edge_row = std::move(rows);
 }
 
+/// Those of further terms that a rank owns the first point of, or an unknown.
+model::TermElements pick_elements(const Plan& plan, const model::TermElements& all,
+                                  LocalNumbers& local, int rank) {
+  model::TermElements mine{all.term, all.points_each, all.numbers_each, {}, {}};
+  for (size_t e = 0; e < all.size(); ++e) {
+    const auto points = all.points_of(e);
+    const auto numbers = all.numbers_of(e);
+    if (plan.owner[points[0]] != rank && !touches(plan, points, rank)) continue;
+    for (const int64_t point : points) mine.points.push_back(local.of(point));
+    mine.numbers.insert(mine.numbers.end(), numbers.begin(), numbers.end());
+  }
+  return mine;
+}
+
 Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
   const Model& model = plan.model;
   Part part;
@@ -253,6 +266,8 @@ Part make_part(const Plan& plan, LocalNumbers& local, int rank) {
     local.of(plan.order[k]);
   pick_springs(plan, local, rank, part);
   pick_solid(plan, local, rank, part);
+  for (const model::TermElements& elements : model.elements)
+    part.model.elements.push_back(pick_elements(plan, elements, local, rank));
   part.model.contact = pick_contact(plan, local, rank);
   part.contact = !model.contact.empty();
   part.bodies = plan.bodies;
@@ -315,6 +330,18 @@ void pass_bodies(Receiver& archive, std::vector<mechanics::RigidBody>& bodies) {
   }
 }
 
+template <class Archive>
+void pass_elements(Archive& archive, std::vector<model::TermElements>& all) {
+  auto count = static_cast<int64_t>(all.size());
+  archive(count);
+  all.resize(count);
+  for (model::TermElements& elements : all) {
+    std::vector<char> name(elements.term.begin(), elements.term.end());
+    archive(name, elements.points_each, elements.numbers_each, elements.points, elements.numbers);
+    elements.term.assign(name.begin(), name.end());
+  }
+}
+
 /// Sends or receives a part: `archive` decides which.
 template <class Archive>
 void pass(Archive& archive, Part& part) {
@@ -330,6 +357,7 @@ void pass(Archive& archive, Part& part) {
   archive(c.stiffness, c.spacing, c.touches.point, c.touches.body, c.touches.binding,
           c.touches.area, c.touches.offset, c.walls.size, c.walls.begin, c.walls.point,
           c.walls.weight, c.walls.area, part.contact);
+  pass_elements(archive, m.elements);
   pass_bodies(archive, part.bodies);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
           part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);

@@ -50,7 +50,7 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
                                   self->direction_, self->work_);
-    Objective::add_blocks(self->contact_, self->direction_, self->work_);
+    Objective::add_blocks(self->blocks_, self->direction_, self->work_);
     objective.positions().keep_owned(self->work_, product);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;
@@ -93,8 +93,8 @@ void Tangent::assemble(Vec displacement) {
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
   if (same) return;
   at_.assign(now.begin(), now.end());
-  contact_ = objective_.contact_blocks(true);
-  convex_contact_ = objective_.contact_blocks(false);
+  blocks_ = objective_.blocks(true);
+  convex_blocks_ = objective_.blocks(false);
   ++assemblies_;
 }
 
@@ -106,7 +106,7 @@ Mat Tangent::convex() {
 }
 
 void Tangent::renew() {
-  entries().fill(convex(), at_, convex_contact_, Curvature::convex);
+  entries().fill(convex(), at_, convex_blocks_, Curvature::convex);
   lift_diagonal();
 }
 
@@ -114,7 +114,7 @@ Mat Tangent::exact() {
   if (!exact_) exact_ = entries().make();
   const bool averaged = objective_.averages_volumes();
   if (filled_at_ == assemblies_) return averaged ? coupled_ : exact_;
-  entries().fill(exact_, at_, contact_, Curvature::exact);
+  entries().fill(exact_, at_, blocks_, Curvature::exact);
   filled_at_ = assemblies_;
   if (!averaged) return exact_;
   coupled_ = nodal_coupling();
@@ -182,13 +182,14 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
           for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
         }
       });
-  // Sides of cuts: multigrid knows those that may come to face, and none that leap over a layer.
+  // Of sides of cuts and further terms multigrid knows what may be coupled but for what leaps over
+  // a layer.
   const auto& layer = objective_.positions().part().model.points.layer;
-  const auto links = objective_.walls().links();
+  const auto links = objective_.links();
   const auto level = [&](int32_t p, int32_t q) { return std::abs(layer[p] - layer[q]) <= 1; };
   for (const auto& [p, q] : links)
     if (level(p, q)) visit(p, q, Mat3::Zero());
-  for (const auto& [p, q, block] : convex_contact_)
+  for (const auto& [p, q, block] : convex_blocks_)
     if (p == q)
       diagonal[p] += block;
     else if (level(p, q) && std::binary_search(links.begin(), links.end(), std::array{p, q}))

@@ -59,6 +59,7 @@ void TangentEntries::make_pattern() {
     for (const auto& corners : objective_.loops().prisms.points)
       for (int32_t p : corners)
         for (int32_t q : corners) link(p, q);
+  for (const mechanics::TermLoop& loop : objective_.loops().terms) loop.for_each_link(link);
   for_each_facing_pair(part_.model.contact.walls, link);
   const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
   for (BlockRows& rows : rows_) rows.begin.push_back(0);
@@ -185,8 +186,7 @@ void TangentEntries::refill(Mat matrix, Work&& add_blocks) const {
 }
 
 void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
-                          std::span<const Objective::ContactBlock> contact,
-                          Curvature curvature) const {
+                          std::span<const Objective::Block> blocks, Curvature curvature) const {
   refill(matrix, [&](double* const values[2]) {
     for (size_t l = 0; l < spring_slots_.size(); ++l)
       mechanics::for_each_spring_block(
@@ -207,7 +207,7 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
                                           add(values, prism_slots_[e][6 * i + j],
                                               prisms.points[e][i], blocks[i][j]);
                                     });
-    for (const auto& [p, q, block] : contact) {
+    for (const auto& [p, q, block] : blocks) {
       add(values, find(p, q), p, block);
       if (p != q) add(values, find(q, p), q, block.transpose());
     }

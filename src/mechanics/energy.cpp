@@ -316,6 +316,7 @@ Totals totals(const Loops& loops, std::span<const Vec3> position) {
         solid_energy(loops.edges, loops.prisms, position) + nodal_energy(loops.nodal, position);
     sum.fixed_energy = solid_energy(loops.fixed_edges, loops.fixed_prisms, position);
   }
+  for (const TermLoop& loop : loops.terms) sum.term_energy += loop.value(position);
   for (int64_t e = 0; e < loops.prisms.counted; ++e) {
     const double v = prism_volume(corners_of(loops.prisms, e, position).data());
     const double v0 = loops.prisms.rest_volume[e], change = v - v0;

@@ -128,6 +128,8 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
     loops.fixed_prisms = make_prism_loop(part, owned_prisms, false);
   }
   loops.nodal = make_nodal_volumes(part, owned_points);
+  for (const model::TermElements& elements : part.elements)
+    loops.terms.emplace_back(elements, part.points, owned_points);
   return loops;
 }
 

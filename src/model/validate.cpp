@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
@@ -252,6 +253,30 @@ void refuse_unattached(const Model& m, const std::string& file) {
           file, i);
 }
 
+void validate_elements(const Model& m, const std::string& file) {
+  constexpr int64_t most_points = 32, most_numbers = 1024;
+  for (size_t k = 0; k < m.elements.size(); ++k) {
+    const TermElements& of = m.elements[k];
+    const std::string name = fmt::format("element/{}", k), points_name = name + "/points",
+                      numbers_name = name + "/numbers";
+    Array(file, name.c_str()).is_within(of.points_each, 0, 1, most_points);
+    Array(file, name.c_str()).is_within(of.numbers_each, 0, 0, most_numbers);
+    const auto each = static_cast<size_t>(of.points_each);
+    const auto numbers_each = static_cast<size_t>(of.numbers_each);
+    Array(file, points_name.c_str()).has_rows(of.points.size(), of.size() * each);
+    Array(file, numbers_name.c_str()).has_rows(of.numbers.size(), of.size() * numbers_each);
+    Array(file, points_name.c_str())
+        .all_within(of.points, 0, static_cast<int64_t>(m.points.position.size()) - 1);
+    Array(file, numbers_name.c_str()).is_finite(of.numbers);
+    for (size_t e = 0; e < of.size(); ++e) {
+      const auto points = of.points_of(e);
+      const std::set<int64_t> different(points.begin(), points.end());
+      if (different.size() != points.size())
+        refuse("{}: /model/element/{}: element {} has one of its points twice", file, k, e);
+    }
+  }
+}
+
 void refuse_floating(const Model& m, const std::string& file) {
   const size_t points = m.points.set.size();
   surface::UnionFind parts(static_cast<int64_t>(points));
@@ -304,6 +329,7 @@ void validate(const Model& model, const std::string& file) {
   Array(file, "skin/points").all_index(model.skin, points);
   validate_bones(model, file);
   validate_contact(model, file);
+  validate_elements(model, file);
   refuse_unattached(model, file);
   refuse_floating(model, file);
 }

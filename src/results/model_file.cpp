@@ -74,6 +74,21 @@ model::Edges read_edges(const Reader& in) {
   return edges;
 }
 
+std::vector<model::TermElements> read_elements(const Reader& in) {
+  std::vector<model::TermElements> all;
+  if (!in.has("/model/element")) return all;
+  for (int64_t k = 0; k < in.links("/model/element"); ++k) {
+    const std::string group = fmt::format("/model/element/{}", k);
+    model::TermElements& of = all.emplace_back();
+    of.term = in.text(group, "term");
+    of.points_each = in.integer(group, "points_each");
+    of.numbers_each = in.integer(group, "numbers_each");
+    of.points = in.integers<int64_t>(group + "/points", Shape::any);
+    of.numbers = in.numbers(group + "/numbers", {Shape::any, {}});
+  }
+  return all;
+}
+
 model::Body::Shape read_shape(const Reader& in, int64_t k, int8_t kind, const double* of) {
   const auto vector = [&](int first) { return Vec3(of[first], of[first + 1], of[first + 2]); };
   if (kind == 1) return scene::Sphere{vector(0), of[3]};
@@ -155,6 +170,7 @@ model::Model read_model(const std::filesystem::path& file) {
   model.springs = read_springs(in);
   model.prisms = read_prisms(in);
   model.edges = read_edges(in);
+  model.elements = read_elements(in);
   if (in.has("/model/spring") || in.has("/model/spring_set"))
     model.spring_sets = in.names("/model/spring_set");
   if (in.has("/model/skin/points")) model.skin = in.tuples<3>("/model/skin/points", Shape::any);

@@ -54,6 +54,20 @@ void write_edges(hid_t model, const model::Edges& edges) {
   write_array(group, "weight", {e}, edges.weight.data());
 }
 
+void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
+  if (all.empty()) return;
+  const base::Hdf5Group group = base::create_hdf5_group(model, "element");
+  for (size_t k = 0; k < all.size(); ++k) {
+    const model::TermElements& of = all[k];
+    const base::Hdf5Group own = base::create_hdf5_group(group, std::to_string(k).c_str());
+    write_attribute(own, "term", of.term);
+    write_attribute(own, "points_each", of.points_each);
+    write_attribute(own, "numbers_each", of.numbers_each);
+    write_array(own, "points", {of.points.size()}, of.points.data());
+    write_array(own, "numbers", {of.numbers.size()}, of.numbers.data());
+  }
+}
+
 /// What a body's shape is made of, in a row of model::shape_numbers; zeros for a bone, which has
 /// its surface.
 std::vector<double> numbers_of(const model::Body& body) {
@@ -169,6 +183,7 @@ void write_model(const base::Hdf5File& file, const model::Model& model, const Me
   write_springs(group, model.springs);
   write_prisms(group, model.prisms);
   write_edges(group, model.edges);
+  write_elements(group, model.elements);
   write_contact(group, model.contact);
   write_skin(group, model.skin);
   write_strings(group, "spring_set", model.spring_sets);
@@ -181,7 +196,10 @@ void write_model(const base::Hdf5File& file, const model::Model& model, const Me
 int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
   const size_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
-  const size_t bytes = descriptions + model.points.position.size() * point +
+  size_t elements = 0;
+  for (const model::TermElements& of : model.elements)
+    elements += 8 * (of.points.size() + of.numbers.size());
+  const size_t bytes = descriptions + elements + model.points.position.size() * point +
                        model.springs.points.size() * spring + model.prisms.points.size() * 11 * 8 +
                        model.edges.points.size() * 3 * 8 + model.contact.touches.point.size() * 21 +
                        model.contact.walls.point.size() * 50 + model.skin.size() * 3 * 8 +

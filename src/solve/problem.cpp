@@ -1,5 +1,7 @@
 #include "repose/solve/problem.h"
 
+#include "repose/base/error.h"
+
 namespace repose::solve {
 
 Problem::Problem(discrete::Positions& positions, const mechanics::Weights& weights, bool force)
@@ -7,6 +9,8 @@ Problem::Problem(discrete::Positions& positions, const mechanics::Weights& weigh
       tangent_(objective_),
       elastic_solver_(positions, tangent_) {
   if (!force) return;
+  if (!positions.part().model.elements.empty())
+    base::refuse("the functional force is of springs; the model has elements of a further term");
   force_.emplace(objective_, weights);
   force_hessian_.emplace(*force_, tangent_);
   force_solver_.emplace(positions, *force_hessian_);

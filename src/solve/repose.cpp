@@ -34,7 +34,8 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const bool solid = objective.positions().part().solid;
   const bool kappa = weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact;
   if (kappa && !solid) numbers.bulk_modulus = weights.volume_weight;
-  numbers.f_e = solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy;
+  numbers.f_e = totals.term_energy +
+                (solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy);
   numbers.potential = objective.potential();
   double force = 0;
   for (const Vec3& f : objective.residual_force()) force += f.norm();

@@ -2,17 +2,23 @@
 """Figures of the house: lines and public headers of each room, functions beyond a screen, functions
 with many parameters, and, with the programs' folder, the frames between main and TaoSolve.
 
-    tests/program/house_figures.py [build/bin]
+    tests/program/house_figures.py [build/bin] [-tree FOLDER]
+
+-tree: of another tree of the project, an older one for example (git worktree add FOLDER COMMIT).
 """
 
+import argparse
+import collections
 import os
+import pathlib
 import re
 import subprocess
 import sys
 import tempfile
 
+import test_house
 from conftest import PROJECT
-from test_house import LONGEST, ROOMS, USUAL, functions, public_headers, sources
+from test_house import LONGEST, USUAL, functions, sources
 
 PARAMETERS = 5
 # A TaoSolve that tells how many frames of the program's own are above it.
@@ -74,23 +80,30 @@ def frames(programs):
 
 
 def main():
-    lines = {room: 0 for room in ROOMS}
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("programs", nargs="?")
+    parser.add_argument("-tree", type=pathlib.Path, default=PROJECT)
+    chosen = parser.parse_args()
+    test_house.PROJECT = chosen.tree
+    lines, headers = collections.Counter(), collections.Counter()
     lengths, many = [], []
     for name, text in sources():
-        lines[name.split("/")[2 if name.startswith("include/") else 1]] += text.count("\n")
+        public = name.startswith("include/")
+        room = name.split("/")[2 if public else 1]
+        lines[room] += text.count("\n")
+        headers[room] += public
         lengths += [length for _, length in functions(text)]
         many += [f"{name}:{line}" for line, n in parameters(text)
                  if n > PARAMETERS and declares(text, line)]
-    headers = public_headers()
     print("| room | lines | public headers |\n|---|--:|--:|")
-    for room, count in lines.items():
-        print(f"| `{room}` | {count} | {len(headers[room])} |")
-    print(f"| all | {sum(lines.values())} | {sum(map(len, headers.values()))} |\n")
+    for room in sorted(lines):
+        print(f"| `{room}` | {lines[room]} | {headers[room]} |")
+    print(f"| all | {lines.total()} | {headers.total()} |\n")
     print(f"{len(lengths)} functions: {sum(n > USUAL for n in lengths)} above {USUAL} lines, "
           f"{sum(n > LONGEST for n in lengths)} above {LONGEST}; "
           f"{len(many)} with more than {PARAMETERS} parameters.")
-    if len(sys.argv) > 1:
-        print(f"Frames between main and TaoSolve: {frames(sys.argv[1])}.")
+    if chosen.programs:
+        print(f"Frames between main and TaoSolve: {frames(chosen.programs)}.")
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ ROOMS = {
     "adapt": {"base", "scene", "surface", "meshtools", "model", "mechanics", "discrete", "linear",
               "solve"},
     "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
-            "results", "adapt"},
+            "results", "adapt", "check"},
 }
 PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
                for top in ("src", "include/repose")]

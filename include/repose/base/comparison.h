@@ -25,6 +25,7 @@ class Comparison {
   /// A statement about the file that holds or does not.
   void statement(const std::string& text, bool holds);
 
+  double tolerance() const { return tolerance_; }
   int64_t compared() const { return compared_; }
   int64_t disagreeing() const { return disagreeing_; }
   /// The row with the largest difference among those that disagree, in words; empty if none does.

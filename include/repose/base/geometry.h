@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 /// Fixed-size vectors that every room uses, and rows of arrays.
@@ -19,7 +20,7 @@ namespace repose::base {
 
 /// The values at `rows`, in their order.
 template <class T>
-std::vector<T> pick(const std::vector<T>& values, const std::vector<int64_t>& rows) {
+std::vector<T> pick(const std::vector<T>& values, std::span<const int64_t> rows) {
   std::vector<T> picked;
   picked.reserve(rows.size());
   for (const int64_t row : rows) picked.push_back(values[row]);

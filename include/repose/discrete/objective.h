@@ -15,15 +15,18 @@ class Objective : public Function {
   /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
   void hessian_action(std::span<const Vec3> direction, Vec product);
 
-  /// A block of contact's Hessian between two local points; where they differ, its transpose is
-  /// that of the second and the first.
-  struct ContactBlock {
+  /// A block of the Hessian between two local points; where they differ, its transpose is that of
+  /// the second and the first.
+  struct Block {
     int32_t p, q;
     Mat3 block;
   };
-  /// Those at the last update, exact or of a semidefinite relative. Not collective.
-  std::vector<ContactBlock> contact_blocks(bool exact);
-  static void add_blocks(std::span<const ContactBlock> blocks, std::span<const Vec3> direction,
+  /// Those of contact and of further terms at the last update, exact or of a semidefinite relative.
+  /// Not collective.
+  std::vector<Block> blocks(bool exact);
+  /// Pairs of different points that such blocks may couple, ascending.
+  std::vector<std::array<int32_t, 2>> links() const;
+  static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
   mechanics::TouchLoop& touches() { return touches_; }
   mechanics::WallLoop& walls() { return walls_; }
@@ -33,10 +36,10 @@ class Objective : public Function {
   /// N, of what is touched on each owned point, at the last update. Not collective.
   std::vector<Vec3> contact_force();
 
-  /// F_i of Eq. 6, of springs without volume term, of a solid whole; [owned points], zero outside
-  /// soft tissue (N).
+  /// F_i of Eq. 6, of springs without volume term, of a solid whole, with further terms; [owned
+  /// points], zero outside soft tissue (N).
   std::vector<Vec3> residual_force();
-  /// Summed over ranks, at the last update; the solid's energy is 0 initially.
+  /// Summed over ranks, at the last update; those of a solid and of further terms are 0 initially.
   mechanics::Totals totals() const;
   double potential() const;  ///< W, N·mm
 
@@ -51,6 +54,7 @@ class Objective : public Function {
   void subtract_loads(double scale, std::span<Vec3> gradient) const;
   void place_bodies();
   double add_contact(double scale, std::span<Vec3> gradient);
+  double add_terms(double scale, std::span<Vec3> gradient) const;
 
   mechanics::Weights weights_;
   mechanics::Loops loops_;

@@ -39,8 +39,8 @@ class Tangent : public Hessian {
   Objective& objective_;
   std::unique_ptr<TangentEntries> entries_;
   base::MatHandle exact_, convex_, action_;
-  base::MatHandle coupled_;  // exact_ and what averaged volumes couple
-  std::vector<Objective::ContactBlock> contact_, convex_contact_;  // at the last assembly
+  base::MatHandle coupled_;                               // exact_ and what averaged volumes couple
+  std::vector<Objective::Block> blocks_, convex_blocks_;  // at the last assembly
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<Vec3> direction_, work_;  // [local points]
   int64_t filled_at_ = -1;              // assemblies() when exact_ was filled

@@ -7,7 +7,7 @@
 
 namespace repose::discrete {
 
-/// Matrices of 3×3 blocks (MATAIJ, block size 3) with an entry wherever springs and prisms of an
+/// Matrices of 3×3 blocks (MATAIJ, block size 3) with an entry wherever the terms of an
 /// objective couple unknown points, and the places of these in them. Each rank fills its own rows;
 /// nothing is added across ranks.
 class TangentEntries {
@@ -15,9 +15,10 @@ class TangentEntries {
   explicit TangentEntries(const Objective& objective);  ///< collective; O(elements) memory
 
   base::MatHandle make() const;  ///< a matrix of zeros; collective
-  /// The Hessian with `position` [local points], mm, and these blocks of contact. Collective.
-  void fill(Mat matrix, std::span<const Vec3> position,
-            std::span<const Objective::ContactBlock> contact, mechanics::Curvature curvature) const;
+  /// The Hessian with `position` [local points], mm, and these blocks of contact and further terms.
+  /// Collective.
+  void fill(Mat matrix, std::span<const Vec3> position, std::span<const Objective::Block> blocks,
+            mechanics::Curvature curvature) const;
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x. Collective.
   void fill_third(Mat matrix, std::span<const Vec3> position,
                   std::span<const Vec3> direction) const;

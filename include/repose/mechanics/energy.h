@@ -43,6 +43,7 @@ struct Totals {
   double spring_energy = 0;     ///< f_e of springs, N·mm
   double solid_energy = 0;      ///< edges' and prisms' of a solid, to a constant, N·mm
   double fixed_energy = 0;      ///< and of those without a soft-tissue point
+  double term_energy = 0;       ///< of further terms
   double volume_squares = 0;    ///< f_v, mm⁶
   double penalty_unit = 0;      ///< Σ ½ (v−v_0)²/v_0, mm³ (times κ: N·mm)
   double volume_error_max = 0;  ///< max |v/v_0 − 1|

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "repose/mechanics/nodal_volumes.h"
+#include "repose/mechanics/term.h"
 #include "repose/model/model.h"
 #include "repose/model/step.h"
 
@@ -51,15 +52,16 @@ struct Loops {
   std::vector<SpringLoop> springs;  ///< one a law that occurs, by exponent
   EdgeLoop edges;                   ///< of a solid
   PrismLoop prisms;
-  NodalVolumes nodal;      ///< empty where no volume is averaged
-  EdgeLoop fixed_edges;    ///< of a solid, those without a soft-tissue point, …
-  PrismLoop fixed_prisms;  ///< … which only add to its energy
+  NodalVolumes nodal;           ///< empty where no volume is averaged
+  std::vector<TermLoop> terms;  ///< further ones
+  EdgeLoop fixed_edges;         ///< of a solid, those without a soft-tissue point, …
+  PrismLoop fixed_prisms;       ///< … which only add to its energy
   bool solid() const { return !prisms.shear_modulus.empty() || fixed_prisms.size() > 0; }
 };
 
 /// The loops over the springs, prisms and edges of `part` with a soft-tissue point. Of its rows,
 /// and of its points, the first `owned_…` are counted here. Elements come in the order of their
-/// points in memory.
+/// points in memory. InputError where a further term is not known.
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
                  int64_t owned_edges = 0, int64_t owned_points = 0);
 

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,12 +55,30 @@ struct Edges {
   std::vector<double> weight;                  ///< [E] w, N/mm, of either sign
 };
 
+/// Elements of one energy term of mechanics/term.h.
+struct TermElements {
+  std::string term;  ///< its name
+  int64_t points_each = 1, numbers_each = 0;
+  std::vector<int64_t> points;  ///< [E, points_each]
+  std::vector<double> numbers;  ///< [E, numbers_each] in the term's units
+  size_t size() const { return points.size() / static_cast<size_t>(points_each); }
+  std::span<const int64_t> points_of(size_t e) const {
+    return std::span(points).subspan(e * static_cast<size_t>(points_each),
+                                     static_cast<size_t>(points_each));
+  }
+  std::span<const double> numbers_of(size_t e) const {
+    return std::span(numbers).subspan(e * static_cast<size_t>(numbers_each),
+                                      static_cast<size_t>(numbers_each));
+  }
+};
+
 struct Model {
   Vec3 gravity = Vec3::Zero();  ///< N/kg
   Points points;
   Springs springs;
   Prisms prisms;
-  Edges edges;  ///< of a solid
+  Edges edges;                         ///< of a solid
+  std::vector<TermElements> elements;  ///< of further terms
   Contact contact;
   std::vector<Triangle> skin;  ///< [K] for drawing, may be empty
   std::vector<std::string> spring_sets;

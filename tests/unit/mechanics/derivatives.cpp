@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "assembled.h"
-#include "oracle.h"
+#include "repose/mechanics/term.h"
 #include "states.h"
 
 /// One test of derivatives for every term and sum of terms, in every state: Taylor expansions
@@ -134,7 +134,7 @@ struct OracleSums {
     value_scale += std::abs(term);
   }
   template <int points>
-  void add(const std::array<int32_t, points>& rows, const test::Expansion<points>& element) {
+  void add(const std::array<int32_t, points>& rows, const Expansion<points>& element) {
     add_value(element.value);
     for (int c = 0; c < points; ++c) {
       const Vec3 part = element.gradient.template segment<3>(3 * c);
@@ -145,10 +145,10 @@ struct OracleSums {
 };
 
 template <int p>
-test::Expansion<2> spring_oracle(const SpringLoop& loop, int64_t e, double scale,
-                                 const std::vector<Vec3>& x) {
+Expansion<2> spring_oracle(const SpringLoop& loop, int64_t e, double scale,
+                           const std::vector<Vec3>& x) {
   const auto [i, j] = loop.points[e];
-  return test::differentiate<2>({x[i], x[j]}, [&](const auto& c) {
+  return differentiate<2>({x[i], x[j]}, [&](const auto& c) {
     using Scalar = typename std::decay_t<decltype(c[0])>::Scalar;
     const Eigen::Matrix<Scalar, 3, 1> d = c[1] - c[0];
     const Scalar elongation = sqrt(d.dot(d)) - Scalar(loop.rest_length[e]);
@@ -157,14 +157,14 @@ test::Expansion<2> spring_oracle(const SpringLoop& loop, int64_t e, double scale
   });
 }
 
-test::Expansion<6> prism_oracle(const PrismLoop& loop, int64_t e, const Weights& weights,
-                                const std::vector<Vec3>& x) {
+Expansion<6> prism_oracle(const PrismLoop& loop, int64_t e, const Weights& weights,
+                          const std::vector<Vec3>& x) {
   std::array<Vec3, 6> corners;
   for (int c = 0; c < 6; ++c) corners[c] = x[loop.points[e][c]];
   const double target = loop.target_volume[e];
   const double factor =
       weights.volume_weight * (weights.volume == paper ? 1.0 : 0.5 / loop.compliance[e]);
-  return test::differentiate<6>(corners, [&](const auto& c) {
+  return differentiate<6>(corners, [&](const auto& c) {
     using Scalar = typename std::decay_t<decltype(c[0])>::Scalar;
     const Scalar change = model::prism_volume(c.data()) - Scalar(target);
     return Scalar(Scalar(factor) * change * change);
@@ -184,10 +184,10 @@ void check_springs(const SpringLoop& loop, double scale, const std::vector<Vec3>
 }
 
 /// Of a prism's volume.
-test::Expansion<6> volume_oracle(const std::array<int32_t, 6>& points, const std::vector<Vec3>& x) {
+Expansion<6> volume_oracle(const std::array<int32_t, 6>& points, const std::vector<Vec3>& x) {
   std::array<Vec3, 6> corners;
   for (int c = 0; c < 6; ++c) corners[c] = x[points[c]];
-  return test::differentiate<6>(corners, [](const auto& c) {
+  return differentiate<6>(corners, [](const auto& c) {
     using Scalar = typename std::decay_t<decltype(c[0])>::Scalar;
     return Scalar(model::prism_volume(c.data()));
   });
@@ -207,7 +207,7 @@ std::vector<double> check_nodal(const NodalVolumes& nodal, const Weights& weight
     double slope = 0;
     for (const int32_t p : points)
       slope += weights.volume_weight * nodal.stiffness[p] * excess[p] / 6;
-    test::Expansion<6> oracle = volume_oracle(points, x);
+    Expansion<6> oracle = volume_oracle(points, x);
     oracle.gradient *= slope;
     oracle.value = 0;
     sums.add<6>(points, oracle);
@@ -235,7 +235,7 @@ void check_prisms(const Loops& loops, const Weights& weights, const std::vector<
 void check_edges(const EdgeLoop& loop, double scale, const std::vector<Vec3>& x, OracleSums& sums) {
   for (int64_t e = 0; e < loop.size(); ++e) {
     const auto [i, j] = loop.points[e];
-    sums.add<2>(loop.points[e], test::differentiate<2>({x[i], x[j]}, [&](const auto& c) {
+    sums.add<2>(loop.points[e], differentiate<2>({x[i], x[j]}, [&](const auto& c) {
                   using Scalar = typename std::decay_t<decltype(c[0])>::Scalar;
                   const Eigen::Matrix<Scalar, 3, 1> d = c[1] - c[0];
                   return Scalar(Scalar(0.5 * scale * loop.weight[e]) * d.dot(d));

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "oracle.h"
+#include "repose/mechanics/term.h"
 #include "states.h"
 
 namespace repose::mechanics {
@@ -132,7 +132,7 @@ TEST(PrismVolume, DerivativesAgreeWithAutomaticDifferentiation) {
   for (uint32_t seed = 0; seed < 20; ++seed) {
     const Prism p = random_prism(seed);
     const auto oracle =
-        test::differentiate<6>(p, [](const auto& x) { return model::prism_volume(x.data()); });
+        differentiate<6>(p, [](const auto& x) { return model::prism_volume(x.data()); });
     const auto skew = prism_volume_hessian(edges(p));
     EXPECT_NEAR(PrismSlope<double>(edges(p)).volume, oracle.value, 1e-13 * 27);
     for (int i = 0; i < 6; ++i) {

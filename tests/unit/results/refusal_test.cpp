@@ -367,6 +367,44 @@ INSTANTIATE_TEST_SUITE_P(
                "/model/contact/wall/area: row 1 is -1 mm²"}),
     name_of);
 
+/// The small model with elements of a further term, whose name need not be known to be read.
+class ElementDefect : public ::testing::TestWithParam<Defect> {};
+
+TEST_P(ElementDefect, IsRefusedByName) {
+  const Folder folder;
+  model::Model m = small_model();
+  m.elements = {{"tie", 2, 1, {0, 1, 1, 2}, {1.0, 2.0}}, {"weight", 1, 0, {3}, {}}};
+  write_small_result(folder.path("a"), m);
+  model::Model back;
+  ASSERT_EQ(refusal([&] { back = read_model(folder.path("a.h5")); }), "accepted");
+  ASSERT_EQ(back.elements.size(), 2u);
+  EXPECT_EQ(back.elements[0].term, "tie");
+  EXPECT_EQ(back.elements[0].points, m.elements[0].points);
+  EXPECT_EQ(back.elements[0].numbers, m.elements[0].numbers);
+  EXPECT_EQ(back.elements[1].points, m.elements[1].points);
+  GetParam().spoil(Spoiler(folder.path("a.h5")));
+  const std::string text = refusal([&] { read_model(folder.path("a.h5")); });
+  EXPECT_NE(text.find(GetParam().message), std::string::npos) << text;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Elements, ElementDefect,
+    ::testing::Values(
+        wrong_index("ElementOfNoPoint", "/model/element/0/points", 3, 999),
+        wrong_index("ElementBelowPoints", "/model/element/1/points", 0, -1),
+        Defect{"PointTwice",
+               [](const Spoiler& f) { f.set<int64_t>("/model/element/0/points", 3, 1); },
+               "/model/element/0: element 1 has one of its points twice"},
+        Defect{"NumberNotFinite",
+               [](const Spoiler& f) { f.set<double>("/model/element/0/numbers", 1, nan); },
+               "/model/element/0/numbers: "},
+        Defect{"PointTooMany",
+               [](const Spoiler& f) {
+                 f.replace("/model/element/0/points", H5T_NATIVE_INT8, {0, 1, 2});
+               },
+               "/model/element/0"}),
+    name_of);
+
 class Acceptable : public ::testing::TestWithParam<Defect> {};
 
 TEST_P(Acceptable, IsReadAsTheSameModel) {

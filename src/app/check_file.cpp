@@ -1,0 +1,60 @@
+#include "repose/app/check_file.h"
+
+#include "repose/base/error.h"
+#include "repose/check/check_step.h"
+#include "repose/results/merged_bones.h"
+#include "repose/results/model_file.h"
+
+namespace repose::app {
+
+namespace {
+
+constexpr double tolerance = 1e-9;
+
+void check_bones(const results::MergedBones& bones, const model::PrescribedMotion& motion,
+                 const results::StoredStep& step, base::Comparison& comparison) {
+  if (step.bone_points.empty()) return;
+  const std::vector<Vec3> moved = results::moved_points(bones, motion, step.numbers.load);
+  double scale = 0;
+  for (const Vec3& point : moved) scale = std::max(scale, point.lpNorm<Eigen::Infinity>());
+  comparison.array("bone_surface/points",
+                   {step.bone_points.data()->data(), 3 * step.bone_points.size()},
+                   {moved.data()->data(), 3 * moved.size()}, scale);
+}
+
+/// What the steps say of each other: the path leads from smaller to larger loads, to the end or to
+/// a step that did not converge. A checkpoint is no end.
+void check_path(const std::vector<model::StepNumbers>& steps, bool is_checkpoint,
+                base::Comparison& comparison) {
+  comparison.begin("path");
+  bool rising = true;
+  for (size_t s = 1; s < steps.size(); ++s) rising = rising && steps[s - 1].load < steps[s].load;
+  comparison.statement("loads increase from step to step", rising);
+  comparison.statement("converged is 0 where the last load is below 1, but in a checkpoint",
+                       is_checkpoint || steps.back().load == 1 || !steps.back().converged);
+}
+
+}  // namespace
+
+base::Comparison check_file(const std::string& file) {
+  const model::Model model = results::read_model(file);
+  const int64_t count = results::step_count(file);
+  if (count == 0) base::refuse("{}: /step holds no step; solve the model first", file);
+  const model::PrescribedMotion motion(model);
+  const results::MergedBones bones = results::merge_bones(model.bone_surfaces);
+  base::Comparison comparison(tolerance);
+  comparison.begin("model");
+  check::check_model(model, comparison);
+  std::vector<model::StepNumbers> steps;
+  for (int64_t s = 0; s < count; ++s) {
+    const results::StoredStep step = results::read_step(file, s, model);
+    comparison.begin(fmt::format("step {:04}", s));
+    check::check_step(model, motion, step.numbers, step.rows, step.displacement, comparison);
+    check_bones(bones, motion, step, comparison);
+    steps.push_back(step.numbers);
+  }
+  check_path(steps, results::is_checkpoint(file), comparison);
+  return comparison;
+}
+
+}  // namespace repose::app

@@ -1,0 +1,91 @@
+#include "repose/mechanics/term.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <map>
+
+#include "repose/base/error.h"
+
+namespace repose::mechanics {
+
+namespace {
+
+std::map<std::string, std::unique_ptr<const Term>>& known_terms() {
+  static std::map<std::string, std::unique_ptr<const Term>> terms;
+  return terms;
+}
+
+}  // namespace
+
+void add_term(const std::string& name, std::unique_ptr<const Term> term) {
+  known_terms()[name] = std::move(term);
+}
+
+const Term& term_of(const model::TermElements& elements) {
+  const auto found = known_terms().find(elements.term);
+  if (found == known_terms().end())
+    base::refuse(
+        "the model has elements of an energy \"{}\", which this program does not know; use the one "
+        "that made it",
+        elements.term);
+  const Term& term = *found->second;
+  if (term.points() != elements.points_each || term.numbers() != elements.numbers_each)
+    base::refuse(
+        "elements of the energy \"{}\" have {} points and {} numbers each, expected {} and {}",
+        elements.term, elements.points_each, elements.numbers_each, term.points(), term.numbers());
+  return term;
+}
+
+TermLoop::TermLoop(const model::TermElements& elements, const model::Points& points, int64_t owned)
+    : term_(&term_of(elements)), each_(static_cast<size_t>(elements.points_each)) {
+  for (const bool counts : {true, false}) {
+    for (size_t e = 0; e < elements.size(); ++e) {
+      const auto of = elements.points_of(e);
+      const auto numbers = elements.numbers_of(e);
+      const bool soft = std::any_of(of.begin(), of.end(), [&](int64_t p) {
+        return points.set[p] == model::PointSet::soft_tissue;
+      });
+      if (!soft || (of[0] < owned) != counts) continue;
+      points_.insert(points_.end(), of.begin(), of.end());
+      numbers_.insert(numbers_.end(), numbers.begin(), numbers.end());
+    }
+    if (counts) counted_ = size();
+  }
+}
+
+std::vector<Vec3> TermLoop::places(size_t e, std::span<const Vec3> position) const {
+  std::vector<Vec3> x;
+  for (const int32_t p : points_of(e)) x.push_back(position[p]);
+  return x;
+}
+
+double TermLoop::value(std::span<const Vec3> position) const {
+  double value = 0;
+  Eigen::VectorXd slope;
+  for (size_t e = 0; e < counted_; ++e)
+    value += term_->gradient(places(e, position), numbers_of(e), slope);
+  return value;
+}
+
+double TermLoop::add_gradient(std::span<const Vec3> position, double scale,
+                              std::span<Vec3> gradient) const {
+  double value = 0;
+  Eigen::VectorXd slope;
+  for (size_t e = 0; e < size(); ++e) {
+    const double here = term_->gradient(places(e, position), numbers_of(e), slope);
+    if (e < counted_) value += here;
+    for (size_t i = 0; i < each_; ++i)
+      gradient[points_of(e)[i]] += scale * slope.segment<3>(static_cast<Eigen::Index>(3 * i));
+  }
+  return value;
+}
+
+Eigen::MatrixXd TermLoop::hessian_of(size_t e, std::span<const Vec3> position, bool exact) const {
+  const Eigen::MatrixXd hessian = term_->hessian(places(e, position), numbers_of(e));
+  if (exact) return hessian;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(hessian);
+  return of.eigenvectors() * of.eigenvalues().cwiseMax(0).asDiagonal() *
+         of.eigenvectors().transpose();
+}
+
+}  // namespace repose::mechanics
