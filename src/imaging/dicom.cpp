@@ -37,8 +37,10 @@ std::vector<Slice> find_slices(const std::filesystem::path& folder) {
     if (entry.is_regular_file()) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<Slice> slices;
-  for (const auto& file : files)
+  for (const auto& file : files) {
+    check_dicom_lengths(file);
     if (file.filename() != "DICOMDIR" && is_dicom(file)) slices.push_back(describe(file));
+  }
   if (slices.empty())
     base::refuse("{}: holds no DICOM slice (subfolders are not searched); name the series' folder",
                  folder.string());

@@ -17,6 +17,10 @@ namespace repose::imaging {
 namespace {
 
 constexpr int64_t nifti_header = 348;  // bytes
+// DICOM's transfer syntaxes whose pixels are not packed.
+constexpr std::string_view implicit_little_endian = "1.2.840.10008.1.2",
+                           explicit_little_endian = "1.2.840.10008.1.2.1",
+                           explicit_big_endian = "1.2.840.10008.1.2.2";
 
 /// How many bytes come out of a zlib or gzip stream, or several in a row, from `offset` on; of a
 /// damaged one those before the damage.
@@ -86,19 +90,52 @@ int64_t meta_bytes(const std::filesystem::path& file) {
   return header.compressed ? unpacked_bytes(data, offset) : size_of(data) - offset;
 }
 
-/// Whether a DICOM file packs its pixels: its transfer syntax, the element (0002, 0010), is none of
-/// 1.2.840.10008.1.2, .1.2.1 and .1.2.2.
-bool is_packed_dicom(const std::filesystem::path& file) {
+/// A DICOM file's transfer syntax, the element (0002, 0010); empty where it is not found.
+std::string transfer_syntax(const std::filesystem::path& file) {
   std::string begin(4096, '\0');
   std::ifstream(file, std::ios::binary)
       .read(begin.data(), static_cast<std::streamsize>(begin.size()));
   const std::string element("\2\0\x10\0UI", 6);
   const size_t at = begin.find(element);
-  if (at == std::string::npos || at + 8 >= begin.size()) return false;
+  if (at == std::string::npos || at + 8 >= begin.size()) return "";
   const std::string syntax = begin.substr(at + 8, static_cast<unsigned char>(begin[at + 6]));
-  const std::string text = syntax.substr(0, syntax.find('\0'));
-  return text != "1.2.840.10008.1.2" && text != "1.2.840.10008.1.2.1" &&
-         text != "1.2.840.10008.1.2.2";
+  return syntax.substr(0, syntax.find('\0'));
+}
+
+/// Whether a DICOM file packs its pixels.
+bool is_packed_dicom(const std::filesystem::path& file) {
+  const std::string syntax = transfer_syntax(file);
+  return !syntax.empty() && syntax != implicit_little_endian && syntax != explicit_little_endian &&
+         syntax != explicit_big_endian;
+}
+
+/// The next data element in a DICOM file of little endian.
+struct DicomElement {
+  uint32_t tag = 0;
+  int64_t header = 8, bytes = 0;
+  bool odd = false;  ///< its kind is none, as some programs write it
+};
+
+DicomElement next_element(std::ifstream& in, bool implicit) {
+  std::array<unsigned char, 12> h{};
+  in.read(reinterpret_cast<char*>(h.data()), h.size());
+  const auto word = [&](size_t at) { return static_cast<uint32_t>(h[at] | h[at + 1] << 8); };
+  const auto number = [&](size_t at) { return word(at) | word(at + 2) << 16; };
+  DicomElement element{word(0) << 16 | word(2), 8, number(4), false};
+  const std::string kind(reinterpret_cast<const char*>(&h[4]), 2);
+  const bool item = word(0) == 0xfffe;
+  if (item || (implicit && word(0) != 2)) return element;
+  const auto capital = [](char c) { return c >= 'A' && c <= 'Z'; };
+  if (!capital(kind[0]) || !capital(kind[1])) {
+    element.odd = kind == "??" || kind == "  " || kind == std::string(2, '\0');
+  } else if (std::string_view("OB OW OF OD OL OV SQ UN UT UC UR SV UV").find(kind) !=
+             std::string_view::npos) {
+    element.header = 12;
+    element.bytes = number(8);
+  } else {
+    element.bytes = word(6);
+  }
+  return element;
 }
 
 int64_t stored_bytes(const std::filesystem::path& file, ImageFormat format) {
@@ -117,6 +154,34 @@ void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, i
   if (stored >= 0 && stored < bytes)
     base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it anew",
                  file.string(), stored, bytes);
+}
+
+void check_dicom_lengths(const std::filesystem::path& file) {
+  constexpr int64_t preamble = 132, sequence = 0xffffffff;
+  constexpr uint32_t pixels = 0x7fe00010, item = 0xfffee000;
+  std::ifstream in(file, std::ios::binary);
+  std::string begin(preamble, ' ');
+  in.read(begin.data(), preamble);
+  if (!begin.ends_with("DICM")) return;
+  const std::string syntax = transfer_syntax(file);
+  const bool implicit = syntax == implicit_little_endian;
+  if (!implicit && syntax != explicit_little_endian) return;
+  const int64_t size = size_of(file);
+  for (int64_t at = preamble; at + 8 <= size;) {
+    in.clear();
+    in.seekg(at);
+    const DicomElement element = next_element(in, implicit);
+    if (element.tag == pixels || element.odd) return;
+    at += element.header;
+    if (element.tag == item || element.bytes == sequence) continue;  // goes on inside
+    if (element.bytes > size - at)
+      base::refuse(
+          "{}: truncated or damaged: its element ({:04x},{:04x}) says it holds {} bytes, {} are "
+          "left; copy it anew",
+          file.string(), element.tag >> 16, element.tag & 0xffff, element.bytes,
+          std::max<int64_t>(0, size - at));
+    at += element.bytes;
+  }
 }
 
 void check_nifti_spacing(const std::filesystem::path& file) {
@@ -150,8 +215,8 @@ void check_meta_dimensions(const std::filesystem::path& file) {
   for (size_t at = begin.find(name); at != std::string::npos; at = begin.find(name, at + 1)) {
     const std::string text = begin.substr(at + name.size(), 100);
     const std::string line = text.substr(0, text.find('\n'));
-    const auto value =
-        base::words(line.substr(std::min(line.find_first_not_of(" \t:="), line.size())));
+    const std::string rest = line.substr(std::min(line.find_first_not_of(" \t:="), line.size()));
+    const auto value = base::words(rest);
     const auto number = value.size() == 1 ? base::parse_integer(value[0]) : std::nullopt;
     if (!number || *number < 1 || *number > most)
       base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),

@@ -11,6 +11,11 @@ namespace repose::imaging {
 /// files are unpacked to their end, without keeping it. Files it cannot judge pass.
 void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes);
 
+/// Throws InputError where an element of a DICOM file in little endian says it holds more than the
+/// file: its library asks for that memory at once. Elements up to the pixels are looked
+/// at; a file without DICOM's mark passes.
+void check_dicom_lengths(const std::filesystem::path& file);
+
 /// Throws InputError where a NIfTI file's header holds a spacing of 0, which its library takes for
 /// 1, or none that is finite. A file that is no NIfTI passes.
 void check_nifti_spacing(const std::filesystem::path& file);

@@ -390,6 +390,12 @@ BREAKS = [
         "row.wrong += 0;",
         r"^base\.comparison",
     ),
+    (
+        "a DICOM element may be longer than its file",
+        "if (element.bytes > size - at)",
+        "if (false)",
+        r"^imaging\.volume_read",
+    ),
     # options
     (
         "the range of a number is no matter",

@@ -102,6 +102,13 @@ TEST(Estimate, KnowsHowFarRestIsInAWellFlatAtItsBottom) {
   EXPECT_NEAR(s.outcome.displacement_error, discrete::largest_block(s.x), 1e-6);
 }
 
+TEST(Estimate, IsNoShorterThanTheWayWhereNoStepWasTaken) {
+  const Search s([](double x) { return std::array{x * x / 2, x, 1.0}; }, 2e-7, 1e-6);
+  EXPECT_TRUE(s.outcome.converged);
+  EXPECT_GT(discrete::largest_block(s.x), 3e-7);
+  EXPECT_GE(s.outcome.displacement_error, discrete::largest_block(s.x));
+}
+
 TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
   // Newton's step is a quarter of the way, and the next a third as long, by chance; there
   // is no minimum beyond the height of the waves.

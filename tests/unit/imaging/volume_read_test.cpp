@@ -1,0 +1,59 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "../../fuzz/seeds.h"
+#include "repose/imaging/volume.h"
+
+/// Headers of volumes read from files written by hand.
+namespace repose::imaging {
+namespace {
+
+std::string meta(const std::string& dimensions) {
+  return fmt::format(
+      "ObjectType = Image\nNDims = {}\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
+      "ElementSpacing = 0.9 0.9 1.5\nDimSize = 3 3 3\nElementType = MET_SHORT\n"
+      "ElementDataFile = LOCAL\n{}",
+      dimensions, std::string(2 * 3 * 3 * 3, '\7'));
+}
+
+TEST(VolumeRead, TakesAMetaImageWithSpacesBehindItsDimensions) {
+  const test::Folder folder;
+  for (const int width : {1, 2, 40}) {
+    const Volume volume = read_volume(folder.write("a.mha", meta(fmt::format("{:<{}}", 3, width))));
+    EXPECT_EQ(volume.size, (std::array<int64_t, 3>{3, 3, 3})) << width;
+  }
+}
+
+TEST(VolumeRead, RefusesAMetaImageOfTooManyDimensions) {
+  const test::Folder folder;
+  for (const char* dimensions : {"4294967296", ": = 99", "three", ""})
+    EXPECT_NE(test::refusal([&] {
+                read_volume(folder.write("a.mha", meta(dimensions)));
+              }).find("its NDims is "),
+              std::string::npos)
+        << dimensions;
+}
+
+/// Two slices, the second with `more` before its pixels.
+std::string refusal_of_slices(const std::string& more) {
+  const test::Folder folder;
+  std::string second = fuzz::slice(2);
+  second.insert(second.find(fuzz::element(8, 0x103e, "LO", "bone")), more);
+  folder.write("1.dcm", fuzz::slice(1));
+  folder.write("2.dcm", second);
+  return test::refusal([&] { read_volume(folder.path(".")); });
+}
+
+TEST(VolumeRead, RefusesASliceWithAnElementLongerThanTheFile) {
+  EXPECT_EQ(refusal_of_slices(""), "accepted");
+  EXPECT_EQ(refusal_of_slices(fuzz::element(8, 0x1030, "LO", "CT")), "accepted");
+  const std::string unknown("\x08\0\x30\x10UN\0\0\xff\xff\xff\x7f", 12),
+      garbage("\x08\0\x30\x10\0-\xff\x7f", 8);
+  EXPECT_NE(refusal_of_slices(unknown).find("(0008,1030) says it holds 2147483647 bytes"),
+            std::string::npos);
+  EXPECT_NE(refusal_of_slices(garbage).find("(0008,1030) says it holds 2147429632 bytes"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace repose::imaging
