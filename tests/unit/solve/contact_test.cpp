@@ -20,10 +20,10 @@ using testing::solid_block;
 
 constexpr double young = 0.015, poisson = 0.45;  // of solid_block
 
-const std::vector<double>& field(const Rest& rest, const std::string& name) {
+const std::vector<double>& field(const Rest& rest, const char* name) {
   for (const model::PointField& field : rest.rows.point_fields)
     if (field.name == name) return field.values;
-  throw std::runtime_error(name + " is missing");
+  throw std::runtime_error(std::string(name) + " is missing");
 }
 
 /// The area that each point of a block stands for on the face whose points lie in a plane.
