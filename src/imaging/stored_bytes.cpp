@@ -165,13 +165,14 @@ void check_dicom_lengths(const std::filesystem::path& file) {
   if (!begin.ends_with("DICM")) return;
   const std::string syntax = transfer_syntax(file);
   const bool implicit = syntax == implicit_little_endian;
-  if (!implicit && syntax != explicit_little_endian) return;
+  const bool known = implicit || syntax == explicit_little_endian;
   const int64_t size = size_of(file);
   for (int64_t at = preamble; at + 8 <= size;) {
     in.clear();
     in.seekg(at);
     const DicomElement element = next_element(in, implicit);
-    if (element.tag == pixels || element.odd) return;
+    const bool description = element.tag >> 16 == 2;  // of the file, explicit in every syntax
+    if (element.tag == pixels || element.odd || !(description || known)) return;
     at += element.header;
     if (element.tag == item || element.bytes == sequence) continue;  // goes on inside
     if (element.bytes > size - at)

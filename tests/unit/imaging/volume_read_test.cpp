@@ -34,24 +34,32 @@ TEST(VolumeRead, RefusesAMetaImageOfTooManyDimensions) {
         << dimensions;
 }
 
-/// Two slices, the second with `more` before its pixels.
-std::string refusal_of_slices(const std::string& more) {
+std::string refusal_of_slices(const std::string& second) {
   const test::Folder folder;
-  std::string second = fuzz::slice(2);
-  second.insert(second.find(fuzz::element(8, 0x103e, "LO", "bone")), more);
   folder.write("1.dcm", fuzz::slice(1));
   folder.write("2.dcm", second);
   return test::refusal([&] { read_volume(folder.path(".")); });
 }
 
+/// A slice with `more` before its series' name.
+std::string slice_with(const std::string& more) {
+  std::string slice = fuzz::slice(2);
+  return slice.insert(slice.find(fuzz::element(8, 0x103e, "LO", "bone")), more);
+}
+
 TEST(VolumeRead, RefusesASliceWithAnElementLongerThanTheFile) {
-  EXPECT_EQ(refusal_of_slices(""), "accepted");
-  EXPECT_EQ(refusal_of_slices(fuzz::element(8, 0x1030, "LO", "CT")), "accepted");
+  EXPECT_EQ(refusal_of_slices(fuzz::slice(2)), "accepted");
+  EXPECT_EQ(refusal_of_slices(slice_with(fuzz::element(8, 0x1030, "LO", "CT"))), "accepted");
   const std::string unknown("\x08\0\x30\x10UN\0\0\xff\xff\xff\x7f", 12),
-      garbage("\x08\0\x30\x10\0-\xff\x7f", 8);
-  EXPECT_NE(refusal_of_slices(unknown).find("(0008,1030) says it holds 2147483647 bytes"),
+      garbage("\x08\0\x30\x10\0-\xff\x7f", 8), syntax("\2\0\x10\0UI\x14\0", 8);
+  EXPECT_NE(refusal_of_slices(slice_with(unknown)).find("(0008,1030) says it holds 2147483647 b"),
             std::string::npos);
-  EXPECT_NE(refusal_of_slices(garbage).find("(0008,1030) says it holds 2147429632 bytes"),
+  EXPECT_NE(refusal_of_slices(slice_with(garbage)).find("(0008,1030) says it holds 2147429632 b"),
+            std::string::npos);
+  std::string odd = fuzz::slice(2);
+  ASSERT_NE(odd.find(syntax), std::string::npos);
+  odd.replace(odd.find(syntax) + 4, 4, std::string("U6\0\x20", 4));
+  EXPECT_NE(refusal_of_slices(odd).find("(0002,0010) says it holds 536884821 bytes"),
             std::string::npos);
 }
 
