@@ -1,5 +1,6 @@
 """A run that cannot write says so in one line and leaves what was there."""
 
+import ctypes
 import hashlib
 import os
 import subprocess
@@ -56,18 +57,15 @@ def test_a_full_disk(run, tmp_path, kilobytes, ranks):
 
 
 def without_rights():
-    """Root writes everywhere: another user tries."""
+    """Root writes everywhere: it gives that right up, for the program that it starts."""
+    drop_capability, write_anywhere = 24, 1  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE
     if os.geteuid() == 0:
-        os.setgid(65534)
-        os.setuid(65534)
+        assert ctypes.CDLL(None).prctl(drop_capability, write_anywhere, 0, 0, 0) == 0
 
 
 def test_a_folder_that_may_not_be_written(older, environment, tmp_path):
     folder, _ = older
     folder.chmod(0o555)
-    for path in (tmp_path, *tmp_path.parents):
-        if path.stat().st_uid == os.geteuid() and "pytest" in str(path):
-            path.chmod(path.stat().st_mode | 0o055)
     result = subprocess.run(
         [str(programs() / "repose-solve"), str(SCENE), "-output", str(folder / "face")],
         cwd=tmp_path,
