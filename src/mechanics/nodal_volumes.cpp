@@ -10,10 +10,10 @@ namespace {
 
 constexpr double share = 1.0 / 6;  // of a prism, to each of its points
 
-using Corners = PrismTriples<double>;
+using PrismPoints = PrismTriples<double>;
 
-Corners gather(const std::array<int32_t, 6>& points, std::span<const Vec3> values) {
-  Corners corners;
+PrismPoints gather(const std::array<int32_t, 6>& points, std::span<const Vec3> values) {
+  PrismPoints corners;
   for (int c = 0; c < 6; ++c) corners[c] = triple(values[points[c]]);
   return corners;
 }
@@ -109,7 +109,7 @@ void add_nodal_action(const NodalVolumes& nodal, std::span<const Vec3> position,
   for (const auto& points : nodal.points) {
     const PrismEdges<double> edges(gather(points, position));
     const PrismSlope<double> v(edges);
-    const Corners turned = prism_slope_change(edges, PrismEdges<double>(gather(points, direction)));
+    const PrismPoints turned = prism_slope_change(edges, PrismEdges<double>(gather(points, direction)));
     const double slope = weight * mean(points, pressure), bend = weight * mean(points, rate);
     for (int c = 0; c < 6; ++c)
       product[points[c]] += vec3(bend * v.gradient[c] + slope * turned[c]);
