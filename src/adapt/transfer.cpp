@@ -1,10 +1,10 @@
 #include "repose/adapt/transfer.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "repose/surface/distance.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::adapt {
 
@@ -24,14 +24,6 @@ surface::Surface skin_of(const Model& model, int64_t layers) {
   for (const auto& [a, b, c] : model.skin)
     skin.triangles.push_back({a / layers, b / layers, c / layers});
   return skin;
-}
-
-/// The weights of a point of a triangle.
-Vec3 barycentric(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
-  Eigen::Matrix<double, 3, 2> edges;
-  edges << b - a, c - a;
-  const Eigen::Vector2d w = edges.colPivHouseholderQr().solve(point - a);
-  return {1 - w.sum(), w[0], w[1]};
 }
 
 /// Depths of the layers as fractions of the thickness, the same in every column.
@@ -55,7 +47,7 @@ Transfer::Transfer(const Model& from, const Model& to)
     const auto& corner = skin.triangles[nearest.triangle];
     const auto& x = skin.points;
     places_.push_back(
-        {corner, barycentric(x[corner[0]], x[corner[1]], x[corner[2]], nearest.point)});
+        {corner, surface::barycentric({x[corner[0]], x[corner[1]], x[corner[2]]}, nearest.point)});
   }
 }
 

@@ -11,7 +11,7 @@
 namespace repose::imaging {
 namespace {
 
-struct Slice {
+struct DicomSlice {
   std::filesystem::path file;
   Image header;
   Mat3 axes;  ///< mm; of a single slice the third column means nothing
@@ -20,8 +20,8 @@ struct Slice {
   int64_t frames() const { return header.size.size() > 2 ? header.size[2] : 1; }
 };
 
-Slice describe(const std::filesystem::path& file) {
-  Slice slice{file, read_header(file, ImageFormat::dicom), {}, {}};
+DicomSlice describe(const std::filesystem::path& file) {
+  DicomSlice slice{file, read_header(file, ImageFormat::dicom), {}, {}};
   if (slice.header.numbers != 1)
     base::refuse("{}: is a colour picture, not a slice; move it elsewhere", file.string());
   if (slice.frames() == 1) slice.header.spacing[2] = 1;
@@ -31,12 +31,12 @@ Slice describe(const std::filesystem::path& file) {
 }
 
 /// Files that are DICOM images; others (DICOMDIR, reports, licences) are passed over.
-std::vector<Slice> find_slices(const std::filesystem::path& folder) {
+std::vector<DicomSlice> find_slices(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (entry.is_regular_file()) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
-  std::vector<Slice> slices;
+  std::vector<DicomSlice> slices;
   for (const auto& file : files) {
     check_dicom_lengths(file);
     if (file.filename() != "DICOMDIR" && is_dicom(file)) slices.push_back(describe(file));
@@ -47,9 +47,9 @@ std::vector<Slice> find_slices(const std::filesystem::path& folder) {
   return slices;
 }
 
-void check_one_series(const std::vector<Slice>& slices, const std::string& folder) {
+void check_one_series(const std::vector<DicomSlice>& slices, const std::string& folder) {
   std::map<std::string, std::pair<std::string, int>> series;
-  for (const Slice& slice : slices) {
+  for (const DicomSlice& slice : slices) {
     series[slice.header.series].first = slice.header.title;
     ++series[slice.header.series].second;
   }
@@ -62,10 +62,10 @@ void check_one_series(const std::vector<Slice>& slices, const std::string& folde
                series.size(), list);
 }
 
-void check_alike(const std::vector<Slice>& slices) {
-  const Slice& first = slices.front();
+void check_alike(const std::vector<DicomSlice>& slices) {
+  const DicomSlice& first = slices.front();
   const std::string name = first.file.filename().string();
-  for (const Slice& slice : slices) {
+  for (const DicomSlice& slice : slices) {
     if (slice.header.size != first.header.size)
       base::refuse("{}: has {} pixels, {} has {}; slices of one series must be alike",
                    slice.file.string(), fmt::join(slice.header.size, " × "), name,
@@ -84,7 +84,7 @@ double median(std::vector<double> numbers) {
 }
 
 /// Slices must be as far apart as most are, to a hundredth of that or of a millimetre.
-void check_steps(const std::vector<Slice>& slices, const Vec3& normal) {
+void check_steps(const std::vector<DicomSlice>& slices, const Vec3& normal) {
   std::vector<double> steps;
   for (size_t s = 1; s < slices.size(); ++s)
     steps.push_back((slices[s].origin - slices[s - 1].origin).dot(normal));
@@ -104,7 +104,7 @@ void check_steps(const std::vector<Slice>& slices, const Vec3& normal) {
 
 /// All slices follow one another by the same vector, which is returned; a tilted gantry makes it
 /// lean against their normal.
-Vec3 common_step(const std::vector<Slice>& slices) {
+Vec3 common_step(const std::vector<DicomSlice>& slices) {
   const Vec3 first = slices.front().origin;
   const Vec3 step = (slices.back().origin - first) / static_cast<double>(slices.size() - 1);
   for (size_t s = 0; s < slices.size(); ++s) {
@@ -119,16 +119,16 @@ Vec3 common_step(const std::vector<Slice>& slices) {
 }  // namespace
 
 Volume read_dicom(const std::filesystem::path& folder, const Watch& watch) {
-  std::vector<Slice> slices = find_slices(folder);
+  std::vector<DicomSlice> slices = find_slices(folder);
   check_one_series(slices, folder.string());
-  const Slice first = slices.front();
+  const DicomSlice first = slices.front();
   const int64_t count = static_cast<int64_t>(slices.size()), frames = first.frames();
   if ((count == 1) == (frames == 1))
     base::refuse("{}: holds {} file(s) of {} slice(s); a volume is one series of slices",
                  folder.string(), count, frames);
   check_alike(slices);
   const Vec3 normal = first.axes.col(0).cross(first.axes.col(1)).normalized();
-  std::sort(slices.begin(), slices.end(), [&](const Slice& a, const Slice& b) {
+  std::sort(slices.begin(), slices.end(), [&](const DicomSlice& a, const DicomSlice& b) {
     return a.origin.dot(normal) < b.origin.dot(normal);
   });
   Volume volume{folder.string(),

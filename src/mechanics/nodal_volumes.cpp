@@ -109,7 +109,8 @@ void add_nodal_action(const NodalVolumes& nodal, std::span<const Vec3> position,
   for (const auto& points : nodal.points) {
     const PrismEdges<double> edges(gather(points, position));
     const PrismSlope<double> v(edges);
-    const PrismPoints turned = prism_slope_change(edges, PrismEdges<double>(gather(points, direction)));
+    const PrismPoints turned =
+        prism_slope_change(edges, PrismEdges<double>(gather(points, direction)));
     const double slope = weight * mean(points, pressure), bend = weight * mean(points, rate);
     for (int c = 0; c < 6; ++c)
       product[points[c]] += vec3(bend * v.gradient[c] + slope * turned[c]);

@@ -168,14 +168,6 @@ Sampled sample(const Surface& given, const TriangleTree& face, double spacing, d
   return samples;
 }
 
-Vec3 weights_at(const Corners& t, const Vec3& point) {
-  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-  const double area = normal.squaredNorm();
-  const double a = (t[2] - t[1]).cross(point - t[1]).dot(normal) / area;
-  const double b = (t[0] - t[2]).cross(point - t[2]).dot(normal) / area;
-  return {a, b, 1 - a - b};
-}
-
 /// Draws the vertices along their normals to the samples within the tolerance.
 void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
          Surface& face) {
@@ -186,7 +178,7 @@ void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neigh
     const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance);
     if (nearest.triangle < 0) continue;
     const Triangle& triangle = face.triangles[nearest.triangle];
-    const Vec3 share = weights_at(tree.corners_of(nearest.triangle), nearest.point);
+    const Vec3 share = barycentric(tree.corners_of(nearest.triangle), nearest.point);
     for (int k = 0; k < 3; ++k) {
       const double part = samples.area[s] * std::max(share[k], 0.0);
       offset[triangle[k]] += part * normals[triangle[k]].dot(samples.point[s] - nearest.point);

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double slack = 1e-3;  // mm, more than a cut is ever shifted
 
-enum class Part { outside, piece, kerf, rest };
+enum class CellPart { outside, piece, kerf, rest };
 
 /// What a cell of the arrangement touches.
 struct Cell {
@@ -50,16 +50,16 @@ class Sorter {
   }
 
   /// Throws InputError where the cuts part nothing or a part is empty.
-  std::map<int64_t, Part> sort() {
+  std::map<int64_t, CellPart> sort() {
     require_parted();
     if (plan_.seed) seeded();
     for (const auto& [cell, what] : touched_)
       if (what.air)
-        parts_[cell] = Part::outside;
+        parts_[cell] = CellPart::outside;
       else if (what.cut() && !plan_.seed)
         parts_[cell] = in_front(what);
-    require_part(Part::piece);
-    require_part(Part::rest);
+    require_part(CellPart::piece);
+    require_part(CellPart::rest);
     assign_whole_shells();
     return parts_;
   }
@@ -76,7 +76,7 @@ class Sorter {
     return compact(name, cells_.points, std::move(triangles));
   }
 
-  Surface border(Part part, const std::string& name) const {
+  Surface border(CellPart part, const std::string& name) const {
     return border(
         [&](int64_t cell) {
           const auto found = parts_.find(cell);
@@ -120,9 +120,9 @@ class Sorter {
       if (what.cut() && farthest[cell] < -plan_.kerf / 2 - slack) what.behind = true;
   }
 
-  static Part in_front(const Cell& what) {
-    if (what.behind) return Part::rest;
-    return what.kerf ? Part::kerf : Part::piece;
+  static CellPart in_front(const Cell& what) {
+    if (what.behind) return CellPart::rest;
+    return what.kerf ? CellPart::kerf : CellPart::piece;
   }
 
   bool solid(int64_t cell) const { return !touched_.at(cell).air; }
@@ -171,7 +171,7 @@ class Sorter {
     std::optional<int64_t> chosen;
     for (const auto& [cell, what] : touched_) {
       if (what.air || !what.cut()) continue;
-      parts_[cell] = what.kerf ? Part::kerf : Part::rest;
+      parts_[cell] = what.kerf ? CellPart::kerf : CellPart::rest;
       const Surface shell = border([c = cell](int64_t other) { return other == c; }, "cell");
       if (DistanceTree(shell).contains(*plan_.seed)) chosen = cell;
     }
@@ -180,16 +180,16 @@ class Sorter {
       base::refuse(
           "{}: the seed of piece '{}', ({:g}, {:g}, {:g}), is not inside the bone; move it",
           bone_.name, plan_.piece, seed.x(), seed.y(), seed.z());
-    if (parts_[*chosen] == Part::kerf)
+    if (parts_[*chosen] == CellPart::kerf)
       base::refuse("{}: the seed of piece '{}', ({:g}, {:g}, {:g}), is in the kerf; move it",
                    bone_.name, plan_.piece, seed.x(), seed.y(), seed.z());
-    parts_[*chosen] = Part::piece;
+    parts_[*chosen] = CellPart::piece;
   }
 
-  void require_part(Part part) const {
+  void require_part(CellPart part) const {
     for (const auto& [cell, what] : parts_)
       if (what == part) return;
-    if (part == Part::rest)
+    if (part == CellPart::rest)
       base::refuse(
           "{}: nothing is left of the bone but piece '{}'; turn the cut's normal round or "
           "give a seed",
@@ -207,9 +207,10 @@ class Sorter {
     for (size_t t = 0; t < cells_.triangles.size(); ++t) {
       const int64_t cell = cells_.cells[t][1];
       if (cells_.origin[t] >= 0 || parts_.contains(cell)) continue;
-      if (!piece) piece.emplace(border(Part::piece, "piece"));
+      if (!piece) piece.emplace(border(CellPart::piece, "piece"));
       const Vec3& point = cells_.points[cells_.triangles[t][0]];
-      parts_[cell] = piece->contains(point) || before_planes(point) ? Part::piece : Part::rest;
+      parts_[cell] =
+          piece->contains(point) || before_planes(point) ? CellPart::piece : CellPart::rest;
     }
   }
 
@@ -224,7 +225,7 @@ class Sorter {
   const Osteotomy& plan_;
   const Arrangement& cells_;
   std::map<int64_t, Cell> touched_;
-  std::map<int64_t, Part> parts_;
+  std::map<int64_t, CellPart> parts_;
 };
 
 /// Whether a part can be written, read again and cut again.
@@ -243,9 +244,9 @@ Pieces cut_shifted(const Surface& bone, const Osteotomy& plan, double shift) {
   Sorter sorter(bone, plan, sheets, cells);
   sorter.sort();
   Pieces pieces;
-  pieces.piece = sorter.border(Part::piece, plan.piece);
-  pieces.rest = sorter.border(Part::rest, bone.name);
-  pieces.kerf_volume = volume_of(sorter.border(Part::kerf, "kerf"));
+  pieces.piece = sorter.border(CellPart::piece, plan.piece);
+  pieces.rest = sorter.border(CellPart::rest, bone.name);
+  pieces.kerf_volume = volume_of(sorter.border(CellPart::kerf, "kerf"));
   return pieces;
 }
 

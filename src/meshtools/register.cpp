@@ -1,7 +1,6 @@
 #include "repose/meshtools/register.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
@@ -14,32 +13,6 @@ using namespace surface;
 namespace {
 
 constexpr double level = 1e-3;  ///< of the test for a bad landmark, over all
-
-using Points = Eigen::Matrix3Xd;
-
-Points stacked(const std::vector<Vec3>& points) {
-  Points stack(3, points.size());
-  for (size_t i = 0; i < points.size(); ++i) stack.col(static_cast<Eigen::Index>(i)) = points[i];
-  return stack;
-}
-
-/// With `mirror` the best reflection instead of the best rotation.
-Similarity umeyama(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed, bool with_scale,
-                   bool mirror) {
-  const Points x = stacked(moving), y = stacked(fixed);
-  const Vec3 x_mean = x.rowwise().mean(), y_mean = y.rowwise().mean();
-  const Points dx = x.colwise() - x_mean, dy = y.colwise() - y_mean;
-  const Mat3 covariance = dy * dx.transpose();
-  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vec3 sign = Vec3::Ones();
-  const bool reflects = svd.matrixU().determinant() * svd.matrixV().determinant() < 0;
-  if (reflects != mirror) sign[2] = -1;
-  Similarity fit;
-  fit.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  if (with_scale) fit.scale = svd.singularValues().dot(sign) / dx.squaredNorm();
-  fit.translation = y_mean - fit.scale * (fit.rotation * x_mean);
-  return fit;
-}
 
 double squared(double x) { return x * x; }
 
@@ -56,12 +29,12 @@ class Fitter {
   /// The fit of those in use but `i`; none: all in use.
   Similarity fit_without(size_t i) const {
     const auto [x, y] = without(i);
-    return umeyama(x, y, with_scale_, false);
+    return base::fit_similarity(x, y, with_scale_);
   }
 
   bool can_predict(size_t i) const {
     const auto x = without(i).first;
-    return x.size() >= 3 && breadth(x) > least_breadth;
+    return x.size() >= 3 && base::breadth(x) > least_breadth;
   }
 
   double error(const Similarity& fit, size_t i) const {
@@ -80,7 +53,7 @@ class Fitter {
     const auto [x, y] = without(i);
     const int freedom = static_cast<int>(3 * x.size()) - (with_scale_ ? 7 : 6);
     if (!can_predict(i) || freedom < 1) return 0;
-    const Similarity fit = umeyama(x, y, with_scale_, false);
+    const Similarity fit = base::fit_similarity(x, y, with_scale_);
     double sum = 0;
     for (size_t k = 0; k < x.size(); ++k) sum += (fit.apply(x[k]) - y[k]).squaredNorm();
     const double variance = std::max(sum / freedom, squared(1e-9 * extent()));
@@ -102,8 +75,9 @@ class Fitter {
   }
 
   double extent() const {
-    const Points y = stacked(fixed_);
-    return (y.rowwise().maxCoeff() - y.rowwise().minCoeff()).norm();
+    Vec3 low = fixed_[0], high = fixed_[0];
+    for (const Vec3& y : fixed_) low = low.cwiseMin(y), high = high.cwiseMax(y);
+    return (high - low).norm();
   }
 
   /// Variance of a predicted position over that of one landmark, mean of the axes: its own, that of
@@ -131,7 +105,7 @@ class Fitter {
 constexpr size_t none = static_cast<size_t>(-1);
 
 void check_breadth(const std::vector<Vec3>& points, const char* which) {
-  const double found = breadth(points);
+  const double found = base::breadth(points);
   if (!(found > least_breadth))
     base::refuse(
         "the {} landmarks lie on a line (breadth {:.2g} of their length, more than {:g} needed), "
@@ -140,30 +114,6 @@ void check_breadth(const std::vector<Vec3>& points, const char* which) {
 }
 
 }  // namespace
-
-Mat4 Similarity::matrix() const {
-  Mat4 matrix = Mat4::Identity();
-  matrix.topLeftCorner<3, 3>() = scale * rotation;
-  matrix.topRightCorner<3, 1>() = translation;
-  return matrix;
-}
-
-Similarity Similarity::after(const Similarity& first) const {
-  return {scale * first.scale, rotation * first.rotation, apply(first.translation)};
-}
-
-Similarity fit_similarity(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
-                          bool with_scale) {
-  return umeyama(moving, fixed, with_scale, false);
-}
-
-double breadth(const std::vector<Vec3>& points) {
-  if (points.size() < 3) return 0;
-  const Points x = stacked(points);
-  const Points centred = x.colwise() - x.rowwise().mean();
-  const Vec3 singular = Eigen::JacobiSVD<Points>(centred).singularValues();
-  return singular[0] > 0 ? singular[1] / singular[0] : 0;
-}
 
 LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
                           bool with_scale) {
@@ -177,7 +127,8 @@ LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec
   LandmarkFit result;
   result.can_be_checked = n >= 4;
   result.rms_all = fitter.rms(fitter.fit_without(none));
-  result.rms_mirrored = fitter.rms(umeyama(moving, fixed, with_scale, true));
+  result.rms_mirrored =
+      fitter.rms(base::fit_similarity(moving, fixed, with_scale, base::Handedness::mirrored));
   const int64_t least = n == 4 ? 3 : 4;
   for (size_t out = 0; out < std::max<size_t>(n / 3, 1) && fitter.count() > least; ++out) {
     std::vector<double> suspicion(n, 0);

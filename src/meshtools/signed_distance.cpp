@@ -3,6 +3,7 @@
 
 #include "repose/meshtools/compare.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::meshtools {
 using namespace surface;
@@ -10,15 +11,6 @@ using namespace imaging;
 namespace {
 
 constexpr double on_border_of_triangle = 1e-9;  // barycentric
-
-/// Barycentric coordinates of a point on a triangle.
-Vec3 barycentric(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
-  const Vec3 normal = (b - a).cross(c - a);
-  const double area = normal.squaredNorm();
-  const double at_a = (c - b).cross(point - b).dot(normal) / area;
-  const double at_b = (a - c).cross(point - c).dot(normal) / area;
-  return {at_a, at_b, 1 - at_a - at_b};
-}
 
 double angle_at(const Vec3& corner, const Vec3& one, const Vec3& other) {
   const Vec3 a = one - corner, b = other - corner;
@@ -54,8 +46,7 @@ SignedDistance::SignedDistance(const Surface& surface)
 
 SignedDistance::Feature SignedDistance::feature_at(const DistanceTree::Nearest& nearest) const {
   const Triangle& triangle = surface_.triangles[nearest.triangle];
-  const Vec3 weight = barycentric(surface_.points[triangle[0]], surface_.points[triangle[1]],
-                                  surface_.points[triangle[2]], nearest.point);
+  const Vec3 weight = barycentric(corners(surface_, triangle), nearest.point);
   int small = 0, smallest = 0, largest = 0;
   for (int k = 0; k < 3; ++k) {
     small += weight[k] < on_border_of_triangle;

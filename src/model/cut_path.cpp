@@ -1,13 +1,13 @@
 #include "repose/model/cut.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <optional>
 #include <set>
 
 #include "repose/base/error.h"
 #include "repose/surface/distance.h"
+#include "repose/surface/triangle_tree.h"
 #include "split_mesh.h"
 
 namespace repose::model {
@@ -32,15 +32,6 @@ Vec3 vertex_normal(const SplitMesh& mesh, int64_t vertex) {
   Vec3 sum = Vec3::Zero();
   for (const int64_t row : mesh.triangles_of(vertex)) sum += unit_normal(mesh, row);
   return sum.normalized();
-}
-
-/// Weights of a triangle's corners at a point in its plane.
-Vec3 barycentric(const SplitMesh& mesh, int64_t row, const Vec3& x) {
-  const auto& [a, b, c] = mesh.triangle(row);
-  Eigen::Matrix<double, 3, 2> sides;
-  sides << mesh.point(b) - mesh.point(a), mesh.point(c) - mesh.point(a);
-  const Eigen::Vector2d w = sides.colPivHouseholderQr().solve(x - mesh.point(a));
-  return {1 - w.sum(), w[0], w[1]};
 }
 
 /// Makes a path of edges out of one incision.
@@ -106,7 +97,8 @@ class PathCutter {
     const surface::DistanceTree tree(skin_);
     const int64_t row = tree.nearest(x).triangle;
     const Triangle t = mesh_.triangle(row);
-    const Vec3 weight = barycentric(mesh_, row, x);
+    const Vec3 weight =
+        surface::barycentric({mesh_.point(t[0]), mesh_.point(t[1]), mesh_.point(t[2])}, x);
     Eigen::Index largest = 0, least = 0;
     if (weight.maxCoeff(&largest) > 1 - snap) return t[largest];
     if (weight.minCoeff(&least) > snap) return mesh_.split_triangle(row, x);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "repose/base/error.h"
 
@@ -13,9 +14,11 @@ RigidMotion line_up(const std::vector<Vec3>& from, const std::vector<Vec3>& to) 
   const Vec3 a = from[1] - from[0], b = to[1] - to[0];
   if (!(a.norm() > 0) || !(b.norm() > 0))
     base::refuse("two landmarks in one place fix no turn; give two apart");
-  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(a, b);
+  const Vec3 axis = a.cross(b).norm() > 0 ? a.cross(b).normalized() : a.unitOrthogonal();
+  const Mat3 turn =
+      Eigen::AngleAxisd(std::atan2(a.cross(b).norm(), a.dot(b)), axis).toRotationMatrix();
   Mat4 matrix = Mat4::Identity();
-  matrix.topLeftCorner<3, 3>() = turn.toRotationMatrix();
+  matrix.topLeftCorner<3, 3>() = turn;
   matrix.topRightCorner<3, 1>() = (to[0] + to[1] - turn * (from[0] + from[1])) / 2;
   return RigidMotion::from_matrix(matrix);
 }

@@ -1,8 +1,6 @@
 #include "repose/scene/rigid_motion.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -46,12 +44,6 @@ AxisAngle axis_angle(const Mat3& rotation) {
 
 Mat3 turn(const Vec3& axis, double angle) {
   return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-}
-
-Vec3 mean(const std::vector<Vec3>& points) {
-  Vec3 sum = Vec3::Zero();
-  for (const Vec3& p : points) sum += p;
-  return sum / static_cast<double>(points.size());
 }
 
 }  // namespace
@@ -126,15 +118,7 @@ bool RigidMotion::is_identity() const {
          translation_.stableNorm() <= 1e-9;
 }
 
-bool determines_rotation(const std::vector<Vec3>& points) {
-  if (points.size() < 3) return false;
-  const Vec3 center = mean(points);
-  Mat3 scatter = Mat3::Zero();
-  for (const Vec3& p : points) scatter += (p - center) * (p - center).transpose();
-  if (!scatter.allFinite()) return false;
-  const Vec3 spread = Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvalues();
-  return spread[1] > 1e-12 * spread[2];
-}
+bool determines_rotation(const std::vector<Vec3>& points) { return base::breadth(points) > 1e-6; }
 
 RigidFit fit_rigid_motion(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
   if (from.size() != to.size())
@@ -143,17 +127,7 @@ RigidFit fit_rigid_motion(const std::vector<Vec3>& from, const std::vector<Vec3>
   if (!determines_rotation(from))
     base::refuse("a rigid fit needs at least three points that are not on a line; there are {}",
                  from.size());
-  const Vec3 from_center = mean(from), to_center = mean(to);
-  Mat3 covariance = Mat3::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i)
-    covariance += (to[i] - to_center) * (from[i] - from_center).transpose();
-  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;
-  Mat4 best = Mat4::Identity();
-  best.topLeftCorner<3, 3>() = u * svd.matrixV().transpose();
-  best.topRightCorner<3, 1>() = to_center - best.topLeftCorner<3, 3>() * from_center;
-  RigidFit fit{RigidMotion::from_matrix(best), 0};
+  RigidFit fit{RigidMotion::from_matrix(base::fit_similarity(from, to, false).matrix()), 0};
   for (std::size_t i = 0; i < from.size(); ++i)
     fit.residual = std::max(fit.residual, (fit.motion.apply(from[i]) - to[i]).norm());
   return fit;

@@ -30,6 +30,14 @@ Vec3 closest_point(const Vec3& q, const Corners& t) {
 
 }  // namespace
 
+Vec3 barycentric(const Corners& t, const Vec3& point) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double area = normal.squaredNorm();
+  const double a = (t[2] - t[1]).cross(point - t[1]).dot(normal) / area;
+  const double b = (t[0] - t[2]).cross(point - t[2]).dot(normal) / area;
+  return {a, b, 1 - a - b};
+}
+
 int longest_edge(const Corners& t) {
   int longest = 0;
   double length = 0;

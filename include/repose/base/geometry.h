@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-/// Fixed-size vectors that every room uses, and rows of arrays.
+/// Fixed-size vectors that every room uses, rows of arrays, and the fit of one point set to
+/// another.
 namespace repose {
 
 using Vec3 = Eigen::Vector3d;  ///< a point (mm), a force (N) or a direction
@@ -26,5 +27,31 @@ std::vector<T> pick(const std::vector<T>& values, std::span<const int64_t> rows)
   for (const int64_t row : rows) picked.push_back(values[row]);
   return picked;
 }
+
+/// y = s R x + t.
+struct Similarity {
+  double scale = 1;
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();  ///< mm
+
+  Vec3 apply(const Vec3& point) const { return scale * (rotation * point) + translation; }
+  Mat4 matrix() const;
+  /// The transform that does `first`, then this one.
+  Similarity after(const Similarity& first) const;
+};
+
+enum class Handedness { kept, mirrored };
+
+/// The least-squares transform taking `moving` to `fixed`, pairs in order (Umeyama, Least-squares
+/// estimation of transformation parameters between two point patterns, 1991): the best rotation,
+/// or the best reflection. The scale stays 1 unless asked for. At least three pairs that fix a
+/// rotation (breadth).
+Similarity fit_similarity(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
+                          bool with_scale, Handedness handedness = Handedness::kept);
+
+/// The width of a point set over its length: the second over the first singular value of the
+/// positions about their mean, to 1e-8. 0 on a line, for fewer than three points, and where a
+/// position is not finite.
+double breadth(std::span<const Vec3> points);
 
 }  // namespace repose::base

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "repose/base/geometry.h"
 #include "repose/surface/surface.h"
 
 /// Registration: the rigid or similarity transform that takes a moving shape to a fixed one.
@@ -10,28 +11,10 @@ namespace repose::meshtools {
 
 using surface::Surface;
 
-/// y = s R x + t.
-struct Similarity {
-  double scale = 1;
-  Mat3 rotation = Mat3::Identity();
-  Vec3 translation = Vec3::Zero();  ///< mm
+using base::Similarity;
 
-  Vec3 apply(const Vec3& point) const { return scale * (rotation * point) + translation; }
-  Mat4 matrix() const;
-  /// The transform that does `first`, then this one.
-  Similarity after(const Similarity& first) const;
-};
-
-/// The least-squares transform taking `moving` to `fixed`, pairs in order (Umeyama, Least-squares
-/// estimation of transformation parameters between two point patterns, 1991; never a reflection).
-/// The scale stays 1 unless asked for. At least three pairs that fix a rotation.
-Similarity fit_similarity(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
-                          bool with_scale);
-
-/// The width of a point set over its length: the second over the first singular value of the
-/// positions about their mean. 0 on a line, and for fewer than three points.
-double breadth(const std::vector<Vec3>& points);
-constexpr double least_breadth = 0.01;  ///< below it, the turn about the line is noise
+/// Of landmarks (base::breadth); below it, the turn about their line is noise.
+constexpr double least_breadth = 0.01;
 
 struct LandmarkFit {
   Similarity transform;           ///< from the landmarks that were not left out
@@ -49,7 +32,7 @@ struct LandmarkFit {
 /// worst, where its error is too large for the scatter of the others, at a level of 0.1 % over all
 /// landmarks (an F test on the prediction variance of the rigid fit, to first order). At most a
 /// third of them is left out, and at least four remain, but of four one may go. Three cannot be
-/// checked. Throws InputError for fewer than three, or a set on a line (breadth).
+/// checked. Throws InputError for fewer than three, or a set on a line (least_breadth).
 LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
                           bool with_scale);
 

@@ -15,6 +15,9 @@ inline Corners corners(const Surface& surface, const Triangle& triangle) {
   return {surface.points[triangle[0]], surface.points[triangle[1]], surface.points[triangle[2]]};
 }
 
+/// Weights of a triangle's corners at the foot of a point in its plane; their sum is 1.
+Vec3 barycentric(const Corners& triangle, const Vec3& point);
+
 /// k such that no edge is longer than that from corner k to the next.
 int longest_edge(const Corners& triangle);
 

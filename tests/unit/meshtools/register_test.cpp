@@ -49,7 +49,7 @@ TEST(Register, recovers_any_transform_from_three_points_on) {
     const bool with_scale = seed % 2 == 1;
     const auto points = cloud(random, 3 + seed % 5);
     const Similarity truth = random.transform(with_scale);
-    const Similarity fit = fit_similarity(points, mapped(truth, points), with_scale);
+    const Similarity fit = base::fit_similarity(points, mapped(truth, points), with_scale);
     EXPECT_LT(difference(fit, truth), 1e-9);
     EXPECT_NEAR(fit.rotation.determinant(), 1, 1e-12);
   }
@@ -67,7 +67,7 @@ TEST(Register, the_fit_is_a_minimum) {
     return s;
   };
   for (const bool with_scale : {false, true}) {
-    const Similarity fit = fit_similarity(moving, fixed, with_scale);
+    const Similarity fit = base::fit_similarity(moving, fixed, with_scale);
     for (int k = 0; k < 50; ++k) {
       Similarity other = fit;
       const Vec3 turn = random.normal(1e-3);
@@ -123,7 +123,7 @@ TEST(Register, leave_one_out_is_the_error_of_the_fit_of_the_others) {
     auto x = moving, y = fixed;
     x.erase(x.begin() + static_cast<std::ptrdiff_t>(i));
     y.erase(y.begin() + static_cast<std::ptrdiff_t>(i));
-    const Similarity others = fit_similarity(x, y, false);
+    const Similarity others = base::fit_similarity(x, y, false);
     EXPECT_NEAR(fit.predicted[i], (others.apply(moving[i]) - fixed[i]).norm(), 1e-9);
     EXPECT_GT(fit.predicted[i], fit.residual[i]);
   }

@@ -17,6 +17,8 @@ TEST(LandmarkFit, FitsByTheirNumber) {
   const RigidFit longer = fit_landmarks({from[0], from[1]}, {to[0], {1, 9, 1}});
   EXPECT_NEAR(longer.residual, 2, 1e-12);
   EXPECT_LT((longer.motion.apply({0, 0, 3}) - Vec3(1, 3, 4)).norm(), 1e-12) << "no turn about it";
+  for (const Vec3& to : {Vec3(-4, 0, 0), Vec3(-4, 1e-12, 0), Vec3(4, 0, 0)})
+    EXPECT_LT(fit_landmarks({from[0], from[1]}, {from[0], to}).residual, 1e-9) << to.transpose();
 }
 
 }  // namespace
