@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "models.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/scene/rigid_motion.h"
@@ -106,6 +109,55 @@ TEST_P(Laws, RigidMotionCarriesTissueRigidly) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Exponents, Laws, ::testing::Values(0, 1, 2));
+
+/// Springs without rest lengths in a row, `orders` of magnitude apart, the softest of 1e-9 N/mm,
+/// each point drawn by such a force.
+struct Row {
+  explicit Row(double orders) {
+    m.bones = {"bone"};
+    for (int i = 0; i <= links; ++i) {
+      const bool end = i == 0 || i == links;
+      testing::add_point(m, {double(i), 0, 0}, end ? PointSet::bone : PointSet::soft_tissue, i);
+      if (!end) m.points.external_force[i] = {softest * (i % 3 - 0.8), 0, 0};
+      if (i > 0)
+        testing::add_spring(m, i - 1, i,
+                            softest * std::pow(10, orders * (7 * i % links) / (links - 1)), 0);
+    }
+    for (double& rest : m.springs.rest_length) rest = 0;
+  }
+  /// Each spring carries what the first does less the loads before it.
+  double first_tension() const {
+    double loads = 0, slack = links, softness = 0;
+    for (int i = 0; i < links; ++i) {
+      loads += m.points.external_force[i].x();
+      slack += loads / m.springs.stiffness[i];
+      softness += 1 / m.springs.stiffness[i];
+    }
+    return slack / softness;
+  }
+  double error(const Rest& rest) const {
+    double tension = first_tension(), x = 0, largest = 0;
+    for (int i = 1; i < links; ++i) {
+      tension -= m.points.external_force[i - 1].x();
+      x += tension / m.springs.stiffness[i - 1];
+      largest = std::max(largest, (rest.rows.position[i] - Vec3(x, 0, 0)).norm());
+    }
+    return largest;
+  }
+
+  static constexpr int links = 11;
+  static constexpr double softest = 1e-9;
+  model::Model m;
+};
+
+TEST(Estimate, IsNoShorterThanTheWayWhereStiffnessesLieFarApart) {
+  for (const double orders : {3, 6, 12, 21}) {
+    const Row row(orders);
+    const Rest rest = find_rest(row.m, 0.1);
+    EXPECT_GE(rest.summary.last.displacement_error, row.error(rest)) << orders;
+    EXPECT_TRUE(rest.summary.path.complete() || orders > 6) << rest.summary.last.reason;
+  }
+}
 
 TEST(FindRepose, RefusesAModelWithNothingFree) {
   const model::Model m = testing::block(2, 2, 2, 2, [](int, int, int) { return PointSet::bone; });
