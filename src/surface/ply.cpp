@@ -34,6 +34,7 @@ class HeaderParser {
       ++header_.lines;
       if (!line.empty() && line[0] == "end_header") {
         header_.bytes = position;
+        std::erase_if(header_.elements, [](const PlyElement& e) { return e.properties.empty(); });
         return header_;
       }
       if (!line.empty()) parse(line);
@@ -176,7 +177,6 @@ void check_text_size(const PlyHeader& header, const Content& content) {
   uint64_t room = (content.bytes.size() - header.bytes + 1) / 2;
   for (const auto& element : header.elements) {
     const uint64_t values = element.properties.size();
-    if (values == 0) continue;
     if (element.count > room / values)
       base::refuse(
           "{}: truncated or damaged: the header promises {} rows of element {}, more than "
@@ -206,8 +206,7 @@ void check_ply(const PlyHeader& header, const Content& content) {
   check_indices(*face, file);
   if (text) return check_text_size(header, content);
   BodyWalk walk(content, header);
-  for (const auto& element : header.elements)
-    if (!element.properties.empty()) walk.step_over(element);
+  for (const auto& element : header.elements) walk.step_over(element);
 }
 
 std::string plain_ply_header(const PlyHeader& header) {
@@ -216,7 +215,6 @@ std::string plain_ply_header(const PlyHeader& header) {
   const PlyElement* face = find_element(header, "face", "faces");
   std::string plain = fmt::format("ply\nformat {} 1.0\n", header.format);
   for (const auto& element : header.elements) {
-    if (element.properties.empty()) continue;
     const char* name = &element == vertex ? "vertex" : &element == face ? "face" : "skipped";
     plain += fmt::format("element {} {}\n", name, element.count);
     for (const auto& property : element.properties) {

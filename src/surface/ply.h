@@ -33,17 +33,17 @@ struct PlyHeader {
   int64_t lines;  ///< lines of the header
 };
 
-/// Parses the header and refuses, by line, what is malformed.
+/// Parses the header and refuses, by line, what is malformed. Leaves out elements without
+/// properties: their rows take no room in a file, however many it claims.
 PlyHeader parse_ply_header(const Content& content);
 
 /// Refuses a header whose elements cannot describe a surface (no coordinates, no faces, types that
 /// the reader does not take) or do not fit into the file.
 void check_ply(const PlyHeader& header, const Content& content);
 
-/// The header again in plain form: LF line ends, format first, no comments, no element without
-/// properties, every element and property but coordinates and vertex indices called "skipped" (the
-/// reader trusts the types of names it knows); list sizes of a text file as ushort, which bounds
-/// what a list may claim.
+/// The header again in plain form: LF line ends, format first, no comments, every element and
+/// property but coordinates and vertex indices called "skipped" (the reader trusts the types of
+/// names it knows); list sizes of a text file as ushort, which bounds what a list may claim.
 std::string plain_ply_header(const PlyHeader& header);
 
 }  // namespace repose::surface

@@ -80,7 +80,7 @@ void add_point(RangeGrid& grid, const Columns& columns, const PlyValues::Row& ro
 }
 
 int64_t cell_of(const PlyValues::Row& row, uint64_t number, const RangeGrid& grid) {
-  if (row.empty() || row[0].empty()) return -1;
+  if (row[0].empty()) return -1;
   const double point = row[0][0];
   if (point >= 0 && point < static_cast<double>(grid.points.size()) && point == std::floor(point))
     return static_cast<int64_t>(point);

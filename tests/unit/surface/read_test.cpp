@@ -82,6 +82,12 @@ TEST_F(Read, ply_with_comments_first_other_types_and_more_elements) {
   EXPECT_EQ(corners(read), wanted);
 }
 
+TEST_F(Read, rows_of_nothing_are_not_walked) {
+  const std::string endless = "element nothing 9000000000000000000\nelement vertex";
+  const std::string painted = with(ply_text(cube()), "element vertex", endless);
+  EXPECT_EQ(read_vertex_values(write("painted.ply", painted)).points.size(), 8u);
+}
+
 TEST_F(Read, polygons_become_triangles_of_the_same_area) {
   const std::string points = "v 0 0 0\nv 20 0 0\nv 20 20 0\nv 10 1 0\nv 0 20 0\n";
   for (const char* face :
