@@ -185,7 +185,7 @@ void check_dicom_lengths(const std::filesystem::path& file) {
   }
 }
 
-void check_nifti_spacing(const std::filesystem::path& file) {
+void check_nifti_header(const std::filesystem::path& file) {
   std::array<unsigned char, nifti_header> header{};
   gzFile in = gzopen(file.c_str(), "rb");  // reads what is not packed as well
   const int read = in ? gzread(in, header.data(), nifti_header) : 0;
@@ -197,12 +197,18 @@ void check_nifti_spacing(const std::filesystem::path& file) {
     return bits;
   };
   if (read != nifti_header || word(0) != nifti_header) return;
+  const auto number = [&](size_t at) { return std::bit_cast<float>(word(at)); };
   for (size_t axis = 0; axis < 3; ++axis) {
-    const float spacing = std::bit_cast<float>(word(80 + 4 * axis));
+    const float spacing = number(80 + 4 * axis);
     if (spacing == 0 || !std::isfinite(spacing))
       base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
                    file.string(), "ijk"[axis], spacing);
   }
+  const bool has_sform = header[254] != 0 || header[255] != 0;
+  for (size_t entry = 0; has_sform && entry < 12; ++entry)
+    if (!std::isfinite(number(280 + 4 * entry)))
+      base::refuse("{}: srow_{}[{}] of its orientation is not finite; mend the header",
+                   file.string(), "xyz"[entry / 4], entry % 4);
 }
 
 void check_meta_dimensions(const std::filesystem::path& file) {

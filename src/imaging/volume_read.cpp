@@ -37,7 +37,7 @@ void check_header(const Image& image, const std::string& name) {
 Volume read_file(const std::filesystem::path& file) {
   const ImageFormat format = format_of(file);
   const std::string name = file.string();
-  if (format == ImageFormat::nifti) check_nifti_spacing(file);
+  if (format == ImageFormat::nifti) check_nifti_header(file);
   if (format == ImageFormat::meta) check_meta_dimensions(file);
   const Image image = read_header(file, format);
   check_header(image, name);

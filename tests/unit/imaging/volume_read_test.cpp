@@ -34,6 +34,20 @@ TEST(VolumeRead, RefusesAMetaImageOfTooManyDimensions) {
         << dimensions;
 }
 
+TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsNotFinite) {
+  const test::Folder folder;
+  const std::string sound = fuzz::niftis()[1];
+  EXPECT_EQ(read_volume(folder.write("a.nii", sound)).axes.cwiseAbs(), Mat3::Identity());
+  for (const float bad : {NAN, INFINITY}) {
+    std::string spoilt = sound;
+    spoilt.replace(296 + 4 * 2, 4, surface::bytes_of<float>(bad));
+    EXPECT_NE(test::refusal([&] {
+                read_volume(folder.write("a.nii", spoilt));
+              }).find("srow_y[2] of its orientation is not finite"),
+              std::string::npos);
+  }
+}
+
 std::string refusal_of_slices(const std::string& second) {
   const test::Folder folder;
   folder.write("1.dcm", fuzz::slice(1));
