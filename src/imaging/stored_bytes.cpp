@@ -17,6 +17,7 @@ namespace repose::imaging {
 namespace {
 
 constexpr int64_t nifti_header = 348;  // bytes
+constexpr float farthest = 1e7f;       // mm, whose squares ITK can add up
 // DICOM's transfer syntaxes whose pixels are not packed.
 constexpr std::string_view implicit_little_endian = "1.2.840.10008.1.2",
                            explicit_little_endian = "1.2.840.10008.1.2.1",
@@ -204,11 +205,12 @@ void check_nifti_header(const std::filesystem::path& file) {
       base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
                    file.string(), "ijk"[axis], spacing);
   }
-  const bool has_sform = header[254] != 0 || header[255] != 0;
-  for (size_t entry = 0; has_sform && entry < 12; ++entry)
-    if (!std::isfinite(number(280 + 4 * entry)))
-      base::refuse("{}: srow_{}[{}] of its orientation is not finite; mend the header",
-                   file.string(), "xyz"[entry / 4], entry % 4);
+  const bool has_rows = header[254] != 0 || header[255] != 0;
+  for (size_t entry = 0; has_rows && entry < 12; ++entry)
+    if (const float mm = number(280 + 4 * entry); !(std::abs(mm) <= farthest))
+      base::refuse(
+          "{}: srow_{}[{}] of its orientation is {:g}, expected at most {:g} mm; mend the header",
+          file.string(), "xyz"[entry / 4], entry % 4, mm, farthest);
 }
 
 void check_meta_dimensions(const std::filesystem::path& file) {

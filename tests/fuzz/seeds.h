@@ -100,10 +100,12 @@ inline std::vector<std::string> niftis() {
   for (const int axis : {0, 1, 2, 3}) put(76 + 4 * axis, surface::bytes_of<float>(1));
   put(108, surface::bytes_of<float>(352));
   put(344, std::string("n+1\0", 4));
-  const std::string plain = header;
-  put(254, surface::bytes_of<int16_t>(1));  // an orientation of rows, srow_x and so on
-  for (const int axis : {0, 1, 2}) put(280 + 20 * axis, surface::bytes_of<float>(1));
-  return {plain + numbers_of_a_volume(), header + numbers_of_a_volume()};
+  std::string by_rows = header, by_turn = header;  // orientations: srow_x and so on, a quaternion
+  by_rows.replace(254, 2, surface::bytes_of<int16_t>(1));
+  for (const int axis : {0, 1, 2}) by_rows.replace(280 + 20 * axis, 4, surface::bytes_of<float>(1));
+  by_turn.replace(252, 2, surface::bytes_of<int16_t>(1));
+  return {header + numbers_of_a_volume(), by_rows + numbers_of_a_volume(),
+          by_turn + numbers_of_a_volume()};
 }
 
 /// One data element of DICOM in explicit little endian.

@@ -34,16 +34,16 @@ TEST(VolumeRead, RefusesAMetaImageOfTooManyDimensions) {
         << dimensions;
 }
 
-TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsNotFinite) {
+TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsHugeOrNotFinite) {
   const test::Folder folder;
   const std::string sound = fuzz::niftis()[1];
   EXPECT_EQ(read_volume(folder.write("a.nii", sound)).axes.cwiseAbs(), Mat3::Identity());
-  for (const float bad : {NAN, INFINITY}) {
+  for (const float bad : {NAN, INFINITY, -1e38f}) {
     std::string spoilt = sound;
     spoilt.replace(296 + 4 * 2, 4, surface::bytes_of<float>(bad));
     EXPECT_NE(test::refusal([&] {
                 read_volume(folder.write("a.nii", spoilt));
-              }).find("srow_y[2] of its orientation is not finite"),
+              }).find("srow_y[2] of its orientation is "),
               std::string::npos);
   }
 }
