@@ -56,6 +56,17 @@ TEST(Restart, IsRefusedWhereNothingWasReached) {
   EXPECT_NE(refusal([] { restart_of({}); }).find("no converged step"), std::string::npos);
 }
 
+TEST(Restart, IsRefusedForAnotherModel) {
+  const Folder folder;
+  model::Model m = small_model();
+  write_small_result(folder.path("a"), m);
+  m.points.position[1].z() += 1e-9;
+  EXPECT_NE(refusal([&] {
+              read_restart(MPI_COMM_SELF, folder.path("a.h5"), m);
+            }).find("its points differ from the input's"),
+            std::string::npos);
+}
+
 TEST(Restart, AResultIsNoCheckpoint) {
   const Folder folder;
   write_small_result(folder.path("a"), small_model());
