@@ -191,14 +191,17 @@ void check_nifti_header(const std::filesystem::path& file) {
   gzFile in = gzopen(file.c_str(), "rb");  // reads what is not packed as well
   const int read = in ? gzread(in, header.data(), nifti_header) : 0;
   if (in) gzclose(in);
-  const auto word = [&](size_t at) {
-    const bool little = header[0] == 0x5c;  // of 348, the first number
+  // The library tells the order of bytes by the number of dimensions, 1 to 7.
+  const auto few = [&](size_t low, size_t high) {
+    return header[high] == 0 && header[low] >= 1 && header[low] <= 7;
+  };
+  const bool little = few(40, 41);
+  if (read != nifti_header || !(little || few(41, 40))) return;
+  const auto number = [&](size_t at) {
     uint32_t bits = 0;
     for (size_t b = 0; b < 4; ++b) bits = bits << 8 | header[at + (little ? 3 - b : b)];
-    return bits;
+    return std::bit_cast<float>(bits);
   };
-  if (read != nifti_header || word(0) != nifti_header) return;
-  const auto number = [&](size_t at) { return std::bit_cast<float>(word(at)); };
   for (size_t axis = 0; axis < 3; ++axis) {
     const float spacing = number(80 + 4 * axis);
     if (spacing == 0 || !std::isfinite(spacing))
