@@ -8,6 +8,7 @@
 #include <numeric>
 #include <set>
 
+#include "model/add_contact.h"
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
@@ -259,6 +260,17 @@ TEST_F(CutSolid, keeps_the_tension_that_its_edges_carry) {
   }
   for (size_t i = 0; i < was.size(); ++i) EXPECT_LT((is[i] - was[i]).norm(), 1e-9);
   EXPECT_GT(largest, 1);
+}
+
+TEST(CutTouches, both_sides_share_the_area_that_touches) {
+  Model m;
+  m.contact.touches = {{3, 5}, {0, 1}, {Binding::touches, Binding::slides}, {4, 6}};
+  share_touches({{5, 9}, {7, 10}}, m);
+  const Touches& touches = m.contact.touches;
+  EXPECT_EQ(touches.point, (std::vector<int64_t>{3, 5, 9}));
+  EXPECT_EQ(touches.body, (std::vector<int32_t>{0, 1, 1}));
+  EXPECT_EQ(touches.binding[2], Binding::slides);
+  EXPECT_EQ(touches.area, (std::vector<double>{4, 3, 3}));
 }
 
 }  // namespace
