@@ -36,7 +36,7 @@ void say(const std::string& text) {
 /// Path of the result without ending; never that of the input, which is read first: what is wrong
 /// with it is to be said first.
 std::string result_name(const base::Options& options, const std::filesystem::path& input) {
-  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
+  std::string name = options.has("output") ? options.text("output") : input.stem().string();
   std::error_code missing;
   if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
   read_job(comm, input);
@@ -89,7 +89,7 @@ class Run {
 
 /// Springs tear, in rounds of searches; the run then begins with the state that these left.
 solve::Tearing Run::tear() {
-  const solve::Tearing tearing =
+  solve::Tearing tearing =
       solve::tear(comm, job_.model, job_.tearing, strategy_.settings, start_.position);
   if (tearing.rounds > 0) stages_.end("tear");
   if (!tearing.torn) return tearing;

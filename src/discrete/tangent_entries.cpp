@@ -89,7 +89,7 @@ void TangentEntries::make_pattern_matrix() {
     const auto row = static_cast<PetscInt>(part_.first_unknown + k);
     for (const BlockRows& rows : rows_) {
       const PetscInt n = rows.begin[k + 1] - rows.begin[k];
-      const std::vector<PetscScalar> zeros(9 * n, 0.0);
+      const std::vector<PetscScalar> zeros(size_t{9} * n, 0.0);
       const std::vector<PetscInt> columns(rows.column.begin() + rows.begin[k],
                                           rows.column.begin() + rows.begin[k + 1]);
       check(MatSetValuesBlocked(pattern_, 1, &row, n, columns.data(), zeros.data(), INSERT_VALUES));

@@ -80,10 +80,12 @@ WallLoop::WallLoop(const model::Walls& walls, double stiffness) : stiffness_(sti
     const size_t count = static_cast<size_t>(walls.size[cut][0]) * rows;
     add_net(walls, cut, first);
     add_net(walls, cut, first + count);
-    for (size_t c = 0; c < count; ++c, ++place)
+    for (size_t c = 0; c < count; ++c, ++place) {
+      const size_t column = c / rows, row = c % rows;
       if (walls.area[place] > 0)
         add_place(walls.point[walls.begin[first + c]], walls.area[place],
-                  {static_cast<double>(c / rows), static_cast<double>(c % rows)});
+                  {static_cast<double>(column), static_cast<double>(row)});
+    }
     link(nets_[nets_.size() - 2], nets_.back());
     first += 2 * count;
   }
