@@ -8,6 +8,7 @@
 
 #include "moved_block.h"
 #include "quadratic.h"
+#include "repose/base/options.h"
 
 namespace repose {
 namespace {
@@ -76,6 +77,8 @@ class Curvatures : public discrete::Hessian {
   base::MatHandle matrix_;
 };
 
+std::array<double, 3> quartic(double x) { return {std::pow(x, 4) / 4, x * x * x, 3 * x * x}; }
+
 /// A search that begins with every scalar unknown at `start`.
 struct Search : testing::MovedBlock {
   Sum sum;
@@ -93,11 +96,7 @@ struct Search : testing::MovedBlock {
 
 TEST(Estimate, KnowsHowFarRestIsInAWellFlatAtItsBottom) {
   // Newton steps from x are x/3, 2x/9, …; the second with the first one's Hessian were 8x/81.
-  const Search s(
-      [](double x) {
-        return std::array{std::pow(x, 4) / 4, x * x * x, 3 * x * x};
-      },
-      1, 2);
+  const Search s(quartic, 1, 2);
   EXPECT_TRUE(s.outcome.converged);
   EXPECT_NEAR(s.outcome.displacement_error, discrete::largest_block(s.x), 1e-6);
 }
@@ -107,6 +106,14 @@ TEST(Estimate, IsNoShorterThanTheWayWhereNoStepWasTaken) {
   EXPECT_TRUE(s.outcome.converged);
   EXPECT_GT(discrete::largest_block(s.x), 3e-7);
   EXPECT_GE(s.outcome.displacement_error, discrete::largest_block(s.x));
+}
+
+TEST(Estimate, AboveTheAccuracyIsNotConverged) {
+  const base::ScopedOption few("-tao_max_it", "1");
+  const Search s(quartic, 1, 0.5);
+  EXPECT_GT(s.outcome.displacement_error, 0.5);
+  EXPECT_LT(s.outcome.displacement_error, 2);
+  EXPECT_FALSE(s.outcome.converged);
 }
 
 TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
