@@ -9,4 +9,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 install_packages clang-tidy-14
 cmake --preset tidy >/dev/null
-exec run-clang-tidy-14 -quiet -p build-tidy -j "${JOBS:-$(nproc)}" "${1:-.}"
+# Debian's ITK 5.2 knows GCC alone: all of its words on compilers that is used.
+exec run-clang-tidy-14 -quiet -p build-tidy -j "${JOBS:-$(nproc)}" \
+  -extra-arg=-DITK_COMPILER_DETECTION_H -extra-arg=-DITK_NOEXCEPT=noexcept "${1:-.}"

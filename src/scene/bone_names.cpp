@@ -7,7 +7,7 @@
 namespace repose::scene {
 
 std::string read_new_name(const Value& value, const std::vector<BoneEntry>& bones) {
-  const std::string name = value.text();
+  std::string name = value.text();
   const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
   if (name.size() > 64 || !std::all_of(name.begin(), name.end(), printable))
     value.refuse("{} must be printable ASCII, 64 characters at most", base::shown(name));

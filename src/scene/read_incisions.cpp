@@ -26,7 +26,7 @@ namespace {
 
 Incision read_incision(const Map& map, int layers) {
   const Value depth = map.at("layers");
-  const Incision incision{read_path(map.at("path")), depth.integer()};
+  Incision incision{read_path(map.at("path")), depth.integer()};
   if (incision.layers > layers)
     depth.refuse("must be a whole number, 1 … {}, as tissue.layers is, it is {}", layers,
                  incision.layers);

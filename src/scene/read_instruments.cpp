@@ -5,14 +5,14 @@ namespace {
 
 /// A vector that must not be zero.
 Vec3 read_direction(const Value& value) {
-  const Vec3 direction = value.vector();
+  Vec3 direction = value.vector();
   if (!(direction.norm() > 0)) value.refuse("must not be zero; give a direction");
   return direction;
 }
 
 Box read_box(const Map& map) {
   const Value size = map.at("size");
-  const Box box{map.at("center").vector(), size.vector()};
+  Box box{map.at("center").vector(), size.vector()};
   if (!(box.size.minCoeff() > 0)) size.refuse("must be greater than 0 along every axis");
   return box;
 }

@@ -85,14 +85,14 @@ std::vector<BoneEntry> read_bones(const Value& value) {
 }
 
 std::vector<double> read_one_a_layer(const Value& value, int layers) {
-  const std::vector<double> numbers = value.numbers();
+  std::vector<double> numbers = value.numbers();
   if (numbers.size() != static_cast<std::size_t>(layers))
     value.refuse("must have one number a layer: {} layers, it has {}", layers, numbers.size());
   return numbers;
 }
 
 std::vector<double> read_depths(const Value& value, int layers) {
-  const std::vector<double> depths = read_one_a_layer(value, layers);
+  std::vector<double> depths = read_one_a_layer(value, layers);
   if (depths.front() != 0 || depths.back() != 1)
     value.refuse(
         "must begin with 0 (the skin) and end with 1 (the bone), it goes from {:g} to {:g}",
@@ -105,7 +105,7 @@ std::vector<double> read_depths(const Value& value, int layers) {
 }
 
 std::vector<double> read_depths_mm(const Value& value, int layers) {
-  const std::vector<double> depths = value.numbers();
+  std::vector<double> depths = value.numbers();
   if (depths.empty() || depths.size() > static_cast<std::size_t>(layers))
     value.refuse("must have 1 to {} numbers, at most one a layer; it has {}", layers,
                  depths.size());

@@ -14,12 +14,12 @@ std::string joined(const std::string& above, const std::string& name) {
 
 }  // namespace
 
-Value::Value(std::filesystem::path file, YAML::Node root)
+Value::Value(std::filesystem::path file, const YAML::Node& root)
     : file_(std::make_shared<const std::filesystem::path>(std::move(file))),
       node_(root),
       mark_(root.Mark()) {}
 
-Value::Value(const Value& parent, YAML::Node node, const YAML::Mark& mark, std::string path,
+Value::Value(const Value& parent, const YAML::Node& node, const YAML::Mark& mark, std::string path,
              std::string place)
     : file_(parent.file_),
       node_(node),
@@ -100,7 +100,7 @@ std::filesystem::path Value::absolute_path() const {
 }
 
 std::filesystem::path Value::file() const {
-  const auto path = absolute_path();
+  auto path = absolute_path();
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
     refuse("names the folder {}; a file is needed", shown());
@@ -110,7 +110,7 @@ std::filesystem::path Value::file() const {
 }
 
 std::filesystem::path Value::file_or_folder() const {
-  const auto path = absolute_path();
+  auto path = absolute_path();
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     refuse("names {}, which is no file or folder (paths are relative to the scene's folder)",

@@ -19,7 +19,7 @@ namespace repose::scene {
 class Value {
  public:
   /// The whole file.
-  Value(std::filesystem::path file, YAML::Node root);
+  Value(std::filesystem::path file, const YAML::Node& root);
 
   /// Throws InputError "file:line:column: key text".
   template <class... Args>
@@ -68,7 +68,7 @@ class Value {
     bool merged;
   };
 
-  Value(const Value& parent, YAML::Node node, const YAML::Mark& mark, std::string path,
+  Value(const Value& parent, const YAML::Node& node, const YAML::Mark& mark, std::string path,
         std::string place);
   std::vector<Value> list(const std::string& path) const;
   std::vector<Entry> entries() const;

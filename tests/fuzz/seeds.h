@@ -128,8 +128,9 @@ inline std::string slice(int number) {
   const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", ct) +
                            element(2, 3, "UI", name) +
                            element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-  return std::string(128, '\0') + "DICM" +
-         element(2, 0, "UL", bytes_of<uint32_t>(static_cast<uint32_t>(meta.size()))) + meta +
+  std::string file(128, '\0');
+  file += "DICM";
+  return file + element(2, 0, "UL", bytes_of<uint32_t>(static_cast<uint32_t>(meta.size()))) + meta +
          element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", name) + element(8, 0x60, "CS", "CT") +
          element(8, 0x103e, "LO", "bone") + element(0x20, 0xd, "UI", "1.2") +
          element(0x20, 0xe, "UI", "1.2.3") + element(0x20, 0x13, "IS", std::to_string(number)) +

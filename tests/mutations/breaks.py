@@ -177,7 +177,7 @@ BREAKS = [
         "averaged pressure is counted twice",
         "(nodal.empty() ? 0 : prisms.nodal_modulus[m]);\n    const double v0",
         "0;\n    const double v0",
-        f"{SOLVE}solid|program.continuum|program.check",
+        f"{MECHANICS}solid|{SOLVE}solid|program.continuum|program.check",
     ),
     (
         "Lamé's constants of incompressible tissue",

@@ -11,6 +11,7 @@ import pytest
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 TIME_LIMIT = 120  # seconds
+PATIENCE = float(os.environ.get("REPOSE_PATIENCE", 1))  # limits times this: slow builds
 
 
 def mpi_environment():
@@ -33,14 +34,15 @@ def finish(command, cwd, environment, time_limit):
         command, cwd=cwd, env=environment, text=True, errors="replace", start_new_session=True,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        stdout, stderr = process.communicate(timeout=time_limit)
+        stdout, stderr = process.communicate(timeout=PATIENCE * time_limit)
     except subprocess.TimeoutExpired:
         process.terminate()  # mpirun stops its ranks, which are not in its process group
         try:
             process.communicate(timeout=10)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
-        pytest.fail(f"still running after {time_limit} s: {' '.join(map(str, command))}")
+        waited = f"{PATIENCE * time_limit:g} s"
+        pytest.fail(f"still running after {waited}: {' '.join(map(str, command))}")
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
 

@@ -2,6 +2,7 @@
 gradient and its Hessian action on the same springs without prisms, with prisms and no volume term,
 and with one."""
 
+import os
 import re
 import shutil
 
@@ -15,6 +16,8 @@ def instructions(tmp_path_factory, environment):
     """count(case): instructions of evaluate_often() in a case of tests/unit/mechanics."""
     if not shutil.which("valgrind"):
         pytest.skip("no valgrind: apt-get install valgrind")
+    if "ASAN_OPTIONS" in os.environ:
+        pytest.skip("valgrind runs no program that has the address sanitizer")
     folder = tmp_path_factory.mktemp("callgrind")
 
     def count(case):

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "assembled.h"
+#include "repose/mechanics/nodal_volumes.h"
 #include "repose/mechanics/stress.h"
 #include "states.h"
 
@@ -144,6 +145,15 @@ TEST_F(SolidBlock, StateOfAPrism) {
       std::sqrt(0.5 * (std::pow(stress[0] - stress[1], 2) + std::pow(stress[1] - stress[2], 2) +
                        std::pow(stress[2] - stress[0], 2)));
   EXPECT_NEAR(state.von_mises, mises, 1e-12);
+}
+
+TEST_F(SolidBlock, VolumesThatAllChangeAlikePressAlikeAveragedOrNot) {
+  std::vector<Vec3> x = model_.points.position;
+  for (Vec3& p : x) p = Vec3(1.1, 0.9, 1.3).asDiagonal() * p;
+  const double slope = modulus_ * (1.1 * 0.9 * 1.3 - 1) - shear_;
+  for (const double m : volume_slopes(model_, x)) EXPECT_NEAR(m, slope, 1e-12);
+  model_.prisms.nodal_modulus.assign(model_.prisms.modulus.size(), modulus_ - shear_);
+  for (const double m : volume_slopes(model_, x)) EXPECT_NEAR(m, slope, 1e-12);
 }
 
 TEST_F(SolidBlock, LimitedSlopesMakeTheHessianSemidefinite) {
