@@ -110,9 +110,9 @@ TEST(Estimate, IsNoShorterThanTheWayWhereNoStepWasTaken) {
 
 TEST(Estimate, AboveTheAccuracyIsNotConverged) {
   const base::ScopedOption few("-tao_max_it", "1");
-  const Search s(quartic, 1, 0.5);
-  EXPECT_GT(s.outcome.displacement_error, 0.5);
-  EXPECT_LT(s.outcome.displacement_error, 2);
+  const Search s(quartic, 1, 0.1);
+  EXPECT_GT(s.outcome.displacement_error, 0.1);
+  EXPECT_LT(s.outcome.displacement_error, 1);
   EXPECT_FALSE(s.outcome.converged);
 }
 
