@@ -81,7 +81,7 @@ double TermLoop::add_gradient(std::span<const Vec3> position, double scale,
 }
 
 Eigen::MatrixXd TermLoop::hessian_of(size_t e, std::span<const Vec3> position, bool exact) const {
-  const Eigen::MatrixXd hessian = term_->hessian(places(e, position), numbers_of(e));
+  Eigen::MatrixXd hessian = term_->hessian(places(e, position), numbers_of(e));
   if (exact) return hessian;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(hessian);
   return of.eigenvectors() * of.eigenvalues().cwiseMax(0).asDiagonal() *

@@ -136,8 +136,8 @@ class TermLoop {
   void for_each_block(std::span<const Vec3> position, bool exact, Visit&& visit) const {
     for (size_t e = 0; e < size(); ++e) {
       const Eigen::MatrixXd hessian = hessian_of(e, position, exact);
-      for (int i = 0; i < term_->points(); ++i)
-        for (int j = i; j < term_->points(); ++j)
+      for (Eigen::Index i = 0; i < term_->points(); ++i)
+        for (Eigen::Index j = i; j < term_->points(); ++j)
           visit(points_of(e)[i], points_of(e)[j], Mat3(hessian.block<3, 3>(3 * i, 3 * j)));
     }
   }
