@@ -109,12 +109,20 @@ void smooth(const VertexNeighbours& neighbours, int rounds, std::vector<double>&
   }
 }
 
+bool in_any(const std::vector<std::function<bool(const Vec3&)>>& regions, const Vec3& point) {
+  return std::any_of(regions.begin(), regions.end(),
+                     [&](const auto& contains) { return contains(point); });
+}
+
 /// The part of the outer skin that is solved.
 Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
   const VertexNeighbours neighbours = neighbours_of(outer.skin);
   const std::vector<char> end = ends_of(outer);
   std::vector<double> inside(end.size(), request.margin);
-  if (!request.beneath.empty() || !request.places.empty()) {
+  if (!request.regions.empty()) {
+    for (size_t v = 0; v < end.size(); ++v)
+      if (!in_any(request.regions, outer.skin.points[v])) inside[v] = -request.margin;
+  } else if (!request.beneath.empty() || !request.places.empty()) {
     inside = way_from_bones(outer.skin, neighbours, end, request);
     for (double& value : inside) value = request.margin - std::min(value, 2 * request.margin);
   }
@@ -123,6 +131,9 @@ Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
   smooth(neighbours, border_smoothing, inside);
   fill(neighbours, end, inside);
   const Surface part = cut_at_zero(outer.skin, inside);
+  if (part.triangles.empty() && !request.regions.empty())
+    base::refuse("{}: nothing of it lies in the regions of tissue.face; move or enlarge them",
+                 outer.skin.name);
   if (part.triangles.empty())
     base::refuse(
         "{}: nothing of it is within {:g} mm of a bone that moves; check that skin and "

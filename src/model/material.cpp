@@ -5,14 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <memory>
 #include <numeric>
 
 #include "region.h"
 #include "repose/base/error.h"
-#include "repose/base/text.h"
-#include "repose/surface/distance.h"
-#include "repose/surface/read.h"
 
 namespace repose::model {
 
@@ -57,56 +53,13 @@ struct Place {
 
 using Inside = std::function<bool(const Place&)>;
 
-/// Which vertices are painted.
-std::vector<char> painted_vertices(const scene::PaintedRegion& region,
-                                   const surface::VertexValues& mesh) {
-  constexpr double tolerance = 40;  // of 255: brushes blend at their rims
-  constexpr const char* channels[3] = {"red", "green", "blue"};
-  const auto values_of = [&](const std::string& name) -> const std::vector<double>& {
-    if (const std::vector<double>* values = mesh.find(name)) return *values;
-    base::refuse(
-        "{}: its vertices have no property {}; they have {}", region.file.string(),
-        base::shown(name),
-        mesh.names.empty() ? "x, y and z alone" : fmt::format("{}", fmt::join(mesh.names, ", ")));
-  };
-  std::vector<char> painted(mesh.points.size(), 1);
-  if (!region.property.empty()) {
-    const std::vector<double>& values = values_of(region.property);
-    for (size_t p = 0; p < painted.size(); ++p) painted[p] = values[p] >= region.at_least;
-    return painted;
-  }
-  for (int c = 0; c < 3; ++c) {
-    const std::vector<double>& values = values_of(channels[c]);
-    for (size_t p = 0; p < painted.size(); ++p)
-      painted[p] &= std::abs(values[p] - region.color[c]) <= tolerance;
-  }
-  return painted;
-}
-
-/// A prism lies in a region of space where its middle does.
-template <class Where>
-Inside inside_of(const Where& where) {
-  return [contains = contains_of(where)](const Place& at) { return contains(at.middle); };
-}
-
-/// A prism lies in it where the painted mesh's vertex nearest to the skin above is painted.
-Inside inside_of(const scene::PaintedRegion& region) {
-  const surface::VertexValues mesh = surface::read_vertex_values(region.file);
-  const std::vector<char> painted = painted_vertices(region, mesh);
-  const auto count = std::count(painted.begin(), painted.end(), 1);
-  if (count == 0)
-    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), painted.size(),
-                 region.property.empty()
-                     ? fmt::format("({:g}, {:g}, {:g})", region.color.x(), region.color.y(),
-                                   region.color.z())
-                     : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
-  const auto tree = std::make_shared<surface::PointTree>(mesh.points);
-  const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);
-  return [=, depth = region.depth](const Place& at) {
-    constexpr double beside = 10;  // mm, where the painted mesh is another one
-    const int64_t nearest = tree->nearest(at.skin, 1).front();
-    return painted[nearest] && (at.skin - (*points)[nearest]).norm() <= beside &&
-           (at.middle - at.skin).norm() <= depth;
+/// A prism lies in a region of space where its middle does, and in a painted one below its paint.
+Inside inside_of(const scene::SkinRegion& region) {
+  if (const auto* space = std::get_if<scene::Region>(&region))
+    return [contains = contains_of(*space)](const Place& at) { return contains(at.middle); };
+  const auto& painted = std::get<scene::PaintedRegion>(region);
+  return [above = contains_of_skin(region), depth = painted.depth](const Place& at) {
+    return above(at.skin) && (at.middle - at.skin).norm() <= depth;
   };
 }
 
@@ -156,8 +109,7 @@ Place place_of(const Model& model, size_t m) {
 void give_regions(const scene::Material& material, const std::string& file, Model& model) {
   for (size_t r = 0; r < material.regions.size(); ++r) {
     const scene::MaterialRegion& region = material.regions[r];
-    const Inside inside =
-        std::visit([&](const auto& where) { return inside_of(where); }, region.where);
+    const Inside inside = inside_of(region.where);
     int64_t found = 0;
     for (size_t m = 0; m < model.prisms.points.size(); ++m) {
       if (!inside(place_of(model, m))) continue;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 #include "repose/imaging/volume.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
@@ -14,6 +15,13 @@ namespace {
 
 Contains inside(const scene::SphereRegion& sphere, double near) {
   return [=](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius + near; };
+}
+
+Contains inside(const scene::Box& box, double near) {
+  return [=](const Vec3& x) {
+    const Vec3 beyond = (x - box.center).cwiseAbs() - 0.5 * box.size;
+    return beyond.cwiseMax(0).norm() <= near;
+  };
 }
 
 Contains inside(const scene::CurveRegion& curve, double near) {
@@ -61,10 +69,60 @@ Contains inside(const scene::LabelRegion& region, double near) {
   };
 }
 
+/// Which vertices are painted.
+std::vector<char> painted_vertices(const scene::PaintedRegion& region,
+                                   const surface::VertexValues& mesh) {
+  constexpr double tolerance = 40;  // of 255: brushes blend at their rims
+  constexpr const char* channels[3] = {"red", "green", "blue"};
+  const auto values_of = [&](const std::string& name) -> const std::vector<double>& {
+    if (const std::vector<double>* values = mesh.find(name)) return *values;
+    base::refuse(
+        "{}: its vertices have no property {}; they have {}", region.file.string(),
+        base::shown(name),
+        mesh.names.empty() ? "x, y and z alone" : fmt::format("{}", fmt::join(mesh.names, ", ")));
+  };
+  std::vector<char> painted(mesh.points.size(), 1);
+  if (!region.property.empty()) {
+    const std::vector<double>& values = values_of(region.property);
+    for (size_t p = 0; p < painted.size(); ++p) painted[p] = values[p] >= region.at_least;
+    return painted;
+  }
+  for (int c = 0; c < 3; ++c) {
+    const std::vector<double>& values = values_of(channels[c]);
+    for (size_t p = 0; p < painted.size(); ++p)
+      painted[p] &= std::abs(values[p] - region.color[c]) <= tolerance;
+  }
+  return painted;
+}
+
+Contains painted(const scene::PaintedRegion& region) {
+  const surface::VertexValues mesh = surface::read_vertex_values(region.file);
+  const std::vector<char> painted = painted_vertices(region, mesh);
+  const auto count = std::count(painted.begin(), painted.end(), 1);
+  if (count == 0)
+    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), painted.size(),
+                 region.property.empty()
+                     ? fmt::format("({:g}, {:g}, {:g})", region.color.x(), region.color.y(),
+                                   region.color.z())
+                     : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
+  const auto tree = std::make_shared<surface::PointTree>(mesh.points);
+  const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);
+  return [=](const Vec3& skin) {
+    constexpr double beside = 10;  // mm, where the painted mesh is another one
+    const int64_t nearest = tree->nearest(skin, 1).front();
+    return painted[nearest] && (skin - (*points)[nearest]).norm() <= beside;
+  };
+}
+
 }  // namespace
 
 Contains contains_of(const scene::Region& region, double near) {
   return std::visit([&](const auto& of) { return inside(of, near); }, region);
+}
+
+Contains contains_of_skin(const scene::SkinRegion& region) {
+  if (const auto* space = std::get_if<scene::Region>(&region)) return contains_of(*space);
+  return painted(std::get<scene::PaintedRegion>(region));
 }
 
 }  // namespace repose::model

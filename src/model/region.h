@@ -11,4 +11,8 @@ using Contains = std::function<bool(const Vec3&)>;
 /// label map). Reads the region's file; throws InputError for a mesh that is not closed.
 Contains contains_of(const scene::Region& region, double near = 0);
 
+/// Whether a point of the skin lies in a region of space, or the painted mesh's vertex nearest to
+/// it, within 10 mm, is painted.
+Contains contains_of_skin(const scene::SkinRegion& region);
+
 }  // namespace repose::model

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "bone_field.h"
+#include "region.h"
 #include "repose/meshtools/face.h"
 
 namespace repose::model {
@@ -14,6 +15,9 @@ meshtools::FaceRequest request_of(const Anatomy& anatomy) {
   const scene::Scene& scene = anatomy.scene;
   const double edge = *scene.tissue.edge;
   meshtools::FaceRequest request{edge > 0 ? edge : meshtools::edge_for(anatomy.skin)};
+  request.margin = scene.tissue.margin;
+  for (const scene::SkinRegion& region : scene.tissue.face)
+    request.regions.push_back(contains_of_skin(region));
   if (!scene.instruments.empty()) return request;
   for (size_t b = 0; b < anatomy.bones.size(); ++b)
     if (!scene.moves[b].is_identity()) request.beneath.push_back(anatomy.bones[b]);

@@ -102,6 +102,13 @@ std::vector<Key> tissue_keys() {
        .unit = "mm",
        .range = Range::between(1, 20),
        .choices = {"auto"}},
+      {"tissue.margin", number, "35",
+       "With edge: how far the skin that is solved reaches along it beyond what lies within 25 mm "
+       "of a moving bone, a force or an incision.",
+       "mm", Range::between(5, 300)},
+      {"tissue.face", list, "",
+       "With edge: regions whose skin is solved in place of that; where they do not hang together, "
+       "the largest part. Excludes margin."},
       {"tissue.attach_within", number, "30", "Tissue deeper than this is not attached to bone.",
        "mm", Range::at_least(0)},
       {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
@@ -111,10 +118,6 @@ std::vector<Key> tissue_keys() {
        Range::at_least(0)},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks): attach_regions of contact."},
-      {"tissue.unattached[].sphere", map, "required", "A region as a sphere."},
-      {"tissue.unattached[].sphere.center", vector, "required", "Its center.", "mm"},
-      {"tissue.unattached[].sphere.radius", number, "required", "Its radius.", "mm",
-       Range::above(0)},
       {"tissue.turgor", number, "0",
        "Initial strain of the skin: of its springs, or of a material's first stratum.", "",
        Range::between(0, 1)},
@@ -129,6 +132,9 @@ std::vector<Key> region_keys(const std::string& item) {
   return {{item + ".sphere", map, "", "The region as a sphere, or"},
           {item + ".sphere.center", vector, "required", "Its center.", "mm"},
           {item + ".sphere.radius", number, "required", "Its radius.", "mm", Range::above(0)},
+          {item + ".box", map, "", "as a box along the axes, or"},
+          {item + ".box.center", vector, "required", "Its center.", "mm"},
+          {item + ".box.size", vector, "required", "Its length along each axis, above 0.", "mm"},
           {item + ".mesh", file, "", "as the inside of a closed triangle mesh, or"},
           {item + ".volume", volume, "", "as the voxels of a label map that have"},
           {item + ".label", integer, "", "this label, or", "", Range::between(1, 100000)},
@@ -163,7 +169,7 @@ std::vector<Key> contact_keys() {
       {"mouth.path", curve, "required",
        "From one corner of the mouth to the other: points near the skin, or a file of them."},
       {"mouth.path[]", vector, "", "One of the points.", "mm"}};
-  for (const std::string item : {"teeth[]", "tissue.attach_regions[]"})
+  for (const std::string item : {"teeth[]", "tissue.attach_regions[]", "tissue.unattached[]"})
     for (Key& row : region_keys(item)) rows.push_back(std::move(row));
   return rows;
 }
@@ -176,19 +182,22 @@ std::vector<Key> elasticity_keys(const std::string& above, const char* standard)
            "", Range::between(-0.9, 0.4999)}};
 }
 
-/// A part of the skin that is painted on a mesh.
-std::vector<Key> painted_keys(const std::string& above) {
-  return {{above, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
-          {above + ".mesh", file, "required",
-           "A PLY of the skin with colors or values at its vertices."},
-          {above + ".color", numbers, "",
-           "Red, green and blue of the paint; excludes property. Vertices within 40 of each count.",
-           "", Range::between(0, 255)},
-          {above + ".property", text, "",
-           "In place of color a property of the vertices (quality, say, or a mask)."},
-          {above + ".at_least", number, "0.5", "The least value of it that counts as painted."},
-          {above + ".depth", number, "", "How deep the region reaches; all the way when not given.",
-           "mm", Range::above(0)}};
+/// The same, or a part of the skin that is painted on a mesh.
+std::vector<Key> skin_region_keys(const std::string& item) {
+  std::vector<Key> rows = region_keys(item);
+  const std::string painted = item + ".painted";
+  rows.insert(
+      rows.end(),
+      {{painted, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
+       {painted + ".mesh", file, "required",
+        "A PLY of the skin with colors or values at its vertices."},
+       {painted + ".color", numbers, "",
+        "Red, green and blue of the paint; excludes property. Vertices within 40 of each count.",
+        "", Range::between(0, 255)},
+       {painted + ".property", text, "",
+        "In place of color a property of the vertices (quality, say, or a mask)."},
+       {painted + ".at_least", number, "0.5", "The least value of it that counts as painted."}});
+  return rows;
 }
 
 std::vector<Key> material_keys() {
@@ -226,16 +235,10 @@ std::vector<Key> material_keys() {
        Range::above(0)},
       {"tissue.material.regions", list, "",
        "Regions of another material; a later one overrides earlier ones."},
-      {"tissue.material.regions[].sphere", map, "", "A region as a sphere."},
-      {"tissue.material.regions[].sphere.center", vector, "required", "Its center.", "mm"},
-      {"tissue.material.regions[].sphere.radius", number, "required", "Its radius.", "mm",
-       Range::above(0)},
-      {"tissue.material.regions[].mesh", file, "",
-       "A region as the inside of a closed triangle mesh."},
-      {"tissue.material.regions[].volume", volume, "", "A label map; needs label."},
-      {"tissue.material.regions[].label", integer, "", "The label that marks the region.", "",
-       Range::between(1, 100000)}};
-  for (const Key& key : painted_keys("tissue.material.regions[].painted")) rows.push_back(key);
+      {"tissue.material.regions[].painted.depth", number, "",
+       "How deep the region reaches; all the way when not given.", "mm", Range::above(0)}};
+  for (const char* item : {"tissue.material.regions[]", "tissue.face[]"})
+    for (const Key& key : skin_region_keys(item)) rows.push_back(key);
   for (const char* above :
        {"tissue.material.skin", "tissue.material.strata[]", "tissue.material.regions[]"})
     for (const Key& key : elasticity_keys(above, "required")) rows.push_back(key);

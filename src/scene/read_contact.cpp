@@ -1,20 +1,8 @@
 #include "read_contact.h"
 
-#include "read_incisions.h"
+#include "read_region.h"
 
 namespace repose::scene {
-
-Region read_region(const Map& map) {
-  const auto sphere = map.find("sphere"), mesh = map.find("mesh"), volume = map.find("volume"),
-             curve = map.find("curve");
-  if (sphere.has_value() + mesh.has_value() + volume.has_value() + curve.has_value() != 1)
-    map.itself().refuse("needs exactly one of sphere, mesh, volume and curve");
-  if (mesh) return MeshRegion{mesh->file()};
-  if (volume) return LabelRegion{volume->file_or_folder(), map.at("label").integer()};
-  if (curve) return CurveRegion{read_path(*curve), map.at("radius").number()};
-  const Map ball(*sphere);
-  return SphereRegion{ball.at("center").vector(), ball.at("radius").number()};
-}
 
 std::vector<AttachRegion> read_attach_regions(const Value& list) {
   std::vector<AttachRegion> regions;

@@ -1,5 +1,7 @@
 #include "read_instruments.h"
 
+#include "read_region.h"
+
 namespace repose::scene {
 namespace {
 
@@ -8,13 +10,6 @@ Vec3 read_direction(const Value& value) {
   Vec3 direction = value.vector();
   if (!(direction.norm() > 0)) value.refuse("must not be zero; give a direction");
   return direction;
-}
-
-Box read_box(const Map& map) {
-  const Value size = map.at("size");
-  Box box{map.at("center").vector(), size.vector()};
-  if (!(box.size.minCoeff() > 0)) size.refuse("must be greater than 0 along every axis");
-  return box;
 }
 
 Instrument read_instrument(const Map& map) {

@@ -1,9 +1,9 @@
 #include "read_material.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "material_presets.h"
+#include "read_region.h"
 
 namespace repose::scene {
 
@@ -20,39 +20,8 @@ Stratum read_stratum(const Value& value, double poisson) {
   return {map.at("thickness").number(), read_elasticity(map, poisson)};
 }
 
-PaintedRegion read_painted(const Value& value) {
-  const Map map(value);
-  const auto color = map.find("color"), property = map.find("property");
-  if (color.has_value() == property.has_value()) value.refuse("needs one of color and property");
-  PaintedRegion region;
-  region.file = map.at("mesh").file();
-  if (property) region.property = property->text();
-  if (const auto least = map.find("at_least")) {
-    if (color) least->refuse("is of property, and color is given; remove one");
-    region.at_least = least->number();
-  }
-  if (color) {
-    const std::vector<double> given = color->numbers();
-    if (given.size() != 3) color->refuse("must be red, green and blue, it has {}", given.size());
-    region.color = {given[0], given[1], given[2]};
-  }
-  const auto depth = map.find("depth");
-  region.depth = depth ? depth->number() : std::numeric_limits<double>::infinity();
-  return region;
-}
-
-MaterialRegion read_region(const Value& value, double poisson) {
-  const Map map(value);
-  const auto sphere = map.find("sphere"), mesh = map.find("mesh"), volume = map.find("volume");
-  const auto painted = map.find("painted");
-  if (sphere.has_value() + mesh.has_value() + volume.has_value() + painted.has_value() != 1)
-    value.refuse("needs one of sphere, mesh, volume and painted");
-  const Elasticity elasticity = read_elasticity(map, poisson);
-  if (mesh) return {MeshRegion{mesh->file()}, elasticity};
-  if (volume) return {LabelRegion{volume->file_or_folder(), map.at("label").integer()}, elasticity};
-  if (painted) return {read_painted(*painted), elasticity};
-  const Map ball(*sphere);
-  return {SphereRegion{ball.at("center").vector(), ball.at("radius").number()}, elasticity};
+MaterialRegion read_material_region(const Map& map, double poisson) {
+  return {read_skin_region(map), read_elasticity(map, poisson)};
 }
 
 void read_dilatation(const Value& value, Material& material) {
@@ -93,7 +62,7 @@ Material read_material(const Value& value) {
   }
   if (const auto regions = map.find("regions"))
     for (const Value& item : regions->items())
-      material.regions.push_back(read_region(item, material.deep.poisson));
+      material.regions.push_back(read_material_region(Map(item), material.deep.poisson));
   if (const auto dilatation = map.find("dilatation")) read_dilatation(*dilatation, material);
   return material;
 }

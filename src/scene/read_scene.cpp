@@ -8,6 +8,7 @@
 #include "read_material.h"
 #include "read_moves.h"
 #include "read_osteotomies.h"
+#include "read_region.h"
 #include "read_yaml.h"
 #include "repose/base/text.h"
 #include "repose/scene/landmarks.h"
@@ -118,15 +119,6 @@ std::vector<double> read_depths_mm(const Value& value, int layers) {
   return depths;
 }
 
-std::vector<SphereRegion> read_regions(const Value& value) {
-  std::vector<SphereRegion> regions;
-  for (const Value& item : value.items()) {
-    const Map sphere(Map(item).at("sphere"));
-    regions.push_back({sphere.at("center").vector(), sphere.at("radius").number()});
-  }
-  return regions;
-}
-
 /// Every name a spring rule may have in a model of so many layers.
 std::vector<std::string> rule_names(int layers) {
   std::vector<std::string> names{"default"};
@@ -186,6 +178,16 @@ void read_mass(Tissue& tissue, const Map& map) {
   if (mass && tissue.density) mass->refuse("and tissue.density exclude each other; remove one");
 }
 
+void read_face(const Map& map, Tissue& tissue) {
+  const auto face = map.find("face"), margin = map.find("margin");
+  if (face && margin) margin->refuse("and tissue.face exclude each other; remove one");
+  for (const auto& key : {face, margin})
+    if (key && !tissue.edge) key->refuse("needs tissue.edge, which has the skin remeshed");
+  if (margin) tissue.margin = margin->number();
+  if (face)
+    for (const Value& item : face->items()) tissue.face.push_back(read_skin_region(Map(item)));
+}
+
 Tissue read_tissue(const Value& value) {
   const Map map(value);
   Tissue tissue;
@@ -196,14 +198,15 @@ Tissue read_tissue(const Value& value) {
   if (depths_mm) tissue.depths_mm = read_depths_mm(*depths_mm, tissue.layers);
   if (const auto edge = map.find("edge"))
     tissue.edge = edge->is_word("auto") ? 0.0 : edge->number();
+  read_face(map, tissue);
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
   set(tissue.release, map, "release", &Value::number);
   set_choice<Attach>(tissue.attach, map, "attach");
   set_choice<Attach>(tissue.released, map, "released");
   if (const auto regions = map.find("unattached"))
-    for (const SphereRegion& region : read_regions(*regions))
-      tissue.attach_regions.push_back({region, Attach::contact});
+    for (const Value& item : regions->items())
+      tissue.attach_regions.push_back({read_region(Map(item)), Attach::contact});
   if (const auto regions = map.find("attach_regions"))
     for (AttachRegion& region : read_attach_regions(*regions))
       tissue.attach_regions.push_back(std::move(region));

@@ -59,6 +59,22 @@ def test_all_move_alike(faces, variant, other):
     assert len(distances) > 300 and np.quantile(distances, 0.95) < 0.5
 
 
+def test_a_painted_face_is_solved_in_place_of_that_over_the_jaw(folder, environment, faces):
+    skin = read_vtp(folder / "raw_given_skin.vtp")
+    within = np.linalg.norm(skin["Points"] - [2, -290, 360], axis=1) < 70
+    meshio.Mesh(skin["Points"], [("triangle", skin["connectivity"].reshape(-1, 3))],
+                point_data={"paint": within.astype(float)}).write(folder / "painted.ply")
+    scene = scene_of("raw.ply").replace(
+        "edge: 4", "edge: 4, face: [{painted: {mesh: painted.ply, property: paint}}]")
+    (folder / "of_paint.yaml").write_text(scene)
+    result = runner(folder, environment)("repose-solve", "of_paint.yaml", "-output", "of_paint")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    solved = read_vtp(folder / "of_paint_given_skin.vtp")["solved"] == 1
+    outer = solved & ~within
+    assert 0.85 < solved.sum() / (within & (skin["solved"] == 1)).sum() < 1.15
+    assert outer.sum() < 0.05 * solved.sum()
+
+
 def test_without_an_edge_all_places_are_listed_and_written(folder, environment):
     (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace(", edge: 4", ""))
     result = runner(folder, environment)("repose-solve", "as_it_is.yaml")

@@ -1,4 +1,6 @@
 #pragma once
+#include <functional>
+
 #include "repose/imaging/outer_skin.h"
 
 namespace repose::meshtools {
@@ -8,9 +10,10 @@ using surface::Surface;
 
 /// What of a given skin is solved, and how it is meshed.
 struct FaceRequest {
-  double edge;                     ///< mm, of the triangles
-  std::vector<Surface> beneath{};  ///< the skin near these (moved bones) …
-  std::vector<Vec3> places{};      ///< … and these is taken; where there are none, all of it
+  double edge;                                              ///< mm, of the triangles
+  std::vector<std::function<bool(const Vec3&)>> regions{};  ///< the skin in these is taken
+  std::vector<Surface> beneath{};  ///< without any, that near these (moved bones) …
+  std::vector<Vec3> places{};      ///< … and these; where there are none either, all of it
   double near = 25;                ///< mm from them, straight
   double margin = 35;              ///< mm further along the skin
   double tolerance = 3;  ///< mm: what of the given skin is farther off (ears) is passed over
@@ -23,11 +26,11 @@ struct Face {
   double least_angle = 0;           ///< degrees, of its triangles
 };
 
-/// A skin fit to be solved, from any triangles: the outer skin (outer_skin.h) over the bones that
-/// move and a margin, without the scan's ends and with no hole in it, remeshed and then drawn along
-/// its normals to the given triangles, whose offsets within the tolerance are averaged over an
-/// edge, so that noise is not followed. Throws InputError where the outer skin is nowhere near the
-/// bones.
+/// A skin fit to be solved, from any triangles: the outer skin (outer_skin.h) in the regions, or
+/// over the bones that move and a margin, without the scan's ends and with no hole in it, remeshed
+/// and then drawn along its normals to the given triangles, whose offsets within the tolerance are
+/// averaged over an edge, so that noise is not followed. Throws InputError where the outer skin is
+/// nowhere in the regions or near the bones.
 Face solvable_face(const Surface& given, const FaceRequest& request);
 
 /// An edge for a head of this size, mm: a seventieth of the surface's bounding diagonal, 2 to 8.

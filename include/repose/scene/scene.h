@@ -69,6 +69,11 @@ struct SphereRegion {
   double radius;  ///< mm
 };
 
+/// Along the axes.
+struct Box {
+  Vec3 center, size;  ///< mm
+};
+
 /// A place that a label of a volume marks.
 struct LabelRegion {
   std::filesystem::path volume;  ///< absolute
@@ -107,7 +112,8 @@ struct CurveRegion {
   double radius;           ///< mm
 };
 
-using Region = std::variant<SphereRegion, MeshRegion, LabelRegion, CurveRegion>;
+using Region = std::variant<SphereRegion, Box, MeshRegion, LabelRegion, CurveRegion>;
+using SkinRegion = std::variant<Region, PaintedRegion>;
 
 /// What tissue that ends at bone does: it moves with it; it keeps its distance and slides along; it
 /// may lift off but never passes; it does not know of it.
@@ -119,7 +125,7 @@ struct AttachRegion {
 };
 
 struct MaterialRegion {
-  std::variant<SphereRegion, MeshRegion, LabelRegion, PaintedRegion> where;
+  SkinRegion where;
   Elasticity elasticity;
 };
 
@@ -135,9 +141,11 @@ struct Material {
 };
 
 struct Tissue {
-  int layers = 4;              ///< 2 … 64
-  std::optional<double> edge;  ///< mm, of the skin's triangles; 0: by its size; unset: as given
-  std::vector<double> depths;  ///< [layers] fractions 0 … 1, increasing; empty: even
+  int layers = 4;                ///< 2 … 64
+  std::optional<double> edge;    ///< mm, of the skin's triangles; 0: by its size; unset: as given
+  std::vector<SkinRegion> face;  ///< the skin that is solved; empty: that over bones that move,
+  double margin = 35;            ///< and mm further along it
+  std::vector<double> depths;    ///< [layers] fractions 0 … 1, increasing; empty: even
   /// mm below the skin of the upper layers, the skin's 0 first, increasing; empty: by `depths`.
   std::vector<double> depths_mm;
   double attach_within = 30;                 ///< mm
@@ -186,11 +194,6 @@ struct Sphere {
 struct Capsule {
   Vec3 from, to;  ///< mm
   double radius;  ///< mm
-};
-
-/// Along the axes.
-struct Box {
-  Vec3 center, size;  ///< mm
 };
 
 /// What lies behind a plane, away from its normal.

@@ -132,6 +132,24 @@ TEST(SolvableFace, keeps_off_the_end_of_a_scan_and_takes_all_where_nothing_is_na
   EXPECT_EQ(inspect(solvable_face(solid(ball), {4}).skin).border_edges, 0);
 }
 
+TEST(SolvableFace, is_the_skin_in_the_regions_where_there_are_any) {
+  FaceRequest request{4};
+  request.places = {Vec3(0, 0, -radius)};
+  request.regions = {[](const Vec3& x) { return x.z() > 20; },
+                     [](const Vec3& x) { return x.z() > -10 && x.x() > 0; }};
+  const Face face = solvable_face(solid(ball), request);
+  double left = radius, right = radius;
+  for (const Vec3& x : face.skin.points) {
+    if (x.x() < -15) left = std::min(left, x.z());
+    if (x.x() > 15) right = std::min(right, x.z());
+  }
+  EXPECT_NEAR(left, 20, 3);
+  EXPECT_NEAR(right, -10, 3);
+  request.regions = {[](const Vec3& x) { return x.z() > 100; }};
+  EXPECT_NE(refusal([&] { solvable_face(solid(ball), request); }).find("tissue.face"),
+            std::string::npos);
+}
+
 TEST(SolvableFace, refuses_bones_that_are_elsewhere) {
   FaceRequest request{4};
   request.beneath = {cube(Vec3(200, 0, 0), 20)};

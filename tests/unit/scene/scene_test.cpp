@@ -75,6 +75,7 @@ TEST(Scene, TableHasTheDefaultsOfTheCode) {
   EXPECT_EQ(base::parse_number(standard("tissue.attach_within")), tissue.attach_within);
   EXPECT_EQ(base::parse_number(standard("tissue.free_thickness")), tissue.free_thickness);
   EXPECT_EQ(base::parse_number(standard("tissue.release")), tissue.release);
+  EXPECT_EQ(base::parse_number(standard("tissue.margin")), tissue.margin);
   EXPECT_EQ(base::parse_number(standard("tissue.turgor")), tissue.turgor);
 }
 
@@ -126,6 +127,26 @@ TEST(Scene, FullTissue) {
   EXPECT_EQ(tissue.turgor, 0.05);
   EXPECT_EQ(tissue.mass, (std::vector<double>{0.05, 0.1, 0.1, 0}));
   EXPECT_FALSE(tissue.density);
+}
+
+TEST(Scene, TheFaceThatIsSolvedIsChosenWhereTheSkinIsRemeshed) {
+  const auto with = [](const std::string& keys) {
+    return minimal.substr(0, minimal.find("tissue")) + "tissue: {layers: 4" + keys + "}\n";
+  };
+  EXPECT_TRUE(read(with(", edge: 4")).tissue.face.empty());
+  EXPECT_EQ(read(with(", edge: 4, margin: 20")).tissue.margin, 20);
+  const auto face = read(with(", edge: auto, face: [{box: {center: [1, 2, 3], size: [4, 5, 6]}}, "
+                              "{curve: [[0, 0, 0], [9, 0, 0]], radius: 8}]"))
+                        .tissue.face;
+  ASSERT_EQ(face.size(), 2u);
+  EXPECT_EQ(std::get<Box>(std::get<Region>(face[0])).size, Vec3(4, 5, 6));
+  EXPECT_EQ(std::get<CurveRegion>(std::get<Region>(face[1])).radius, 8);
+  const std::string ball = ", face: [{sphere: {center: [0, 0, 0], radius: 9}}]";
+  EXPECT_NE(refused(with(ball)).find("tissue.face needs tissue.edge"), std::string::npos);
+  EXPECT_NE(refused(with(", margin: 20")).find("tissue.margin needs tissue.edge"),
+            std::string::npos);
+  EXPECT_NE(refused(with(", edge: 4, margin: 20" + ball)).find("exclude each other"),
+            std::string::npos);
 }
 
 TEST(Scene, FullSprings) {

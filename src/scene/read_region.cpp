@@ -1,0 +1,71 @@
+#include "read_region.h"
+
+#include <fmt/ranges.h>
+
+#include <limits>
+
+#include "read_incisions.h"
+
+namespace repose::scene {
+namespace {
+
+PaintedRegion read_painted(const Value& value) {
+  const Map map(value);
+  const auto color = map.find("color"), property = map.find("property");
+  if (color.has_value() == property.has_value()) value.refuse("needs one of color and property");
+  PaintedRegion region;
+  region.file = map.at("mesh").file();
+  if (property) region.property = property->text();
+  if (const auto least = map.find("at_least")) {
+    if (color) least->refuse("is of property, and color is given; remove one");
+    region.at_least = least->number();
+  }
+  if (color) {
+    const std::vector<double> given = color->numbers();
+    if (given.size() != 3) color->refuse("must be red, green and blue, it has {}", given.size());
+    region.color = {given[0], given[1], given[2]};
+  }
+  const auto depth = map.find("depth");
+  region.depth = depth ? depth->number() : std::numeric_limits<double>::infinity();
+  return region;
+}
+
+/// Which of the keys the item has, of which it must have one.
+std::string kind_of(const Map& map, const std::vector<std::string>& kinds) {
+  std::vector<std::string> given;
+  for (const std::string& kind : kinds)
+    if (map.find(kind)) given.push_back(kind);
+  if (given.size() != 1) map.itself().refuse("needs exactly one of {}", fmt::join(kinds, ", "));
+  return given.front();
+}
+
+Region read_space(const std::string& kind, const Map& map) {
+  const Value value = map.at(kind);
+  if (kind == "mesh") return MeshRegion{value.file()};
+  if (kind == "volume") return LabelRegion{value.file_or_folder(), map.at("label").integer()};
+  if (kind == "curve") return CurveRegion{read_path(value), map.at("radius").number()};
+  if (kind == "box") return read_box(Map(value));
+  const Map ball(value);
+  return SphereRegion{ball.at("center").vector(), ball.at("radius").number()};
+}
+
+}  // namespace
+
+Region read_region(const Map& map) {
+  return read_space(kind_of(map, {"sphere", "box", "mesh", "volume", "curve"}), map);
+}
+
+SkinRegion read_skin_region(const Map& map) {
+  const std::string kind = kind_of(map, {"sphere", "box", "mesh", "volume", "curve", "painted"});
+  if (kind == "painted") return read_painted(map.at(kind));
+  return read_space(kind, map);
+}
+
+Box read_box(const Map& map) {
+  const Value size = map.at("size");
+  Box box{map.at("center").vector(), size.vector()};
+  if (!(box.size.minCoeff() > 0)) size.refuse("must be greater than 0 along every axis");
+  return box;
+}
+
+}  // namespace repose::scene
