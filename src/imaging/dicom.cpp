@@ -106,7 +106,7 @@ void check_steps(const std::vector<DicomSlice>& slices, const Vec3& normal) {
 /// lean against their normal.
 Vec3 common_step(const std::vector<DicomSlice>& slices) {
   const Vec3 first = slices.front().origin;
-  const Vec3 step = (slices.back().origin - first) / static_cast<double>(slices.size() - 1);
+  Vec3 step = (slices.back().origin - first) / static_cast<double>(slices.size() - 1);
   for (size_t s = 0; s < slices.size(); ++s) {
     const double off = (slices[s].origin - first - static_cast<double>(s) * step).norm();
     if (off > 0.05 * std::max(step.norm(), slices[s].axes.col(0).norm()))

@@ -41,9 +41,10 @@ class Bone {
       for (int axis = 0; axis < 3; ++axis) {
         const int32_t other = next(voxels_[node], axis);
         if (other < 0) continue;
-        graph.neighbour[node][2 * axis] = other;
-        graph.neighbour[other][2 * axis + 1] = static_cast<int32_t>(node);
-        graph.capacity[node][2 * axis] = graph.capacity[other][2 * axis + 1] =
+        const auto up = static_cast<size_t>(2 * axis), down = up + 1;
+        graph.neighbour[node][up] = other;
+        graph.neighbour[other][down] = static_cast<int32_t>(node);
+        graph.capacity[node][up] = graph.capacity[other][down] =
             cost(voxels_[node], voxels_[other], axis);
       }
     return graph;

@@ -237,7 +237,7 @@ void Coarsening::refill(const ColumnLevel& fine) {
     row.clear();
     point.clear();
     for (int64_t k = fine.pattern().begin[i]; k < fine.pattern().begin[i + 1]; ++k) {
-      const Eigen::Matrix3f block = fine.block(k);
+      const Eigen::Matrix3f& block = fine.block(k);
       weights_[fine.pattern().column[k]].visit([&](int32_t b, float weight) {
         if (at[b] == none) {
           at[b] = static_cast<int32_t>(point.size());
