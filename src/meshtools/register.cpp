@@ -14,10 +14,6 @@ namespace {
 
 constexpr double level = 1e-3;  ///< of the test for a bad landmark, over all
 
-/// In double throughout: with long double, which valgrind does not have, Boost's own start fails.
-using FisherLaw = boost::math::fisher_f_distribution<
-    double, boost::math::policies::policy<boost::math::policies::promote_double<false>>>;
-
 double squared(double x) { return x * x; }
 
 /// Landmarks in use, and what the rest of them say of each.
@@ -62,7 +58,7 @@ class Fitter {
     for (size_t k = 0; k < x.size(); ++k) sum += (fit.apply(x[k]) - y[k]).squaredNorm();
     const double variance = std::max(sum / freedom, squared(1e-9 * extent()));
     const double f = squared(error(fit, i)) / (3 * variance * inflation(x, moving_[i]));
-    const FisherLaw law(3, freedom);
+    const boost::math::fisher_f law(3, freedom);
     const double share = level / static_cast<double>(count());
     return f / boost::math::quantile(boost::math::complement(law, share));
   }
