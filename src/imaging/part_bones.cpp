@@ -41,7 +41,7 @@ class Bone {
       for (int axis = 0; axis < 3; ++axis) {
         const int32_t other = next(voxels_[node], axis);
         if (other < 0) continue;
-        const auto up = static_cast<size_t>(2 * axis), down = up + 1;
+        const size_t up = 2 * static_cast<size_t>(axis), down = up + 1;
         graph.neighbour[node][up] = other;
         graph.neighbour[other][down] = static_cast<int32_t>(node);
         graph.capacity[node][up] = graph.capacity[other][down] =

@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from conftest import PROJECT, finish, runner
+from conftest import PATIENCE, PROJECT, finish, runner
 
 MESHES = PROJECT / "meshes"
-QUICK = ["-layers", 2, "-limit", 1000, "-seconds", 0.3, "-path_seconds", 2]
+QUICK = ["-layers", 2, "-limit", 1000, "-seconds", 0.3 * PATIENCE, "-path_seconds", 2 * PATIENCE]
 
 
 @pytest.fixture(scope="module")
