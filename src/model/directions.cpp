@@ -45,8 +45,8 @@ Vec3 into_cone(const SkinMesh& mesh, int64_t v, const Cone& cone, Vec3 u) {
     if (cosine >= cone.cosine) return u;
     u = (u + (1.05 * (cone.cosine - cosine) + 1e-3) * normal).normalized();
   }
-  for (double part = 0.25; part < 1; part += 0.25) {
-    const Vec3 turned = (u + part * (cone.axis - u)).normalized();
+  for (const double part : {0.25, 0.5, 0.75}) {
+    Vec3 turned = (u + part * (cone.axis - u)).normalized();
     if (worst_normal(mesh, v, turned).second >= cone.cosine) return turned;
   }
   return cone.axis;

@@ -77,9 +77,10 @@ std::map<std::string, scene::SpringRule> isotropic_rules(const scene::Elasticity
 void refuse_unknown_sets(const std::map<std::string, scene::SpringRule>& rules,
                          const std::vector<std::string>& sets) {
   for (const auto& [name, rule] : rules) {
-    const bool known = name == "default" || std::any_of(sets.begin(), sets.end(), [&](auto& set) {
-                         return set == name || kind_of(set) == name;
-                       });
+    const bool known =
+        name == "default" || std::any_of(sets.begin(), sets.end(), [&, &name = name](auto& set) {
+          return set == name || kind_of(set) == name;
+        });
     if (!known)
       base::refuse(
           "tissue.springs: no spring set is called '{}'; with these layers the sets are default, "

@@ -342,8 +342,9 @@ Distance DistanceField::sample(const Vec3& point) const {
         const int64_t row = (int64_t{at.block_at[2][k]} * size_[1] + at.block_at[1][j]) * size_[0] +
                             at.block_at[0][i];
         if (place_[row] < 0) return result;
-        const double f = value_[place_[row] * cells +
-                                (at.cell_at[2][k] * b + at.cell_at[1][j]) * b + at.cell_at[0][i]];
+        const double f =
+            value_[place_[row] * cells + (int64_t{at.cell_at[2][k]} * b + at.cell_at[1][j]) * b +
+                   at.cell_at[0][i]];
         v += at.weight[0][i] * f;
         vx += at.slope[0][i] * f;
         vxx += at.bend[0][i] * f;
