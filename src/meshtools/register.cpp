@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 namespace repose::meshtools {
 using namespace surface;
@@ -74,11 +75,7 @@ class Fitter {
     return rest;
   }
 
-  double extent() const {
-    Vec3 low = fixed_[0], high = fixed_[0];
-    for (const Vec3& y : fixed_) low = low.cwiseMin(y), high = high.cwiseMax(y);
-    return (high - low).norm();
-  }
+  double extent() const { return bounding_diagonal(fixed_); }
 
   /// Variance of a predicted position over that of one landmark, mean of the axes: its own, that of
   /// the shift, and that of the turn, Cov ω = J⁻¹ with J = Σ |q|² I − q qᵀ.

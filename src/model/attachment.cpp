@@ -22,9 +22,9 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Tissue& t
   std::vector<scene::Attach> wish(columns.deep.size(), tissue.attach);
   for (size_t k = 0; k < tissue.attach_regions.size(); ++k) {
     const auto& [where, how] = tissue.attach_regions[k];
-    const bool drawn = std::holds_alternative<scene::SphereRegion>(where) ||
-                       std::holds_alternative<scene::CurveRegion>(where);
-    const Contains inside = contains_of(where, drawn ? 0 : near);
+    const bool segmented = std::holds_alternative<scene::MeshRegion>(where) ||
+                           std::holds_alternative<scene::LabelRegion>(where);
+    const Contains inside = contains_of(where, segmented ? near : 0);
     int64_t met = 0;
     for (size_t v = 0; v < columns.deep.size(); ++v) {
       if (attachment.bone[v] < 0 || !inside(columns.deep[v])) continue;

@@ -97,10 +97,9 @@ std::vector<char> painted_vertices(const scene::PaintedRegion& region,
 
 Contains painted(const scene::PaintedRegion& region) {
   const surface::VertexValues mesh = surface::read_vertex_values(region.file);
-  const std::vector<char> painted = painted_vertices(region, mesh);
-  const auto count = std::count(painted.begin(), painted.end(), 1);
-  if (count == 0)
-    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), painted.size(),
+  const auto marks = std::make_shared<std::vector<char>>(painted_vertices(region, mesh));
+  if (std::count(marks->begin(), marks->end(), 1) == 0)
+    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), marks->size(),
                  region.property.empty()
                      ? fmt::format("({:g}, {:g}, {:g})", region.color.x(), region.color.y(),
                                    region.color.z())
@@ -110,7 +109,7 @@ Contains painted(const scene::PaintedRegion& region) {
   return [=](const Vec3& skin) {
     constexpr double beside = 10;  // mm, where the painted mesh is another one
     const int64_t nearest = tree->nearest(skin, 1).front();
-    return painted[nearest] && (skin - (*points)[nearest]).norm() <= beside;
+    return (*marks)[nearest] && (skin - (*points)[nearest]).norm() <= beside;
   };
 }
 

@@ -6,8 +6,8 @@ namespace repose::model {
 /// Puts a skin fit to be solved (meshtools/face.h), with edges of scene.tissue.edge, in the place
 /// of the given one, which the anatomy keeps: in the regions of scene.tissue.face or, without any,
 /// over the bones that move, forces and incisions; of all that is given where instruments are
-/// pushed or nothing of these is. A remark says how near it
-/// is. Vertices that lie up to 3 mm inside bone are moved out of it, with a remark.
+/// pushed or nothing of these is. A remark says how near it is. Vertices that lie up to 3 mm inside
+/// bone are moved out of it, with a remark.
 void solve_remeshed(Anatomy& anatomy);
 
 }  // namespace repose::model

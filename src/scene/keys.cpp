@@ -144,7 +144,7 @@ std::vector<Key> region_keys(const std::string& item) {
 }
 
 std::vector<Key> contact_keys() {
-  std::vector<Key> rows{
+  return {
       {"contact", map, "", "Tissue against bones and itself; without it as for a material."},
       {.path = "contact.bones",
        .kind = choice,
@@ -169,9 +169,6 @@ std::vector<Key> contact_keys() {
       {"mouth.path", curve, "required",
        "From one corner of the mouth to the other: points near the skin, or a file of them."},
       {"mouth.path[]", vector, "", "One of the points.", "mm"}};
-  for (const std::string item : {"teeth[]", "tissue.attach_regions[]", "tissue.unattached[]"})
-    for (Key& row : region_keys(item)) rows.push_back(std::move(row));
-  return rows;
 }
 
 /// Young's modulus and Poisson's ratio, below `above`.
@@ -182,21 +179,30 @@ std::vector<Key> elasticity_keys(const std::string& above, const char* standard)
            "", Range::between(-0.9, 0.4999)}};
 }
 
-/// The same, or a part of the skin that is painted on a mesh.
-std::vector<Key> skin_region_keys(const std::string& item) {
-  std::vector<Key> rows = region_keys(item);
+/// A part of the skin that is painted on a mesh, below the item of a list.
+std::vector<Key> painted_keys(const std::string& item) {
   const std::string painted = item + ".painted";
-  rows.insert(
-      rows.end(),
-      {{painted, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
-       {painted + ".mesh", file, "required",
-        "A PLY of the skin with colors or values at its vertices."},
-       {painted + ".color", numbers, "",
-        "Red, green and blue of the paint; excludes property. Vertices within 40 of each count.",
-        "", Range::between(0, 255)},
-       {painted + ".property", text, "",
-        "In place of color a property of the vertices (quality, say, or a mask)."},
-       {painted + ".at_least", number, "0.5", "The least value of it that counts as painted."}});
+  return {{painted, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
+          {painted + ".mesh", file, "required",
+           "A PLY of the skin with colors or values at its vertices."},
+          {painted + ".color", numbers, "",
+           "Red, green and blue of the paint; excludes property. Vertices within 40 of each count.",
+           "", Range::between(0, 255)},
+          {painted + ".property", text, "",
+           "In place of color a property of the vertices (quality, say, or a mask)."},
+          {painted + ".at_least", number, "0.5", "The least value of it that counts as painted."}};
+}
+
+/// The items of all lists of regions.
+std::vector<Key> regions_keys() {
+  std::vector<Key> rows;
+  const auto add = [&](const std::vector<Key>& more) {
+    rows.insert(rows.end(), more.begin(), more.end());
+  };
+  for (const char* item : {"teeth[]", "tissue.attach_regions[]", "tissue.unattached[]",
+                           "tissue.face[]", "tissue.material.regions[]"})
+    add(region_keys(item));
+  for (const char* item : {"tissue.face[]", "tissue.material.regions[]"}) add(painted_keys(item));
   return rows;
 }
 
@@ -237,8 +243,6 @@ std::vector<Key> material_keys() {
        "Regions of another material; a later one overrides earlier ones."},
       {"tissue.material.regions[].painted.depth", number, "",
        "How deep the region reaches; all the way when not given.", "mm", Range::above(0)}};
-  for (const char* item : {"tissue.material.regions[]", "tissue.face[]"})
-    for (const Key& key : skin_region_keys(item)) rows.push_back(key);
   for (const char* above :
        {"tissue.material.skin", "tissue.material.strata[]", "tissue.material.regions[]"})
     for (const Key& key : elasticity_keys(above, "required")) rows.push_back(key);
@@ -463,7 +467,7 @@ const std::vector<Key>& all_keys() {
     for (const auto& part :
          {surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(), load_keys(),
           osteotomy_keys(), move_keys(), collision_keys(), instrument_keys(), contact_keys(),
-          incision_keys(), tearing_keys(), solve_keys()})
+          regions_keys(), incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

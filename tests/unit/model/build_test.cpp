@@ -149,6 +149,14 @@ TEST(Build, an_unattached_region_is_let_go_and_its_columns_stay_as_they_are) {
   EXPECT_EQ(let_go, 49);  // grid points within 4.02 cells
 }
 
+TEST(Build, a_box_lets_go_no_more_than_lies_in_it) {
+  scene::Scene scene = patches::scene_of(3, {"skull"});
+  scene.tissue.attach_regions = {
+      {scene::Box{{50, 50, -10}, {38, 28, 2}}, scene::Attach::contact}};  // the grid is of 5 mm
+  const BuiltModel built = build_model(scene, patches::square(20, 100), {kFlatBone});
+  EXPECT_EQ(built.report.free_deep, 7 * 5);
+}
+
 struct TwoJaws {
   surface::Surface skin = patches::square(40, 100);
   std::vector<surface::Surface> bones = {patches::box({-20, -20, -25}, {51.2, 120, -10}),
