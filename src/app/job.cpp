@@ -13,9 +13,14 @@ namespace repose::app {
 
 namespace {
 
-model::BuiltModel build(const model::Anatomy& anatomy, const std::filesystem::path& input) {
+/// A model or its ground, from an anatomy.
+template <class Made>
+Made make(const model::Anatomy& anatomy, const std::filesystem::path& input) {
   try {
-    return model::build_model(anatomy);
+    if constexpr (std::is_same_v<Made, model::Ground>)
+      return model::Ground(anatomy);
+    else
+      return model::build_model(anatomy);
   } catch (const model::RefusedPlaces& refused) {
     const std::string file = input.stem().string() + "_refused.ply";
     surface::write_ply(file, refused.places());
@@ -23,25 +28,64 @@ model::BuiltModel build(const model::Anatomy& anatomy, const std::filesystem::pa
   }
 }
 
-/// On rank 0.
-void read(const std::filesystem::path& input, Job& job) {
-  if (results::is_hdf5(input)) {
-    job.model = results::read_model(input);
-    job.wanted.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays the same
-    return;
-  }
-  const scene::Scene scene = scene::read_scene(input);
+/// Whether every rank makes its part of the model itself. On rank 0.
+bool is_raised(MPI_Comm comm, const model::Anatomy& anatomy) {
+  constexpr size_t worth_a_part = 8;  // columns a rank
+  const auto ranks = static_cast<size_t>(base::size(comm));
+  return ranks > 1 && model::is_by_columns(anatomy.scene) && !anatomy.scene.tearing &&
+         !anatomy.given_skin && anatomy.skin.points.size() >= worth_a_part * ranks;
+}
+
+/// What a scene says, before its model is made. On rank 0.
+void read_scene(const scene::Scene& scene, Job& job) {
   job.anatomy = model::load_anatomy(scene);
   job.remeshed = job.anatomy->given_skin.has_value();
-  model::BuiltModel built = build(*job.anatomy, input);
-  job.model = std::move(built.model);
-  job.held = std::move(built.held);
-  job.cuts = std::move(built.cuts);
   job.tearing = scene.tearing;
-  job.building = describe_build(built.report);
   job.wanted = scene.solve;
   job.recording = recording_of(scene);
   job.initial_equilibrium = job.recording.has_value();
+}
+
+/// On rank 0.
+void build(const std::filesystem::path& input, Job& job) {
+  model::BuiltModel built = make<model::BuiltModel>(*job.anatomy, input);
+  job.model = std::move(built.model);
+  job.held = std::move(built.held);
+  job.cuts = std::move(built.cuts);
+  job.building = describe_build(built.report);
+}
+
+/// Every rank makes its part. Collective.
+void raise(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
+  std::optional<model::Ground> ground;  // on rank 0
+  base::on_first_rank(comm, [&] { ground.emplace(make<model::Ground>(*job.anatomy, input)); });
+  scene::Scene scene;
+  base::together(
+      comm, [&] { scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input); });
+  job.raised = discrete::raise(comm, ground ? &*ground : nullptr, std::move(scene));
+  base::on_first_rank(comm, [&] {
+    model::BuildReport report = ground->report();
+    report.effective_modulus = job.raised->effective_modulus;
+    job.building = describe_build(report);
+    job.model = std::move(job.raised->frame);
+  });
+}
+
+/// Collective.
+void read(MPI_Comm comm, const std::filesystem::path& input, bool whole, Job& job) {
+  bool raised = false;
+  base::on_first_rank(comm, [&] {
+    if (results::is_hdf5(input)) {
+      job.model = results::read_model(input);
+      job.wanted.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
+      return;
+    }
+    read_scene(scene::read_scene(input), job);
+    raised = !whole && is_raised(comm, *job.anatomy);
+    if (!raised) build(input, job);
+  });
+  MPI_Bcast(&raised, 1, MPI_C_BOOL, 0, comm);
+  if (raised) raise(comm, input, job);
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
@@ -60,14 +104,16 @@ void bring_into_equilibrium(MPI_Comm comm, Job& job) {
   MPI_Bcast(&recording, sizeof recording, MPI_BYTE, 0, comm);
   if (!job.initial_equilibrium) return;
   job.recording = recording;
-  job.building += describe_prestress(solve::prestress(comm, job.model, recording));
+  job.building +=
+      describe_prestress(job.raised ? solve::prestress(comm, job.raised->part, recording)
+                                    : solve::prestress(comm, job.model, recording));
 }
 
 /// Gives all ranks what rank 0 knows and all have to know.
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
-  job.solid = model::is_solid(job.model);
-  job.touches = !job.model.contact.empty();
+  job.solid = job.raised || model::is_solid(job.model);
+  job.touches = job.raised ? job.raised->part.contact : !job.model.contact.empty();
   for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
   MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);
   for (bool* flag : {&job.solid, &job.touches, &job.remeshed, &job.initial_equilibrium})
@@ -76,9 +122,9 @@ void share(MPI_Comm comm, Job& job) {
 
 }  // namespace
 
-Job read_job(MPI_Comm comm, const std::filesystem::path& input) {
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, bool whole) {
   Job job;
-  base::on_first_rank(comm, [&] { read(input, job); });
+  read(comm, input, whole, job);
   bring_into_equilibrium(comm, job);
   base::on_first_rank(comm, [&] {
     make_incisions(job);

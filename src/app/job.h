@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "repose/discrete/part.h"
 #include "repose/model/build.h"
 #include "repose/solve/prestress.h"
 
@@ -13,24 +14,26 @@ namespace repose::app {
 
 /// A scene or a model, read and built: what is to be solved.
 struct Job {
-  model::Model model;                         ///< on rank 0
-  scene::Solve wanted;                        ///< the scene's, bulk modulus set; on all ranks
-  std::optional<model::Anatomy> anatomy;      ///< of a scene, on rank 0
-  std::optional<solve::Recording> recording;  ///< of an initial equilibrium, on all ranks
-  bool solid = false;                         ///< the tissue is one, on all ranks
-  bool initial_equilibrium = false;           ///< before the bones move, on all ranks
-  bool remeshed = false;                      ///< the skin is not the given one, on all ranks
-  std::string building;                       ///< what the builder has to say, on rank 0
-  std::vector<std::vector<int64_t>> held;     ///< points of each instrument, on rank 0
-  std::vector<std::string> bodies;            ///< that the tissue may touch, on rank 0
-  bool touches = false;                       ///< it touches bodies or itself, on all ranks
-  std::vector<model::Cut> cuts;               ///< on rank 0
-  std::optional<double> tearing;              ///< N, on rank 0
+  model::Model model;                          ///< on rank 0; where it is raised, its frame
+  std::optional<discrete::RaisedPart> raised;  ///< on all ranks, of a model that is nowhere whole
+  scene::Solve wanted;                         ///< the scene's, bulk modulus set; on all ranks
+  std::optional<model::Anatomy> anatomy;       ///< of a scene, on rank 0
+  std::optional<solve::Recording> recording;   ///< of an initial equilibrium, on all ranks
+  bool solid = false;                          ///< the tissue is one, on all ranks
+  bool initial_equilibrium = false;            ///< before the bones move, on all ranks
+  bool remeshed = false;                       ///< the skin is not the given one, on all ranks
+  std::string building;                        ///< what the builder has to say, on rank 0
+  std::vector<std::vector<int64_t>> held;      ///< points of each instrument, on rank 0
+  std::vector<std::string> bodies;             ///< that the tissue may touch, on rank 0
+  bool touches = false;                        ///< it touches bodies or itself, on all ranks
+  std::vector<model::Cut> cuts;                ///< on rank 0
+  std::optional<double> tearing;               ///< N, on rank 0
 };
 
 /// Reads a scene (.yaml) or a model (.h5), builds the scene's model with its initial equilibrium
-/// and makes its incisions. Where no tissue fits, the places of the skin to look at are written to
-/// NAME_refused.ply. Throws InputError. Collective.
-Job read_job(MPI_Comm comm, const std::filesystem::path& input);
+/// and makes its incisions. On several ranks each raises its part of a scene's model, unless the
+/// scene or `whole` asks for more than is known by columns. Where no tissue fits, the places of the
+/// skin to look at are written to NAME_refused.ply. Throws InputError. Collective.
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, bool whole);
 
 }  // namespace repose::app

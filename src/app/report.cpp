@@ -78,8 +78,7 @@ std::string remedy(const solve::Summary& s, bool stretched) {
 
 }  // namespace
 
-std::string describe_model(const model::Model& model) {
-  const model::Counts c = model::count(model);
+std::string describe_model(const model::Counts& c) {
   return report_row("points", fmt::format("{} ({} soft tissue, {} boundary, {} bone, {} held)",
                                           c.points, c.soft, c.boundary, c.bone, c.held)) +
          (c.edges > 0 ? report_row("edges", fmt::format("{}", c.edges))

@@ -14,7 +14,7 @@ namespace repose::app {
 std::string report_row(const std::string& name, const std::string& value);
 
 /// Points, springs and prisms of a model, by set. Lines ending in a newline.
-std::string describe_model(const model::Model& model);
+std::string describe_model(const model::Counts& counts);
 
 /// What the builder did: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);

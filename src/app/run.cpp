@@ -39,8 +39,20 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   std::string name = options.has("output") ? options.text("output") : input.stem().string();
   std::error_code missing;
   if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
-  read_job(comm, input);
+  read_job(comm, input, true);
   base::refuse("{}: the result would replace the input; give another -output", input.string());
+}
+
+/// Whether an option asks for more than the parts of a model that ranks make themselves.
+bool needs_whole(const base::Options& options) {
+  for (const char* name : {"adapt", "discretisation", "sensitivity", "verify_path"})
+    if (options.flag(name)) return true;
+  return options.has("restart") || options.text("profile") == "preview";
+}
+
+/// On rank 0.
+model::Counts counts_of(const Job& job) {
+  return job.raised ? job.raised->counts : model::count(job.model);
 }
 
 /// Why a result is not to be trusted as an end, or nothing.
@@ -140,8 +152,10 @@ solve::Summary Run::search(Writer& writer) {
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
                       strategy_.sensitivity || !job_.held.empty();
   solve::Summary summary =
-      needed ? solve::find_repose(comm, job_.model, settings, start_, std::ref(writer))
-             : solve::find_repose(comm, std::move(job_.model), settings, start_, std::ref(writer));
+      job_.raised ? solve::find_repose(comm, job_.raised->part, settings, start_, std::ref(writer))
+      : needed
+          ? solve::find_repose(comm, job_.model, settings, start_, std::ref(writer))
+          : solve::find_repose(comm, std::move(job_.model), settings, start_, std::ref(writer));
   if (summary.path.complete() && !writer.unsettled().empty()) {
     summary.path.last.converged = false;
     summary.last.reason += "; " + writer.unsettled();
@@ -196,7 +210,8 @@ std::string Run::describe_sensitivity(const solve::Summary& summary, const Write
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  Writer writer(comm, name_, job_.model, coarser, checkpoint_interval, unsettled(tearing));
+  Writer writer(comm, name_, job_.model, job_.raised ? &*job_.raised : nullptr, coarser,
+                checkpoint_interval, unsettled(tearing));
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
@@ -227,10 +242,11 @@ base::Exit run(const base::Options& options) {
   base::on_first_rank(comm, [&] {
     if (!dry) lock.emplace(name);
   });
-  Job job = read_job(comm, input);
+  Job job = read_job(comm, input, needs_whole(options));
   Strategy strategy = make_strategy(comm, options, job);
   stages.end("build");
-  if (base::rank(comm) == 0) say(job.building + describe_model(job.model) + strategy.explanation);
+  if (base::rank(comm) == 0)
+    say(job.building + describe_model(counts_of(job)) + strategy.explanation);
   if (dry) {
     say(describe_stages(stages));
     return base::Exit::done;

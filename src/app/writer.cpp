@@ -4,19 +4,29 @@
 #include "repose/adapt/discretisation.h"
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/solve/reaction.h"
 
 namespace repose::app {
 
 Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-               const Coarser& coarser, double interval, std::string unsettled)
+               const discrete::RaisedPart* raised, const Coarser& coarser, double interval,
+               std::string unsettled)
     : comm_(comm),
       name_(name),
       model_(model),
+      raised_(raised),
       coarser_(coarser),
       unsettled_(std::move(unsettled)),
-      file_(comm, name, model),
+      file_(open("", results::Kind::result)),
       interval_(interval) {}
+
+results::ResultFile Writer::open(const std::string& ending, results::Kind kind) const {
+  const std::filesystem::path file = name_.string() + ending;
+  if (!raised_) return results::ResultFile(comm_, file, model_, kind);
+  return results::ResultFile(comm_, file, model_, discrete::NaturalRows::of_model(comm_, *raised_),
+                             kind);
+}
 
 void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
   if (numbers.load == 1 && coarser_.discretisation_error)
@@ -88,8 +98,7 @@ bool Writer::due() const {
 /// The last rest position reached and, of a search at load 1, the state it is at: with both a run
 /// can go on from there or, should that lead astray, along the path.
 void Writer::write_checkpoint(const solve::Look& look) {
-  results::ResultFile file(comm_, name_.string() + "_checkpoint", model_,
-                           results::Kind::checkpoint);
+  results::ResultFile file = open("_checkpoint", results::Kind::checkpoint);
   file.append(reached_->numbers, reached_->rows);
   if (look && reached_->numbers.load < 1)
     look([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });

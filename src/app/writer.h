@@ -21,10 +21,12 @@ struct Coarser {
 /// members that write or gather are collective.
 class Writer {
  public:
+  /// `raised`: what there is of a model that is nowhere whole, or none; `model` is its frame then.
   /// `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a rest position at
   /// load 1 is the end, or empty.
   Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-         const Coarser& coarser, double interval, std::string unsettled);
+         const discrete::RaisedPart* raised, const Coarser& coarser, double interval,
+         std::string unsettled);
 
   void operator()(model::StepNumbers numbers, model::StepRows rows);
   /// At an iteration of a search.
@@ -49,6 +51,7 @@ class Writer {
     model::StepNumbers numbers;
     model::StepRows rows;
   };
+  results::ResultFile open(const std::string& ending, results::Kind kind) const;
   void compare(model::StepNumbers& numbers, model::StepRows& rows);
   bool due() const;
   void write_checkpoint(const solve::Look& look);
@@ -56,6 +59,7 @@ class Writer {
   MPI_Comm comm_;
   std::filesystem::path name_;
   const model::Model& model_;
+  const discrete::RaisedPart* raised_;
   const Coarser& coarser_;
   std::string comparison_, unsettled_;
   results::ResultFile file_;

@@ -86,6 +86,94 @@ std::vector<double> NaturalRows::bring(const Rows& rows, const std::vector<doubl
   return natural;
 }
 
+namespace {
+
+/// How many numbers a value is.
+template <class Value>
+constexpr int width = 1;
+template <>
+constexpr int width<Vec3> = 3;
+template <class T, size_t n>
+constexpr int width<std::array<T, n>> = static_cast<int>(n);
+
+}  // namespace
+
+template <class Value>
+std::vector<Value> NaturalRows::bring_each(const Rows& rows,
+                                           const std::vector<Value>& values) const {
+  constexpr int numbers = width<Value>;
+  const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
+  std::vector<double> owned(rows.row.size() * numbers), natural(slab.rows() * numbers);
+  std::vector<Value> mine(slab.rows());
+  const auto at = [](auto& value, int k) -> auto& {
+    if constexpr (numbers == 1)
+      return value;
+    else
+      return value[k];
+  };
+  for (size_t i = 0; i < rows.row.size(); ++i)
+    for (int k = 0; k < numbers; ++k)
+      owned[numbers * i + k] = static_cast<double>(at(values[i], k));
+  carry({rows.row, rows.total, numbers}, owned.data(), natural.data(), SCATTER_FORWARD);
+  for (size_t i = 0; i < mine.size(); ++i)
+    for (int k = 0; k < numbers; ++k) {
+      auto& number = at(mine[i], k);
+      number = static_cast<std::decay_t<decltype(number)>>(natural[numbers * i + k]);
+    }
+  return mine;
+}
+
+namespace {
+
+/// Elements in the whole model's rows of points.
+template <size_t n>
+std::vector<std::array<int64_t, n>> in_rows(const std::vector<std::array<int64_t, n>>& elements,
+                                            int64_t owned, const std::vector<int64_t>& row) {
+  std::vector<std::array<int64_t, n>> whole(elements.begin(), elements.begin() + owned);
+  for (auto& element : whole)
+    for (int64_t& point : element) point = row[point];
+  return whole;
+}
+
+}  // namespace
+
+model::ModelRows NaturalRows::of_model(MPI_Comm comm, const RaisedPart& raised) {
+  const Part& part = raised.part;
+  const NaturalRows natural(comm, part);
+  model::ModelRows rows;
+  rows.counts = raised.counts;
+  rows.touches = raised.touches;
+  const auto bring = [&](const Rows& of, const auto& values) {
+    return natural.bring_each(of, values);
+  };
+  const Rows& points = natural.points_;
+  const model::Points& p = part.model.points;
+  rows.points = {bring(points, p.position), bring(points, p.set),           bring(points, p.target),
+                 bring(points, p.layer),    bring(points, p.column),        bring(points, p.bone),
+                 bring(points, p.mass),     bring(points, p.external_force)};
+  rows.outward = bring(points, raised.outward);
+  const Rows& prisms = natural.prisms_;
+  const model::Prisms& m = part.model.prisms;
+  int averaged = !m.nodal_modulus.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &averaged, 1, MPI_INT, MPI_MAX, comm);
+  rows.prisms = {bring(prisms, in_rows(m.points, part.owned_prisms, part.point_row)),
+                 bring(prisms, m.rest_volume),
+                 bring(prisms, m.shear_modulus),
+                 bring(prisms, m.modulus),
+                 bring(prisms, m.target_volume),
+                 {}};
+  if (averaged != 0) rows.prisms.nodal_modulus = bring(prisms, m.nodal_modulus);
+  const Rows edges{part.edge_row, raised.counts.edges, 1};
+  const model::Edges& e = part.model.edges;
+  rows.edges = {bring(edges, in_rows(e.points, part.owned_edges, part.point_row)),
+                bring(edges, e.weight)};
+  const Rows touching{raised.touch_row, raised.touches, 1};
+  const model::Touches& t = part.model.contact.touches;
+  rows.touch = {bring(touching, base::pick(part.point_row, t.point)), bring(touching, t.body),
+                bring(touching, t.binding), bring(touching, t.area)};
+  return rows;
+}
+
 void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Springs& springs = part_.model.springs;
   std::vector<double> values(part_.owned_springs);

@@ -18,7 +18,7 @@ constexpr double margin = 2;  // mm, beyond what points and bones may come neare
 
 /// mm², what each point of a layered model stands for in its layer.
 std::vector<double> layer_areas(const SkinMesh& mesh, const Model& model) {
-  const size_t layers = model.points.position.size() / mesh.points.size();
+  const size_t layers = model.points.position.size() / std::max<size_t>(mesh.points.size(), 1);
   std::vector<double> area(model.points.position.size(), 0.0);
   const auto& x = model.points.position;
   for (const Triangle& t : mesh.triangles)
@@ -47,13 +47,15 @@ void add(int64_t point, int32_t body, Binding binding, double area, Touches& tou
 /// Free points against the bones that they may come to.
 void touch_bones(const scene::Scene& scene, const Attachment& attachment,
                  const std::vector<double>& area, Model& model) {
+  for (size_t b = 0; b < model.bones.size(); ++b)
+    model.contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
   const bool touching = scene.contact && scene.contact->bones;
   const BoneField field(model.bone_surfaces);
   std::vector<double> way;
   for (size_t b = 0; b < model.bones.size(); ++b)
     way.push_back(travel(model.bone_surfaces[b], scene.moves[b]));
   const double farthest = way.empty() ? 0 : *std::max_element(way.begin(), way.end());
-  const size_t layers = area.size() / attachment.bone.size();
+  const size_t layers = area.size() / std::max<size_t>(attachment.bone.size(), 1);
   for (size_t p = 0; p < area.size(); ++p) {
     if (model.points.set[p] != PointSet::soft_tissue) continue;
     const size_t column = p / layers;
@@ -103,6 +105,8 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
         scene.file.string(), number);
 }
 
+}  // namespace
+
 /// Finer than the tissue can follow, teeth and edges catch single points.
 double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh) {
   constexpr double share = 0.75;  // of the mean edge
@@ -112,33 +116,23 @@ double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh) {
   return share * sum / static_cast<double>(mesh.edges.size());
 }
 
-double penalty(const scene::Scene& scene, const Model& model, size_t columns) {
-  constexpr double times = 25;  // the tissue's own stiffness
-  if (scene.contact && scene.contact->stiffness) return *scene.contact->stiffness;
-  const size_t layers = model.points.position.size() / columns;
-  std::vector<double> thickness;
-  for (size_t c = 0; c < columns; ++c)
-    thickness.push_back(
-        (model.points.position[(c + 1) * layers - 1] - model.points.position[c * layers]).norm());
-  std::nth_element(thickness.begin(), thickness.begin() + columns / 2, thickness.end());
-  return times * effective_modulus(model) / thickness[columns / 2];
+void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model) {
+  touch_bones(scene, attachment, layer_areas(mesh, model), model);
 }
-
-}  // namespace
 
 void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model) {
   Contact& contact = model.contact;
   const std::vector<double> area = layer_areas(mesh, model);
-  for (size_t b = 0; b < model.bones.size(); ++b)
-    contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
   touch_bones(scene, attachment, area, model);
   for (size_t i = 0; i < scene.instruments.size(); ++i)
     if (scene.instruments[i].slide || (scene.contact && scene.contact->bones))
       touch_instrument(scene, i, area, model);
   if (contact.touches.point.empty()) contact.bodies.clear();
   contact.spacing = grid_spacing(scene, mesh);
-  contact.stiffness = penalty(scene, model, mesh.points.size());
+  const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
+  contact.stiffness = contact_stiffness(scene, column_sums(model, layers));
 }
 
 void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {

@@ -16,6 +16,13 @@ namespace repose::model {
 void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model);
 
+/// Of this the bones alone, and the points that may come to them: of a part of a model, too.
+void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model);
+
+/// mm, of the grids of distances.
+double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh);
+
 /// Doubled points, whose pairs are given, touch what the points touched, with half the area each.
 void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
 

@@ -9,6 +9,7 @@
 
 #include "region.h"
 #include "repose/base/error.h"
+#include "repose/model/build.h"
 
 namespace repose::model {
 
@@ -106,22 +107,19 @@ Place place_of(const Model& model, size_t m) {
   return {middle_of(corners_of(model, m)), skin};
 }
 
-void give_regions(const scene::Material& material, const std::string& file, Model& model) {
-  for (size_t r = 0; r < material.regions.size(); ++r) {
-    const scene::MaterialRegion& region = material.regions[r];
+/// [regions] how many prisms each holds.
+std::vector<int64_t> give_regions(const scene::Material& material, Model& model) {
+  std::vector<int64_t> found;
+  for (const scene::MaterialRegion& region : material.regions) {
     const Inside inside = inside_of(region.where);
-    int64_t found = 0;
+    found.push_back(0);
     for (size_t m = 0; m < model.prisms.points.size(); ++m) {
       if (!inside(place_of(model, m))) continue;
       give_moduli(moduli(region.elasticity), m, model.prisms);
-      ++found;
+      ++found.back();
     }
-    if (found == 0)
-      base::refuse(
-          "{}: tissue.material.regions[{}]: holds no prism of the tissue; move or enlarge it, or "
-          "give the tissue more layers",
-          file, r);
   }
+  return found;
 }
 
 /// The weights of all prisms by the lower of their points, which is a row.
@@ -237,7 +235,8 @@ void assemble_edges(const std::string& file, Model& model) {
   }
 }
 
-void set_material(const scene::Tissue& tissue, const std::string& file, Model& model) {
+std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string& file,
+                                  Model& model) {
   const scene::Material& material = *tissue.material;
   Prisms& prisms = model.prisms;
   const size_t count = prisms.points.size();
@@ -245,7 +244,7 @@ void set_material(const scene::Tissue& tissue, const std::string& file, Model& m
   prisms.modulus.resize(count);
   for (size_t m = 0; m < count; ++m)
     give_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
-  give_regions(material, file, model);
+  std::vector<int64_t> found = give_regions(material, model);
   if (material.dilatation == scene::Dilatation::nodal)
     for (size_t m = 0; m < count; ++m)
       prisms.nodal_modulus.push_back(prisms.modulus[m] - prisms.shear_modulus[m]);
@@ -254,6 +253,16 @@ void set_material(const scene::Tissue& tissue, const std::string& file, Model& m
                                    (1 + prisms.shear_modulus[m] / prisms.modulus[m]));
   assemble_edges(file, model);
   if (tissue.turgor > 0) add_skin_tension(skin_tension(tissue, file), model);
+  return found;
+}
+
+void require_regions(const std::vector<int64_t>& found, const std::string& file) {
+  for (size_t r = 0; r < found.size(); ++r)
+    if (found[r] == 0)
+      base::refuse(
+          "{}: tissue.material.regions[{}]: holds no prism of the tissue; move or enlarge it, or "
+          "give the tissue more layers",
+          file, r);
 }
 
 }  // namespace repose::model

@@ -56,11 +56,11 @@ void set_points(const std::vector<char>& rim, const Attachment& attachment,
 }
 
 void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneField& bones,
-                  const Model& model, Attachment& attachment) {
+                  const Counts& counts, Attachment& attachment) {
   const std::string file = scene.file.string();
   std::vector<int64_t> tied(bones.size(), 0);
-  for (const auto& bones_of : {model.points.bone, attachment.slides_on})
-    for (const int32_t bone : bones_of)
+  for (const auto* bones_of : {&attachment.bone, &attachment.slides_on})
+    for (const int32_t bone : *bones_of)
       if (bone >= 0) ++tied[bone];
   const bool touching =
       scene.contact && scene.contact->bones &&
@@ -75,7 +75,6 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
     attachment.remarks.push_back(
         fmt::format("no tissue is attached to bone '{}': {}", scene.bones[b].name, why));
   }
-  const Counts counts = count(model);
   if (counts.soft == 0)
     base::refuse(
         "{}: no point of the tissue is free to move: all {} columns lie on the fixed rim; "

@@ -21,8 +21,8 @@ void set_points(const std::vector<char>& rim, const Attachment& attachment,
 
 /// Refuses, in one line naming the scene, a model without a free point, one that nothing holds, and
 /// a bone that moves while no tissue is attached to it; a bone that stays and holds nothing is a
-/// remark. The model's point sets are final.
+/// remark. The sets of the points, as counted, are final.
 void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneField& bones,
-                  const Model& model, Attachment& attachment);
+                  const Counts& counts, Attachment& attachment);
 
 }  // namespace repose::model

@@ -150,19 +150,62 @@ double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& sol
   return missing_bulk_modulus(effective_modulus(model) / evenly, solve.poisson);
 }
 
-double effective_modulus(const Model& model) {
-  double stiffness = 0, volume = 0;
-  for (size_t m = 0; m < model.prisms.modulus.size(); ++m) {
-    const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
-    stiffness += model.prisms.rest_volume[m] * shear * (3 * lame + 2 * shear) / (lame + shear);
+namespace {
+
+/// Calls add(point, E V, V) for each prism (0 for E of springs) and add(point, k r², 0) for each
+/// spring, with its first point.
+template <class Add>
+void for_each_stiffness(const Model& model, Add&& add) {
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    const double volume = model.prisms.rest_volume[m];
+    double stiffness = 0;
+    if (is_solid(model)) {
+      const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
+      stiffness = volume * shear * (3 * lame + 2 * shear) / (lame + shear);
+    }
+    add(model.prisms.points[m][0], stiffness, volume);
   }
   for (size_t j = 0; j < model.springs.points.size(); ++j) {
     const auto [p, q] = model.springs.points[j];
-    stiffness += model.springs.stiffness[j] *
-                 (model.points.position[q] - model.points.position[p]).squaredNorm();
+    const Vec3 along = model.points.position[q] - model.points.position[p];
+    add(p, model.springs.stiffness[j] * along.squaredNorm(), 0.0);
   }
-  for (const double v : model.prisms.rest_volume) volume += v;
+}
+
+}  // namespace
+
+double effective_modulus(const Model& model) {
+  double stiffness = 0, volume = 0;
+  for_each_stiffness(model, [&](int64_t, double k, double v) { stiffness += k, volume += v; });
   return volume > 0 ? stiffness / volume : 0;
+}
+
+std::vector<ColumnSums> column_sums(const Model& model, int64_t layers) {
+  const std::vector<Vec3>& x = model.points.position;
+  std::vector<ColumnSums> sums(x.size() / layers);
+  for (size_t c = 0; c < sums.size(); ++c)
+    sums[c].thickness = (x[(c + 1) * layers - 1] - x[c * layers]).norm();
+  for_each_stiffness(model, [&](int64_t point, double stiffness, double volume) {
+    sums[point / layers].stiffness += stiffness;
+    sums[point / layers].volume += volume;
+  });
+  return sums;
+}
+
+double effective_modulus(const std::vector<ColumnSums>& columns) {
+  double stiffness = 0, volume = 0;
+  for (const ColumnSums& column : columns) stiffness += column.stiffness, volume += column.volume;
+  return volume > 0 ? stiffness / volume : 0;
+}
+
+double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns) {
+  constexpr double times = 25;  // the tissue's own stiffness
+  if (scene.contact && scene.contact->stiffness) return *scene.contact->stiffness;
+  std::vector<double> thickness;
+  for (const ColumnSums& column : columns) thickness.push_back(column.thickness);
+  const auto middle = thickness.begin() + static_cast<std::ptrdiff_t>(thickness.size() / 2);
+  std::nth_element(thickness.begin(), middle, thickness.end());
+  return times * effective_modulus(columns) / *middle;
 }
 
 }  // namespace repose::model

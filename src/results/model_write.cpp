@@ -1,24 +1,41 @@
 #include "model_write.h"
 
+#include <optional>
+#include <type_traits>
+
 #include "writer.h"
 
 namespace repose::results {
 
 namespace {
 
-void write_points(hid_t model, const model::Points& points) {
-  const base::Hdf5Group group = base::create_hdf5_group(model, "point");
-  const hsize_t n = points.position.size();
-  std::vector<int8_t> set;
-  for (const model::PointSet value : points.set) set.push_back(static_cast<int8_t>(value));
-  write_array(group, "position", {n, 3}, flat(points.position));
-  write_array(group, "set", {n}, set.data());
-  write_array(group, "target", {n, 3}, flat(points.target));
-  write_array(group, "layer", {n}, points.layer.data());
-  write_array(group, "column", {n}, points.column.data());
-  write_array(group, "bone", {n}, points.bone.data());
-  write_array(group, "mass", {n}, points.mass.data());
-  write_array(group, "external_force", {n, 3}, flat(points.external_force));
+/// How many numbers a value is, if it is not one.
+template <class Value>
+constexpr hsize_t width = 0;
+template <>
+constexpr hsize_t width<Vec3> = 3;
+template <class T, size_t n>
+constexpr hsize_t width<std::array<T, n>> = n;
+
+/// The numbers of any array, row by row.
+template <class Value>
+auto numbers(const std::vector<Value>& values) {
+  if constexpr (width < Value >> 0)
+    return flat(values);
+  else if constexpr (std::is_enum_v<Value>)
+    return reinterpret_cast<const int8_t*>(values.data());
+  else
+    return values.data();
+}
+
+/// The arrays of a group. `all`: they are slabs of so many rows, to be written later.
+template <class Group>
+void write_arrays(hid_t group, const Group& of, std::optional<int64_t> all) {
+  model::for_each_array(of, [&]<class Value>(const char* name, const std::vector<Value>& values) {
+    std::vector<hsize_t> shape = {all ? static_cast<hsize_t>(*all) : values.size()};
+    if (width < Value >> 0) shape.push_back(width<Value>);
+    write_array(group, name, shape, all ? nullptr : numbers(values));
+  });
 }
 
 void write_springs(hid_t model, const model::Springs& springs) {
@@ -31,27 +48,6 @@ void write_springs(hid_t model, const model::Springs& springs) {
   write_array(group, "stiffness", {s}, springs.stiffness.data());
   write_array(group, "exponent", {s}, springs.exponent.data());
   write_array(group, "reference", {s}, springs.reference.data());
-}
-
-void write_prisms(hid_t model, const model::Prisms& prisms) {
-  const base::Hdf5Group group = base::create_hdf5_group(model, "prism");
-  const hsize_t m = prisms.points.size();
-  write_array(group, "points", {m, 6}, flat(prisms.points));
-  write_array(group, "rest_volume", {m}, prisms.rest_volume.data());
-  if (prisms.modulus.empty()) return;
-  write_array(group, "shear_modulus", {m}, prisms.shear_modulus.data());
-  write_array(group, "modulus", {m}, prisms.modulus.data());
-  write_array(group, "target_volume", {m}, prisms.target_volume.data());
-  if (prisms.nodal_modulus.empty()) return;
-  write_array(group, "nodal_modulus", {m}, prisms.nodal_modulus.data());
-}
-
-void write_edges(hid_t model, const model::Edges& edges) {
-  if (edges.points.empty()) return;
-  const base::Hdf5Group group = base::create_hdf5_group(model, "edge");
-  const hsize_t e = edges.points.size();
-  write_array(group, "points", {e, 2}, flat(edges.points));
-  write_array(group, "weight", {e}, edges.weight.data());
 }
 
 void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
@@ -114,20 +110,16 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
   write_array(group, "body_shape", {count, model::shape_numbers}, shape.data());
 }
 
-void write_contact(hid_t model, const model::Contact& contact) {
-  if (contact.empty()) return;
+void write_contact(hid_t model, const model::Contact& contact, const model::ModelRows* slabs) {
+  if (slabs ? slabs->touches == 0 : contact.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "contact");
   write_attribute(group, "stiffness", contact.stiffness);
   write_attribute(group, "grid", contact.spacing);
   write_bodies(group, contact.bodies);
-  const model::Touches& touches = contact.touches;
-  const hsize_t c = touches.point.size();
-  std::vector<int8_t> binding;
-  for (const model::Binding value : touches.binding) binding.push_back(static_cast<int8_t>(value));
-  write_array(group, "point", {c}, touches.point.data());
-  write_array(group, "body_row", {c}, touches.body.data());
-  write_array(group, "binding", {c}, binding.data());
-  write_array(group, "area", {c}, touches.area.data());
+  if (slabs)
+    write_arrays(group, slabs->touch, slabs->touches);
+  else
+    write_arrays(group, contact.touches, {});
   const model::Walls& walls = contact.walls;
   if (walls.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
@@ -172,19 +164,28 @@ void write_merged(hid_t model, const MergedBones& bones) {
 
 }  // namespace
 
-void write_model(const base::Hdf5File& file, const model::Model& model, const MergedBones& bones) {
+void write_model(const base::Hdf5File& file, const model::Model& model,
+                 const model::ModelRows* slabs, const MergedBones& bones) {
   const base::Hdf5Group root(H5Gopen2(file, "/", H5P_DEFAULT));
   write_attribute(root, "format", std::string("tissue-model"));
   write_attribute(root, "version", int64_t{1});
   const base::Hdf5Group group = base::create_hdf5_group(file, "model");
   const Vec3& g = model.gravity;
   write_attribute(group, "gravity", std::vector<double>{g.x(), g.y(), g.z()});
-  write_points(group, model.points);
+  const auto write = [&](const char* name, const auto& whole, const auto* slab, int64_t rows) {
+    const base::Hdf5Group own = base::create_hdf5_group(group, name);
+    if (slab)
+      write_arrays(own, *slab, rows);
+    else
+      write_arrays(own, whole, {});
+  };
+  const model::Counts all = slabs ? slabs->counts : model::count(model);
+  write("point", model.points, slabs ? &slabs->points : nullptr, all.points);
   write_springs(group, model.springs);
-  write_prisms(group, model.prisms);
-  write_edges(group, model.edges);
+  write("prism", model.prisms, slabs ? &slabs->prisms : nullptr, all.prisms);
+  if (all.edges > 0) write("edge", model.edges, slabs ? &slabs->edges : nullptr, all.edges);
   write_elements(group, model.elements);
-  write_contact(group, model.contact);
+  write_contact(group, model.contact, slabs);
   write_skin(group, model.skin);
   write_strings(group, "spring_set", model.spring_sets);
   write_strings(group, "bone", model.bones);
@@ -193,18 +194,62 @@ void write_model(const base::Hdf5File& file, const model::Model& model, const Me
   write_transforms(group, model.bone_transform);
 }
 
-int64_t model_bytes(const model::Model& model, const MergedBones& bones) {
-  const size_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
+namespace {
+
+/// Memory types of what arrays hold.
+template <class Value>
+hid_t memory_type() {
+  if constexpr (width < Value >> 0)
+    return memory_type<std::decay_t<decltype(std::declval<Value>()[0])>>();
+  else if constexpr (std::is_same_v<Value, double>)
+    return H5T_NATIVE_DOUBLE;
+  else if constexpr (std::is_same_v<Value, int64_t>)
+    return H5T_NATIVE_INT64;
+  else if constexpr (std::is_same_v<Value, int32_t>)
+    return H5T_NATIVE_INT32;
+  else
+    return H5T_NATIVE_INT8;
+}
+
+template <class Group>
+void fill(MPI_Comm comm, hid_t group, const Group& slab, int64_t rows, const OnDisk& on_disk) {
+  const base::Slab mine = base::slab(rows, base::rank(comm), base::size(comm));
+  model::for_each_array(slab, [&]<class Value>(const char* name, const std::vector<Value>& values) {
+    base::Hdf5Dataset dataset;
+    on_disk([&] { dataset = base::Hdf5Dataset(H5Dopen2(group, name, H5P_DEFAULT)); });
+    on_disk([&] { write_rows(comm, dataset, mine, numbers(values), memory_type<Value>()); });
+  });
+}
+
+}  // namespace
+
+void fill_model(MPI_Comm comm, hid_t file, const model::ModelRows& slabs, const OnDisk& on_disk) {
+  const model::Counts& all = slabs.counts;
+  const auto write = [&](const char* name, const auto& slab, int64_t rows) {
+    base::Hdf5Group group;
+    on_disk([&] { group = base::Hdf5Group(H5Gopen2(file, name, H5P_DEFAULT)); });
+    fill(comm, group, slab, rows, on_disk);
+  };
+  write("/model/point", slabs.points, all.points);
+  write("/model/prism", slabs.prisms, all.prisms);
+  if (all.edges > 0) write("/model/edge", slabs.edges, all.edges);
+  if (slabs.touches > 0) write("/model/contact", slabs.touch, slabs.touches);
+}
+
+int64_t model_bytes(const model::Model& model, const model::ModelRows* slabs,
+                    const MergedBones& bones) {
+  const int64_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
+  const model::Counts all = slabs ? slabs->counts : model::count(model);
+  const size_t touches = slabs ? slabs->touches : model.contact.touches.point.size();
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   size_t elements = 0;
   for (const model::TermElements& of : model.elements)
     elements += 8 * (of.points.size() + of.numbers.size());
-  const size_t bytes = descriptions + elements + model.points.position.size() * point +
-                       model.springs.points.size() * spring + model.prisms.points.size() * 11 * 8 +
-                       model.edges.points.size() * 3 * 8 + model.contact.touches.point.size() * 21 +
+  const size_t bytes = descriptions + elements + touches * 21 +
                        model.contact.walls.point.size() * 50 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
-  return static_cast<int64_t>(bytes);
+  return static_cast<int64_t>(bytes) + all.points * point + all.springs * spring +
+         all.prisms * 11 * 8 + all.edges * 3 * 8;
 }
 
 }  // namespace repose::results

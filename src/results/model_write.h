@@ -1,4 +1,6 @@
 #pragma once
+#include <functional>
+
 #include "repose/base/hdf5.h"
 #include "repose/model/model.h"
 #include "repose/results/merged_bones.h"
@@ -6,10 +8,20 @@
 namespace repose::results {
 
 /// Writes format, version and /model, serially; and, where there are bone surfaces,
-/// /model/bone_surfaces (points f64 [P,3], triangles i64 [T,3], bone i32 [T]), the same merged.
-void write_model(const base::Hdf5File& file, const model::Model& model, const MergedBones& bones);
+/// /model/bone_surfaces (points f64 [P,3], triangles i64 [T,3], bone i32 [T]), the same merged. Of
+/// a model that is nowhere whole `slabs` says what arrays of points and elements there are, which
+/// are left for fill_model().
+void write_model(const base::Hdf5File& file, const model::Model& model,
+                 const model::ModelRows* slabs, const MergedBones& bones);
+
+/// Work on a file that all ranks do, and all fail if one does.
+using OnDisk = std::function<void(const std::function<void()>&)>;
+
+/// Writes every rank's slabs, none of which is empty. Collective; `file` is open on all ranks.
+void fill_model(MPI_Comm comm, hid_t file, const model::ModelRows& slabs, const OnDisk& on_disk);
 
 /// Enough bytes for write_model, descriptions included.
-int64_t model_bytes(const model::Model& model, const MergedBones& bones);
+int64_t model_bytes(const model::Model& model, const model::ModelRows* slabs,
+                    const MergedBones& bones);
 
 }  // namespace repose::results

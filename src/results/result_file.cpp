@@ -1,10 +1,8 @@
 #include "repose/results/result_file.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <unordered_map>
 
 #include "model_write.h"
 #include "repose/base/agreement.h"
@@ -33,24 +31,6 @@ void say_where(const std::filesystem::path& file, Work&& work) {
     base::refuse("{}: cannot be written: {}; free space or choose another -output", file.string(),
                  reason.what());
   }
-}
-
-/// Of every point the outward unit normal of the skin above it, area-weighted, at the initial
-/// position; zero where there is no skin above.
-std::vector<Vec3> outward_normals(const model::Model& model) {
-  const model::Points& points = model.points;
-  std::unordered_map<int64_t, Vec3> of_column;
-  for (const Triangle& t : model.skin) {
-    const Vec3& a = points.position[t[0]];
-    const Vec3 area = (points.position[t[1]] - a).cross(points.position[t[2]] - a);
-    for (const int64_t corner : t)
-      of_column.try_emplace(points.column[corner], Vec3::Zero()).first->second += area;
-  }
-  std::vector<Vec3> normals(points.position.size(), Vec3::Zero());
-  for (size_t i = 0; i < normals.size(); ++i)
-    if (const auto found = of_column.find(points.column[i]); found != of_column.end())
-      normals[i] = found->second.normalized();
-  return normals;
 }
 
 PetscLogEvent write_event() {
@@ -140,7 +120,7 @@ struct ResultFile::State {
     return (88 + 24 * static_cast<int64_t>(fields.size())) * counts.points + 16 * counts.springs +
            48 * counts.prisms + 24 * counts.bone_points + (int64_t{1} << 16);
   }
-  void create(const model::Model& model, Kind kind);
+  void create(const model::Model& model, const model::ModelRows* slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
   void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
@@ -153,30 +133,32 @@ struct ResultFile::State {
   void publish();
 };
 
-void ResultFile::State::create(const model::Model& model, Kind kind) {
+void ResultFile::State::create(const model::Model& model, const model::ModelRows* slabs,
+                               Kind kind) {
   unfinished.emplace(with_ending(name, ".h5"));
   part = unfinished->part();
   bones = merge_bones(model.bone_surfaces);
   motion.emplace(model);
   say_where(unfinished->file(), [&] {
     base::Hdf5File whole = base::create_hdf5(part);
-    unfinished->reserve(model_bytes(model, bones));
-    write_model(whole, model, bones);
+    unfinished->reserve(model_bytes(model, slabs, bones));
+    write_model(whole, model, slabs, bones);
     const base::Hdf5Group root(H5Gopen2(whole, "/", H5P_DEFAULT));
     for (const auto& [name, text] : base::this_run(comm)) write_attribute(root, name.c_str(), text);
     if (kind == Kind::checkpoint) write_attribute(root, "checkpoint", int64_t{1});
     base::create_hdf5_group(whole, "step");
     whole.close();
   });
-  const model::Counts of = model::count(model);
+  const model::Counts of = slabs ? slabs->counts : model::count(model);
+  const bool solid = slabs || model::is_solid(model);
   counts = {of.points,
             of.springs,
             of.prisms,
             static_cast<int64_t>(model.skin.size()),
             static_cast<int64_t>(bones.points.size()),
             static_cast<int64_t>(bones.triangles.size()),
-            model::is_solid(model),
-            model::is_solid(model)};
+            solid,
+            solid};
 }
 
 void ResultFile::State::require_rows(const model::StepRows& rows) const {
@@ -306,19 +288,33 @@ void ResultFile::State::publish() {
   for (auto& document : documents) document->commit();
 }
 
-ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-                       Kind kind)
-    : state_(std::make_unique<State>()) {
+void ResultFile::open(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+                      const model::ModelRows* slabs, Kind kind) {
   State& s = *state_;
   s.comm = comm;
   // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
   s.name = std::filesystem::absolute(name);
-  base::on_first_rank(comm, [&] { s.create(model, kind); });
+  base::on_first_rank(comm, [&] { s.create(model, slabs, kind); });
   base::share(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
-  s.initial = base::scatter(comm, model.points.position);
-  s.outward = base::scatter(comm, outward_normals(model));
   s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
+}
+
+ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+                       Kind kind)
+    : state_(std::make_unique<State>()) {
+  open(comm, name, model, nullptr, kind);
+  state_->initial = base::scatter(comm, model.points.position);
+  state_->outward = base::scatter(comm, model::outward_normals(model));
+}
+
+ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& frame,
+                       const model::ModelRows& slabs, Kind kind)
+    : state_(std::make_unique<State>()) {
+  open(comm, name, frame, &slabs, kind);
+  fill_model(comm, state_->file, slabs, [this](const auto& work) { state_->on_disk(work); });
+  state_->initial = slabs.points.position;
+  state_->outward = slabs.outward;
 }
 
 ResultFile::~ResultFile() = default;

@@ -28,7 +28,7 @@ void write_whole(hid_t place, const std::string& name, const std::vector<hsize_t
                  hid_t file_type, hid_t memory_type, const void* values) {
   const base::Hdf5Space space = make_space(shape);
   const base::Hdf5Dataset dataset = create_dataset(place, name, file_type, space);
-  if (check_hdf5(H5Sget_simple_extent_npoints(space)) > 0)
+  if (values && check_hdf5(H5Sget_simple_extent_npoints(space)) > 0)
     check_hdf5(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values));
 }
 
@@ -148,7 +148,7 @@ constexpr int64_t piece_bytes = int64_t{1} << 28;
 
 /// Writes rows [begin, end) of the slab, possibly none; every rank calls it.
 void write_piece(hid_t dataset, hid_t file_space, hid_t transfer, const base::Slab& rows,
-                 int64_t columns, const double* values) {
+                 int64_t columns, const void* values, hid_t memory_type) {
   const int dimensions = columns == 0 ? 1 : 2;
   const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
   const hsize_t count[2] = {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(columns)};
@@ -159,7 +159,7 @@ void write_piece(hid_t dataset, hid_t file_space, hid_t transfer, const base::Sl
   } else {
     check_hdf5(H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start, nullptr, count, nullptr));
   }
-  check_hdf5(H5Dwrite(dataset, H5T_NATIVE_DOUBLE, memory, file_space, transfer, values));
+  check_hdf5(H5Dwrite(dataset, memory_type, memory, file_space, transfer, values));
 }
 
 }  // namespace
@@ -171,7 +171,7 @@ base::Hdf5Dataset create_rows(hid_t place, const std::string& name, int64_t rows
 }
 
 void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Slab& mine,
-                const double* values) {
+                const void* values, hid_t memory_type) {
   const base::Hdf5Space space(H5Dget_space(dataset));
   if (check_hdf5(H5Sget_simple_extent_npoints(space)) == 0) return;
   hsize_t shape[2] = {0, 0};
@@ -182,7 +182,8 @@ void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Sla
   // Slabs are contiguous: nothing to gather, and MPI-IO's own collective writes hang on a disk
   // error.
   check_hdf5(H5Pset_dxpl_mpio_collective_opt(transfer, H5FD_MPIO_INDIVIDUAL_IO));
-  const int64_t step = std::max<int64_t>(piece_bytes / (8 * width), 1);
+  const auto row_bytes = static_cast<int64_t>(H5Tget_size(memory_type)) * width;
+  const int64_t step = std::max<int64_t>(piece_bytes / row_bytes, 1);
   int64_t longest = mine.rows();
   MPI_Allreduce(MPI_IN_PLACE, &longest, 1, MPI_INT64_T, MPI_MAX, comm);
   static const double nothing = 0;
@@ -191,7 +192,9 @@ void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Sla
       const base::Slab piece{std::min(mine.begin + done, mine.end),
                              std::min(mine.begin + done + step, mine.end)};
       write_piece(dataset, space, transfer, piece, columns,
-                  values ? values + (piece.begin - mine.begin) * width : &nothing);
+                  values ? static_cast<const char*>(values) + (piece.begin - mine.begin) * row_bytes
+                         : static_cast<const void*>(&nothing),
+                  memory_type);
     } catch (const base::Hdf5Error&) {
       failure = std::current_exception();
     }

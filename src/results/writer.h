@@ -23,7 +23,7 @@ const int64_t* flat(const std::vector<std::array<int64_t, K>>& tuples) {
   return tuples.empty() ? nullptr : tuples[0].data();
 }
 
-/// Writes a whole dataset from one process.
+/// Writes a whole dataset from one process; without values creates it only.
 void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
                  const double* values);
 void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
@@ -58,10 +58,11 @@ void write_virtual(hid_t file, hid_t place, const std::string& name,
 /// write. Collective where the file is.
 base::Hdf5Dataset create_rows(hid_t place, const std::string& name, int64_t rows, int64_t columns);
 
-/// Writes rows `mine` of such a dataset, row by row in `values`. Collective over `comm`; in pieces
+/// Writes rows `mine` of a dataset of numbers, row by row in `values`, of the HDF5 type
+/// `memory_type`. Collective over `comm`; in pieces
 /// that fit MPI's int counts. A rank that fails goes on to the end before it throws, so that all
 /// can agree on the outcome afterwards.
 void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Slab& mine,
-                const double* values);
+                const void* values, hid_t memory_type = H5T_NATIVE_DOUBLE);
 
 }  // namespace repose::results

@@ -235,25 +235,28 @@ void set_rest_lengths(const std::vector<char>& skin, const std::vector<double>& 
 }
 
 /// Refuses on all ranks, naming the point with the largest force. Collective.
-void refuse_unbalanced(MPI_Comm comm, const Model& whole, const discrete::Part& part, Vec force,
+void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
                        const Prestress& so_far) {
   const PetscScalar* values = nullptr;
   check(VecGetArrayRead(force, &values));
   int64_t worst = -1;
+  Vec3 at = Vec3::Zero();
   for (int64_t i = 0; i < part.owned_points; ++i) {
     if (part.unknown[i] < 0) continue;
     const auto* f = values + 3 * (part.unknown[i] - part.first_unknown);
-    if (Eigen::Map<const Vec3>(f).norm() >= so_far.residual) worst = part.point_row[i];
+    if (Eigen::Map<const Vec3>(f).norm() < so_far.residual || part.point_row[i] < worst) continue;
+    worst = part.point_row[i];
+    at = part.model.points.position[i];
   }
   check(VecRestoreArrayRead(force, &values));
+  const int64_t mine = worst;
   MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT64_T, MPI_MAX, comm);
-  base::on_first_rank(comm, [&] {
-    const Vec3& at = whole.points.position[worst];
-    base::refuse(
-        "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
-        "{:.2f}) mm: its springs cannot hold it; give tissue.springs a stiffness there",
-        so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z());
-  });
+  if (mine != worst) at.setZero();
+  MPI_Allreduce(MPI_IN_PLACE, at.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
+  base::refuse(
+      "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
+      "{:.2f}) mm: its springs cannot hold it; give tissue.springs a stiffness there",
+      so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z());
 }
 
 /// Brings values of this rank's first rows together in `whole` on rank 0. Collective.
@@ -296,10 +299,8 @@ double add_balance(const Stiffness& stiffness, Model& model) {
   return largest;
 }
 
-Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
-  discrete::Part part = discrete::distribute(comm, model);
-  part.model.gravity = gravity;
-  for (Vec3& force : part.model.points.external_force) force.setZero();
+/// `part` is without its external forces, under the gravity of the recording.
+Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
   Prestress result;
   result.solid = true;
   Stiffness stiffness(comm, solid_stiffness_part(part));
@@ -312,12 +313,20 @@ Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
     if (result.residual <= balanced * result.largest_force) break;
     if (pass == most_refinements) {
       if (result.residual <= rounding * result.largest_force) break;
-      refuse_unbalanced(comm, model, part, force, result);
+      refuse_unbalanced(comm, part, force, result);
     }
     stiffness.solve(force);
     result.largest_pressure += add_balance(stiffness, part.model);
   }
   MPI_Allreduce(MPI_IN_PLACE, &result.largest_pressure, 1, MPI_DOUBLE, MPI_MAX, comm);
+  return result;
+}
+
+Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
+  discrete::Part part = discrete::distribute(comm, model);
+  part.model.gravity = gravity;
+  for (Vec3& force : part.model.points.external_force) force.setZero();
+  const Prestress result = balance_solid(comm, part);
   collect(comm, part.edge_row, part.model.edges.weight, model.edges.weight);
   collect(comm, part.prism_row, part.model.prisms.target_volume, model.prisms.target_volume);
   return result;
@@ -342,7 +351,7 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
     if (result.residual <= balanced * result.largest_force) break;
     if (pass == most_refinements) {
       if (result.residual <= rounding_force(comm, part)) break;
-      refuse_unbalanced(comm, model, part, force, result);
+      refuse_unbalanced(comm, part, force, result);
     }
     stiffness.solve(force);
     for (size_t j = 0; j < skin.size(); ++j)
@@ -365,6 +374,20 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   bool solid = model::is_solid(model);
   MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
   return solid ? balance_solid(comm, model, as.gravity) : balance_springs(comm, model, as);
+}
+
+Prestress prestress(MPI_Comm comm, discrete::Part& part, Recording as) {
+  static const PetscLogEvent event = base::log_event("RpPrestress");
+  const base::Logged logged(event);
+  MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
+  const Vec3 gravity = std::exchange(part.model.gravity, as.gravity);
+  std::vector<Vec3>& forces = part.model.points.external_force;
+  const std::vector<Vec3> acting =
+      std::exchange(forces, std::vector(forces.size(), Vec3(Vec3::Zero())));
+  const Prestress result = balance_solid(comm, part);
+  part.model.gravity = gravity;
+  forces = acting;
+  return result;
 }
 
 }  // namespace repose::solve

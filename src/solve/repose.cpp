@@ -306,8 +306,10 @@ void end_stage(const Settings& settings, const char* name) {
   if (settings.stages) settings.stages->end(name);
 }
 
-Summary find_in_part(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                     const Start& start, const Receiver& receive) {
+}  // namespace
+
+Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
+                    const Start& start, const Receiver& receive) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   discrete::Positions positions(comm, part);
@@ -337,18 +339,16 @@ Summary find_in_part(MPI_Comm comm, const discrete::Part& part, const Settings& 
   return summary;
 }
 
-}  // namespace
-
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
-  return find_in_part(comm, discrete::distribute(comm, model), settings, start, receive);
+  return find_repose(comm, discrete::distribute(comm, model), settings, start, receive);
 }
 
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
   const discrete::Part part = discrete::distribute(comm, model);
   model = {};
-  return find_in_part(comm, part, settings, start, receive);
+  return find_repose(comm, part, settings, start, receive);
 }
 
 }  // namespace repose::solve

@@ -15,6 +15,15 @@ namespace {
 
 constexpr int b = DistanceField::block;
 constexpr int64_t cells = int64_t{b} * b * b;
+constexpr int64_t most_blocks = int64_t{1} << 27;
+constexpr size_t most_values = size_t{1} << 26;
+
+[[noreturn]] void refuse_grid(double spacing) {
+  base::refuse(
+      "the distances to a body of contact would take more than {} million points of a grid of {:g} "
+      "mm; make contact.grid larger",
+      most_values >> 20, spacing);
+}
 
 /// Normals of a surface's features, weighted by angle at vertices.
 class Pseudonormals {
@@ -72,7 +81,25 @@ class Pseudonormals {
   std::map<std::pair<int64_t, int64_t>, Vec3, std::less<>> edge_;
 };
 
+int64_t count_blocks(const std::array<int32_t, 3>& size) {
+  return int64_t{size[0]} * size[1] * size[2];
+}
+
 }  // namespace
+
+void DistanceField::lay_grid(const Surface& surface) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Triangle& t : surface.triangles)
+    for (const int64_t p : t) {
+      low = low.cwiseMin(surface.points[p]);
+      high = high.cwiseMax(surface.points[p]);
+    }
+  const double margin = reach_ + 3 * spacing_;
+  origin_ = low - Vec3::Constant(margin);
+  for (int a = 0; a < 3; ++a)
+    size_[a] = 1 + static_cast<int32_t>((high[a] - low[a] + 2 * margin) / (b * spacing_));
+  if (count_blocks(size_) > most_blocks) refuse_grid(spacing_);
+}
 
 /// Fills a field: closest triangles are found near the surface and handed on from grid point to
 /// grid point, on both sides as far as outsides are asked for; then signs; then deeper inside.
@@ -80,39 +107,15 @@ class FieldBuilder {
  public:
   FieldBuilder(const Surface& surface, DistanceField& field)
       : surface_(surface), normals_(surface), field_(field) {
-    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (const Triangle& t : surface.triangles)
-      for (const int64_t p : t) {
-        low = low.cwiseMin(surface.points[p]);
-        high = high.cwiseMax(surface.points[p]);
-      }
-    const double h = field.spacing_, margin = field.reach_ + 3 * h;
-    field.origin_ = low - Vec3::Constant(margin);
-    for (int a = 0; a < 3; ++a) {
-      field.size_[a] = 1 + static_cast<int32_t>((high[a] - low[a] + 2 * margin) / (b * h));
-      points_[a] = int64_t{b} * field.size_[a];
-    }
-    const int64_t blocks = int64_t{field.size_[0]} * field.size_[1] * field.size_[2];
-    if (blocks > most_blocks) refuse();
-    field.place_.assign(blocks, -1);
+    for (int a = 0; a < 3; ++a) points_[a] = int64_t{b} * field.size_[a];
+    field.place_.assign(count_blocks(field.size_), -1);
   }
 
-  /// Leaves out what is far from all points.
-  void want(const std::vector<Vec3>& points, double near) {
-    wanted_.assign(field_.place_.size(), points.empty());
-    const double h = field_.spacing_;
-    for (const Vec3& point : points) {
-      std::array<int64_t, 3> low, high;
-      for (int a = 0; a < 3; ++a) {
-        const double at = (point[a] - field_.origin_[a]) / h, wide = near / h + 2;
-        low[a] = std::max<int64_t>(0, static_cast<int64_t>(std::floor((at - wide) / b)));
-        high[a] = std::min<int64_t>(field_.size_[a] - 1,
-                                    static_cast<int64_t>(std::floor((at + wide) / b)));
-      }
-      for (int64_t k = low[2]; k <= high[2]; ++k)
-        for (int64_t j = low[1]; j <= high[1]; ++j)
-          for (int64_t i = low[0]; i <= high[0]; ++i) wanted_[block_row(i, j, k)] = 1;
-    }
+  /// Leaves out the blocks that are not wanted, if any is.
+  void want(const std::vector<char>& wanted) {
+    wanted_ = wanted;
+    if (std::find(wanted.begin(), wanted.end(), 1) == wanted.end())
+      wanted_.assign(field_.place_.size(), 1);
   }
 
   void fill() {
@@ -127,16 +130,6 @@ class FieldBuilder {
 
  private:
   using Index = std::array<int64_t, 3>;
-  static constexpr int64_t most_blocks = int64_t{1} << 27;
-  static constexpr size_t most_values = size_t{1} << 26;
-
-  [[noreturn]] void refuse() const {
-    base::refuse(
-        "the distances to a body of contact would take more than {} million points of a grid of "
-        "{:g} mm; make contact.grid larger",
-        most_values >> 20, field_.spacing_);
-  }
-
   int64_t block_row(int64_t i, int64_t j, int64_t k) const {
     return (k * field_.size_[1] + j) * field_.size_[0] + i;
   }
@@ -149,7 +142,7 @@ class FieldBuilder {
     if (!wanted_[row]) return -1;
     int32_t& place = field_.place_[row];
     if (place < 0) {
-      if (field_.value_.size() >= most_values) refuse();
+      if (field_.value_.size() >= most_values) refuse_grid(field_.spacing_);
       place = static_cast<int32_t>(field_.value_.size() / cells);
       field_.value_.resize(field_.value_.size() + cells, std::numeric_limits<float>::infinity());
       triangle_.resize(field_.value_.size(), -1);
@@ -295,11 +288,34 @@ class FieldBuilder {
 };
 
 DistanceField::DistanceField(const Surface& surface, double spacing, double reach,
-                             const std::vector<Vec3>& points, double near)
+                             const std::vector<char>& wanted, double near)
     : spacing_(spacing), reach_(reach), depth_(std::max(near, reach)) {
+  lay_grid(surface);
   FieldBuilder builder(surface, *this);
-  builder.want(points, near);
+  builder.want(wanted);
   builder.fill();
+}
+
+std::vector<char> DistanceField::blocks_near(const Surface& surface, double spacing, double reach,
+                                             const std::vector<Vec3>& points, double near) {
+  DistanceField grid;
+  grid.spacing_ = spacing;
+  grid.reach_ = reach;
+  grid.lay_grid(surface);
+  const auto& size = grid.size_;
+  std::vector<char> wanted(count_blocks(size), 0);
+  for (const Vec3& point : points) {
+    std::array<int64_t, 3> low, high;
+    for (int a = 0; a < 3; ++a) {
+      const double at = (point[a] - grid.origin_[a]) / spacing, wide = near / spacing + 2;
+      low[a] = std::max<int64_t>(0, static_cast<int64_t>(std::floor((at - wide) / b)));
+      high[a] = std::min<int64_t>(size[a] - 1, static_cast<int64_t>(std::floor((at + wide) / b)));
+    }
+    for (int64_t k = low[2]; k <= high[2]; ++k)
+      for (int64_t j = low[1]; j <= high[1]; ++j)
+        for (int64_t i = low[0]; i <= high[0]; ++i) wanted[(k * size[1] + j) * size[0] + i] = 1;
+  }
+  return wanted;
 }
 
 /// The 4³ grid points around a point, and the weights of each axis with two derivatives.

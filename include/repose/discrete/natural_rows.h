@@ -16,6 +16,9 @@ class NaturalRows {
   /// The arrays of a step at the objective's last update.
   model::StepRows rows(Objective& objective, bool with_pressure = false) const;
 
+  /// The arrays of a raised part's model, as it is now.
+  static model::ModelRows of_model(MPI_Comm comm, const RaisedPart& raised);
+
   /// This rank's slab of values [at least owned points] at the points, in natural order.
   std::vector<Vec3> natural(std::span<const Vec3> values) const;
   /// The same as a field of the result.
@@ -37,6 +40,9 @@ class NaturalRows {
   void carry_at_once(const Rows& rows, const double* owned, const double* natural,
                      ScatterMode mode) const;
   std::vector<double> bring(const Rows& rows, const std::vector<double>& owned) const;
+  /// Brings the first of `values`, as many as there are rows, whatever they are.
+  template <class Value>
+  std::vector<Value> bring_each(const Rows& rows, const std::vector<Value>& values) const;
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_contact(Objective& objective, model::StepRows& rows) const;

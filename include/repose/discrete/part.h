@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "repose/mechanics/rigid_body.h"
+#include "repose/model/build.h"
 #include "repose/model/model.h"
 
 /// Distribution of a model over ranks: columns are the unit, nothing is ever added across ranks.
@@ -36,5 +37,22 @@ struct Part {
 /// Shares `model` (looked at on rank 0 only) out over the ranks by a graph partition of its columns
 /// (PT-Scotch through MatPartitioning). Collective.
 Part distribute(MPI_Comm comm, const model::Model& model);
+
+/// A part that its own rank has made, and what else is told of the model.
+struct RaisedPart {
+  Part part;
+  model::Model frame;              ///< Ground::frame() and its contact's bodies, on rank 0
+  model::Counts counts;            ///< of the whole model, on all ranks
+  int64_t touches = 0;             ///< likewise, rows of contact
+  std::vector<int64_t> touch_row;  ///< [touches of the part] in the whole model
+  std::vector<Vec3> outward;       ///< [owned points] outward_normals()
+  double effective_modulus = 0;    ///< N/mm², on rank 0
+};
+
+/// The same as distribute() of the scene's model, which is nowhere whole: rank 0, which alone has
+/// the `ground`, gives every rank the columns that it owns and those around them, and the rank
+/// makes the model of these. `scene` is read on all ranks; its moves are rank 0's. Throws
+/// InputError. Collective.
+RaisedPart raise(MPI_Comm comm, const model::Ground* ground, scene::Scene scene);
 
 }  // namespace repose::discrete

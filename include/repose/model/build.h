@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -6,6 +7,7 @@
 #include "repose/model/cut.h"
 #include "repose/model/instruments.h"
 #include "repose/model/model.h"
+#include "repose/model/skin_mesh.h"
 #include "repose/scene/scene.h"
 #include "repose/surface/surface.h"
 
@@ -52,6 +54,69 @@ BuiltModel build_model(const Anatomy& anatomy);
 
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
+
+/// Columns of tissue, ascending, and the triangles of skin between them.
+struct Piece {
+  std::vector<int64_t> column;    ///< [C] vertices of the whole skin
+  std::vector<Vec3> skin, deep;   ///< [C] mm, where a column begins and ends
+  std::vector<int32_t> bone;      ///< [C] that the deepest point moves with, −1 for none
+  std::vector<int32_t> slides;    ///< [C] bone that it slides along, −1 for none
+  std::vector<char> free;         ///< [C] 1: it does not even touch bones
+  std::vector<char> rim;          ///< [C] 1: held in whole
+  std::vector<Triangle> corner;   ///< [F] rows of the piece
+  std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
+};
+
+/// What the tissue of a scene stands on, known column by column: of a model, all but its layers.
+/// Takes memory by the skin, where the model takes it by the skin times the layers.
+class Ground {
+ public:
+  /// Serial; as build_model(). For tissue that is a solid without incisions, instruments, forces
+  /// and masses of layers (see is_by_columns).
+  explicit Ground(const Anatomy& anatomy);
+  ~Ground();
+  Ground(Ground&&) noexcept;
+
+  const SkinMesh& skin() const;
+  int64_t layers() const;
+  /// Points of a column that are free to move.
+  int64_t soft_points(int64_t column) const;
+  /// The given columns (ascending), those that share a triangle with them, and those that share one
+  /// with these: all that values at elements of the given columns depend on.
+  Piece piece(const std::vector<int64_t>& columns) const;
+  /// The model without its points, prisms and edges: skin, bones, bodies, the grid of contact.
+  Model frame() const;
+  BuildReport report() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Whether all of a scene's model is known by columns; otherwise one process builds it whole.
+bool is_by_columns(const scene::Scene& scene);
+
+/// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
+/// columns that the piece was made around, all there is; of others, what the piece has. Indices are
+/// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0. `found` [regions of
+/// the material] gets the prisms in each. Serial.
+Model raise(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
+            const Piece& piece, std::vector<int64_t>& found);
+
+/// Of a column, for the means over the whole tissue.
+struct ColumnSums {
+  double stiffness = 0;  ///< N mm, as in effective_modulus(), of elements that begin in the column
+  double volume = 0;     ///< mm³, of the same
+  double thickness = 0;  ///< mm
+};
+/// Of the columns of a model of make_layers, in their order.
+std::vector<ColumnSums> column_sums(const Model& model, int64_t layers);
+/// N/mm²: the stiffness of all over their volume.
+double effective_modulus(const std::vector<ColumnSums>& columns);
+/// N/mm³, of contact: the scene's, or that of the columns' modulus and thickness.
+double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns);
+/// Refuses a region of a material that holds no prism.
+void require_regions(const std::vector<int64_t>& found, const std::string& file);
 
 /// N/mm²: of springs Σ k0 r_0² / Σ v_0, of a solid the mean of Young's modulus over its volume.
 double effective_modulus(const Model& model);

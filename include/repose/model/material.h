@@ -47,8 +47,10 @@ Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Ve
 /// first stratum, in both directions of the skin: its tension τ_s = E τ h / (1 − ν), N/mm, adds ½
 /// τ_s ∫ |∇x|² over the skin, which is quadratic too (cotangent weights: Pinkall & Polthier 1993).
 /// Reads the regions' meshes and volumes. Throws InputError naming `file` and the place of a prism
-/// too distorted, a region that holds no prism, or turgor without a stratum. Serial.
-void set_material(const scene::Tissue& tissue, const std::string& file, Model& model);
+/// too distorted, or turgor without a stratum. Serial.
+/// Returns for each region how many prisms it holds; none is for the caller to refuse.
+std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string& file,
+                                  Model& model);
 
 /// The edges anew from the prisms and their shear moduli, sorted by their points. InputError as
 /// above. Serial, O(prisms).

@@ -93,12 +93,59 @@ inline bool is_solid(const Model& model) { return !model.prisms.modulus.empty();
 /// Some rows of the prisms, with all that belongs to them.
 Prisms pick_prisms(const Prisms& prisms, const std::vector<int64_t>& rows);
 
+/// [N] of every point the outward unit normal of the skin above it, area-weighted, at the initial
+/// position; zero where there is no skin above.
+std::vector<Vec3> outward_normals(const Model& model);
+
 /// The numbers a person asks for first.
 struct Counts {
   int64_t points = 0, soft = 0, boundary = 0, bone = 0, held = 0, springs = 0, prisms = 0;
   int64_t edges = 0;
 };
 Counts count(const Model& model);
+
+/// Calls visit(name, array) for each array of points, of prisms, of edges or of what touches, with
+/// its name and in its order in a file; of prisms only those that they have.
+template <class Group, class Visit>
+void for_each_array(Group& of, Visit&& visit) {
+  if constexpr (requires { of.target; }) {
+    visit("position", of.position);
+    visit("set", of.set);
+    visit("target", of.target);
+    visit("layer", of.layer);
+    visit("column", of.column);
+    visit("bone", of.bone);
+    visit("mass", of.mass);
+    visit("external_force", of.external_force);
+  } else if constexpr (requires { of.rest_volume; }) {
+    visit("points", of.points);
+    visit("rest_volume", of.rest_volume);
+    if (of.modulus.empty()) return;
+    visit("shear_modulus", of.shear_modulus);
+    visit("modulus", of.modulus);
+    visit("target_volume", of.target_volume);
+    if (!of.nodal_modulus.empty()) visit("nodal_modulus", of.nodal_modulus);
+  } else if constexpr (requires { of.binding; }) {
+    visit("point", of.point);
+    visit("body_row", of.body);
+    visit("binding", of.binding);
+    visit("area", of.area);
+  } else {
+    visit("points", of.points);
+    visit("weight", of.weight);
+  }
+}
+
+/// Of a model that is nowhere whole this rank's slabs (base::slab) of its arrays, in natural order.
+struct ModelRows {
+  Counts counts;        ///< of the whole
+  int64_t touches = 0;  ///< likewise, rows of contact
+  Points points;
+  Prisms prisms;
+  Edges edges;
+  Touches touch;              ///< without offsets
+  std::vector<Vec3> outward;  ///< outward_normals()
+};
 
 /// Refuses a model that is not one: index out of range, value not finite, negative stiffness, mass
 /// or rest length, s_ref ≤ 0, unknown exponent or set, arrays of different length, a volume that is

@@ -23,6 +23,10 @@ class ResultFile {
   /// looked at on rank 0 only, and copied as far as it is needed later).
   ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
              Kind kind = Kind::result);
+  /// The same of a model that is nowhere whole: `frame`, on rank 0, has what is neither point nor
+  /// element; no rank's slabs are empty.
+  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& frame,
+             const model::ModelRows& slabs, Kind kind = Kind::result);
   ~ResultFile();
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
@@ -39,6 +43,8 @@ class ResultFile {
 
  private:
   struct State;
+  void open(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
+            const model::ModelRows* slabs, Kind kind);
   std::unique_ptr<State> state_;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <mpi.h>
 
-#include "repose/model/model.h"
+#include "repose/discrete/part.h"
 
 namespace repose::solve {
 
@@ -35,5 +35,7 @@ struct Recording {
 /// the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift the
 /// edges' weights and the prisms' target volumes (docs/theory/continuum.md).
 Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
+/// The same of a solid that is shared out already.
+Prestress prestress(MPI_Comm comm, discrete::Part& part, Recording as);
 
 }  // namespace repose::solve

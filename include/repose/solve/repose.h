@@ -5,6 +5,7 @@
 
 #include "repose/base/interrupt.h"
 #include "repose/base/program.h"
+#include "repose/discrete/part.h"
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
 #include "repose/solve/stability.h"
@@ -66,6 +67,9 @@ struct Start {
 /// position along the load path, hands every step to `receive`. Throws InputError where nothing is
 /// free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
+                    const Start& start, const Receiver& receive);
+/// The same for a model that is shared out.
+Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
                     const Start& start, const Receiver& receive);
 /// The same for a model that nobody needs any more: its memory is free once it is shared out.
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,

@@ -28,10 +28,13 @@ class DistanceField {
   /// point to grid point. The sign is that of the angle-weighted pseudonormal there (Bærentzen &
   /// Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal"), put to the
   /// vote among grid points between which no surface can lie, because slivers mislead some. Left
-  /// out where a grid block is farther than `near` mm from all of `points`, if there are any;
-  /// −`near` at least, or −`reach`. `spacing` and `reach` in mm. O(T + grid points).
+  /// out where a block is not `wanted`, if any is; −`near` mm at least, or −`reach`. `spacing` and
+  /// `reach` in mm. O(T + grid points).
   DistanceField(const Surface& surface, double spacing, double reach,
-                const std::vector<Vec3>& points, double near);
+                const std::vector<char>& wanted, double near);
+  /// [blocks] 1: a block of that field's grid that is nowhere farther than `near` from a point.
+  static std::vector<char> blocks_near(const Surface& surface, double spacing, double reach,
+                                       const std::vector<Vec3>& points, double near);
 
   /// The value alone, mm; `reach` where the field is not known.
   double value(const Vec3& point) const;
@@ -48,6 +51,7 @@ class DistanceField {
  private:
   friend class FieldBuilder;
   struct Corner;
+  void lay_grid(const Surface& surface);
   bool locate(const Vec3& point, Corner& corner) const;
 
   Vec3 origin_ = Vec3::Zero();                  // mm, of grid point (0, 0, 0)

@@ -1,0 +1,41 @@
+#include "by_column.h"
+
+#include <numeric>
+
+namespace repose::discrete {
+
+ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column) {
+  std::vector<int64_t> own, count;
+  for (const int64_t c : column) {
+    if (own.empty() || own.back() != c) own.push_back(c), count.push_back(0);
+    ++count.back();
+  }
+  std::vector<int64_t> first = gather_by_column(comm, columns + 1, own, count);
+  if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
+  // Every rank asks for the first rows of its columns.
+  ColumnRows rows;
+  std::vector<int64_t> begin;
+  if (base::rank(comm) > 0) {
+    Sender(comm, 0)(own);
+    Receiver(comm, 0)(begin, rows.total);
+  } else {
+    rows.total = first.back();
+    std::vector<int64_t> theirs, answer;
+    for (int other = 1; other < base::size(comm); ++other) {
+      Receiver(comm, other)(theirs);
+      answer.clear();
+      for (const int64_t c : theirs) answer.push_back(first[c]);
+      Sender(comm, other)(answer, rows.total);
+    }
+    for (const int64_t c : own) begin.push_back(first[c]);
+  }
+  size_t k = 0;
+  int64_t next = 0;
+  for (const int64_t c : column) {
+    if (own[k] != c) ++k, next = 0;
+    rows.row.push_back(begin[k] + next++);
+  }
+  return rows;
+}
+
+}  // namespace repose::discrete

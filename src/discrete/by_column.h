@@ -1,0 +1,42 @@
+#pragma once
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "repose/base/agreement.h"
+#include "repose/discrete/message.h"
+
+namespace repose::discrete {
+
+/// Rows in a list of the whole model that is sorted by column.
+struct ColumnRows {
+  std::vector<int64_t> row;
+  int64_t total = 0;
+};
+
+/// Of items of this rank's own columns, `column` [items] ascending, all those of a column. O(all
+/// columns) on rank 0. Collective.
+ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column);
+
+/// [columns] on rank 0 the values of all ranks' own columns; collective.
+template <class Value>
+std::vector<Value> gather_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& own,
+                                    const std::vector<Value>& values) {
+  if (base::rank(comm) > 0) {
+    Sender(comm, 0)(own, values);
+    return {};
+  }
+  std::vector<Value> all(columns);
+  std::vector<int64_t> theirs;
+  std::vector<Value> sent;
+  for (int sender = 0; sender < base::size(comm); ++sender) {
+    if (sender > 0) Receiver(comm, sender)(theirs, sent);
+    const std::vector<int64_t>& column = sender > 0 ? theirs : own;
+    const std::vector<Value>& value = sender > 0 ? sent : values;
+    for (size_t k = 0; k < column.size(); ++k) all[column[k]] = value[k];
+  }
+  return all;
+}
+
+}  // namespace repose::discrete

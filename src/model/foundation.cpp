@@ -1,0 +1,122 @@
+#include "foundation.h"
+
+#include <algorithm>
+
+#include "orientation.h"
+#include "point_sets.h"
+#include "release.h"
+#include "repose/base/error.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double gap_worth_saying = 0.5;  // mm
+
+std::vector<BoneField::Nearest> nearest_bone(const SkinMesh& mesh, const BoneField& bones) {
+  std::vector<BoneField::Nearest> nearest;
+  nearest.reserve(mesh.points.size());
+  for (const Vec3& x : mesh.points) nearest.push_back(bones.nearest(x));
+  return nearest;
+}
+
+void require_one_of_each(const scene::Scene& scene, const std::vector<surface::Surface>& bones) {
+  if (bones.size() != scene.bones.size() || scene.moves.size() != scene.bones.size())
+    throw base::InternalError(fmt::format("{} bones, {} bone surfaces, {} moves: not one of each",
+                                          scene.bones.size(), bones.size(), scene.moves.size()));
+}
+
+/// The skin with the paths of the incisions as edges.
+SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin,
+                         std::vector<Cut>& cuts) {
+  SkinMesh mesh = make_skin_mesh(skin);
+  if (scene.incisions.empty()) return mesh;
+  surface::Surface refined = skin;
+  cuts = insert_paths(scene.incisions, scene.file.string(), refined);
+  for (Cut& cut : cuts) cut.meets = scene.contact && scene.contact->cuts;
+  return make_skin_mesh(refined);
+}
+
+/// Which columns are held as the rim; those let go of bone, as do those near other pieces.
+std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
+                             const Columns& columns, const BoneField& field,
+                             Attachment& attachment) {
+  std::vector<char> rim = rim_columns(mesh, scene.rim != scene::Rim::free);
+  const auto let_go = [&] {
+    for (size_t c = 0; c < rim.size(); ++c)
+      if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
+  };
+  if (scene.rim == scene::Rim::fixed) let_go();
+  release_near_other_pieces(columns.deep, field, scene.moves,
+                            {scene.tissue.release, scene.tissue.released}, attachment);
+  if (scene.rim != scene::Rim::automatic) return rim;
+  for (size_t c = 0; c < rim.size(); ++c) {
+    const int32_t bone = attachment.bone[c];
+    rim[c] = rim[c] && bone >= 0 && scene.moves[bone].is_identity();
+  }
+  let_go();
+  return rim;
+}
+
+}  // namespace
+
+Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& skin,
+                          const std::vector<surface::Surface>& bones) {
+  require_one_of_each(scene, bones);
+  std::vector<Cut> cuts;
+  SkinMesh mesh = mesh_with_paths(scene, skin, cuts);
+  BoneField field(bones);
+  require_same_place(mesh, skin.name, bones, field);
+  const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);
+  BuildReport report;
+  if (face_outwards(nearest, mesh))
+    report.remarks.push_back(
+        fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
+  Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
+  Attachment attachment = attach_columns(columns, field, scene.tissue);
+  std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
+  release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
+                   attachment);
+  return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),
+          std::move(attachment), std::move(rim),  std::move(report)};
+}
+
+void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
+               Model& model) {
+  model.bone_surfaces = bones;
+  for (size_t b = 0; b < bones.size(); ++b) {
+    model.bones.push_back(scene.bones[b].name);
+    model.bone_surfaces[b].name = scene.bones[b].name;
+    model.bone_transform.push_back(scene.moves[b].matrix());
+  }
+}
+
+void report_columns(const Foundation& on, int64_t attached, BuildReport& report) {
+  const Columns& columns = on.columns;
+  const Attachment& attachment = on.attachment;
+  report.skin_vertices = static_cast<int64_t>(on.mesh.points.size());
+  report.skin_edges = static_cast<int64_t>(on.mesh.edges.size());
+  report.skin_triangles = static_cast<int64_t>(on.mesh.triangles.size());
+  report.attached = attached;
+  report.free_deep = report.skin_vertices - attached - std::count(on.rim.begin(), on.rim.end(), 1);
+  std::vector<double> sorted = columns.thickness;
+  std::sort(sorted.begin(), sorted.end());
+  report.thickness_min = sorted.front();
+  report.thickness_median = sorted[sorted.size() / 2];
+  report.thickness_max = sorted.back();
+  report.shortened = columns.shortened;
+  report.released = attachment.released;
+  report.remarks.insert(report.remarks.end(), attachment.remarks.begin(), attachment.remarks.end());
+  if (columns.bent > 0)
+    report.remarks.push_back(fmt::format(
+        "{} columns were bent towards their neighbours, which they crossed", columns.bent));
+  if (columns.shortened > 0)
+    report.remarks.push_back(fmt::format(
+        "{} columns were shortened so that neighbours do not cross", columns.shortened));
+  if (attachment.largest_gap > gap_worth_saying)
+    report.remarks.push_back(
+        fmt::format("deepest points attached to bone end up to {:.2f} mm short of it, where bone "
+                    "falls away steeply or columns were shortened",
+                    attachment.largest_gap));
+}
+
+}  // namespace repose::model

@@ -1,0 +1,35 @@
+#pragma once
+#include <vector>
+
+#include "attachment.h"
+#include "bone_field.h"
+#include "columns.h"
+#include "repose/model/build.h"
+#include "repose/model/cut.h"
+#include "repose/model/skin_mesh.h"
+#include "repose/scene/scene.h"
+
+namespace repose::model {
+
+/// The columns of a scene's tissue, laid and attached.
+struct Foundation {
+  SkinMesh mesh;  ///< with the paths of the incisions as edges
+  std::vector<Cut> cuts;
+  BoneField field;
+  Columns columns;
+  Attachment attachment;
+  std::vector<char> rim;  ///< [V] 1: a column that is held in whole
+  BuildReport report;     ///< with the remarks so far
+};
+
+/// As build_model(), of which it is the part that knows no layers.
+Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& skin,
+                          const std::vector<surface::Surface>& bones);
+
+/// Gives a model of make_layers the scene's bones, as they are and go.
+void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& bones, Model& model);
+
+/// Into the report: what became of the columns, and how many points and bones they hold to.
+void report_columns(const Foundation& on, int64_t attached, BuildReport& report);
+
+}  // namespace repose::model

@@ -1,0 +1,211 @@
+#include <gtest/gtest.h>
+
+#include "../model/patches.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/solve/prestress.h"
+#include "repose/solve/repose.h"
+#include "rest.h"
+
+namespace repose {
+namespace {
+
+namespace patches = model::patches;
+using discrete::Part;
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+
+/// Two jaws, one of which moves, under a skin of so many squares along each side.
+model::Anatomy jaws(int squares) {
+  scene::Scene scene = patches::scene_of(4, {"upper", "lower"});
+  scene.moves[1] = scene::RigidMotion::translation({0, 6, 1});
+  scene.rim = scene::Rim::free;
+  scene.tissue.material = scene::Material{.deep = {0.015, 0.45}, .strata = {}, .regions = {}};
+  scene.contact = scene::Contact{};
+  return {scene,
+          patches::square(squares, 100),
+          {},
+          {patches::box({-20, -20, -25}, {51.2, 120, -10}),
+           patches::box({51.3, -20, -25}, {120, 120, -10})},
+          {}};
+}
+
+/// The same with all that a material can have, weight, and layers at given depths.
+model::Anatomy rich(int squares) {
+  model::Anatomy anatomy = jaws(squares);
+  scene::Tissue& tissue = anatomy.scene.tissue;
+  tissue.material->strata = {{1.5, {0.1, 0.4}}};
+  tissue.material->regions = {{scene::Region{scene::SphereRegion{{30, 50, -5}, 20}}, {0.05, 0.3}}};
+  tissue.material->dilatation = scene::Dilatation::nodal;
+  tissue.depths_mm = {0, 1.5};
+  tissue.turgor = 0.05;
+  tissue.density = 1e-6;
+  anatomy.scene.gravity = Vec3(0, 0, -9.81);
+  return anatomy;
+}
+
+discrete::RaisedPart raise(const model::Anatomy& anatomy) {
+  std::optional<model::Ground> ground;
+  base::on_first_rank(comm, [&] { ground.emplace(anatomy); });
+  return discrete::raise(comm, ground ? &*ground : nullptr, anatomy.scene);
+}
+
+void expect_same(const model::Model& one, const model::Model& other) {
+  EXPECT_EQ(one.gravity, other.gravity);
+  EXPECT_EQ(one.points.position, other.points.position);
+  EXPECT_EQ(one.points.set, other.points.set);
+  EXPECT_EQ(one.points.target, other.points.target);
+  EXPECT_EQ(one.points.layer, other.points.layer);
+  EXPECT_EQ(one.points.column, other.points.column);
+  EXPECT_EQ(one.points.bone, other.points.bone);
+  EXPECT_EQ(one.points.external_force, other.points.external_force);
+  EXPECT_EQ(one.prisms.points, other.prisms.points);
+  EXPECT_EQ(one.prisms.rest_volume, other.prisms.rest_volume);
+  EXPECT_EQ(one.prisms.shear_modulus, other.prisms.shear_modulus);
+  EXPECT_EQ(one.prisms.modulus, other.prisms.modulus);
+  EXPECT_EQ(one.prisms.target_volume, other.prisms.target_volume);
+  EXPECT_EQ(one.prisms.nodal_modulus, other.prisms.nodal_modulus);
+  EXPECT_EQ(one.edges.points, other.edges.points);
+  EXPECT_EQ(one.edges.weight, other.edges.weight);
+  EXPECT_EQ(one.contact.stiffness, other.contact.stiffness);
+  EXPECT_EQ(one.contact.spacing, other.contact.spacing);
+  EXPECT_EQ(one.contact.touches.point, other.contact.touches.point);
+  EXPECT_EQ(one.contact.touches.body, other.contact.touches.body);
+  EXPECT_EQ(one.contact.touches.binding, other.contact.touches.binding);
+  EXPECT_EQ(one.contact.touches.area, other.contact.touches.area);
+  EXPECT_EQ(one.contact.touches.offset, other.contact.touches.offset);
+  EXPECT_EQ(one.bone_transform, other.bone_transform);
+}
+
+void expect_same(const Part& one, const Part& other) {
+  expect_same(one.model, other.model);
+  EXPECT_EQ(one.point_row, other.point_row);
+  EXPECT_EQ(one.prism_row, other.prism_row);
+  EXPECT_EQ(one.edge_row, other.edge_row);
+  EXPECT_EQ(one.unknown, other.unknown);
+  EXPECT_EQ(one.owned_points, other.owned_points);
+  EXPECT_EQ(one.owned_prisms, other.owned_prisms);
+  EXPECT_EQ(one.owned_edges, other.owned_edges);
+  EXPECT_EQ(one.first_unknown, other.first_unknown);
+  EXPECT_EQ(one.owned_unknowns, other.owned_unknowns);
+  EXPECT_EQ(one.total_points, other.total_points);
+  EXPECT_EQ(one.total_springs, other.total_springs);
+  EXPECT_EQ(one.total_prisms, other.total_prisms);
+  EXPECT_EQ(one.total_unknowns, other.total_unknowns);
+  EXPECT_EQ(one.solid, other.solid);
+  EXPECT_EQ(one.contact, other.contact);
+  ASSERT_EQ(one.bodies.size(), other.bodies.size());
+  for (const Vec3& at : {Vec3(30, 40, -8), Vec3(70, 20, -12)})
+    for (size_t k = 0; k < one.bodies.size(); ++k)
+      EXPECT_EQ(one.bodies[k].distance(at).value, other.bodies[k].distance(at).value);
+}
+
+void expect_same_masses(const Part& one, const Part& other) {
+  for (int64_t i = 0; i < one.owned_points; ++i)
+    EXPECT_EQ(one.model.points.mass[i], other.model.points.mass[i]) << i;
+}
+
+/// So many squares that columns are dealt out in order: PT-Scotch deals otherwise each time.
+int squares() {
+  const int ranks = base::size(comm);
+  return ranks == 1 ? 24 : ranks < 5 ? ranks : 5;
+}
+
+TEST(Raise, parts_are_those_of_the_whole_model) {
+  for (const model::Anatomy& anatomy : {jaws(squares()), rich(squares())}) {
+    const model::BuiltModel built = model::build_model(anatomy);
+    const Part part = discrete::distribute(comm, built.model);
+    const discrete::RaisedPart raised = raise(anatomy);
+    expect_same(raised.part, part);
+    expect_same_masses(raised.part, part);
+    EXPECT_TRUE(part.contact);
+    const model::Counts all = model::count(built.model);
+    EXPECT_EQ(raised.counts.points, all.points);
+    EXPECT_EQ(raised.counts.soft, all.soft);
+    EXPECT_EQ(raised.counts.boundary, all.boundary);
+    EXPECT_EQ(raised.counts.bone, all.bone);
+    EXPECT_EQ(raised.counts.prisms, all.prisms);
+    EXPECT_EQ(raised.counts.edges, all.edges);
+    if (base::rank(comm) > 0) continue;
+    EXPECT_EQ(raised.frame.skin, built.model.skin);
+    EXPECT_EQ(raised.frame.bones, built.model.bones);
+    EXPECT_EQ(raised.frame.contact.bodies.size(), built.model.contact.bodies.size());
+    EXPECT_NEAR(raised.effective_modulus, built.report.effective_modulus, 1e-12);
+  }
+}
+
+TEST(Raise, a_rank_without_columns_has_an_empty_part) {
+  const model::Anatomy anatomy = jaws(1);  // four columns
+  const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
+  expect_same(raise(anatomy).part, part);
+}
+
+/// This rank's slab of rows.
+template <class Value>
+std::vector<Value> slab(const std::vector<Value>& whole) {
+  const base::Slab mine =
+      base::slab(static_cast<int64_t>(whole.size()), base::rank(comm), base::size(comm));
+  return {whole.begin() + mine.begin, whole.begin() + mine.end};
+}
+
+TEST(Raise, its_rows_are_those_of_the_whole_model) {
+  const model::Anatomy anatomy = rich(24);
+  const model::Model whole = model::build_model(anatomy).model;
+  const model::ModelRows rows = discrete::NaturalRows::of_model(comm, raise(anatomy));
+  EXPECT_EQ(rows.points.position, slab(whole.points.position));
+  EXPECT_EQ(rows.points.set, slab(whole.points.set));
+  EXPECT_EQ(rows.points.target, slab(whole.points.target));
+  EXPECT_EQ(rows.points.layer, slab(whole.points.layer));
+  EXPECT_EQ(rows.points.column, slab(whole.points.column));
+  EXPECT_EQ(rows.points.bone, slab(whole.points.bone));
+  EXPECT_EQ(rows.points.mass, slab(whole.points.mass));
+  EXPECT_EQ(rows.prisms.points, slab(whole.prisms.points));
+  EXPECT_EQ(rows.prisms.target_volume, slab(whole.prisms.target_volume));
+  EXPECT_EQ(rows.prisms.nodal_modulus, slab(whole.prisms.nodal_modulus));
+  EXPECT_EQ(rows.edges.points, slab(whole.edges.points));
+  EXPECT_EQ(rows.edges.weight, slab(whole.edges.weight));
+  EXPECT_EQ(rows.touch.point, slab(whole.contact.touches.point));
+  EXPECT_EQ(rows.touch.body, slab(whole.contact.touches.body));
+  EXPECT_EQ(rows.touch.binding, slab(whole.contact.touches.binding));
+  EXPECT_EQ(rows.touch.area, slab(whole.contact.touches.area));
+  EXPECT_EQ(rows.outward, slab(model::outward_normals(whole)));
+  EXPECT_EQ(rows.touches, static_cast<int64_t>(whole.contact.touches.point.size()));
+}
+
+TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
+  const model::Anatomy anatomy = rich(12);
+  model::Model whole = model::build_model(anatomy).model;
+  discrete::RaisedPart raised = raise(anatomy);
+  const solve::Recording as{0.05, Vec3(0, 0, -9.81)};
+  const solve::Prestress one = solve::prestress(comm, whole, as);
+  const solve::Prestress other = solve::prestress(comm, raised.part, as);
+  EXPECT_GT(one.largest_force, 0);
+  EXPECT_NEAR(one.largest_force, other.largest_force, 1e-12 * one.largest_force);
+  EXPECT_NEAR(one.largest_pressure, other.largest_pressure, 1e-6 * one.largest_pressure);
+  EXPECT_LE(other.residual, 1e-10 * one.largest_force);
+  EXPECT_EQ(raised.part.model.gravity, Vec3(0, 0, -9.81));
+}
+
+TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
+  model::Anatomy anatomy = rich(12);
+  anatomy.scene.tissue.material->regions = {
+      {scene::Region{scene::SphereRegion{{0, 0, 500}, 1}}, {0.05, 0.3}}};
+  EXPECT_THROW(raise(anatomy), base::InputError);
+}
+
+TEST(Raise, what_needs_more_than_columns_is_said) {
+  scene::Scene scene = jaws(4).scene;
+  EXPECT_TRUE(model::is_by_columns(scene));
+  scene.forces = {{Vec3::Zero(), 5, Vec3::UnitX()}};
+  EXPECT_FALSE(model::is_by_columns(scene));
+  scene = jaws(4).scene;
+  scene.tissue.material.reset();
+  EXPECT_FALSE(model::is_by_columns(scene));
+  scene = jaws(4).scene;
+  scene.tissue.mass = {1, 1, 1, 1};
+  EXPECT_FALSE(model::is_by_columns(scene));
+}
+
+}  // namespace
+}  // namespace repose
