@@ -15,14 +15,20 @@ constexpr double fade = 20;              // mm
 constexpr double ridge = 0.01;           // of the mean square extent of the neighbours
 constexpr double beyond_farthest = 1.1;  // where the weights end
 
-/// The points of a model's skin.
+/// The points of a solved skin.
 struct SkinPoints {
+  const surface::Surface& skin;
+  const std::vector<Vec3>& displacement;
+};
+
+/// Those of a model, by themselves.
+struct OwnSkin {
   surface::Surface skin;
   std::vector<Vec3> displacement;
 };
 
-SkinPoints skin_points(const model::Model& model, const std::vector<Vec3>& displacement) {
-  SkinPoints points{{"solved skin", {}, {}}, {}};
+OwnSkin skin_of(const model::Model& model, const std::vector<Vec3>& displacement) {
+  OwnSkin points{{"solved skin", {}, {}}, {}};
   std::vector<int64_t> row(displacement.size(), -1);
   for (size_t i = 0; i < displacement.size(); ++i) {
     if (model.points.layer[i] != 0) continue;
@@ -66,9 +72,10 @@ Vec3 motion_at(const Vec3& at, const SkinPoints& from, const std::vector<int64_t
 
 }  // namespace
 
-surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
+surface::PointData displacement_of_given(const surface::Surface& given,
+                                         const surface::Surface& skin,
                                          const std::vector<Vec3>& displacement) {
-  const SkinPoints from = skin_points(model, displacement);
+  const SkinPoints from{skin, displacement};
   const surface::PointTree tree(from.skin.points);
   const meshtools::SignedDistance distance(from.skin);
   surface::PointData data;
@@ -84,6 +91,12 @@ surface::PointData displacement_of_given(const surface::Surface& given, const mo
                   : Vec3::Zero());
   }
   return data;
+}
+
+surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
+                                         const std::vector<Vec3>& displacement) {
+  const OwnSkin own = skin_of(model, displacement);
+  return displacement_of_given(given, own.skin, own.displacement);
 }
 
 }  // namespace repose::adapt

@@ -28,12 +28,13 @@ Made make(const model::Anatomy& anatomy, const std::filesystem::path& input) {
   }
 }
 
-/// Whether every rank makes its part of the model itself. On rank 0.
-bool is_raised(MPI_Comm comm, const model::Anatomy& anatomy) {
+/// Why rank 0 builds the model whole, or nothing where every rank makes its part.
+std::string why_whole(MPI_Comm comm, const model::Anatomy& anatomy, const std::string& wish) {
   constexpr size_t worth_a_part = 8;  // columns a rank
-  const auto ranks = static_cast<size_t>(base::size(comm));
-  return ranks > 1 && model::is_by_columns(anatomy.scene) && !anatomy.scene.tearing &&
-         !anatomy.given_skin && anatomy.skin.points.size() >= worth_a_part * ranks;
+  if (!wish.empty()) return wish;
+  if (anatomy.skin.points.size() < worth_a_part * static_cast<size_t>(base::size(comm)))
+    return "its skin has few vertices";
+  return model::beyond_columns(anatomy.scene);
 }
 
 /// What a scene says, before its model is made. On rank 0.
@@ -62,18 +63,21 @@ void raise(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
   scene::Scene scene;
   base::together(
       comm, [&] { scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input); });
+  job.layers = scene.tissue.layers;
   job.raised = discrete::raise(comm, ground ? &*ground : nullptr, std::move(scene));
   base::on_first_rank(comm, [&] {
     model::BuildReport report = ground->report();
     report.effective_modulus = job.raised->effective_modulus;
-    job.building = describe_build(report);
+    job.building = describe_build(report) +
+                   report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
     job.model = std::move(job.raised->frame);
   });
 }
 
 /// Collective.
-void read(MPI_Comm comm, const std::filesystem::path& input, bool whole, Job& job) {
+void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole, Job& job) {
   bool raised = false;
+  const bool shared = base::size(comm) > 1;
   base::on_first_rank(comm, [&] {
     if (results::is_hdf5(input)) {
       job.model = results::read_model(input);
@@ -81,8 +85,11 @@ void read(MPI_Comm comm, const std::filesystem::path& input, bool whole, Job& jo
       return;
     }
     read_scene(scene::read_scene(input), job);
-    raised = !whole && is_raised(comm, *job.anatomy);
-    if (!raised) build(input, job);
+    const std::string why = why_whole(comm, *job.anatomy, whole);
+    raised = shared && why.empty();
+    if (raised) return;
+    build(input, job);
+    if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
   });
   MPI_Bcast(&raised, 1, MPI_C_BOOL, 0, comm);
   if (raised) raise(comm, input, job);
@@ -122,7 +129,7 @@ void share(MPI_Comm comm, Job& job) {
 
 }  // namespace
 
-Job read_job(MPI_Comm comm, const std::filesystem::path& input, bool whole) {
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole) {
   Job job;
   read(comm, input, whole, job);
   bring_into_equilibrium(comm, job);

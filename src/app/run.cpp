@@ -39,15 +39,16 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   std::string name = options.has("output") ? options.text("output") : input.stem().string();
   std::error_code missing;
   if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
-  read_job(comm, input, true);
+  read_job(comm, input, "");
   base::refuse("{}: the result would replace the input; give another -output", input.string());
 }
 
-/// Whether an option asks for more than the parts of a model that ranks make themselves.
-bool needs_whole(const base::Options& options) {
-  for (const char* name : {"adapt", "discretisation", "sensitivity", "verify_path"})
-    if (options.flag(name)) return true;
-  return options.has("restart") || options.text("profile") == "preview";
+/// The option that asks for more than the parts of a model that ranks make themselves, or nothing.
+std::string needs_whole(const base::Options& options) {
+  for (const std::string name : {"adapt", "discretisation", "sensitivity", "verify_path"})
+    if (options.flag(name)) return "-" + name;
+  if (options.has("restart")) return "-restart";
+  return options.text("profile") == "preview" ? "-profile preview" : "";
 }
 
 /// On rank 0.
@@ -185,15 +186,20 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
 /// NAME_given_skin.vtp. Collective.
 std::string Run::write_given_skin(const Writer& writer) const {
   if (!job_.remeshed || !job_.cuts.empty()) return "";
-  const std::vector<Vec3> position = writer.positions();
   const std::string file = name_ + "_given_skin.vtp";
-  base::on_first_rank(comm, [&] {
-    const model::Model model = results::read_model(name_ + ".h5");
+  const auto write = [&](const auto& solved, const std::vector<Vec3>& initial,
+                         const std::vector<Vec3>& position) {
     std::vector<Vec3> displacement(position.size());
-    for (size_t i = 0; i < position.size(); ++i)
-      displacement[i] = position[i] - model.points.position[i];
+    for (size_t i = 0; i < position.size(); ++i) displacement[i] = position[i] - initial[i];
     const surface::Surface& given = *job_.anatomy->given_skin;
-    surface::write_surface(file, given, adapt::displacement_of_given(given, model, displacement));
+    surface::write_surface(file, given, adapt::displacement_of_given(given, solved, displacement));
+  };
+  const std::vector<Vec3> position =
+      job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+  base::on_first_rank(comm, [&] {
+    if (job_.raised) return write(job_.anatomy->skin, job_.anatomy->skin.points, position);
+    const model::Model model = results::read_model(name_ + ".h5");
+    write(model, model.points.position, position);
   });
   return report_row("given skin", file + ": its vertices, with displacement");
 }

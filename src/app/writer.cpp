@@ -57,6 +57,16 @@ std::vector<Vec3> Writer::positions() const {
   return discrete::gather_points(comm_, last_.rows.position);
 }
 
+std::vector<Vec3> Writer::skin_positions(int64_t layers) const {
+  auto rows = static_cast<int64_t>(last_.rows.position.size()), total = rows;
+  MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_INT64_T, MPI_SUM, comm_);
+  const int64_t begin = base::slab(total, base::rank(comm_), base::size(comm_)).begin;
+  std::vector<Vec3> skin;
+  for (int64_t i = (layers - begin % layers) % layers; i < rows; i += layers)
+    skin.push_back(last_.rows.position[i]);
+  return discrete::gather_points(comm_, skin);
+}
+
 std::vector<double> Writer::volume_ratios() const {
   const std::vector<double>& ratio = last_.rows.volume_ratio;
   return discrete::gather(comm_, ratio.data(), ratio.size());

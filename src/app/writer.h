@@ -40,6 +40,8 @@ class Writer {
   const std::string& comparison() const { return comparison_; }
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
+  /// Of every so many points the first: of a model of layers, the skin.
+  std::vector<Vec3> skin_positions(int64_t layers) const;
   std::vector<double> volume_ratios() const;
   /// [N] N/mm², or nothing where tissue touches nothing; likewise.
   std::vector<double> contact_pressures() const;

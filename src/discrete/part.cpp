@@ -6,6 +6,7 @@
 
 #include "countable.h"
 #include "partition.h"
+#include "pass_bodies.h"
 #include "plan.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
@@ -79,50 +80,6 @@ void plan_contact(Plan& plan, const ColumnGraph& graph) {
   keep_cuts_whole(graph, plan);
   plan.bodies = mechanics::make_bodies(plan.model);
   plan.touch_offset = mechanics::touch_offsets(plan.model, plan.bodies);
-}
-
-template <class Archive>
-void pass_shape(Archive& archive, mechanics::RigidBody::Shape& shape) {
-  std::visit(
-      [&](auto& of) {
-        if constexpr (requires { of.pass(archive); })
-          of.pass(archive);
-        else
-          archive(of);
-      },
-      shape);
-}
-
-void pass_bodies(Sender& archive, std::vector<mechanics::RigidBody>& bodies) {
-  archive(static_cast<int64_t>(bodies.size()));
-  for (const mechanics::RigidBody& body : bodies) {
-    archive(body.bone(), body.push(), static_cast<int64_t>(body.shape().index()));
-    auto shape = body.shape();
-    pass_shape(archive, shape);
-  }
-}
-
-/// One of the kind that is to be received.
-mechanics::RigidBody::Shape empty_shape(int64_t index) {
-  const Vec3 zero = Vec3::Zero();
-  if (index == 0) return scene::Sphere{zero, 0};
-  if (index == 1) return scene::Capsule{zero, zero, 0};
-  if (index == 2) return scene::Box{zero, zero};
-  if (index == 3) return scene::HalfSpace{zero, zero};
-  return surface::DistanceField{};
-}
-
-void pass_bodies(Receiver& archive, std::vector<mechanics::RigidBody>& bodies) {
-  int64_t count = 0, index = 0;
-  archive(count);
-  for (int64_t k = 0; k < count; ++k) {
-    int32_t bone = -1;
-    Vec3 push = Vec3::Zero();
-    archive(bone, push, index);
-    auto shape = empty_shape(index);
-    pass_shape(archive, shape);
-    bodies.emplace_back(std::move(shape), bone, push);
-  }
 }
 
 template <class Archive>

@@ -5,6 +5,7 @@
 #include "by_column.h"
 #include "countable.h"
 #include "partition.h"
+#include "pass_bodies.h"
 #include "plan.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
@@ -174,10 +175,18 @@ void complete_contact(MPI_Comm comm, double stiffness, bool touching, model::Mod
   for (std::vector<char>& blocks : wanted)
     MPI_Allreduce(MPI_IN_PLACE, blocks.data(), static_cast<int>(blocks.size()), MPI_CHAR, MPI_MAX,
                   comm);
-  base::together(comm, [&] {
-    plan.bodies = mechanics::make_bodies(model, travel, wanted);
-    plan.touch_offset = mechanics::touch_offsets(model, plan.bodies);
-  });
+  base::on_first_rank(comm, [&] { plan.bodies = mechanics::make_bodies(model, travel, wanted); });
+  for (int to = 1; to < base::size(comm); ++to)
+    base::together(comm, [&] {
+      if (base::rank(comm) == 0) {
+        Sender sender(comm, to);
+        pass_bodies(sender, plan.bodies);
+      } else if (base::rank(comm) == to) {
+        Receiver receiver(comm, 0);
+        pass_bodies(receiver, plan.bodies);
+      }
+    });
+  plan.touch_offset = mechanics::touch_offsets(model, plan.bodies);
 }
 
 /// By the columns of a piece what a plan says of its points.

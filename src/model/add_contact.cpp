@@ -109,11 +109,12 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
 
 /// Finer than the tissue can follow, teeth and edges catch single points.
 double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh) {
-  constexpr double share = 0.75;  // of the mean edge
+  constexpr double share = 0.75;   // of the mean edge
+  constexpr double finest = 0.75;  // mm: the bones of a CT are known no finer
   if (scene.contact && scene.contact->grid) return *scene.contact->grid;
   double sum = 0;
   for (size_t e = 0; e < mesh.edges.size(); ++e) sum += mesh.edge_length(static_cast<int64_t>(e));
-  return share * sum / static_cast<double>(mesh.edges.size());
+  return std::max(finest, share * sum / static_cast<double>(mesh.edges.size()));
 }
 
 void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,

@@ -11,8 +11,8 @@ namespace repose::model {
 /// the scene's contact leaves them out; bones that it slides along; instruments on which the skin
 /// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
 /// its median thickness; distances are read from grids of the scene's spacing, or 0.75 of the mean
-/// edge of the skin. Throws InputError naming the scene and an instrument that reaches no free
-/// point of the skin.
+/// edge of the skin, and 0.75 mm at least. Throws InputError naming the scene and an instrument
+/// that reaches no free point of the skin.
 void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model);
 

@@ -11,9 +11,13 @@
 
 namespace repose::model {
 
-bool is_by_columns(const scene::Scene& scene) {
-  return scene.tissue.material && scene.incisions.empty() && scene.instruments.empty() &&
-         scene.forces.empty() && scene.tissue.mass.empty();
+std::string beyond_columns(const scene::Scene& scene) {
+  if (!scene.tissue.material) return "its tissue is springs";
+  if (!scene.incisions.empty()) return "it has incisions";
+  if (!scene.instruments.empty()) return "it has instruments";
+  if (!scene.forces.empty()) return "it has forces";
+  if (!scene.tissue.mass.empty()) return "its layers have masses";
+  return "";
 }
 
 struct Ground::State {

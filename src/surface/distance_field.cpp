@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "repose/base/error.h"
 #include "repose/surface/triangle_tree.h"
@@ -160,17 +161,16 @@ class FieldBuilder {
 
   /// Hands triangles on from the grid points in the queue to their neighbours, up to limit_.
   void spread() {
-    for (size_t next = 0; next < queue_.size(); ++next) {
-      const Index at = queue_[next];  // the queue grows meanwhile
-      const int32_t triangle = triangle_[slot(at)];
-      for_neighbours(at, [&](const Index& beside) {
-        if (triangle == deep)
-          sink(beside);
-        else
-          offer(beside, triangle);
-      });
-    }
-    queue_.clear();
+    while (!queue_.empty())
+      for (const Index& at : std::exchange(queue_, {})) {
+        const int32_t triangle = triangle_[slot(at)];
+        for_neighbours(at, [&](const Index& beside) {
+          if (triangle == deep)
+            sink(beside);
+          else
+            offer(beside, triangle);
+        });
+      }
   }
 
   template <class Visit>

@@ -1,8 +1,6 @@
 /// What every stage of a large model's way costs, in time and memory: a synthetic head is built,
 /// written, read, shared out, evaluated, searched by 20 iterations of L-BFGS, and its step written.
-/// Nothing makes a matrix. Prints a line a stage: its name, CPU seconds of the slowest rank, and
-/// the most memory in use during it, of all ranks together and of rank 0, bytes; large.py makes a
-/// table of it.
+/// Nothing makes a matrix. Prints a line a stage (stage_clock.h), of which large.py makes a table.
 ///
 ///     benchmark_large SKIN_VERTICES FILE
 ///     mpirun -n 2 benchmark_large SKIN_VERTICES FILE
@@ -10,59 +8,26 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <string>
 
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
-#include "repose/base/program.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/objective.h"
 #include "repose/meshtools/phantom.h"
 #include "repose/model/build.h"
 #include "repose/results/model_file.h"
 #include "repose/results/result_file.h"
+#include "stage_clock.h"
 
 namespace {
 
 using namespace repose;
 using base::check;
+using benchmark::Clock;
 
 const MPI_Comm comm = MPI_COMM_WORLD;
 constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
-
-/// Most bytes that were resident since the last restart() (Linux).
-double peak_bytes() {
-  std::ifstream status("/proc/self/status");
-  std::string word;
-  while (status >> word)
-    if (word == "VmHWM:") break;
-  double kibibytes = 0;
-  status >> kibibytes;
-  return 1024 * kibibytes;
-}
-
-class Clock {
- public:
-  Clock() { restart(); }
-  void end(const char* stage, int64_t goes = 1) {
-    double seconds = (base::cpu_seconds() - begin_) / static_cast<double>(goes);
-    const double mine = peak_bytes();
-    double all = 0;
-    MPI_Allreduce(MPI_IN_PLACE, &seconds, 1, MPI_DOUBLE, MPI_MAX, comm);
-    MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, comm);
-    if (base::rank(comm) == 0) std::printf("%s %.9f %.0f %.0f\n", stage, seconds, all, mine);
-    std::fflush(stdout);
-    restart();
-  }
-
- private:
-  void restart() {
-    std::ofstream("/proc/self/clear_refs") << 5;  // the peak starts anew
-    begin_ = base::cpu_seconds();
-  }
-  double begin_ = 0;
-};
 
 /// The jaw goes forward by 6 mm.
 scene::Scene jaw_advance() {

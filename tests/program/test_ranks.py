@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
+from heads import read_vtp
 from tissue import apart, last, model_of, steps
 
 LOADED = """
@@ -49,6 +50,42 @@ def test_same_face_on_any_number_of_ranks(solved, ranks):
 def test_same_face_of_a_turned_jaw(solved):
     options = ["paper_jaw_opening.yaml", "-accuracy", "1e-9"]
     check_same(solved(*options), solved(*options, ranks=3))
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5])
+@pytest.mark.parametrize("scene", ["head_solid.yaml", "head_le_fort.yaml"])
+def test_ranks_make_the_parts_of_a_solid_that_one_rank_builds(solved, scene, ranks):
+    one, many = solved(scene), solved(scene, ranks=ranks)
+    model, other = model_of(one), model_of(many)
+    assert model.keys() == other.keys()
+    assert [name for name in model if model[name].tobytes() != other[name].tobytes()] == []
+    assert apart(last(one), last(many)) < 0.1  # the accuracy
+
+
+def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
+    text = (PROJECT / "meshes/head_solid.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    (tmp_path / "solid.yaml").write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 8", 1))
+    found = []
+    for ranks in (1, 2):
+        result = run("repose-solve", "solid.yaml", "-output", f"on{ranks}", ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert ("by 2 ranks, each its part" in result.stdout) == (ranks == 2)
+        found.append(read_vtp(tmp_path / f"on{ranks}_given_skin.vtp")["displacement"])
+    assert np.abs(found[0]).max() > 1
+    assert np.abs(found[0] - found[1]).max() < 0.1
+
+
+@pytest.mark.parametrize("options, why", [
+    ("head_springs_advance.yaml", "its tissue is springs"),
+    ("head_instrument.yaml", "it has instruments"),
+    ("head_incision.yaml", "it has incisions"),
+    ("head_solid.yaml -verify_path", "-verify_path")])
+def test_why_one_rank_builds_the_model_whole_is_told(run, options, why):
+    scene, *rest = options.split()
+    result = run("repose-solve", PROJECT / "meshes" / scene, *rest, "-dry_run", ranks=2)
+    assert result.returncode == 0, result
+    assert f"by rank 0, whole: {why}\n" in result.stdout
 
 
 @pytest.mark.parametrize("volume", ["none", "paper"])

@@ -8,8 +8,11 @@ namespace repose::adapt {
 /// dirty and larger: an affine motion fitted to the 16 nearest skin points of the model by moving
 /// least squares, for what lies farther off than they do (ears, inner walls) that at their border.
 /// Beyond the rim of the solved skin it fades to nothing over 20 mm. The fields are `displacement`
-/// (mm) and `solved`, the share of it that is left (1 over the solved skin). `displacement` [N] is
-/// the model's. Serial.
+/// (mm) and `solved`, the share of it that is left (1 over the solved skin). `displacement` is that
+/// of the points of the solved `skin`, or of all of a model. Serial.
+surface::PointData displacement_of_given(const surface::Surface& given,
+                                         const surface::Surface& skin,
+                                         const std::vector<Vec3>& displacement);
 surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
                                          const std::vector<Vec3>& displacement);
 

@@ -71,8 +71,7 @@ struct Piece {
 /// Takes memory by the skin, where the model takes it by the skin times the layers.
 class Ground {
  public:
-  /// Serial; as build_model(). For tissue that is a solid without incisions, instruments, forces
-  /// and masses of layers (see is_by_columns).
+  /// Serial; as build_model(). For scenes of which nothing is beyond_columns().
   explicit Ground(const Anatomy& anatomy);
   ~Ground();
   Ground(Ground&&) noexcept;
@@ -93,8 +92,8 @@ class Ground {
   std::unique_ptr<State> state_;
 };
 
-/// Whether all of a scene's model is known by columns; otherwise one process builds it whole.
-bool is_by_columns(const scene::Scene& scene);
+/// What of a scene is not known by columns, so that one process builds its model whole; or nothing.
+std::string beyond_columns(const scene::Scene& scene);
 
 /// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
 /// columns that the piece was made around, all there is; of others, what the piece has. Indices are

@@ -196,15 +196,15 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
 
 TEST(Raise, what_needs_more_than_columns_is_said) {
   scene::Scene scene = jaws(4).scene;
-  EXPECT_TRUE(model::is_by_columns(scene));
+  EXPECT_EQ(model::beyond_columns(scene), "");
   scene.forces = {{Vec3::Zero(), 5, Vec3::UnitX()}};
-  EXPECT_FALSE(model::is_by_columns(scene));
+  EXPECT_EQ(model::beyond_columns(scene), "it has forces");
   scene = jaws(4).scene;
   scene.tissue.material.reset();
-  EXPECT_FALSE(model::is_by_columns(scene));
+  EXPECT_EQ(model::beyond_columns(scene), "its tissue is springs");
   scene = jaws(4).scene;
   scene.tissue.mass = {1, 1, 1, 1};
-  EXPECT_FALSE(model::is_by_columns(scene));
+  EXPECT_EQ(model::beyond_columns(scene), "its layers have masses");
 }
 
 }  // namespace

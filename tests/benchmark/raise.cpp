@@ -1,0 +1,103 @@
+/// What every stage of a large solid's way costs before it is searched, built whole by rank 0 and
+/// shared out, or raised by all ranks from their columns: a synthetic head with contact. Prints a
+/// line a stage (stage_clock.h), of which raise.py makes a table.
+///
+///     mpirun -n 2 benchmark_raise SKIN_VERTICES FILE whole|raised
+#include <optional>
+
+#include "repose/base/petsc.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/discrete/objective.h"
+#include "repose/meshtools/phantom.h"
+#include "repose/model/build.h"
+#include "repose/results/result_file.h"
+#include "stage_clock.h"
+
+namespace {
+
+using namespace repose;
+using benchmark::Clock;
+
+const MPI_Comm comm = MPI_COMM_WORLD;
+constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
+
+/// The jaw goes forward by 6 mm.
+scene::Scene jaw_advance() {
+  scene::Scene scene;
+  scene.bones = {{"skull", {}}, {"mandible", {}}};
+  scene.tissue.layers = 4;
+  scene.tissue.material = scene::Material{.deep = {0.015, 0.45}, .strata = {}, .regions = {}};
+  scene.contact = scene::Contact{};
+  scene.moves = {scene::RigidMotion(), scene::RigidMotion::translation({0, -6, 0})};
+  return scene;
+}
+
+/// The surfaces, on rank 0.
+model::Anatomy anatomy_of(int64_t skin_vertices) {
+  model::Anatomy anatomy{jaw_advance(), {}, {}, {}, {}};
+  if (base::rank(comm) > 0) return anatomy;
+  anatomy.skin = meshtools::make_phantom_skin(skin_vertices);
+  anatomy.bones = {meshtools::make_phantom_skull(bone_edge),
+                   meshtools::make_phantom_mandible(bone_edge)};
+  return anatomy;
+}
+
+using File = std::optional<results::ResultFile>;
+
+discrete::Part whole(const model::Anatomy& anatomy, const std::string& name, File& file,
+                     Clock& clock) {
+  model::Model model;
+  if (base::rank(comm) == 0) model = model::build_model(anatomy).model;
+  clock.end("build");
+  file.emplace(comm, name, model);
+  clock.end("write");
+  discrete::Part part = discrete::distribute(comm, model);
+  clock.end("distribute");
+  return part;
+}
+
+discrete::Part raised(const model::Anatomy& anatomy, const std::string& name, File& file,
+                      Clock& clock) {
+  std::optional<model::Ground> ground;
+  if (base::rank(comm) == 0) ground.emplace(anatomy);
+  clock.end("ground");
+  discrete::RaisedPart raised = discrete::raise(comm, ground ? &*ground : nullptr, anatomy.scene);
+  ground.reset();
+  clock.end("raise");
+  file.emplace(comm, name, raised.frame, discrete::NaturalRows::of_model(comm, raised));
+  clock.end("write");
+  return std::move(raised.part);
+}
+
+void measure(int64_t skin_vertices, const std::string& name, bool is_whole) {
+  Clock clock;
+  const model::Anatomy anatomy = anatomy_of(skin_vertices);
+  clock.end("surfaces");
+  File file;
+  const discrete::Part part =
+      is_whole ? whole(anatomy, name, file, clock) : raised(anatomy, name, file, clock);
+  if (base::rank(comm) == 0) std::printf("points %ld\n", static_cast<long>(part.total_points));
+  discrete::Positions positions(comm, part);
+  discrete::Objective objective(positions, mechanics::solid_weights);
+  const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();
+  positions.set_load(0.1);
+  objective.evaluate(at, gradient);
+  clock.end("evaluate");
+  model::StepNumbers numbers;
+  numbers.volume = model::VolumeTerm::material;
+  file->append(numbers, discrete::NaturalRows(comm, part).rows(objective));
+  file->commit();
+  clock.end("result");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: benchmark_raise SKIN_VERTICES FILE whole|raised\n");
+    return 1;
+  }
+  const base::Session session(1, argv, nullptr);
+  measure(std::stoll(argv[1]), argv[2], std::string(argv[3]) == "whole");
+  return 0;
+}
