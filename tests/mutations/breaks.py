@@ -404,4 +404,24 @@ BREAKS = [
         r"^base\.",
     ),
     ("unknown options are taken", "unknown_.push_back(name);\n    return is_value", "return is_value", r"^base\."),
+    # parts that ranks make themselves
+    (
+        "a piece lacks its second ring",
+        "triangles_at(on.mesh, columns_of(on.mesh, triangles_at(on.mesh, columns)))",
+        "triangles_at(on.mesh, columns)",
+        f"{SOLVE}on_",
+    ),
+    ("a column's rows are all its first", "begin[k] + next++", "begin[k] + 0 * next++", f"{SOLVE}on_"),
+    (
+        "only rank 0 says where distances are asked for",
+        "MPI_Allreduce(MPI_IN_PLACE, blocks.data(), static_cast<int>(blocks.size()), MPI_CHAR, MPI_MAX,",
+        "MPI_Allreduce(MPI_IN_PLACE, blocks.data(), 0, MPI_CHAR, MPI_MAX,",
+        f"{SOLVE}on_",
+    ),
+    (
+        "only rank 0 says how far points go",
+        "MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm);",
+        "MPI_Bcast(&travel, 1, MPI_DOUBLE, 0, comm);",
+        f"{SOLVE}on_",
+    ),
 ]

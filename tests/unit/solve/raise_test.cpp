@@ -173,6 +173,26 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
   EXPECT_EQ(rows.touches, static_cast<int64_t>(whole.contact.touches.point.size()));
 }
 
+/// The jaws turn together, about each corner: points of one rank go farther than others'.
+TEST(Raise, bodies_know_the_distances_that_any_rank_asks_for) {
+  for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(100, 0, 0), Vec3(0, 100, 0), Vec3(100, 100, 0)}) {
+    model::Anatomy anatomy = jaws(24);
+    anatomy.scene.contact->grid = 1;
+    anatomy.scene.moves.assign(2, scene::RigidMotion::rotation(Vec3::UnitZ(), corner, 12));
+    anatomy.bones = {patches::box({-20, -20, -80}, {51.2, 120, -10}),
+                     patches::box({51.3, -20, -80}, {120, 120, -10})};
+    const auto bodies = mechanics::make_bodies(model::build_model(anatomy).model);
+    const discrete::RaisedPart raised = raise(anatomy);
+    ASSERT_EQ(raised.part.bodies.size(), bodies.size());
+    for (size_t k = 0; k < bodies.size(); ++k)
+      for (double x = 2; x < 100; x += 8)
+        for (double y = 2; y < 100; y += 8)
+          for (const double z : {-8.0, -12.0, -40.0})
+            ASSERT_EQ(raised.part.bodies[k].distance({x, y, z}).value,
+                      bodies[k].distance({x, y, z}).value);
+  }
+}
+
 TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   const model::Anatomy anatomy = rich(12);
   model::Model whole = model::build_model(anatomy).model;
