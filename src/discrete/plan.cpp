@@ -31,15 +31,17 @@ bool touches(const Plan& plan, std::span<const int64_t> element, int rank) {
   });
 }
 
-/// [N] Of averaged volumes the points whose average one rank evaluates: its own, and those of the
-/// prisms at its unknowns.
-std::vector<char> averaged_points(const Plan& plan, int rank) {
-  std::vector<char> averaged(plan.owner.size(), 0);
-  for (size_t row = 0; row < averaged.size(); ++row) averaged[row] = plan.owner[row] == rank;
+/// [N] Points around which one rank has all prisms of a solid: its own, because those of an edge
+/// say how stiff it is (solve/prestress.h), and where volumes are averaged those of the prisms at
+/// its unknowns.
+std::vector<char> surrounded_points(const Plan& plan, int rank) {
+  std::vector<char> surrounded(plan.owner.size(), 0);
+  for (size_t row = 0; row < surrounded.size(); ++row) surrounded[row] = plan.owner[row] == rank;
+  if (plan.model.prisms.nodal_modulus.empty()) return surrounded;
   for (const auto& prism : plan.model.prisms.points)
     if (plan.owner[prism[0]] == rank || touches(plan, prism, rank))
-      for (const int64_t row : prism) averaged[row] = 1;
-  return averaged;
+      for (const int64_t row : prism) surrounded[row] = 1;
+  return surrounded;
 }
 
 /// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
@@ -48,13 +50,14 @@ std::vector<char> averaged_points(const Plan& plan, int rank) {
 template <size_t n>
 std::vector<int64_t> element_rows(const Plan& plan,
                                   const std::vector<std::array<int64_t, n>>& elements, int rank,
-                                  int64_t& owned, const std::vector<char>& averaged = {}) {
+                                  int64_t& owned, const std::vector<char>& surrounded = {}) {
   constexpr int64_t points_in_block = 1024;
   const int64_t blocks = plan.total_points / points_in_block + 1;
   const auto block_of = [&](const std::array<int64_t, n>& element) {
     const bool mine = plan.owner[element[0]] == rank;
-    const bool near = !averaged.empty() && std::any_of(element.begin(), element.end(),
-                                                       [&](int64_t p) { return averaged[p] != 0; });
+    const bool near =
+        !surrounded.empty() &&
+        std::any_of(element.begin(), element.end(), [&](int64_t p) { return surrounded[p] != 0; });
     if (!mine && !near && !touches(plan, element, rank)) return 2 * blocks;
     int64_t first = plan.place[element[0]];
     for (const int64_t point : element) first = std::min(first, plan.place[point]);
@@ -141,9 +144,9 @@ void pick_springs(const Plan& plan, LocalNumbers& local, int rank, Part& part) {
 /// Prisms, and edges.
 void pick_solid(const Plan& plan, LocalNumbers& local, int rank, Part& part) {
   const Model& model = plan.model;
-  std::vector<char> averaged;
-  if (!model.prisms.nodal_modulus.empty()) averaged = averaged_points(plan, rank);
-  auto rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms, averaged);
+  std::vector<char> surrounded;
+  if (model::is_solid(model)) surrounded = surrounded_points(plan, rank);
+  auto rows = element_rows(plan, model.prisms.points, rank, part.owned_prisms, surrounded);
   part.model.prisms = model::pick_prisms(model.prisms, rows);
   number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);

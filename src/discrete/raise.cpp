@@ -21,7 +21,8 @@ namespace {
 using base::pick;
 using model::PointSet;
 
-/// What a rank is given: a piece of the ground, and where its columns stand in the whole.
+/// What a rank is given: a piece of the ground, and where its columns stand in
+/// the whole.
 struct Deal {
   model::Piece piece;
   std::vector<int> owner;                          // [C] rank of each column
@@ -34,24 +35,24 @@ struct Deal {
 };
 
 template <class Archive>
-void pass(Archive& archive, Deal& d) {
-  model::Piece& p = d.piece;
+void pass(Archive &archive, Deal &d) {
+  model::Piece &p = d.piece;
   archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.corner, p.triangle);
   archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.total_unknowns,
           d.first_unknown, d.unknowns, d.spacing, d.moves);
 }
 
 template <class Archive>
-void pass(Archive& archive, std::vector<surface::Surface>& bones) {
+void pass(Archive &archive, std::vector<surface::Surface> &bones) {
   auto count = static_cast<int64_t>(bones.size());
   archive(count);
   bones.resize(count);
-  for (surface::Surface& bone : bones) archive(bone.points, bone.triangles);
+  for (surface::Surface &bone : bones) archive(bone.points, bone.triangles);
 }
 
 /// As column_graph() of the model, but for the columns of its points.
-ColumnGraph graph_of(const model::Ground& ground) {
-  const model::SkinMesh& skin = ground.skin();
+ColumnGraph graph_of(const model::Ground &ground) {
+  const model::SkinMesh &skin = ground.skin();
   ColumnGraph graph;
   graph.row_begin.push_back(0);
   for (int64_t c = 0; c < static_cast<int64_t>(skin.points.size()); ++c) {
@@ -66,8 +67,8 @@ ColumnGraph graph_of(const model::Ground& ground) {
 /// What rank 0 knows while it deals the ground out.
 class Dealer {
  public:
-  Dealer(const model::Ground& ground, const scene::Scene& scene, const ColumnGraph& graph,
-         const std::vector<int>& owner, int ranks)
+  Dealer(const model::Ground &ground, const scene::Scene &scene, const ColumnGraph &graph,
+         const std::vector<int> &owner, int ranks)
       : ground_(ground), scene_(scene), owner_(owner), own_(ranks), first_unknown_(ranks + 1) {
     const auto columns = static_cast<int64_t>(owner.size());
     const std::vector<int64_t> memory = memory_order(graph);
@@ -107,9 +108,9 @@ class Dealer {
   }
 
  private:
-  const model::Ground& ground_;
-  const scene::Scene& scene_;
-  const std::vector<int>& owner_;
+  const model::Ground &ground_;
+  const scene::Scene &scene_;
+  const std::vector<int> &owner_;
   std::vector<std::vector<int64_t>> own_;  // [ranks] columns
   std::vector<int64_t> place_, unknown_;   // [columns] as in Deal
   std::vector<int64_t> first_unknown_;     // [ranks + 1]
@@ -117,8 +118,8 @@ class Dealer {
 };
 
 /// Every rank's deal, and the bones on all. Collective.
-Deal deal_out(MPI_Comm comm, const model::Ground* ground, const scene::Scene& scene,
-              model::Model& frame, std::vector<surface::Surface>& bones) {
+Deal deal_out(MPI_Comm comm, const model::Ground *ground, const scene::Scene &scene,
+              model::Model &frame, std::vector<surface::Surface> &bones) {
   const int ranks = base::size(comm), rank = base::rank(comm);
   ColumnGraph graph;
   base::on_first_rank(comm, [&] {
@@ -149,48 +150,80 @@ Deal deal_out(MPI_Comm comm, const model::Ground* ground, const scene::Scene& sc
   return deal;
 }
 
-/// Of each column of the piece that its rank owns, what a mean over the whole takes. Rank 0's
-/// answer is that of all columns. Collective.
-std::vector<model::ColumnSums> sums_of_all(MPI_Comm comm, const Deal& deal,
-                                           const std::vector<int64_t>& own,
-                                           const model::Model& model) {
-  const std::vector<model::ColumnSums> mine = pick(model::column_sums(model, deal.layers), own);
-  return gather_by_column(comm, deal.columns, pick(deal.piece.column, own), mine);
+/// The model of a rank's piece; refuses regions that hold no prism of any.
+/// Collective.
+model::Model raise_piece(MPI_Comm comm, const scene::Scene &scene,
+                         const std::vector<surface::Surface> &bones, const Deal &deal) {
+  model::Model model;
+  std::vector<int64_t> found;
+  base::together(comm, [&] { model = model::raise(scene, bones, deal.piece, found); });
+  model.contact.spacing = deal.spacing;
+  MPI_Allreduce(MPI_IN_PLACE, found.data(), static_cast<int>(found.size()), MPI_INT64_T, MPI_SUM,
+                comm);
+  base::on_first_rank(comm, [&] { model::require_regions(found, scene.file.string()); });
+  return model;
 }
 
-/// What contact needs to know of the whole model: stiffness and bodies. Collective.
-void complete_contact(MPI_Comm comm, double stiffness, bool touching, model::Model& model,
-                      Plan& plan) {
-  model::Contact& contact = model.contact;
-  contact.stiffness = stiffness;
-  MPI_Bcast(&contact.stiffness, 1, MPI_DOUBLE, 0, comm);
-  if (!touching) {
-    contact.bodies.clear();
-    return;
-  }
+/// Rows of the piece's columns that a rank owns.
+std::vector<int64_t> own_columns(const Deal &deal, int rank) {
+  std::vector<int64_t> own;
+  for (size_t c = 0; c < deal.owner.size(); ++c)
+    if (deal.owner[c] == rank) own.push_back(static_cast<int64_t>(c));
+  return own;
+}
+
+/// The means over the whole tissue: rank 0's effective modulus and, for all,
+/// contact's stiffness. Collective.
+void take_means(MPI_Comm comm, const scene::Scene &scene, const Deal &deal,
+                const std::vector<int64_t> &own, model::Model &model, RaisedPart &raised) {
+  const auto mine = pick(model::column_sums(model, deal.layers), own);
+  const auto sums = gather_by_column(comm, deal.columns, pick(deal.piece.column, own), mine);
+  base::on_first_rank(comm, [&] {
+    raised.effective_modulus = model::effective_modulus(sums);
+    model.contact.stiffness = model::contact_stiffness(scene, sums);
+  });
+  MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
+}
+
+/// The bodies, built by rank 0 from what all ranks ask for. Collective.
+std::vector<mechanics::RigidBody> share_bodies(MPI_Comm comm, const model::Model &model) {
   double travel = model::PrescribedMotion(model).largest_travel(model);
   MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm);
   std::vector<std::vector<char>> wanted;
   base::together(comm, [&] { wanted = mechanics::wanted_blocks(model, travel); });
-  for (std::vector<char>& blocks : wanted)
+  for (std::vector<char> &blocks : wanted)
     MPI_Allreduce(MPI_IN_PLACE, blocks.data(), static_cast<int>(blocks.size()), MPI_CHAR, MPI_MAX,
                   comm);
-  base::on_first_rank(comm, [&] { plan.bodies = mechanics::make_bodies(model, travel, wanted); });
+  std::vector<mechanics::RigidBody> bodies;
+  base::on_first_rank(comm, [&] { bodies = mechanics::make_bodies(model, travel, wanted); });
   for (int to = 1; to < base::size(comm); ++to)
     base::together(comm, [&] {
       if (base::rank(comm) == 0) {
         Sender sender(comm, to);
-        pass_bodies(sender, plan.bodies);
+        pass_bodies(sender, bodies);
       } else if (base::rank(comm) == to) {
         Receiver receiver(comm, 0);
-        pass_bodies(receiver, plan.bodies);
+        pass_bodies(receiver, bodies);
       }
     });
+  return bodies;
+}
+
+/// What the piece's points touch, if those of any rank touch anything.
+/// Collective.
+void plan_contact(MPI_Comm comm, model::Model &model, Plan &plan) {
+  int64_t touching = !model.contact.touches.point.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT64_T, MPI_MAX, comm);
+  if (touching == 0) {
+    model.contact.bodies.clear();
+    return;
+  }
+  plan.bodies = share_bodies(comm, model);
   plan.touch_offset = mechanics::touch_offsets(model, plan.bodies);
 }
 
 /// By the columns of a piece what a plan says of its points.
-void number_points(const Deal& deal, Plan& plan) {
+void number_points(const Deal &deal, Plan &plan) {
   for (size_t c = 0; c < deal.owner.size(); ++c) {
     int64_t unknown = deal.unknown[c];
     for (int64_t a = 0; a < deal.layers; ++a) {
@@ -205,7 +238,7 @@ void number_points(const Deal& deal, Plan& plan) {
 }
 
 /// Rows of the piece's points that a rank owns, by their places.
-std::vector<int64_t> own_points(const Deal& deal, std::vector<int64_t> own) {
+std::vector<int64_t> own_points(const Deal &deal, std::vector<int64_t> own) {
   std::sort(own.begin(), own.end(),
             [&](int64_t a, int64_t b) { return deal.place[a] < deal.place[b]; });
   std::vector<int64_t> rows;
@@ -214,20 +247,22 @@ std::vector<int64_t> own_points(const Deal& deal, std::vector<int64_t> own) {
   return rows;
 }
 
-/// The whole model's rows in place of the piece's. `edge_row` [edges of the piece].
-void number_rows(const Deal& deal, const std::vector<int64_t>& edge_row, Part& part) {
+/// The whole model's rows in place of the piece's. `edge_row` [edges of the
+/// piece].
+void number_rows(const Deal &deal, const std::vector<int64_t> &edge_row, Part &part) {
   const auto triangles = static_cast<int64_t>(deal.piece.triangle.size());
-  for (int64_t& row : part.point_row)
+  for (int64_t &row : part.point_row)
     row = deal.piece.column[row / deal.layers] * deal.layers + row % deal.layers;
-  for (int64_t& row : part.prism_row)
+  for (int64_t &row : part.prism_row)
     row = row / triangles * deal.triangles + deal.piece.triangle[row % triangles];
-  for (int64_t& row : part.edge_row) row = edge_row[row];
+  for (int64_t &row : part.edge_row) row = edge_row[row];
   part.total_springs = 0;
   part.total_prisms = (deal.layers - 1) * deal.triangles;
 }
 
-/// Rows of the piece's edges in the whole model, −1 of those of others. Collective.
-ColumnRows rows_of_edges(MPI_Comm comm, int rank, const Deal& deal, const model::Model& model) {
+/// Rows of the piece's edges in the whole model, −1 of those of others.
+/// Collective.
+ColumnRows rows_of_edges(MPI_Comm comm, int rank, const Deal &deal, const model::Model &model) {
   std::vector<int64_t> mine, column;
   for (size_t e = 0; e < model.edges.points.size(); ++e) {
     const int64_t c = model.edges.points[e][0] / deal.layers;
@@ -241,7 +276,18 @@ ColumnRows rows_of_edges(MPI_Comm comm, int rank, const Deal& deal, const model:
   return all;
 }
 
-model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
+/// Rows of contact in the whole model. Collective.
+void number_touches(MPI_Comm comm, const Deal &deal, RaisedPart &raised) {
+  const model::Model &model = raised.part.model;
+  std::vector<int64_t> column;
+  for (const int64_t point : model.contact.touches.point)
+    column.push_back(model.points.column[point]);
+  ColumnRows rows = rows_by_column(comm, deal.columns, column);
+  raised.touch_row = std::move(rows.row);
+  raised.touches = rows.total;
+}
+
+model::Counts count_all(MPI_Comm comm, const Part &part, int64_t edges) {
   int64_t of[4] = {};
   for (int64_t i = 0; i < part.owned_points; ++i) ++of[static_cast<int>(part.model.points.set[i])];
   MPI_Allreduce(MPI_IN_PLACE, of, 4, MPI_INT64_T, MPI_SUM, comm);
@@ -255,7 +301,7 @@ model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
 
 }  // namespace
 
-RaisedPart raise(MPI_Comm comm, const model::Ground* ground, scene::Scene scene) {
+RaisedPart raise(MPI_Comm comm, const model::Ground *ground, scene::Scene scene) {
   static const PetscLogEvent event = base::log_event("RpPartition");
   const base::Logged logged(event);
   const int rank = base::rank(comm);
@@ -263,45 +309,23 @@ RaisedPart raise(MPI_Comm comm, const model::Ground* ground, scene::Scene scene)
   std::vector<surface::Surface> bones;
   const Deal deal = deal_out(comm, ground, scene, raised.frame, bones);
   scene.moves = deal.moves;
-  model::Model model;
-  std::vector<int64_t> found;
-  base::together(comm, [&] { model = model::raise(scene, bones, deal.piece, found); });
-  model.contact.spacing = deal.spacing;
-  MPI_Allreduce(MPI_IN_PLACE, found.data(), static_cast<int>(found.size()), MPI_INT64_T, MPI_SUM,
-                comm);
-  base::on_first_rank(comm, [&] { model::require_regions(found, scene.file.string()); });
-
-  std::vector<int64_t> own;  // rows of the piece's columns
-  for (size_t c = 0; c < deal.owner.size(); ++c)
-    if (deal.owner[c] == rank) own.push_back(static_cast<int64_t>(c));
-  const auto sums = sums_of_all(comm, deal, own, model);
-  double stiffness = 0;
-  base::on_first_rank(comm, [&] {
-    raised.effective_modulus = model::effective_modulus(sums);
-    stiffness = model::contact_stiffness(scene, sums);
-  });
-  int64_t touching = !model.contact.touches.point.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT64_T, MPI_MAX, comm);
-
+  model::Model model = raise_piece(comm, scene, bones, deal);
+  const std::vector<int64_t> own = own_columns(deal, rank);
+  take_means(comm, scene, deal, own, model, raised);
   Plan plan{model, {}, {}, {}, {}, {}, {}, {}};
   plan_motion(plan);
-  complete_contact(comm, stiffness, touching != 0, model, plan);
+  plan_contact(comm, model, plan);
   number_points(deal, plan);
-  const ColumnRows edges = rows_of_edges(comm, rank, deal, model);
   const std::vector<int64_t> points = own_points(deal, own);
   LocalNumbers local(static_cast<int64_t>(plan.owner.size()));
-  raised.part = make_part(plan, {rank, points, deal.first_unknown, deal.unknowns}, local);
-  raised.outward = pick(model::outward_normals(model), points);
-  Part& part = raised.part;
-  number_rows(deal, edges.row, part);
+  Part &part = raised.part;
+  part = make_part(plan, {rank, points, deal.first_unknown, deal.unknowns}, local);
   part.solid = true;
-  part.contact = touching != 0;
-  std::vector<int64_t> column;
-  for (const int64_t point : part.model.contact.touches.point)
-    column.push_back(part.model.points.column[point]);
-  ColumnRows touches = rows_by_column(comm, deal.columns, column);
-  raised.touch_row = std::move(touches.row);
-  raised.touches = touches.total;
+  part.contact = !model.contact.bodies.empty();
+  const ColumnRows edges = rows_of_edges(comm, rank, deal, model);
+  number_rows(deal, edges.row, part);
+  number_touches(comm, deal, raised);
+  raised.outward = pick(model::outward_normals(model), points);
   raised.counts = count_all(comm, part, edges.total);
   raised.frame.contact.bodies = model.contact.bodies;
   raised.frame.contact.stiffness = model.contact.stiffness;

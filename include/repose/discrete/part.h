@@ -14,8 +14,9 @@ namespace repose::discrete {
 /// What one rank works on. `model` is a model in local numbers: the points of its own columns come
 /// first, column after column, then ghosts; springs, edges and prisms whose first point it owns
 /// come first (they count in energies and are written here), then those that merely touch a
-/// soft-tissue point it owns, and where volumes are averaged around points, the other prisms around
-/// its points and those of its prisms. Bones that do not move rigidly appear as held points.
+/// soft-tissue point it owns, and of a solid the other prisms around its points and, where volumes
+/// are averaged around points, around those of its prisms. Bones that do not move rigidly appear as
+/// held points.
 struct Part {
   model::Model model;
   bool solid = false;  ///< the whole model is one, whatever is here
