@@ -69,10 +69,12 @@ void collapse(Collapser& collapser, const Surface& surface, const DecimateOption
     const Tolerance tolerance(tree, (1 - proof_accuracy) * options.distance, extent);
     return run(&tolerance);
   }
-  for (double distance = first_share * extent; distance < last_share * extent; distance *= 2) {
+  double distance = first_share * extent;
+  while (distance < last_share * extent) {
     if (collapser.triangles() <= options.triangles) return;
     const Tolerance tolerance(tree, distance, extent);
     run(&tolerance);
+    distance *= 2;
   }
   run(nullptr);
 }

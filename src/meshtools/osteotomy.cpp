@@ -270,7 +270,8 @@ Pieces cut_bone(const Surface& bone, const Osteotomy& plan) {
   constexpr double step = 1e-4;  // mm
   constexpr int attempts = 6;
   for (int attempt = 0; attempt < attempts; ++attempt) {
-    const double shift = (attempt % 2 ? step : -step) * ((attempt + 1) / 2);
+    const int steps = (attempt + 1) / 2;
+    const double shift = (attempt % 2 ? step : -step) * steps;
     Pieces pieces = cut_shifted(bone, plan, shift);
     if (!is_sound(pieces.piece) || !is_sound(pieces.rest)) continue;
     if (attempt > 0)

@@ -54,8 +54,9 @@ std::vector<Color> paints_of(const Held& held) {
   std::stable_sort(frequent.begin(), frequent.end(),
                    [](const auto& one, const auto& other) { return one.second > other.second; });
   std::vector<Color> paints;
-  for (const auto& [value, vertices] : frequent) {
-    const bool blend = vertices * least_part < held.values.size() ||
+  for (const auto& paint_and_vertices : frequent) {
+    const Color& value = paint_and_vertices.first;
+    const bool blend = paint_and_vertices.second * least_part < held.values.size() ||
                        std::any_of(paints.begin(), paints.end(), [&](const Color& paint) {
                          return apart(value, paint) <= blended;
                        });

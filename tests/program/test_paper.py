@@ -45,7 +45,7 @@ def page(folder):
 def test_table_1_is_the_papers(page):
     row = tables(page)[0][0]
     assert row[:4] == ["2", "954 (954)", "5881 (5881)", "874 (1748)"]
-    assert all(0 < float(cell) < 100 for cell in row[4:])
+    assert all(0 < float(cell) < 100 * PATIENCE for cell in row[4:])
 
 
 def test_energy_is_minimised(page):

@@ -1,0 +1,28 @@
+#pragma once
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "repose/model/build.h"
+
+namespace repose::discrete {
+
+/// What a rank is given: a piece of the ground, and where its columns stand in the whole.
+struct Deal {
+  model::Piece piece;
+  std::vector<int> owner;                          ///< [C] rank of each column
+  std::vector<int64_t> place;                      ///< [C] of its first point, as in Plan
+  std::vector<int64_t> unknown;                    ///< [C] block number of its first unknown
+  int64_t layers = 0, columns = 0, triangles = 0;  ///< of the whole
+  int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;
+  double spacing = 0;                     ///< mm, of contact's grids
+  std::vector<scene::RigidMotion> moves;  ///< [bones]
+};
+
+/// Deals the `ground` out, which rank 0 alone looks at: to every rank its piece, and the bones; to
+/// rank 0 the model's frame. Columns are shared out as by distribute(). Collective.
+Deal deal_out(MPI_Comm comm, const model::Ground* ground, const scene::Scene& scene,
+              model::Model& frame, std::vector<surface::Surface>& bones);
+
+}  // namespace repose::discrete
