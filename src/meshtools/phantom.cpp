@@ -15,7 +15,11 @@ using Distance = double (*)(const Vec3&);
 /// Where a point first meets a solid on its way along a direction, by sphere tracing.
 Vec3 first_met(Distance distance, Vec3 point, const Vec3& direction) {
   const Vec3 step = direction.normalized();
-  for (double d = distance(point); d > 1e-9; d = distance(point)) point += 0.8 * d * step;
+  double left = distance(point);
+  while (left > 1e-9) {
+    point += 0.8 * left * step;
+    left = distance(point);
+  }
   return point;
 }
 
