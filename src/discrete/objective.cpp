@@ -102,20 +102,25 @@ std::vector<Vec3> Objective::contact_force() {
   return {work_.begin(), work_.begin() + positions_.part().owned_points};
 }
 
-std::vector<Objective::Block> Objective::blocks(bool exact) {
+std::vector<Objective::Block> Objective::term_blocks(bool exact) const {
   std::vector<Block> blocks;
-  const auto add = [&](int32_t p, int32_t q, const Mat3& block) {
-    blocks.push_back({p, q, weights_.elastic * block});
-  };
   for (const mechanics::TermLoop& loop : loops_.terms)
-    loop.for_each_block(positions_.local(), exact, add);
+    loop.for_each_block(positions_.local(), exact, [&](int32_t p, int32_t q, const Mat3& block) {
+      blocks.push_back({p, q, weights_.elastic * block});
+    });
+  return blocks;
+}
+
+std::vector<Objective::Block> Objective::contact_blocks(bool exact) {
+  std::vector<Block> blocks;
   if (!positions_.part().contact) return blocks;
+  const auto add = [&](int64_t p, int64_t q, const Mat3& block) {
+    blocks.push_back(
+        {static_cast<int32_t>(p), static_cast<int32_t>(q), weights_.elastic * block});
+  };
   place_bodies();
   touches_.look(positions_.local());
-  touches_.for_each_block(exact, [&](int64_t point, const Mat3& block) {
-    const auto p = static_cast<int32_t>(point);
-    add(p, p, block);
-  });
+  touches_.for_each_block(exact, [&](int64_t p, const Mat3& block) { add(p, p, block); });
   walls_.look(positions_.local());
   walls_.for_each_block(exact, add);
   return blocks;
@@ -179,10 +184,11 @@ void Objective::add_blocks(std::span<const Block> blocks, std::span<const Vec3> 
   }
 }
 
-void Objective::hessian_action(std::span<const Vec3> direction, Vec product) {
+void Objective::hessian_action(std::span<const Vec3> direction, Vec product, bool contact) {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
   mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
-  add_blocks(blocks(true), direction, work_);
+  add_blocks(term_blocks(true), direction, work_);
+  if (contact) add_blocks(contact_blocks(true), direction, work_);
   positions_.keep_owned(work_, product);
 }
 

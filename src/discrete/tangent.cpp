@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "flops.h"
 #include "repose/base/log.h"
@@ -91,10 +93,19 @@ void Tangent::assemble(Vec displacement) {
   const auto now = positions.local();
   int same = at_.size() == now.size() && std::equal(now.begin(), now.end(), at_.begin());
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
-  if (same) return;
+  if (same && !contact_changed_) return;
   at_.assign(now.begin(), now.end());
-  blocks_ = objective_.blocks(true);
-  convex_blocks_ = objective_.blocks(false);
+  if (!same) ++states_;
+  set_contact(objective_.contact_blocks(true), objective_.contact_blocks(false));
+}
+
+void Tangent::set_contact(std::vector<Objective::Block> exact,
+                          std::vector<Objective::Block> convex) {
+  blocks_ = std::move(exact);
+  std::ranges::copy(objective_.term_blocks(true), std::back_inserter(blocks_));
+  convex_contact_ = std::move(convex);
+  convex_terms_ = objective_.term_blocks(false);
+  contact_changed_ = false;
   ++assemblies_;
 }
 
@@ -106,7 +117,9 @@ Mat Tangent::convex() {
 }
 
 void Tangent::renew() {
-  entries().fill(convex(), at_, convex_blocks_, Curvature::convex);
+  std::vector<Objective::Block> blocks = convex_terms_;
+  blocks.insert(blocks.end(), convex_contact_.begin(), convex_contact_.end());
+  entries().fill(convex(), at_, blocks, Curvature::convex);
   lift_diagonal();
 }
 
@@ -182,20 +195,31 @@ void Tangent::visit_convex(const BlockVisitor& visit) const {
           for (int j = i + 1; j < 6; ++j) visit(corners[i], corners[j], blocks[i][j]);
         }
       });
-  // Of sides of cuts and further terms multigrid knows what may be coupled but for what leaps over
-  // a layer.
-  const auto& layer = objective_.positions().part().model.points.layer;
-  const auto links = objective_.links();
-  const auto level = [&](int32_t p, int32_t q) { return std::abs(layer[p] - layer[q]) <= 1; };
-  for (const auto& [p, q] : links)
+  for (const auto& [p, q] : objective_.links())
     if (level(p, q)) visit(p, q, Mat3::Zero());
-  for (const auto& [p, q, block] : convex_blocks_)
-    if (p == q)
-      diagonal[p] += block;
-    else if (level(p, q) && std::binary_search(links.begin(), links.end(), std::array{p, q}))
-      visit(p, q, block);
   for (size_t p = 0; p < diagonal.size(); ++p)
     visit(static_cast<int32_t>(p), static_cast<int32_t>(p), diagonal[p]);
+  visit_level(convex_terms_, visit);
+}
+
+/// Multigrid couples no points across a layer.
+bool Tangent::level(int32_t p, int32_t q) const {
+  const auto& layer = objective_.positions().part().model.points.layer;
+  return std::abs(layer[p] - layer[q]) <= 1;
+}
+
+void Tangent::visit_level(std::span<const Objective::Block> blocks,
+                          const BlockVisitor& visit) const {
+  std::vector<std::array<int32_t, 2>> links;
+  for (const auto& [p, q, block] : blocks) {
+    if (p != q && links.empty()) links = objective_.links();
+    if (p == q || (level(p, q) && std::ranges::binary_search(links, std::array{p, q})))
+      visit(p, q, block);
+  }
+}
+
+void Tangent::visit_contact(const BlockVisitor& visit) const {
+  visit_level(convex_contact_, visit);
 }
 
 }  // namespace repose::discrete

@@ -104,32 +104,51 @@ void ColumnLevel::fill(const UpperSums& sums) {
   }
 }
 
-void ColumnLevel::damp() {
+void ColumnLevel::add(int32_t row, int32_t column, const Eigen::Matrix3f& block) {
+  const auto at = [&](int32_t i, int32_t j) -> Eigen::Matrix3f& {
+    const auto begin = pattern_.column.begin() + pattern_.begin[i];
+    return block_[std::lower_bound(begin, pattern_.column.begin() + pattern_.begin[i + 1], j) -
+                  pattern_.column.begin()];
+  };
+  at(row, column) += block;
+  if (row != column) at(column, row) += block.transpose();
+}
+
+void ColumnLevel::damp(int32_t i) {
   constexpr float lift = 1e-4f;  // of the mean diagonal: semidefinite columns become definite
-  for (int32_t i = 0; i < own(); ++i) {
-    const float stiffness = block(diagonal(i)).trace() / 3;
-    float beyond = 0;
-    for (int64_t k = diagonal(i); k < pattern_.begin[i + 1]; ++k)
-      if (pattern_.column[k] >= own()) beyond += block(k).norm();
-    damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
+  const float stiffness = block(diagonal(i)).trace() / 3;
+  float beyond = 0;
+  for (int64_t k = diagonal(i); k < pattern_.begin[i + 1]; ++k)
+    if (pattern_.column[k] >= own()) beyond += block(k).norm();
+  damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
+}
+
+void ColumnLevel::factor_column(size_t c) {
+  Mat3 above = Mat3::Zero();  // inverse of what elimination left of the point above
+  for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
+    damp(i);
+    Mat3 pivot = block(diagonal(i)).cast<double>();
+    if (i > chain_[c]) {
+      const Mat3 link = block(diagonal(i) - 1).cast<double>();
+      pivot -= link * above * link.transpose();
+    }
+    pivot += damping_[i] * Mat3::Identity();
+    above = pivot.inverse();
+    above = (0.5 * (above + above.transpose())).eval();
+    Eigen::Map<Eigen::Matrix3f>(inverse_.data() + int64_t{9} * i) = above.cast<float>();
   }
 }
 
 void ColumnLevel::factor() {
-  damp();
-  for (size_t c = 0; c + 1 < chain_.size(); ++c) {
-    Mat3 above = Mat3::Zero();  // inverse of what elimination left of the point above
-    for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
-      Mat3 pivot = block(diagonal(i)).cast<double>();
-      if (i > chain_[c]) {
-        const Mat3 link = block(diagonal(i) - 1).cast<double>();
-        pivot -= link * above * link.transpose();
-      }
-      pivot += damping_[i] * Mat3::Identity();
-      above = pivot.inverse();
-      above = (0.5 * (above + above.transpose())).eval();
-      Eigen::Map<Eigen::Matrix3f>(inverse_.data() + int64_t{9} * i) = above.cast<float>();
-    }
+  for (size_t c = 0; c + 1 < chain_.size(); ++c) factor_column(c);
+}
+
+void ColumnLevel::factor(std::span<const int32_t> points) {
+  auto last = chain_.end();
+  for (const int32_t point : points) {
+    const auto column = std::upper_bound(chain_.begin(), chain_.end(), point) - 1;
+    if (column != last) factor_column(column - chain_.begin());
+    last = column;
   }
 }
 

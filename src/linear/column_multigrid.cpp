@@ -217,7 +217,42 @@ void ColumnMultigrid::factor() {
   if (coarsest_) coarsest_->factor();
 }
 
+void ColumnMultigrid::set_extra(const BlockSource& blocks) {
+  using Change = std::map<std::array<int32_t, 2>, Eigen::Matrix3f>;
+  const auto add = [](Change& to, int32_t i, int32_t j, const Eigen::Matrix3f& block) {
+    to.try_emplace({i, j}, Eigen::Matrix3f::Zero()).first->second += block;
+  };
+  Change change;
+  for (const auto& [at, block] : extra_) change[at] = -block;
+  extra_.clear();
+  blocks([&](int32_t p, int32_t q, const Mat3& block) {
+    const int32_t i = number_[p], j = number_[q];
+    if (i < 0 || j < 0 || std::max(i, j) >= fine_->own()) return;
+    const Eigen::Matrix3f scaled = (block / scale_).cast<float>();
+    add(extra_, std::min(i, j), std::max(i, j), i <= j ? scaled : scaled.transpose());
+  });
+  for (const auto& [at, block] : extra_) add(change, at[0], at[1], block);
+  for (size_t l = 0; l < levels_.size(); ++l) {
+    std::vector<int32_t> touched;
+    Change next;
+    for (const auto& [at, block] : change) {
+      if (block.isZero(0)) continue;
+      levels_[l].matrix->add(at[0], at[1], block);
+      touched.insert(touched.end(), at.begin(), at.end());
+      if (l < coarsening_.size())
+        coarsening_[l]->visit_change(
+            at[0], at[1], block,
+            [&](int32_t a, int32_t b, const Eigen::Matrix3f& sum) { add(next, a, b, sum); });
+    }
+    std::ranges::sort(touched);
+    levels_[l].matrix->factor(touched);
+    change = std::move(next);
+  }
+  if (coarsest_) coarsest_->factor();
+}
+
 void ColumnMultigrid::refill(const BlockSource& blocks) {
+  extra_.clear();
   fill_fine(blocks);
   for (size_t l = 0; l < coarsening_.size(); ++l) coarsening_[l]->refill(*levels_[l].matrix);
   factor();

@@ -136,6 +136,7 @@ void TangentSolver::prepare(Vec displacement) {
 void TangentSolver::renew(Vec displacement) {
   hessian_.assemble(displacement);
   if (hessian_.assemblies() == made_at_) return;
+  if (columns_ && hessian_.states() == made_at_state_) return refresh(displacement);
   check(PCSetReusePreconditioner(preconditioner(), PETSC_FALSE));
   renew_preconditioner();
 }
@@ -160,6 +161,7 @@ void TangentSolver::renew_preconditioner() {
   }
   lag_.renew();
   made_at_ = hessian_.assemblies();
+  made_at_state_ = hessian_.states();
   ++renewals_;
 }
 
@@ -183,6 +185,18 @@ void TangentSolver::renew_columns() {
   } else {
     columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
   }
+  update_contact();
+}
+
+void TangentSolver::refresh(Vec displacement) {
+  hessian_.assemble(displacement);
+  update_contact();
+}
+
+void TangentSolver::update_contact() {
+  if (columns_ && positions_.part().contact)
+    columns_->set_extra(
+        [this](const discrete::BlockVisitor& visit) { hessian_.visit_contact(visit); });
 }
 
 PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {

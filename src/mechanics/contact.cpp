@@ -29,16 +29,25 @@ TouchLoop::TouchLoop(const model::Touches& touches, double stiffness, std::vecto
       seen_(touches.point.size(), Vec3::Zero()),
       distance_(touches.point.size(), -infinite),
       gap_(touches.point.size(), infinite),
-      normal_(touches.point.size(), Vec3::Zero()) {}
+      normal_(touches.point.size(), Vec3::Zero()),
+      curvature_(touches.point.size(), Mat3::Zero()) {}
 
 double TouchLoop::least_gap(size_t c, const Vec3& beside) const {
   constexpr double steepest = 1.1;  // of a distance read from a grid
   return distance_[c] - steepest * (beside - seen_[c]).norm() - touches_.offset[c];
 }
 
+void TouchLoop::measure(size_t c, const Vec3& beside) {
+  const surface::Distance d = bodies_[touches_.body[c]].distance(beside);
+  seen_[c] = beside;
+  distance_[c] = d.value;
+  gap_[c] = d.value - touches_.offset[c];
+  normal_[c] = d.gradient;
+  curvature_[c] = d.curvature;
+}
+
 void TouchLoop::look(std::span<const Vec3> position) {
   acting_.clear();
-  curvature_.clear();
   for (size_t c = 0; c < touches_.point.size(); ++c) {
     const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
     if (const double least = least_gap(c, beside);
@@ -46,14 +55,30 @@ void TouchLoop::look(std::span<const Vec3> position) {
       gap_[c] = least;
       continue;
     }
-    const surface::Distance d = bodies_[touches_.body[c]].distance(beside);
-    seen_[c] = beside;
-    distance_[c] = d.value;
-    gap_[c] = d.value - touches_.offset[c];
-    normal_[c] = d.gradient;
-    if (press(gap_[c], multiplier_[c], stiffness_, slides(c)).stiffness == 0) continue;
-    acting_.push_back(c);
-    curvature_.push_back(d.curvature);
+    measure(c, beside);
+    if (now(c).stiffness != 0) acting_.push_back(c);
+  }
+}
+
+std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, double reach) {
+  std::vector<LinearGap> gaps;
+  for (size_t c = 0; c < touches_.point.size(); ++c) {
+    const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
+    if (!slides(c) && least_gap(c, beside) > reach) continue;
+    measure(c, beside);
+    if ((!slides(c) && gap_[c] > reach) || normal_[c].isZero(0)) continue;
+    gaps.push_back({c, slides(c), touches_.area[c], gap_[c],
+                    {{static_cast<int32_t>(touches_.point[c]), normal_[c]}}, {}});
+  }
+  return gaps;
+}
+
+void TouchLoop::carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const {
+  for (LinearGap& g : gaps) {
+    const RigidBody& body = bodies_[touches_.body[g.constraint]];
+    auto& [point, normal] = g.gradient.front();
+    normal = body.distance(seen_[g.constraint]).gradient;
+    g.gap += normal.dot(position[point] - body.in_space(seen_[g.constraint]));
   }
 }
 
@@ -78,12 +103,10 @@ double TouchLoop::add_gradient(std::span<const Vec3> position, double scale,
   return value;
 }
 
-Mat3 TouchLoop::block(size_t c, bool exact) const {
-  const auto place = std::lower_bound(acting_.begin(), acting_.end(), c) - acting_.begin();
-  const Pressing now = press(gap_[c], multiplier_[c], stiffness_, slides(c));
-  Mat3 bend = now.pressure * curvature_[place];
+Mat3 TouchLoop::block(size_t c, bool exact, const Pressing& pressing) const {
+  Mat3 bend = pressing.pressure * curvature_[c];
   if (!exact) bend = negative_part(bend);
-  return touches_.area[c] * (now.stiffness * normal_[c] * normal_[c].transpose() - bend);
+  return touches_.area[c] * (pressing.stiffness * normal_[c] * normal_[c].transpose() - bend);
 }
 
 }  // namespace repose::mechanics

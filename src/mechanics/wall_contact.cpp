@@ -245,21 +245,48 @@ double WallLoop::add_gradient(std::span<const Vec3> position, double scale,
   return value;
 }
 
+std::vector<LinearGap> WallLoop::linear_gaps(double reach) const {
+  std::vector<LinearGap> gaps;
+  for (size_t w = 0; w < places_.size(); ++w) {
+    const Foot& foot = feet_[w];
+    if (!foot.opposite || foot.gap > reach) continue;
+    LinearGap& gap = gaps.emplace_back(LinearGap{w, false, places_[w].area, foot.gap, {}, {}});
+    for (const auto& [p, at_p] : touched(w)) gap.gradient.emplace_back(p, at_p.col(0));
+    gap.lumped = lumped(w);
+  }
+  return gaps;
+}
+
+/// The gap's gradient as that between the point of either side that counts most: spread over all,
+/// a preconditioner that couples neighbors only would keep but a part of it.
+LinearGap::Gradient WallLoop::lumped(size_t w) const {
+  constexpr double weight = 0.7;  // between 1, what smooth motion meets, and that of one point
+  const Vec3& normal = feet_[w].normal;
+  std::pair<double, int32_t> own{0, -1}, other{0, -1};
+  for (const auto& [p, at_p] : touched(w)) {
+    const double share = normal.dot(at_p.col(0));
+    own = std::max(own, {share, p});
+    other = std::max(other, {-share, p});
+  }
+  LinearGap::Gradient lumped;
+  if (own.second >= 0) lumped.emplace_back(own.second, weight * normal);
+  if (other.second >= 0) lumped.emplace_back(other.second, -weight * normal);
+  std::ranges::sort(lumped, {}, [](const auto& of) { return of.first; });
+  return lumped;
+}
+
 /// Of the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r,
 /// e = n·∂S₂,
 ///     ∂²g = −aᵀ m⁻¹ κ A⁻¹ a − aᵀ A⁻¹ e − eᵀ A⁻¹ a − g eᵀ A⁻¹ e,   A = m − g κ.
-Eigen::Matrix<double, 5, 5> WallLoop::bilinear(size_t w, bool exact) const {
+WallLoop::Form WallLoop::bilinear(size_t w, const Pressing& pressing) const {
   const Foot& foot = feet_[w];
-  const Pressing pressing = now(w);
-  Eigen::Matrix<double, 5, 5> form = Eigen::Matrix<double, 5, 5>::Zero();
+  Form form = Form::Zero();
   form(0, 0) = pressing.stiffness;
-  if (exact) {
-    const Eigen::Matrix2d metric = foot.patch.metric(), curvature = foot.patch.bend(foot.normal);
-    const Eigen::Matrix2d inverse = (metric - foot.gap * curvature).inverse();
-    form.block<2, 2>(1, 1) = pressing.pressure * metric.inverse() * curvature * inverse;
-    form.block<2, 2>(1, 3) = form.block<2, 2>(3, 1) = pressing.pressure * inverse;
-    form.block<2, 2>(3, 3) = pressing.pressure * foot.gap * inverse;
-  }
+  const Eigen::Matrix2d metric = foot.patch.metric(), curvature = foot.patch.bend(foot.normal);
+  const Eigen::Matrix2d inverse = (metric - foot.gap * curvature).inverse();
+  form.block<2, 2>(1, 1) = pressing.pressure * metric.inverse() * curvature * inverse;
+  form.block<2, 2>(1, 3) = form.block<2, 2>(3, 1) = pressing.pressure * inverse;
+  form.block<2, 2>(3, 3) = pressing.pressure * foot.gap * inverse;
   return places_[w].area * form;
 }
 

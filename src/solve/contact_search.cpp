@@ -6,9 +6,15 @@
 
 namespace repose::solve {
 
+using base::check;
+
 namespace {
 
-double largest(MPI_Comm comm, double value) {
+constexpr double missed = 0.25;       // of the accuracy, by contact
+constexpr double contact_safety = 2;  // the estimate is so many times what is left
+constexpr double predicted_to = 0.1;  // mm
+
+double largest_of_ranks(MPI_Comm comm, double value) {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
   return value;
 }
@@ -16,16 +22,27 @@ double largest(MPI_Comm comm, double value) {
 }  // namespace
 
 ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                             Minimiser& minimiser)
+                             linear::TangentSolver& solver, Minimiser& minimiser)
     : objective_(objective),
       tangent_(tangent),
       minimiser_(minimiser),
-      stiffness_(objective.positions().part().model.contact.stiffness) {}
+      qp_(objective, tangent, solver),
+      stiffness_(objective_.positions().part().model.contact.stiffness),
+      gradient_(objective.positions().make_vector()),
+      slope_(objective.positions().make_vector()),
+      step_(objective.positions().make_vector()),
+      trial_(objective.positions().make_vector()) {}
+
+void ContactSearch::keep_multipliers() {
+  const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
+  before_.assign(p.begin(), p.end());
+  walls_before_.assign(q.begin(), q.end());
+}
 
 void ContactSearch::set_stiffness(double stiffness) {
   objective_.touches().set_stiffness(stiffness);
   objective_.walls().set_stiffness(stiffness);
-  tangent_.forget();
+  tangent_.forget_contact();
 }
 
 /// mm, by which pressures differ from multipliers, over the penalty's stiffness: the gap where a
@@ -40,7 +57,7 @@ double ContactSearch::violation() {
   walls.look(objective_.positions().local());
   for (size_t w = 0; w < walls.size(); ++w)
     most = std::max(most, std::abs(walls.pressure(w) - walls.multipliers()[w]));
-  return largest(objective_.positions().comm(), most / objective_.touches().stiffness());
+  return largest_of_ranks(objective_.positions().comm(), most / objective_.touches().stiffness());
 }
 
 void ContactSearch::move_multipliers() {
@@ -54,40 +71,137 @@ void ContactSearch::move_multipliers() {
   walls.set_multipliers(pressure);
 }
 
-Outcome ContactSearch::run(Vec displacement, double accuracy) {
-  constexpr int most_rounds = 30, rough_rounds = 2;
-  constexpr double softened = 0.25;  // of the penalty's stiffness, in rough rounds
-  constexpr double rough = 0.25;     // mm
-  constexpr double missed = 0.25;    // of the accuracy, by contact
-  // Multipliers that go from one state to another and back do so no more under a stiffer penalty.
-  constexpr double slow = 0.9, stiffer = 2, stiffest = 16;
-  constexpr double safety = 2;  // the estimate is so many times what is left
-  const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
-  before_.assign(p.begin(), p.end());
-  walls_before_.assign(q.begin(), q.end());
+std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
+  keep_multipliers();
+  kept_ = true;
+  discrete::Positions& positions = objective_.positions();
+  positions.update(displacement);
+  const discrete::Part& part = positions.part();
+  std::vector<Vec3> way(positions.local().size(), Vec3::Zero());
+  for (size_t i = 0; i < way.size(); ++i)
+    if (part.unknown[i] < 0)
+      way[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  set_stiffness(stiffness_);
+  check(VecSet(gradient_, 0));  // it is at rest
+  subtract_contact();
+  qp_.linearize(displacement, load, way);
+  objective_.hessian_action(way, trial_, false);
+  check(VecAXPY(slope_, 1.0, trial_));
+  const bool found = qp_.solve(displacement, slope_, predicted_to, increment);
+  tangent_.forget_contact();
+  if (!found) go_back(displacement);
+  return found;
+}
+
+/// slope_ = gradient_ without its part of contact, at the objective's last update.
+void ContactSearch::subtract_contact() {
+  const discrete::Part& part = objective_.positions().part();
+  std::vector<Vec3> force = objective_.contact_force();
+  for (Vec3& f : force) f *= objective_.weights().elastic;
+  force.resize(part.point_row.size(), Vec3::Zero());
+  objective_.positions().keep_owned(force, slope_);
+  check(VecAXPY(slope_, 1.0, gradient_));
+}
+
+Outcome ContactSearch::approach(Vec displacement, double accuracy) {
+  constexpr int most = 5;
+  constexpr double softened = 0.25;  // of the penalty's stiffness
+  constexpr double rough = 0.1, finer = 0.05;  // mm, at first and then
+  constexpr double close = 0.1;  // mm of gaps, from where quadratic programs lead
   Outcome outcome;
   int64_t iterations = 0;
-  for (int round = 0; round < rough_rounds; ++round) {
-    set_stiffness(softened * stiffness_);
-    outcome = minimiser_.approach(displacement, std::max(rough, accuracy));
+  set_stiffness(softened * stiffness_);
+  for (int n = 0; n < most; ++n) {
+    outcome = minimiser_.approach(displacement, std::max(n == 0 ? rough : finer, accuracy), n > 0);
     iterations += outcome.iterations;
     if (outcome.stopped) break;
     objective_.positions().update(displacement);
+    const double left = violation();
     move_multipliers();
+    if (left <= std::max(close, accuracy)) break;
+    tangent_.forget_contact();
   }
+  outcome.iterations = iterations;
   set_stiffness(stiffness_);
-  if (outcome.stopped) {
-    const base::VecHandle gradient = objective_.positions().make_vector();
-    outcome.objective = objective_.evaluate(displacement, gradient);
-    outcome.gradient_max = discrete::largest_block(gradient);
+  return outcome;
+}
+
+bool ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
+  constexpr int most_steps = 12, most_halved = 6;
+  constexpr double near = 0.5;  // of the accuracy, a step that ends the search
+  constexpr double rounding = 1e-12;
+  const double scale = objective_.weights().elastic;
+  double value = objective_.evaluate(displacement, gradient_);
+  for (int n = 0; n < most_steps; ++n) {
+    subtract_contact();
+    const double tissue = value - scale * objective_.contact_value();
+    qp_.linearize(displacement);
+    if (!qp_.solve(displacement, slope_, 0.1 * accuracy, step_)) return false;
+    const double length = discrete::largest_block(step_);
+    const double merit = tissue + scale * objective_.contact_value();
+    double share = 1;
+    for (int k = 0;; ++k, share /= 2) {
+      check(VecCopy(displacement, trial_));
+      check(VecAXPY(trial_, share, step_));
+      value = objective_.evaluate(trial_, gradient_);
+      if (value <= merit + rounding * std::abs(merit)) break;
+      if (k == most_halved) return false;
+    }
+    check(VecCopy(trial_, displacement));
+    ++iterations;
+    if (share == 1 && length <= near * accuracy) return true;
   }
+  return false;
+}
+
+/// Ends the search where a strict estimate says that it is over.
+Outcome ContactSearch::finish(Vec displacement, double accuracy) {
+  tangent_.forget_contact();
+  Outcome outcome = minimiser_.finish(displacement, (1 - missed) * accuracy);
+  objective_.positions().update(displacement);
+  outcome.displacement_error += contact_safety * violation();
+  outcome.converged = outcome.converged && outcome.displacement_error <= accuracy;
+  return outcome;
+}
+
+Outcome ContactSearch::run(Vec displacement, double accuracy) {
+  if (!kept_) {
+    keep_multipliers();
+    const Outcome outcome = finish(displacement, accuracy);
+    if (outcome.converged) return outcome;
+  }
+  kept_ = false;
+  Outcome outcome = approach(displacement, accuracy);
+  if (outcome.stopped) {
+    outcome.objective = objective_.evaluate(displacement, gradient_);
+    outcome.gradient_max = discrete::largest_block(gradient_);
+    return outcome;
+  }
+  int64_t iterations = outcome.iterations;
+  if (newton(displacement, accuracy, iterations)) {
+    outcome = finish(displacement, accuracy);
+    outcome.iterations += iterations;
+    if (outcome.converged) return outcome;
+  }
+  outcome = rounds(displacement, accuracy);
+  outcome.iterations += iterations;
+  return outcome;
+}
+
+Outcome ContactSearch::rounds(Vec displacement, double accuracy) {
+  constexpr int most_rounds = 30;
+  // Multipliers that go from one state to another and back do so no more under a stiffer penalty.
+  constexpr double slow = 0.9, stiffer = 2, stiffest = 16;
+  Outcome outcome;
+  int64_t iterations = 0;
+  set_stiffness(stiffness_);
   double stiffness = stiffness_, least = std::numeric_limits<double>::infinity();
   for (int round = 0; round < most_rounds && !outcome.stopped; ++round) {
     outcome = minimiser_.run(displacement, (1 - missed) * accuracy);
     iterations += outcome.iterations;
     objective_.positions().update(displacement);
     const double left = violation();
-    outcome.displacement_error += safety * left;
+    outcome.displacement_error += contact_safety * left;
     const bool over = outcome.converged && outcome.displacement_error <= accuracy;
     if (!outcome.converged || over) break;
     move_multipliers();
@@ -104,7 +218,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 void ContactSearch::go_back(Vec) {
   objective_.touches().set_multipliers(before_);
   objective_.walls().set_multipliers(walls_before_);
-  tangent_.forget();
+  tangent_.forget_contact();
 }
 
 double penetration(discrete::Objective& objective) {
@@ -116,7 +230,7 @@ double penetration(discrete::Objective& objective) {
   mechanics::WallLoop& walls = objective.walls();
   walls.look(position);
   for (size_t w = 0; w < walls.size(); ++w) deepest = std::max(deepest, -walls.gap(w));
-  return largest(objective.positions().comm(), deepest);
+  return largest_of_ranks(objective.positions().comm(), deepest);
 }
 
 }  // namespace repose::solve

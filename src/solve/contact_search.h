@@ -1,31 +1,43 @@
 #pragma once
-#include "repose/discrete/tangent.h"
+#include "contact_qp.h"
 #include "repose/solve/minimiser.h"
 
 namespace repose::solve {
 
-/// Finds the rest position of tissue that touches bodies and itself: an augmented Lagrangian
-/// (Hestenes 1969; Powell 1969; Simo & Laursen 1992 for contact), minimisation after minimisation,
-/// the multipliers moved to the pressures of each, until what passes or lifts off is below the
-/// accuracy. The first are rough and their penalty is soft: then few points change sides at once.
-/// The multipliers of a load are where the next begins.
+/// Finds the rest position of tissue that touches bodies and itself (docs/theory/contact.md): the
+/// step to a load is predicted with its contact by a quadratic program; one quasi-Newton search on
+/// the augmented Lagrangian with a soft penalty comes near; sequential quadratic programs (Nocedal &
+/// Wright 2006, chapter 18) end it, multipliers included. Where these fail, rounds of minimization
+/// and new multipliers follow (Hestenes 1969; Powell 1969; Simo & Laursen 1992 for contact). The
+/// multipliers of a load are where the next begins.
 class ContactSearch : public RestSearch {
  public:
-  /// `tangent` is the objective's Hessian, `minimiser` minimises it.
-  ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent, Minimiser& minimiser);
+  /// `tangent` is the objective's Hessian, `solver` solves with it, `minimiser` minimises it.
+  ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
+                linear::TangentSolver& solver, Minimiser& minimiser);
+  std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
 
  private:
+  void keep_multipliers();
   void set_stiffness(double stiffness);
   double violation();
   void move_multipliers();
+  void subtract_contact();
+  Outcome approach(Vec displacement, double accuracy);
+  bool newton(Vec displacement, double accuracy, int64_t& iterations);
+  Outcome finish(Vec displacement, double accuracy);
+  Outcome rounds(Vec displacement, double accuracy);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   Minimiser& minimiser_;
+  ContactQp qp_;
   double stiffness_;                           // N/mm³, of the model's contact
+  bool kept_ = false;                          // before_ are those before the prediction
   std::vector<double> before_, walls_before_;  // multipliers before the last search
+  base::VecHandle gradient_, slope_, step_, trial_;
 };
 
 /// mm, the deepest that a point is inside a body, beyond its offset, or has passed the other side

@@ -84,6 +84,11 @@ void InitialHessian::renew(Vec displacement) {
   lag_.renew();
 }
 
+void InitialHessian::refresh(Vec displacement) {
+  solver_.refresh(displacement);
+  lag_.renew();
+}
+
 bool InitialHessian::needs_renewal(double force, double length) {
   if (renewals_ != solver_.renewals()) lag_.renew();  // by a look at the distance from rest
   renewals_ = solver_.renewals();

@@ -66,7 +66,8 @@ int64_t LoadPath::inverted(Vec displacement) {
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   discrete::Positions& positions = objective_.positions();
   const int64_t folded_before = inverted(displacement);
-  const bool predicted = predictor_.predict(displacement, load, increment_);
+  const auto own = search_.predict(displacement, load, increment_);
+  const bool predicted = own ? *own : predictor_.predict(displacement, load, increment_);
   Attempt attempt;
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));

@@ -362,12 +362,15 @@ bool Minimiser::worth_going_on(int64_t iterations) {
   return slowed_ || (reason == TAO_DIVERGED_LS_FAILURE && iterations > 1);
 }
 
-void Minimiser::search(Vec displacement) {
+void Minimiser::search(Vec displacement, bool near) {
   PetscInt iterations = 0;
   iterations_ = 0;
   do {
-    slowed_ = false;
-    if (initial_) initial_->renew(displacement);
+    if (initial_ && near && !slowed_)
+      initial_->refresh(displacement);
+    else if (initial_)
+      initial_->renew(displacement);
+    slowed_ = near = false;
     const PetscErrorCode code = TaoSolve(tao_);
     if (thrown_) std::rethrow_exception(thrown_);
     check(code);
@@ -376,14 +379,14 @@ void Minimiser::search(Vec displacement) {
   } while (worth_going_on(iterations));
 }
 
-Outcome Minimiser::approach(Vec displacement, double distance) {
+Outcome Minimiser::approach(Vec displacement, double distance, bool near) {
   if (!initial_) return run(displacement, distance);
   accuracy_ = distance;
   thrown_ = nullptr;
   stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
   rough_ = true;
-  search(displacement);
+  search(displacement, near);
   rough_ = false;
   Outcome outcome;
   outcome.iterations = iterations_;
@@ -394,6 +397,14 @@ Outcome Minimiser::approach(Vec displacement, double distance) {
   check(TaoGetConvergedReason(tao_, &reason));
   outcome.reason = reason_of(outcome, reason);
   return outcome;
+}
+
+Outcome Minimiser::finish(Vec displacement, double accuracy) {
+  accuracy_ = accuracy;
+  thrown_ = nullptr;
+  stopped_ = closed_ = false;
+  iterations_ = 0;
+  return summary(displacement);
 }
 
 Outcome Minimiser::run(Vec displacement, double accuracy) {

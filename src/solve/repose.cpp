@@ -138,7 +138,8 @@ class Searcher {
                    std::ref(watcher_)) {
     if (problem_.force()) force_search_.emplace(*problem_.force(), minimiser_);
     if (positions.part().contact)
-      contact_.emplace(problem_.objective(), problem_.tangent(), minimiser_);
+      contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
+                       minimiser_);
     if (is_exact(settings))
       exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                             minimiser_);

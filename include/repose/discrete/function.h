@@ -64,12 +64,16 @@ class Hessian {
   /// relative can be visited.
   virtual bool elliptic() const { return true; }
   /// Shows all blocks of the relative that touch this rank's points, at the state of the last
-  /// assemble(). Not collective.
+  /// assemble(), but for those of contact, which change more often. Not collective.
   virtual void visit_convex(const BlockVisitor&) const {}
+  /// Shows those of contact, where visit_convex couples points. Not collective.
+  virtual void visit_contact(const BlockVisitor&) const {}
   int64_t assemblies() const { return assemblies_; }
+  /// Of them, those at a new displacement or load; at others contact alone changed.
+  int64_t states() const { return states_; }
 
  protected:
-  int64_t assemblies_ = 0;
+  int64_t assemblies_ = 0, states_ = 0;
 };
 
 }  // namespace repose::discrete

@@ -12,8 +12,9 @@ class Objective : public Function {
  public:
   Objective(Positions& positions, const mechanics::Weights& weights);
 
-  /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update.
-  void hessian_action(std::span<const Vec3> direction, Vec product);
+  /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update; on request
+  /// without contact.
+  void hessian_action(std::span<const Vec3> direction, Vec product, bool contact = true);
 
   /// A block of the Hessian between two local points; where they differ, its transpose is that of
   /// the second and the first.
@@ -21,9 +22,10 @@ class Objective : public Function {
     int32_t p, q;
     Mat3 block;
   };
-  /// Those of contact and of further terms at the last update, exact or of a semidefinite relative.
+  /// Those of further terms and of contact at the last update, exact or of a semidefinite relative.
   /// Not collective.
-  std::vector<Block> blocks(bool exact);
+  std::vector<Block> term_blocks(bool exact) const;
+  std::vector<Block> contact_blocks(bool exact);
   /// Pairs of different points that such blocks may couple, ascending.
   std::vector<std::array<int32_t, 2>> links() const;
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
@@ -31,6 +33,8 @@ class Objective : public Function {
   mechanics::TouchLoop& touches() { return touches_; }
   mechanics::WallLoop& walls() { return walls_; }
   const mechanics::WallLoop& walls() const { return walls_; }
+  /// Takes the bodies to where they are at the positions' load. Not collective.
+  void place_bodies();
   /// Contact's value, at the last update, summed over ranks, N·mm.
   double contact_value();
   /// N, of what is touched on each owned point, at the last update. Not collective.
@@ -52,7 +56,6 @@ class Objective : public Function {
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;
   void subtract_loads(double scale, std::span<Vec3> gradient) const;
-  void place_bodies();
   double add_contact(double scale, std::span<Vec3> gradient);
   double add_terms(double scale, std::span<Vec3> gradient) const;
 

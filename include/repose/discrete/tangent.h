@@ -17,6 +17,12 @@ class Tangent : public Hessian {
   void assemble(Vec displacement) override;
   /// The next assembly is done in any case: the elements have changed.
   void forget() { at_.clear(); }
+  /// The next assembly takes the objective's contact as it is then.
+  void forget_contact() { contact_changed_ = true; }
+
+  /// Takes these blocks, exact and of the semidefinite relative, in place of the objective's
+  /// contact until the state changes.
+  void set_contact(std::vector<Objective::Block> exact, std::vector<Objective::Block> convex);
 
   base::MatHandle make_third();  ///< a matrix for third(); collective
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
@@ -28,6 +34,7 @@ class Tangent : public Hessian {
   void renew() override;
   Mat action() override { return action_; }
   void visit_convex(const BlockVisitor& visit) const override;
+  void visit_contact(const BlockVisitor& visit) const override;
 
  private:
   static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
@@ -35,14 +42,18 @@ class Tangent : public Hessian {
   const TangentEntries& entries();
   base::MatHandle nodal_coupling() const;
   void lift_diagonal();
+  bool level(int32_t p, int32_t q) const;
+  void visit_level(std::span<const Objective::Block> blocks, const BlockVisitor& visit) const;
 
   Objective& objective_;
   std::unique_ptr<TangentEntries> entries_;
   base::MatHandle exact_, convex_, action_;
   base::MatHandle coupled_;                               // exact_ and what averaged volumes couple
-  std::vector<Objective::Block> blocks_, convex_blocks_;  // at the last assembly
+  std::vector<Objective::Block> blocks_;  // of terms and contact, at the last assembly
+  std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<Vec3> direction_, work_;  // [local points]
+  bool contact_changed_ = true;
   int64_t filled_at_ = -1;              // assemblies() when exact_ was filled
 };
 

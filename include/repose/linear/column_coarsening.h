@@ -22,6 +22,23 @@ class Coarsening {
   ColumnLevel& coarse() { return *coarse_; }
   const ColumnLevel& coarse() const { return *coarse_; }
 
+  /// Adds Pᵀ D P to the coarse matrix for a change D of a block of the fine one, of own points, and
+  /// its mirror image: calls visit(row, column, block) for what it adds, column not before row.
+  template <class Visit>
+  void visit_change(int32_t i, int32_t j, const Eigen::Matrix3f& change, Visit&& visit) const {
+    weights_[i].visit([&](int32_t a, float weight_a) {
+      weights_[j].visit([&](int32_t b, float weight_b) {
+        const Eigen::Matrix3f block = weight_a * weight_b * change;
+        if (a == b && i != j)
+          visit(a, a, Eigen::Matrix3f(block + block.transpose()));
+        else if (a < b || a == b)
+          visit(a, b, block);
+        else if (i != j)
+          visit(b, a, Eigen::Matrix3f(block.transpose()));
+      });
+    });
+  }
+
   /// coarse = Pᵀ fine; own points of both.
   void restrict_to(std::span<const Lanes> fine, std::span<Lanes> coarse) const;
   /// fine += P coarse; own points of both.

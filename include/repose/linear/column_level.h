@@ -71,8 +71,12 @@ class ColumnLevel {
   int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
   /// Takes all blocks anew; those left of the diagonal are mirror images. Not collective.
   void fill(const UpperSums& sums);
-  /// Factors the columns' own blocks, after the entries have changed. Not collective.
+  /// Adds to the block of two own points, and to its mirror image; it is in the pattern.
+  void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
+  /// Factors the columns' own blocks, after the entries have changed: all, or those of the given own
+  /// points, ascending. Not collective.
   void factor();
+  void factor(std::span<const int32_t> points);
 
   /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0. D: the columns' blocks, and what keeps
   /// sweeps convergent although ranks sweep at once: half of the norms of the blocks of ghosts on
@@ -89,7 +93,8 @@ class ColumnLevel {
 
  private:
   using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
-  void damp();
+  void damp(int32_t point);
+  void factor_column(size_t column);
   /// Σ of the blocks [k, end) of a row with x.
   Lanes row_product(int64_t k, int64_t end, std::span<const Lanes> x) const;
   void solve_column(int64_t column, std::span<Lanes> x) const;

@@ -1,5 +1,7 @@
 #pragma once
+#include <array>
 #include <functional>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -24,6 +26,9 @@ class ColumnMultigrid {
 
   /// Takes the numbers of the matrix anew; no block may be where there was none. Collective.
   void refill(const BlockSource& blocks);
+  /// Adds blocks of own points, in place of those that the last call since refill() added: on each
+  /// level only what they change. Collective.
+  void set_extra(const BlockSource& blocks);
   /// z ≈ A⁻¹ r, a symmetric positive definite map; both of 3 unknowns a point. Collective.
   void apply(Vec r, Vec z);
 
@@ -42,6 +47,7 @@ class ColumnMultigrid {
   std::vector<std::unique_ptr<Coarsening>> coarsening_;
   std::vector<Level> levels_;  // finest first
   std::unique_ptr<Coarsest> coarsest_;
+  std::map<std::array<int32_t, 2>, Eigen::Matrix3f> extra_;  // by own numbers, ascending
 };
 
 }  // namespace repose::linear

@@ -32,6 +32,9 @@ class TangentSolver {
   /// there.
   void renew(Vec displacement);
 
+  /// Takes the Hessian to `displacement`, and of the preconditioner the contact alone.
+  void refresh(Vec displacement);
+
   /// Makes `other` use the preconditioner, whose lag its solves add to.
   void lend_preconditioner(KSP other);
 
@@ -76,6 +79,8 @@ class TangentSolver {
   Mat preconditioner_matrix();
   /// Makes the preconditioner anew, at the state of the Hessian's last assembly.
   void renew_preconditioner();
+  /// Takes the Hessian's present contact into the preconditioner, where that is multigrid.
+  void update_contact();
   bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
   /// Multigrid gives way to factors at the next renewal: tissue will be nearly incompressible.
   void give_way();
@@ -119,7 +124,7 @@ class TangentSolver {
   bool finished_ = false;
   LagPolicy lag_;
   int64_t renewals_ = 0;
-  int64_t made_at_ = -1;  // assemblies of the Hessian at the last renewal
+  int64_t made_at_ = -1, made_at_state_ = -1;  // assemblies and states at the last renewal
 };
 
 }  // namespace repose::linear

@@ -1,5 +1,6 @@
 #pragma once
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "repose/mechanics/rigid_body.h"
@@ -19,6 +20,26 @@ inline Pressing press(double gap, double multiplier, double stiffness, bool slid
   const double before = multiplier * multiplier;
   if (!slides && !(pressure > 0)) return {-before / (2 * stiffness), 0, 0};
   return {(pressure * pressure - before) / (2 * stiffness), pressure, stiffness};
+}
+
+/// A gap to first order: gap + Σ gradient · d over points displaced by d, mm. It stays ≥ 0, or 0
+/// where the point slides.
+struct LinearGap {
+  size_t constraint;  ///< row of the loop's multipliers
+  bool slides;
+  double area;  ///< mm²
+  double gap;   ///< mm
+  using Gradient = std::vector<std::pair<int32_t, Vec3>>;  ///< by point, ascending
+  Gradient gradient;
+  Gradient lumped;  ///< the same at few points, for preconditioners; empty: as `gradient`
+};
+
+/// Calls visit(p, q, block) for the blocks of weight · g gᵀ, p not after q.
+template <class Visit>
+void visit_products(const LinearGap::Gradient& g, double weight, Visit&& visit) {
+  for (size_t i = 0; i < g.size(); ++i)
+    for (size_t j = i; j < g.size(); ++j)
+      visit(g[i].first, g[j].first, Mat3(weight * g[i].second * g[j].second.transpose()));
 }
 
 /// Points against rigid bodies. A distance changes by no more than its point moves, so that a
@@ -46,20 +67,36 @@ class TouchLoop {
   /// Calls visit(point, block): the Hessian at the latest look, or a semidefinite relative.
   template <class Visit>
   void for_each_block(bool exact, Visit&& visit) const {
-    for (const size_t c : acting_) visit(touches_.point[c], block(c, exact));
+    for (const size_t c : acting_) visit(touches_.point[c], block(c, exact, now(c)));
+  }
+  /// The gaps below `reach` mm, to first order about the positions.
+  std::vector<LinearGap> linear_gaps(std::span<const Vec3> position, double reach);
+  /// Takes gaps made by linear_gaps to where the bodies have moved since: each point stays beside
+  /// the place of its body that it was beside.
+  void carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const;
+  /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
+  template <class Visit>
+  void for_each_curvature(std::span<const LinearGap> gaps, bool exact, Visit&& visit) const {
+    for (const LinearGap& g : gaps)
+      if (const double p = multiplier_[g.constraint]; p != 0)
+        visit(touches_.point[g.constraint], block(g.constraint, exact, {0, p, 0}));
   }
   /// Gaps (mm; where they cannot act a lower bound) and pressures p − k g (N/mm²) at the latest
   /// look, [C].
   std::span<const double> gaps() const { return gap_; }
   double pressure(size_t c) const {
-    return press(gap_[c], multiplier_[c], stiffness_, slides(c)).pressure;
+    return now(c).pressure;
   }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
  private:
   bool slides(size_t c) const { return touches_.binding[c] == model::Binding::slides; }
   double least_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
-  Mat3 block(size_t c, bool exact) const;
+  Pressing now(size_t c) const {
+    return press(gap_[c], multiplier_[c], stiffness_, slides(c));
+  }
+  void measure(size_t c, const Vec3& beside);
+  Mat3 block(size_t c, bool exact, const Pressing& pressing) const;
 
   model::Touches touches_;
   double stiffness_ = 1;
@@ -68,8 +105,8 @@ class TouchLoop {
   std::vector<Vec3> seen_;          // [C] where the point was beside its body when last looked at
   std::vector<double> distance_;    // [C] mm, then
   std::vector<double> gap_;         // [C] at the latest look
-  std::vector<Vec3> normal_;        // [C] of those that act
-  std::vector<Mat3> curvature_;     // [acting]
+  std::vector<Vec3> normal_;        // [C] when last looked at
+  std::vector<Mat3> curvature_;     // [C] likewise
   std::vector<size_t> acting_;      // at the latest look
 };
 

@@ -34,6 +34,8 @@ class RigidBody {
   }
   /// Where a point in space is beside the body as it was at load 0.
   Vec3 beside(const Vec3& point) const { return rotation_.transpose() * (point - shift_); }
+  /// Inverse of beside().
+  Vec3 in_space(const Vec3& beside) const { return rotation_ * beside + shift_; }
   /// Distance to a point given by beside(); the derivatives are those in space.
   surface::Distance distance(const Vec3& beside) const;
   /// Up to this the distance is known, mm.

@@ -40,18 +40,20 @@ class WallLoop {
   void for_each_block(bool exact, Visit&& visit) const {
     for (size_t w = 0; w < places_.size(); ++w) {
       if (!acts(w)) continue;
-      const Eigen::Matrix<double, 5, 5> form = bilinear(w, exact);
-      const int ranks = exact ? 5 : 1;
-      const std::vector<Touched> points = touched(w);
-      for (size_t i = 0; i < points.size(); ++i)
-        for (size_t j = i; j < points.size(); ++j) {
-          const auto& [p, at_p] = points[i];
-          const auto& [q, at_q] = points[j];
-          visit(p, q,
-                Mat3(at_p.leftCols(ranks) * form.topLeftCorner(ranks, ranks) *
-                     at_q.leftCols(ranks).transpose()));
-        }
+      if (exact)
+        visit_blocks(w, bilinear(w, now(w)), visit);
+      else
+        visit_products(lumped(w), places_[w].area * stiffness_, visit);
     }
+  }
+  /// The gaps below `reach` mm at the latest look, to first order.
+  std::vector<LinearGap> linear_gaps(double reach) const;
+  /// Calls visit(p, q, block) for the curvature −a p ∂²g of the multipliers at the latest look.
+  template <class Visit>
+  void for_each_curvature(std::span<const LinearGap> gaps, Visit&& visit) const {
+    for (const LinearGap& g : gaps)
+      if (const double p = multiplier_[g.constraint]; p != 0)
+        visit_blocks(g.constraint, bilinear(g.constraint, {0, p, 0}), visit);
   }
   /// Points that may come to face each other, one before the other, sorted.
   std::span<const std::array<int32_t, 2>> links() const { return links_; }
@@ -111,7 +113,20 @@ class WallLoop {
   void add_place(int64_t point, double area, const Eigen::Vector2d& at);
   void link(const Net& own, const Net& other);
   std::vector<Touched> touched(size_t w) const;  // of a place that acts, by point
-  Eigen::Matrix<double, 5, 5> bilinear(size_t w, bool exact) const;
+  using Form = Eigen::Matrix<double, 5, 5>;
+  Form bilinear(size_t w, const Pressing& pressing) const;
+  LinearGap::Gradient lumped(size_t w) const;
+  /// The blocks of a form in the columns of Touched.
+  template <class Visit>
+  void visit_blocks(size_t w, const Form& form, Visit&& visit) const {
+    const std::vector<Touched> points = touched(w);
+    for (size_t i = 0; i < points.size(); ++i)
+      for (size_t j = i; j < points.size(); ++j) {
+        const auto& [p, at_p] = points[i];
+        const auto& [q, at_q] = points[j];
+        visit(p, q, Mat3(at_p * form * at_q.transpose()));
+      }
+  }
 
   double stiffness_ = 1;
   std::vector<Net> nets_;

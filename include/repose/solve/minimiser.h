@@ -39,8 +39,13 @@ class Minimiser : public RestSearch {
   ~Minimiser() override;
 
   /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
-  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
-  Outcome approach(Vec displacement, double distance);
+  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped. `near`:
+  /// the search begins where the last one ended, but for contact.
+  Outcome approach(Vec displacement, double distance, bool near = false);
+
+  /// Estimates the distance to the rest position and ends the search by Newton steps, where these
+  /// are short enough; no search of TAO's.
+  Outcome finish(Vec displacement, double accuracy);
 
   /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
   Outcome run(Vec displacement, double accuracy) override;
@@ -49,7 +54,7 @@ class Minimiser : public RestSearch {
   struct Callbacks;
   void make_tao();
   void set_forcing();
-  void search(Vec displacement);
+  void search(Vec displacement, bool near = false);
   /// Whether the search that ended after so many iterations is to be begun again where it ended.
   bool worth_going_on(int64_t iterations);
   /// `last`: the search is over, so the estimate is told.

@@ -2,6 +2,7 @@
 #include <petscvec.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace repose::solve {
@@ -33,6 +34,12 @@ struct Outcome {
 class RestSearch {
  public:
   virtual ~RestSearch() = default;
+  /// A prediction of its own of how the rest position moves from `displacement` at the positions'
+  /// load to `load`: whether there is one, then in `increment`; nothing where the linear one serves.
+  /// Collective.
+  virtual std::optional<bool> predict(Vec /*displacement*/, double /*load*/, Vec /*increment*/) {
+    return {};
+  }
   /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
   /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
