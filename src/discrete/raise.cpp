@@ -2,14 +2,12 @@
 
 #include "by_column.h"
 #include "deal.h"
-#include "pass_bodies.h"
 #include "plan.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
 #include "repose/discrete/message.h"
 #include "repose/discrete/part.h"
-#include "repose/model/motion.h"
 
 namespace repose::discrete {
 
@@ -53,30 +51,6 @@ void take_means(MPI_Comm comm, const scene::Scene& scene, const Deal& deal,
   MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
 }
 
-/// The bodies, built by rank 0 from what all ranks ask for. Collective.
-std::vector<mechanics::RigidBody> share_bodies(MPI_Comm comm, const model::Model& model) {
-  double travel = model::PrescribedMotion(model).largest_travel(model);
-  MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm);
-  std::vector<std::vector<char>> wanted;
-  base::together(comm, [&] { wanted = mechanics::wanted_blocks(model, travel); });
-  for (std::vector<char>& blocks : wanted)
-    MPI_Allreduce(MPI_IN_PLACE, blocks.data(), static_cast<int>(blocks.size()), MPI_CHAR, MPI_MAX,
-                  comm);
-  std::vector<mechanics::RigidBody> bodies;
-  base::on_first_rank(comm, [&] { bodies = mechanics::make_bodies(model, travel, wanted); });
-  for (int to = 1; to < base::size(comm); ++to)
-    base::together(comm, [&] {
-      if (base::rank(comm) == 0) {
-        Sender sender(comm, to);
-        pass_bodies(sender, bodies);
-      } else if (base::rank(comm) == to) {
-        Receiver receiver(comm, 0);
-        pass_bodies(receiver, bodies);
-      }
-    });
-  return bodies;
-}
-
 /// What the piece's points touch, if those of any rank touch anything.
 /// Collective.
 void plan_contact(MPI_Comm comm, model::Model& model, Plan& plan) {
@@ -86,7 +60,7 @@ void plan_contact(MPI_Comm comm, model::Model& model, Plan& plan) {
     model.contact.bodies.clear();
     return;
   }
-  plan.bodies = share_bodies(comm, model);
+  base::together(comm, [&] { plan.bodies = mechanics::make_bodies(model); });
   plan.touch_offset = mechanics::touch_offsets(model, plan.bodies);
 }
 

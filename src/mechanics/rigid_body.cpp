@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "repose/model/motion.h"
-
 namespace repose::mechanics {
 
 namespace {
@@ -72,17 +70,6 @@ double RigidBody::reach() const {
 
 namespace {
 
-/// mm outside a body up to which distances are known, and how near to points.
-struct Extent {
-  double reach, near;
-};
-
-Extent extent_of(const model::Contact& contact, double travel) {
-  constexpr double least_reach = 6;  // more than tissue that slides keeps away
-  constexpr double margin = 10;      // besides the way that bones go
-  return {std::max(least_reach, 4 * contact.spacing), travel + margin};
-}
-
 /// The mesh of a body, if it has one.
 const surface::Surface* mesh_of(const model::Model& model, const model::Body& body) {
   return body.bone >= 0 ? &model.bone_surfaces[body.bone]
@@ -91,31 +78,13 @@ const surface::Surface* mesh_of(const model::Model& model, const model::Body& bo
 
 }  // namespace
 
-std::vector<std::vector<char>> wanted_blocks(const model::Model& model, double travel) {
-  const model::Contact& contact = model.contact;
-  const Extent extent = extent_of(contact, travel);
-  std::vector<std::vector<Vec3>> points(contact.bodies.size());
-  for (size_t c = 0; c < contact.touches.point.size(); ++c)
-    points[contact.touches.body[c]].push_back(model.points.position[contact.touches.point[c]]);
-  std::vector<std::vector<char>> wanted(contact.bodies.size());
-  for (size_t k = 0; k < wanted.size(); ++k)
-    if (const surface::Surface* mesh = mesh_of(model, contact.bodies[k]))
-      wanted[k] = surface::DistanceField::blocks_near(*mesh, contact.spacing, extent.reach,
-                                                      points[k], extent.near);
-  return wanted;
-}
-
-std::vector<RigidBody> make_bodies(const model::Model& model, double travel,
-                                   const std::vector<std::vector<char>>& wanted) {
-  const model::Contact& contact = model.contact;
-  const Extent extent = extent_of(contact, travel);
+std::vector<RigidBody> make_bodies(const model::Model& model) {
+  constexpr double least_reach = 6;  // mm, more than tissue that slides keeps away
+  const double spacing = model.contact.spacing, reach = std::max(least_reach, 4 * spacing);
   std::vector<RigidBody> bodies;
-  for (size_t k = 0; k < contact.bodies.size(); ++k) {
-    const model::Body& body = contact.bodies[k];
+  for (const model::Body& body : model.contact.bodies) {
     if (const surface::Surface* mesh = mesh_of(model, body)) {
-      bodies.emplace_back(
-          surface::DistanceField(*mesh, contact.spacing, extent.reach, wanted[k], extent.near),
-          body.bone, body.push);
+      bodies.emplace_back(surface::DistanceField(*mesh, spacing, reach), body.bone, body.push);
       continue;
     }
     bodies.push_back(std::visit(
@@ -128,11 +97,6 @@ std::vector<RigidBody> make_bodies(const model::Model& model, double travel,
         body.shape));
   }
   return bodies;
-}
-
-std::vector<RigidBody> make_bodies(const model::Model& model) {
-  const double travel = model::PrescribedMotion(model).largest_travel(model);
-  return make_bodies(model, travel, wanted_blocks(model, travel));
 }
 
 std::vector<double> touch_offsets(const model::Model& model, const std::vector<RigidBody>& bodies) {

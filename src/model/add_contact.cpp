@@ -105,16 +105,35 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
         scene.file.string(), number);
 }
 
+/// mm, the 2nd percentile of the thickness of bone that is near the deep end of a column, along the
+/// way from there into the bone; `most` if that is larger.
+double thin_bone(const Foundation& on, double most) {
+  constexpr double near = 20, start = 0.01, share = 0.02;  // mm, mm, of the rays
+  constexpr size_t rays = 1000;
+  std::vector<double> thickness;
+  const std::vector<Vec3>& deep = on.columns.deep;
+  for (size_t c = 0; c < deep.size(); c += 1 + deep.size() / rays) {
+    const BoneField::Nearest bone = on.field.nearest(deep[c]);
+    if (!(bone.distance < near)) continue;
+    const Vec3 into =
+        bone.distance > 10 * start ? bone.point - deep[c] : deep[c] - on.mesh.points[c];
+    const Vec3 direction = into.normalized();
+    const auto exit = on.field.first_hit(bone.point + start * direction, direction, most);
+    thickness.push_back(exit ? start + exit->distance : most);
+  }
+  if (thickness.empty()) return most;
+  const auto thin =
+      thickness.begin() + static_cast<int64_t>(share * static_cast<double>(thickness.size()));
+  std::nth_element(thickness.begin(), thin, thickness.end());
+  return *thin;
+}
+
 }  // namespace
 
-/// Finer than the tissue can follow, teeth and edges catch single points.
-double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh) {
-  constexpr double share = 0.75;   // of the mean edge
-  constexpr double finest = 0.75;  // mm: the bones of a CT are known no finer
+double grid_spacing(const scene::Scene& scene, const Foundation& on) {
+  constexpr double finest = 0.5, coarsest = 1;  // mm
   if (scene.contact && scene.contact->grid) return *scene.contact->grid;
-  double sum = 0;
-  for (size_t e = 0; e < mesh.edges.size(); ++e) sum += mesh.edge_length(static_cast<int64_t>(e));
-  return std::max(finest, share * sum / static_cast<double>(mesh.edges.size()));
+  return std::clamp(thin_bone(on, 2 * coarsest) / 2, finest, coarsest);
 }
 
 void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
@@ -122,16 +141,16 @@ void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachme
   touch_bones(scene, attachment, layer_areas(mesh, model), model);
 }
 
-void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                 Model& model) {
+void add_contact(const scene::Scene& scene, const Foundation& on, Model& model) {
   Contact& contact = model.contact;
+  const SkinMesh& mesh = on.mesh;
   const std::vector<double> area = layer_areas(mesh, model);
-  touch_bones(scene, attachment, area, model);
+  touch_bones(scene, on.attachment, area, model);
   for (size_t i = 0; i < scene.instruments.size(); ++i)
     if (scene.instruments[i].slide || (scene.contact && scene.contact->bones))
       touch_instrument(scene, i, area, model);
   if (contact.touches.point.empty()) contact.bodies.clear();
-  contact.spacing = grid_spacing(scene, mesh);
+  contact.spacing = grid_spacing(scene, on);
   const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
   contact.stiffness = contact_stiffness(scene, column_sums(model, layers));
 }

@@ -1,27 +1,23 @@
 #pragma once
-#include "attachment.h"
-#include "repose/model/cut.h"
+#include "foundation.h"
 #include "repose/model/model.h"
-#include "repose/model/skin_mesh.h"
-#include "repose/scene/scene.h"
 
 namespace repose::model {
 
 /// What the tissue of a model of make_layers touches: bones that it may reach as they move, unless
 /// the scene's contact leaves them out; bones that it slides along; instruments on which the skin
 /// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
-/// its median thickness; distances are read from grids of the scene's spacing, or 0.75 of the mean
-/// edge of the skin, and 0.75 mm at least. Throws InputError naming the scene and an instrument
-/// that reaches no free point of the skin.
-void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                 Model& model);
+/// its median thickness. Throws InputError naming the scene and an instrument that reaches no free
+/// point of the skin.
+void add_contact(const scene::Scene& scene, const Foundation& on, Model& model);
 
 /// Of this the bones alone, and the points that may come to them: of a part of a model, too.
 void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model);
 
-/// mm, of the grids of distances.
-double grid_spacing(const scene::Scene& scene, const SkinMesh& mesh);
+/// Returns the spacing of the grids of distances, mm: the scene's, or half the thickness of thin
+/// bone near the tissue, which a coarser grid would miss, but 0.5 mm at least and 1 mm at most.
+double grid_spacing(const scene::Scene& scene, const Foundation& on);
 
 /// Doubled points, whose pairs are given, touch what the points touched, with half the area each.
 void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model);

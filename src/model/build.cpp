@@ -59,7 +59,7 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   require_held(scene, on.mesh, on.field, counts, on.attachment);
   complete(scene, on.mesh, built.model);
   add_bones(scene, bones, built.model);
-  add_contact(scene, on.mesh, on.attachment, built.model);
+  add_contact(scene, on, built.model);
   built.cuts = std::move(on.cuts);
   built.report = on.report;
   report_columns(on, counts.bone, built.report);

@@ -128,7 +128,7 @@ Model Ground::frame() const {
     frame.skin.push_back({t[0] * state_->layers, t[1] * state_->layers, t[2] * state_->layers});
   frame.gravity = state_->scene.gravity.value_or(Vec3::Zero());
   add_bones(state_->scene, state_->bones, frame);
-  frame.contact.spacing = grid_spacing(state_->scene, on.mesh);
+  frame.contact.spacing = grid_spacing(state_->scene, on);
   return frame;
 }
 

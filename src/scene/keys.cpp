@@ -159,7 +159,8 @@ std::vector<Key> contact_keys() {
        .choices = {"on", "off"}},
       {"contact.grid", number, "",
        "Spacing of the grids from which distances to meshes are read, which round edges of bones "
-       "by some tenths of it; when not given 0.75 of the skin's mean edge, at least 0.75 mm.",
+       "by some tenths of it; when not given half the thickness of thin bone near the tissue, 0.5 "
+       "to 1 mm.",
        "mm", Range::between(0.1, 10)},
       {"contact.stiffness", number, "",
        "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",

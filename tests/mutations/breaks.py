@@ -261,8 +261,32 @@ BREAKS = [
     ),
     (
         "the inside of a body is outside",
-        "if (votes <= 0) return;",
-        "if (votes >= 0) return;",
+        "last_distance_ = inside ? -distance : distance;",
+        "last_distance_ = inside ? distance : -distance;",
+        r"^surface\.distance_field",
+    ),
+    (
+        "a vertex on a grid line belongs to both its edges",
+        "from.z() < z && to.z() >= z",
+        "from.z() <= z && to.z() >= z",
+        r"^surface\.distance_field",
+    ),
+    (
+        "crossings before a point count, too",
+        "static_cast<int>(side) * winding < 0",
+        "static_cast<int>(side) * winding != 0",
+        r"^surface\.distance_field",
+    ),
+    (
+        "a sign reaches beyond the surface",
+        "travel < std::abs(last_distance_)",
+        "travel < 3 * std::abs(last_distance_)",
+        r"^surface\.distance_field",
+    ),
+    (
+        "a closer triangle than the last is missed",
+        "(1 + 1e-9) * squared",
+        "0.9 * squared",
         r"^surface\.distance_field",
     ),
     # mouth and cuts
@@ -412,16 +436,4 @@ BREAKS = [
         f"{SOLVE}on_",
     ),
     ("a column's rows are all its first", "begin[k] + next++", "begin[k] + 0 * next++", f"{SOLVE}on_"),
-    (
-        "only rank 0 says where distances are asked for",
-        "MPI_Allreduce(MPI_IN_PLACE, blocks.data(), static_cast<int>(blocks.size()), MPI_CHAR, MPI_MAX,",
-        "MPI_Allreduce(MPI_IN_PLACE, blocks.data(), 0, MPI_CHAR, MPI_MAX,",
-        f"{SOLVE}on_",
-    ),
-    (
-        "only rank 0 says how far points go",
-        "MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm);",
-        "MPI_Bcast(&travel, 1, MPI_DOUBLE, 0, comm);",
-        f"{SOLVE}on_",
-    ),
 ]

@@ -49,17 +49,9 @@ class RigidBody {
   Vec3 shift_ = Vec3::Zero();
 };
 
-/// The bodies of a model's contact at load 0. The distances to meshes are known as far as points
-/// and bodies move, and 6 mm and 4 spacings outside them at least.
+/// Returns the bodies of a model's contact at load 0. The distances to meshes are known up to 6 mm,
+/// and 4 spacings, outside them.
 std::vector<RigidBody> make_bodies(const model::Model& model);
-
-/// [bodies] which blocks of a body's distances the points that touch it ask for as points and
-/// bodies move by up to `travel` mm; empty for one that is no mesh. Of a part of a model: what that
-/// part asks for.
-std::vector<std::vector<char>> wanted_blocks(const model::Model& model, double travel);
-/// From what all parts of a model ask for.
-std::vector<RigidBody> make_bodies(const model::Model& model, double travel,
-                                   const std::vector<std::vector<char>>& wanted);
 
 /// Takes bodies to where they are at a load: `bone_matrix` gives that of a bone.
 template <class BoneMatrix>

@@ -216,7 +216,7 @@ struct Instrument {
 /// Tissue against bones and the sides of cuts against each other.
 struct Contact {
   bool bones = true, cuts = true;
-  std::optional<double> grid;       ///< mm, of the distances to bones; unset: by the skin's mesh
+  std::optional<double> grid;       ///< mm, of the distances to meshes; unset: by the bones
   std::optional<double> stiffness;  ///< N/mm³ of the penalty; unset: by the tissue
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <vector>
+#include <memory>
 
 #include "repose/surface/surface.h"
 
@@ -15,50 +15,56 @@ struct Distance {
 };
 
 /// The signed distance from a closed surface, negative inside, as a cubic B-spline on a grid of
-/// cubes, so that two derivatives are continuous. The exact distances at the grid's points are its
-/// coefficients, which smooths it by a Gaussian of 0.58 spacings (variance h²/3): plane parts stay
-/// exact, a convex edge lies up to 0.3 spacings deeper than the surface's. Known inside the surface
-/// and up to `reach` outside it. Plain arrays: blocks of 8³ values where it is known.
+/// cubes, so that two derivatives are continuous. Its coefficients are the exact distances at the
+/// grid points, at most `reach`, which smooths the distance by a Gaussian of 0.58 spacings
+/// (variance h²/3): plane parts stay exact, a convex edge lies up to 0.3 spacings deeper than the
+/// surface's. Inside is where the surface's winding number is not 0. Grid values are computed when
+/// they are first needed and kept in memory. A value depends on its grid point alone, so that
+/// neither the order of questions nor the rank matters. One thread at a time may ask a field and
+/// its copies.
 class DistanceField {
  public:
-  static constexpr int block = 8;
+  using Index = std::array<int64_t, 3>;  ///< of a grid point
 
   DistanceField() = default;
-  /// From exact distances to the closest triangle, found near the surface and handed on from grid
-  /// point to grid point. The sign is that of the angle-weighted pseudonormal there (Bærentzen &
-  /// Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal"), put to the
-  /// vote among grid points between which no surface can lie, because slivers mislead some. Left
-  /// out where a block is not `wanted`, if any is; −`near` mm at least, or −`reach`. `spacing` and
-  /// `reach` in mm. O(T + grid points).
-  DistanceField(const Surface& surface, double spacing, double reach,
-                const std::vector<char>& wanted, double near);
-  /// [blocks] 1: a block of that field's grid that is nowhere farther than `near` from a point.
-  static std::vector<char> blocks_near(const Surface& surface, double spacing, double reach,
-                                       const std::vector<Vec3>& points, double near);
+  /// Lays the grid, without any value. `spacing` and `reach` in mm. Throws InputError where the
+  /// grid would be too large.
+  DistanceField(Surface surface, double spacing, double reach);
 
-  /// The value alone, mm; `reach` where the field is not known.
+  /// The value alone, mm; `reach` beyond.
   double value(const Vec3& point) const;
-  /// With derivatives; these are 0 where the field is not known.
+  /// With derivatives; these are 0 beyond `reach`.
   Distance sample(const Vec3& point) const;
-  double reach() const { return reach_; }
+  double reach() const { return grid_.reach; }
 
-  /// Its arrays, for those who send it elsewhere.
+  Vec3 grid_point(const Index& at) const { return grid_.point(at); }  ///< mm
+  Index grid_points() const;                                          ///< along each axis
+  /// The exact signed distance at a grid point, at most `reach`, rounded to single precision.
+  float value_at(const Index& at) const;
+  int64_t computed_values() const;  ///< grid values that are known
+
+  /// Sends or receives its surface and grid, without values.
   template <class Archive>
   void pass(Archive& archive) {
-    archive(origin_, spacing_, reach_, depth_, size_, place_, value_);
+    archive(surface_.points, surface_.triangles, grid_.origin, grid_.spacing, grid_.reach,
+            grid_.blocks);
   }
 
  private:
-  friend class FieldBuilder;
-  struct Corner;
-  void lay_grid(const Surface& surface);
-  bool locate(const Vec3& point, Corner& corner) const;
+  struct Grid {
+    Vec3 origin = Vec3::Zero();     // mm, of grid point (0, 0, 0)
+    double spacing = 1, reach = 0;  // mm
+    Index blocks{};                 // along each axis
+    Vec3 point(const Index& at) const;
+  };
+  class Values;
+  struct Stencil;
+  Values& values() const;
+  bool locate(const Vec3& point, Stencil& stencil) const;
 
-  Vec3 origin_ = Vec3::Zero();                  // mm, of grid point (0, 0, 0)
-  double spacing_ = 1, reach_ = 0, depth_ = 0;  // mm
-  std::array<int32_t, 3> size_{};               // blocks along each axis
-  std::vector<int32_t> place_;                  // [blocks] which of the kept ones, or −1
-  std::vector<float> value_;                    // [kept blocks][8³] mm
+  Surface surface_;
+  Grid grid_;
+  mutable std::shared_ptr<Values> values_;  // made by the first question
 };
 
 }  // namespace repose::surface

@@ -70,6 +70,19 @@ TEST(Build, every_point_is_in_the_set_it_belongs_to) {
   EXPECT_EQ(built.model.bones, std::vector<std::string>{"jaw"});
 }
 
+TEST(Build, grids_of_distances_resolve_thin_bone) {
+  const auto spacing = [](double thickness, const auto& grid) {
+    scene::Scene scene = patches::scene_of(3, {"jaw"});
+    scene.contact.emplace().grid = grid;
+    const auto bone = patches::box({-30, -30, -10 - thickness}, {130, 130, -10});
+    return build_model(scene, patches::square(6, 60), {bone}).model.contact.spacing;
+  };
+  EXPECT_EQ(spacing(15, std::nullopt), 1);
+  EXPECT_NEAR(spacing(1.4, std::nullopt), 0.7, 1e-9);
+  EXPECT_EQ(spacing(0.3, std::nullopt), 0.5);
+  EXPECT_EQ(spacing(1.4, std::optional(2.5)), 2.5);
+}
+
 TEST(Build, only_the_longest_border_is_the_rim) {
   const surface::Surface skin = patches::paper_sized_annulus();
   const surface::Surface bone = patches::box({-100, -100, -30}, {100, 100, -10});

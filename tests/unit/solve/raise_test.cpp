@@ -174,8 +174,8 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
   EXPECT_EQ(rows.touches, static_cast<int64_t>(whole.contact.touches.point.size()));
 }
 
-/// The jaws turn together, about each corner: points of one rank go farther than others'.
-TEST(Raise, bodies_know_the_distances_that_any_rank_asks_for) {
+/// The jaws turn together about each corner.
+TEST(Raise, every_rank_reads_the_same_distances_to_bodies) {
   for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(100, 0, 0), Vec3(0, 100, 0), Vec3(100, 100, 0)}) {
     model::Anatomy anatomy = jaws(24);
     anatomy.scene.contact->grid = 1;
