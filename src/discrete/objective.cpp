@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "flops.h"
 #include "repose/base/error.h"
@@ -38,6 +40,16 @@ std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& lo
   return force;
 }
 
+/// The contact with bodies whose edges are rounded.
+mechanics::TouchLoop rounded_touches(const Part& part) {
+  constexpr double times = 2.5;
+  std::vector<mechanics::RigidBody> bodies;
+  for (const mechanics::RigidBody& body : part.bodies) bodies.push_back(body.smoothed(times));
+  model::Touches touches = part.model.contact.touches;
+  if (!touches.point.empty()) touches.offset = mechanics::touch_offsets(part.model, bodies);
+  return {touches, part.model.contact.stiffness, std::move(bodies)};
+}
+
 /// Replaces what is not finite by nothing and cuts blocks to a length that can still be squared.
 void make_finite(std::span<Vec3> gradient) {
   constexpr double longest = 1e100;
@@ -66,10 +78,20 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
       averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
       touches_(positions.part().model.contact.touches, positions.part().model.contact.stiffness,
                positions.part().bodies),
+      other_touches_(rounded_touches(positions.part())),
       walls_(positions.part().model.contact.walls, positions.part().model.contact.stiffness),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
       initial_(mechanics::totals(loops_, positions.part().model.points.position)),
       work_(positions.local().size()) {}
+
+void Objective::round_bodies(bool rounded) {
+  if (rounded == rounded_) return;
+  rounded_ = rounded;
+  other_touches_.set_multipliers(touches_.multipliers());
+  other_touches_.set_stiffness(touches_.stiffness());
+  std::swap(touches_, other_touches_);
+  placed_at_ = std::numeric_limits<double>::quiet_NaN();
+}
 
 void Objective::place_bodies() {
   if (placed_at_ == positions_.load()) return;
@@ -115,8 +137,7 @@ std::vector<Objective::Block> Objective::contact_blocks(bool exact) {
   std::vector<Block> blocks;
   if (!positions_.part().contact) return blocks;
   const auto add = [&](int64_t p, int64_t q, const Mat3& block) {
-    blocks.push_back(
-        {static_cast<int32_t>(p), static_cast<int32_t>(q), weights_.elastic * block});
+    blocks.push_back({static_cast<int32_t>(p), static_cast<int32_t>(q), weights_.elastic * block});
   };
   place_bodies();
   touches_.look(positions_.local());

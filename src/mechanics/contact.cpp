@@ -67,8 +67,12 @@ std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, do
     if (!slides(c) && least_gap(c, beside) > reach) continue;
     measure(c, beside);
     if ((!slides(c) && gap_[c] > reach) || normal_[c].isZero(0)) continue;
-    gaps.push_back({c, slides(c), touches_.area[c], gap_[c],
-                    {{static_cast<int32_t>(touches_.point[c]), normal_[c]}}, {}});
+    gaps.push_back({c,
+                    slides(c),
+                    touches_.area[c],
+                    gap_[c],
+                    {{static_cast<int32_t>(touches_.point[c]), normal_[c]}},
+                    {}});
   }
   return gaps;
 }

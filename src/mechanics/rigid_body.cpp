@@ -63,6 +63,13 @@ Distance RigidBody::distance(const Vec3& beside) const {
   return d;
 }
 
+RigidBody RigidBody::smoothed(double times) const {
+  const auto* field = std::get_if<surface::DistanceField>(shape_.get());
+  RigidBody body = *this;
+  if (field) body.shape_ = std::make_shared<const Shape>(field->coarser(times));
+  return body;
+}
+
 double RigidBody::reach() const {
   const auto* field = std::get_if<surface::DistanceField>(shape_.get());
   return field ? field->reach() : std::numeric_limits<double>::infinity();

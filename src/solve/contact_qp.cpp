@@ -71,16 +71,17 @@ void ContactQp::add_gaps() {
       const auto p = static_cast<int32_t>(point);
       (exact ? curvature_ : convex_curvature_).push_back({p, p, scale * block});
     });
-  objective_.walls().for_each_curvature(
-      std::span(gaps_).subspan(touching_),
-      [&](int32_t p, int32_t q, const Mat3& block) { curvature_.push_back({p, q, scale * block}); });
+  objective_.walls().for_each_curvature(std::span(gaps_).subspan(touching_),
+                                        [&](int32_t p, int32_t q, const Mat3& block) {
+                                          curvature_.push_back({p, q, scale * block});
+                                        });
 }
 
 void ContactQp::take_multipliers() {
   multiplier_.clear();
   for (size_t k = 0; k < gaps_.size(); ++k) {
-    const auto from = k < touching_ ? objective_.touches().multipliers()
-                                    : objective_.walls().multipliers();
+    const auto from =
+        k < touching_ ? objective_.touches().multipliers() : objective_.walls().multipliers();
     multiplier_.push_back(from[gaps_[k].constraint]);
   }
 }

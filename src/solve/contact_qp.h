@@ -10,8 +10,8 @@ namespace repose::solve {
 /// The quadratic program of a step of contact: minimizes ½ dᵀHd + bᵀd over d with
 /// g + Σ ∇g · d ≥ 0 at every gap that is near, = 0 where a point slides (docs/theory/contact.md).
 /// H is the exact Hessian of the tissue and the curvature −a p ∂²g of the gaps' multipliers. An
-/// augmented Lagrangian on an active set: each linear solve, by the tangent solver, is followed by a
-/// new set and new multipliers. The multipliers begin and end in the objective's loops.
+/// augmented Lagrangian on an active set: each linear solve, by the tangent solver, is followed by
+/// a new set and new multipliers. The multipliers begin and end in the objective's loops.
 class ContactQp {
  public:
   ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
@@ -23,8 +23,8 @@ class ContactQp {
   /// its body that it is beside. `way` [local points] mm, of fixed points. Collective.
   void linearize(Vec displacement, double load, std::span<const Vec3> way);
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
-  /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Returns whether
-  /// that was reached without negative curvature. Collective.
+  /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Returns
+  /// whether that was reached without negative curvature. Collective.
   bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
 
  private:

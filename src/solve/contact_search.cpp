@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace repose::solve {
 
@@ -13,6 +14,9 @@ namespace {
 constexpr double missed = 0.25;       // of the accuracy, by contact
 constexpr double contact_safety = 2;  // the estimate is so many times what is left
 constexpr double predicted_to = 0.1;  // mm
+// Bodies with rounded edges have one rest position where sharper ones catch single points on either
+// side: it decides the side.
+constexpr ContactSearch::Approach to_rounded{true, 0.1, 0.05, 0.3}, to_exact{false, 0.1, 0.05, 0.1};
 
 double largest_of_ranks(MPI_Comm comm, double value) {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
@@ -22,10 +26,12 @@ double largest_of_ranks(MPI_Comm comm, double value) {
 }  // namespace
 
 ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                             linear::TangentSolver& solver, Minimiser& minimiser)
+                             linear::TangentSolver& solver, Minimiser& minimiser,
+                             Minimiser::Watch watch)
     : objective_(objective),
       tangent_(tangent),
       minimiser_(minimiser),
+      watch_(std::move(watch)),
       qp_(objective, tangent, solver),
       stiffness_(objective_.positions().part().model.contact.stiffness),
       gradient_(objective.positions().make_vector()),
@@ -81,6 +87,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   for (size_t i = 0; i < way.size(); ++i)
     if (part.unknown[i] < 0)
       way[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  objective_.round_bodies(true);
   set_stiffness(stiffness_);
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
@@ -103,55 +110,69 @@ void ContactSearch::subtract_contact() {
   check(VecAXPY(slope_, 1.0, gradient_));
 }
 
-Outcome ContactSearch::approach(Vec displacement, double accuracy) {
+/// Searches on the augmented Lagrangian, each followed by new multipliers. A soft penalty lets
+/// points change sides a few at a time.
+Outcome ContactSearch::approach(Vec displacement, double accuracy, const Approach& to) {
   constexpr int most = 5;
   constexpr double softened = 0.25;  // of the penalty's stiffness
-  constexpr double rough = 0.1, finer = 0.05;  // mm, at first and then
-  constexpr double close = 0.1;  // mm of gaps, from where quadratic programs lead
   Outcome outcome;
   int64_t iterations = 0;
+  objective_.round_bodies(to.rounded);
   set_stiffness(softened * stiffness_);
   for (int n = 0; n < most; ++n) {
-    outcome = minimiser_.approach(displacement, std::max(n == 0 ? rough : finer, accuracy), n > 0);
+    const bool near = n > 0 || !to.rounded;
+    outcome =
+        minimiser_.approach(displacement, std::max(near ? to.finer : to.rough, accuracy), near);
     iterations += outcome.iterations;
     if (outcome.stopped) break;
     objective_.positions().update(displacement);
     const double left = violation();
     move_multipliers();
-    if (left <= std::max(close, accuracy)) break;
+    if (left <= std::max(to.left, accuracy)) break;
     tangent_.forget_contact();
   }
   outcome.iterations = iterations;
+  objective_.round_bodies(false);
   set_stiffness(stiffness_);
   return outcome;
 }
 
-bool ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
-  constexpr int most_steps = 12, most_halved = 6;
-  constexpr double near = 0.5;  // of the accuracy, a step that ends the search
+/// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
+/// from `tissue`, the value without contact. Its full length is tried first.
+bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
+  constexpr int most_halved = 6;
   constexpr double rounding = 1e-12;
-  const double scale = objective_.weights().elastic;
+  const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
+  for (int k = 0; k <= most_halved; ++k) {
+    check(VecCopy(displacement, trial_));
+    check(VecAXPY(trial_, std::ldexp(1.0, -k), step_));
+    value = objective_.evaluate(trial_, gradient_);
+    if (value > merit + rounding * std::abs(merit)) continue;
+    check(VecCopy(trial_, displacement));
+    return true;
+  }
+  return false;
+}
+
+ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
+  constexpr int most_steps = 12;
+  constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   double value = objective_.evaluate(displacement, gradient_);
   for (int n = 0; n < most_steps; ++n) {
     subtract_contact();
-    const double tissue = value - scale * objective_.contact_value();
+    const double tissue = value - objective_.weights().elastic * objective_.contact_value();
     qp_.linearize(displacement);
-    if (!qp_.solve(displacement, slope_, 0.1 * accuracy, step_)) return false;
+    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
-    const double merit = tissue + scale * objective_.contact_value();
-    double share = 1;
-    for (int k = 0;; ++k, share /= 2) {
-      check(VecCopy(displacement, trial_));
-      check(VecAXPY(trial_, share, step_));
-      value = objective_.evaluate(trial_, gradient_);
-      if (value <= merit + rounding * std::abs(merit)) break;
-      if (k == most_halved) return false;
-    }
-    check(VecCopy(trial_, displacement));
+    if (!take_step(displacement, tissue, value)) return End::failed;
     ++iterations;
-    if (share == 1 && length <= near * accuracy) return true;
+    if (length <= near * accuracy) return End::reached;
+    if (watch_ && !watch_({iterations, objective_.positions().load(), value,
+                           discrete::largest_block(gradient_), length, objective_.evaluations(),
+                           displacement}))
+      return End::stopped;
   }
-  return false;
+  return End::failed;
 }
 
 /// Ends the search where a strict estimate says that it is over.
@@ -164,26 +185,36 @@ Outcome ContactSearch::finish(Vec displacement, double accuracy) {
   return outcome;
 }
 
+Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
+  outcome.objective = objective_.evaluate(displacement, gradient_);
+  outcome.gradient_max = discrete::largest_block(gradient_);
+  return outcome;
+}
+
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   if (!kept_) {
     keep_multipliers();
-    const Outcome outcome = finish(displacement, accuracy);
+    Outcome outcome = finish(displacement, accuracy);
     if (outcome.converged) return outcome;
   }
   kept_ = false;
-  Outcome outcome = approach(displacement, accuracy);
-  if (outcome.stopped) {
-    outcome.objective = objective_.evaluate(displacement, gradient_);
-    outcome.gradient_max = discrete::largest_block(gradient_);
-    return outcome;
-  }
+  Outcome outcome = approach(displacement, accuracy, to_rounded);
   int64_t iterations = outcome.iterations;
-  if (newton(displacement, accuracy, iterations)) {
-    outcome = finish(displacement, accuracy);
-    outcome.iterations += iterations;
-    if (outcome.converged) return outcome;
+  if (!outcome.stopped) {
+    outcome = approach(displacement, accuracy, to_exact);
+    iterations += outcome.iterations;
   }
-  outcome = rounds(displacement, accuracy);
+  if (outcome.stopped) return stopped(displacement, outcome);
+  const End end = newton(displacement, accuracy, iterations);
+  if (end == End::reached) outcome = finish(displacement, accuracy);
+  if (end == End::stopped) {
+    outcome.converged = false;
+    outcome.stopped = true;
+    outcome.reason = stopped_reason;
+    outcome = stopped(displacement, outcome);
+  }
+  if (end == End::failed || (!outcome.converged && !outcome.stopped))
+    outcome = rounds(displacement, accuracy);
   outcome.iterations += iterations;
   return outcome;
 }
@@ -216,6 +247,7 @@ Outcome ContactSearch::rounds(Vec displacement, double accuracy) {
 }
 
 void ContactSearch::go_back(Vec) {
+  objective_.round_bodies(false);
   objective_.touches().set_multipliers(before_);
   objective_.walls().set_multipliers(walls_before_);
   tangent_.forget_contact();

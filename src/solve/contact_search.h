@@ -5,16 +5,23 @@
 namespace repose::solve {
 
 /// Finds the rest position of tissue that touches bodies and itself (docs/theory/contact.md): the
-/// step to a load is predicted with its contact by a quadratic program; one quasi-Newton search on
-/// the augmented Lagrangian with a soft penalty comes near; sequential quadratic programs (Nocedal &
-/// Wright 2006, chapter 18) end it, multipliers included. Where these fail, rounds of minimization
-/// and new multipliers follow (Hestenes 1969; Powell 1969; Simo & Laursen 1992 for contact). The
-/// multipliers of a load are where the next begins.
+/// step to a load is predicted with its contact by a quadratic program; quasi-Newton searches on
+/// the augmented Lagrangian with a soft penalty come near, first to bodies with rounded edges;
+/// sequential quadratic programs (Nocedal & Wright 2006, chapter 18) end it, multipliers included.
+/// Where these fail, rounds of minimization and new multipliers follow (Hestenes 1969; Powell 1969;
+/// Simo & Laursen 1992 for contact). The multipliers of a load are where the next begins.
 class ContactSearch : public RestSearch {
  public:
-  /// `tangent` is the objective's Hessian, `solver` solves with it, `minimiser` minimises it.
+  struct Approach {
+    bool rounded;         ///< edges of bodies (discrete::Objective::round_bodies)
+    double rough, finer;  ///< mm, to which the first search goes, and those near it
+    double left;          ///< mm of gaps, from where on the next stage leads
+  };
+
+  /// `tangent` is the objective's Hessian, `solver` solves with it, `minimiser` minimises
+  /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                linear::TangentSolver& solver, Minimiser& minimiser);
+                linear::TangentSolver& solver, Minimiser& minimiser, Minimiser::Watch watch);
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
@@ -25,17 +32,21 @@ class ContactSearch : public RestSearch {
   double violation();
   void move_multipliers();
   void subtract_contact();
-  Outcome approach(Vec displacement, double accuracy);
-  bool newton(Vec displacement, double accuracy, int64_t& iterations);
+  Outcome approach(Vec displacement, double accuracy, const Approach& to);
+  enum class End { reached, failed, stopped };
+  End newton(Vec displacement, double accuracy, int64_t& iterations);
+  bool take_step(Vec displacement, double tissue, double& value);
+  Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   Outcome rounds(Vec displacement, double accuracy);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   Minimiser& minimiser_;
+  Minimiser::Watch watch_;
   ContactQp qp_;
   double stiffness_;                           // N/mm³, of the model's contact
-  bool kept_ = false;                          // before_ are those before the prediction
+  bool kept_ = false;                          // before_ are those before a prediction
   std::vector<double> before_, walls_before_;  // multipliers before the last search
   base::VecHandle gradient_, slope_, step_, trial_;
 };

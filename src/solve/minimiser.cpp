@@ -323,8 +323,7 @@ double Minimiser::measure(Vec displacement, bool last) {
 }
 
 std::string Minimiser::reason_of(const Outcome& outcome, TaoConvergedReason reason) const {
-  if (stopped_ && (!outcome.converged || function_.positions().load() < 1))
-    return "stopped before it was done, by a signal or the time limit";
+  if (stopped_ && (!outcome.converged || function_.positions().load() < 1)) return stopped_reason;
   if (outcome.converged) return reason_text(TAO_CONVERGED_USER);
   return stalled_ ? "the objective no longer decreases beyond rounding" : reason_text(reason);
 }

@@ -139,7 +139,7 @@ class Searcher {
     if (problem_.force()) force_search_.emplace(*problem_.force(), minimiser_);
     if (positions.part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
-                       minimiser_);
+                       minimiser_, std::ref(watcher_));
     if (is_exact(settings))
       exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                             minimiser_);

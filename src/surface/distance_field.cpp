@@ -41,6 +41,13 @@ DistanceField::DistanceField(Surface surface, double spacing, double reach)
   for (int a = 0; a < 3; ++a) grid_.blocks[a] = 1 + static_cast<int64_t>(blocks[a]);
 }
 
+DistanceField DistanceField::coarser(double times) const {
+  constexpr double reach = 4;  // spacings, at least: what a stencil spans
+  if (surface_.triangles.empty()) return {};
+  const double spacing = times * grid_.spacing;
+  return {surface_, spacing, std::max(grid_.reach, reach * spacing)};
+}
+
 Vec3 DistanceField::Grid::point(const Index& at) const {
   return origin + spacing * Vec3(static_cast<double>(at[0]), static_cast<double>(at[1]),
                                  static_cast<double>(at[2]));

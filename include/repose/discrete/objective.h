@@ -31,6 +31,9 @@ class Objective : public Function {
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
   mechanics::TouchLoop& touches() { return touches_; }
+  /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
+  /// are kept. Not collective.
+  void round_bodies(bool rounded);
   mechanics::WallLoop& walls() { return walls_; }
   const mechanics::WallLoop& walls() const { return walls_; }
   /// Takes the bodies to where they are at the positions' load. Not collective.
@@ -62,7 +65,8 @@ class Objective : public Function {
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool averages_volumes_;
-  mechanics::TouchLoop touches_;
+  mechanics::TouchLoop touches_, other_touches_;  // those in use, and the others
+  bool rounded_ = false;                          // bodies in use are
   mechanics::WallLoop walls_;
   double placed_at_ = 0;          // load at which the bodies are
   bool loaded_ = false;           // some rank has a weight or an external force

@@ -48,13 +48,13 @@ class Tangent : public Hessian {
   Objective& objective_;
   std::unique_ptr<TangentEntries> entries_;
   base::MatHandle exact_, convex_, action_;
-  base::MatHandle coupled_;                               // exact_ and what averaged volumes couple
+  base::MatHandle coupled_;               // exact_ and what averaged volumes couple
   std::vector<Objective::Block> blocks_;  // of terms and contact, at the last assembly
   std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<Vec3> direction_, work_;  // [local points]
   bool contact_changed_ = true;
-  int64_t filled_at_ = -1;              // assemblies() when exact_ was filled
+  int64_t filled_at_ = -1;  // assemblies() when exact_ was filled
 };
 
 }  // namespace repose::discrete

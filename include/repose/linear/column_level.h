@@ -73,8 +73,8 @@ class ColumnLevel {
   void fill(const UpperSums& sums);
   /// Adds to the block of two own points, and to its mirror image; it is in the pattern.
   void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
-  /// Factors the columns' own blocks, after the entries have changed: all, or those of the given own
-  /// points, ascending. Not collective.
+  /// Factors the columns' own blocks, after the entries have changed: all, or those of the given
+  /// own points, ascending. Not collective.
   void factor();
   void factor(std::span<const int32_t> points);
 

@@ -27,8 +27,8 @@ inline Pressing press(double gap, double multiplier, double stiffness, bool slid
 struct LinearGap {
   size_t constraint;  ///< row of the loop's multipliers
   bool slides;
-  double area;  ///< mm²
-  double gap;   ///< mm
+  double area;                                             ///< mm²
+  double gap;                                              ///< mm
   using Gradient = std::vector<std::pair<int32_t, Vec3>>;  ///< by point, ascending
   Gradient gradient;
   Gradient lumped;  ///< the same at few points, for preconditioners; empty: as `gradient`
@@ -84,17 +84,13 @@ class TouchLoop {
   /// Gaps (mm; where they cannot act a lower bound) and pressures p − k g (N/mm²) at the latest
   /// look, [C].
   std::span<const double> gaps() const { return gap_; }
-  double pressure(size_t c) const {
-    return now(c).pressure;
-  }
+  double pressure(size_t c) const { return now(c).pressure; }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
  private:
   bool slides(size_t c) const { return touches_.binding[c] == model::Binding::slides; }
   double least_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
-  Pressing now(size_t c) const {
-    return press(gap_[c], multiplier_[c], stiffness_, slides(c));
-  }
+  Pressing now(size_t c) const { return press(gap_[c], multiplier_[c], stiffness_, slides(c)); }
   void measure(size_t c, const Vec3& beside);
   Mat3 block(size_t c, bool exact, const Pressing& pressing) const;
 

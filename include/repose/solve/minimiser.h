@@ -39,8 +39,8 @@ class Minimiser : public RestSearch {
   ~Minimiser() override;
 
   /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
-  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped. `near`:
-  /// the search begins where the last one ended, but for contact.
+  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
+  /// `near`: the search begins where the last one ended, but for contact.
   Outcome approach(Vec displacement, double distance, bool near = false);
 
   /// Estimates the distance to the rest position and ends the search by Newton steps, where these

@@ -18,6 +18,9 @@ struct Iteration {
   Vec displacement = nullptr;    ///< the state
 };
 
+inline constexpr const char* stopped_reason =
+    "stopped before it was done, by a signal or the time limit";
+
 /// How a search for the rest position at one load ended.
 struct Outcome {
   bool converged = false;         ///< the estimated distance is below the accuracy asked for
@@ -35,8 +38,8 @@ class RestSearch {
  public:
   virtual ~RestSearch() = default;
   /// A prediction of its own of how the rest position moves from `displacement` at the positions'
-  /// load to `load`: whether there is one, then in `increment`; nothing where the linear one serves.
-  /// Collective.
+  /// load to `load`: whether there is one, then in `increment`; nothing where the linear one
+  /// serves. Collective.
   virtual std::optional<bool> predict(Vec /*displacement*/, double /*load*/, Vec /*increment*/) {
     return {};
   }

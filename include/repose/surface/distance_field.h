@@ -31,6 +31,9 @@ class DistanceField {
   /// grid would be too large.
   DistanceField(Surface surface, double spacing, double reach);
 
+  /// The field of the same surface on a grid so many times coarser.
+  DistanceField coarser(double times) const;
+
   /// The value alone, mm; `reach` beyond.
   double value(const Vec3& point) const;
   /// With derivatives; these are 0 beyond `reach`.
