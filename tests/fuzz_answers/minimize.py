@@ -22,6 +22,7 @@ class Problem:
         self.equal = np.zeros(len(self.area), bool)
         self.equal[:len(self.touches.equal)] = self.touches.equal
         self.number = len(self.area)
+        self.stiffness = float(model.get("contact@stiffness", 1.0))  # N/mm³, what gaps compare by
 
     def look(self, x):
         """Gaps [C], and what their derivatives need."""
@@ -188,11 +189,11 @@ def active_set(problem, x, near=1e-3, most=60, longest=1.0):
     """Newton's method on energy gradient = Σ force ∂g with the gaps that press closed, from x."""
     stiffness = max(1e-12, np.abs(np.diag(problem.hessian(x))).mean())
     force = first_forces(problem, x, near) if problem.number else np.zeros(0)
-    length, rows = np.inf, np.zeros(0, int)
+    length, presses = np.inf, force > 0
     for _ in range(most):
         hessian, gradient = problem.hessian(x), problem.gradient(x)
         gap, seen = problem.look(x)
-        rows = np.flatnonzero(problem.equal | (force - stiffness * gap > 0))
+        rows = np.flatnonzero(problem.equal | presses)
         jacobian = problem.jacobian(rows, seen)
         acting = np.flatnonzero(force)
         hessian = hessian - problem.bend(acting, force[acting], seen)
@@ -203,10 +204,10 @@ def active_set(problem, x, near=1e-3, most=60, longest=1.0):
         step = solution[:len(gradient)]
         length = np.abs(step).max(initial=0)
         x = problem.moved(x, step * min(1, longest / max(length, 1e-300)))
-        same = set(rows) == set(np.flatnonzero(force)) | set(np.flatnonzero(problem.equal))
         force = np.zeros(problem.number)
         force[rows] = solution[len(gradient):]
-        if length < 1e-11 or (length < 1e-9 and same):
+        before, presses = presses, force > problem.stiffness * problem.area * problem.look(x)[0]
+        if length < 1e-9 and (before | problem.equal == presses | problem.equal).all():
             break
     return finished(problem, x, length, force)
 
