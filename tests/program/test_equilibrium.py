@@ -1,6 +1,8 @@
 """The initial equilibrium: nothing moves under the gravity of the recording, another gravity moves the
 face, a scene that asks for the impossible is refused."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,22 @@ def test_rest_lengths_do_not_depend_on_the_posture_after(solved, posture):
     one, other = (model_of(solved(posture(g), "-stability")) for g in (UPRIGHT, BOWED))
     assert np.array_equal(one["spring/rest_length"], other["spring/rest_length"])
     assert not np.array_equal(one["gravity"], other["gravity"])
+
+
+@pytest.mark.parametrize("tissue", ["springs", "material"])
+def test_tissue_that_slides_on_bone_begins_in_equilibrium(solved, posture, tissue):
+    scene = posture(LYING, turgor=0.01 if tissue == "springs" else 0, name=f"sliding_{tissue}")
+    text = scene.read_text() + "teeth:\n  - {sphere: {center: [0, -90, -30], radius: 40}}\n"
+    if tissue == "material":
+        text = re.sub(r"  springs:.*?\n(?=\S)", "  material: {preset: face}\n", text, flags=re.S)
+        text = text[:text.index("solve:")] + text[text.index("gravity:"):]
+    scene.write_text(text)
+    file = solved(scene)
+    model, step = model_of(file), last(file)
+    assert (model["contact/binding"] == 1).any()
+    assert np.abs(step["point/displacement"]).max() < 1e-6
+    assert step["gradient_max"] < 1e-9 * np.linalg.norm(
+        model["point/mass"][:, None] * LYING, axis=1).max()
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
