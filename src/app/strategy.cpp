@@ -176,7 +176,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   auto models = static_cast<int>(s.resolutions.size());
   MPI_Bcast(&models, 1, MPI_INT, 0, comm);
   s.resolutions.resize(models);
-  for (bool* flag : {&s.preview, &s.sensitivity}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  for (bool* flag : {&s.preview, &s.sensitivity, &s.tears}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (base::rank(comm) == 0 && options.flag("dry_run")) s.explanation = explain(wish, all, job, s);
   return s;
 }
