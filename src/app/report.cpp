@@ -209,6 +209,24 @@ std::string describe_stages(const base::Stages& stages) {
   return text;
 }
 
+std::string describe_saved(const std::string& name) {
+  return report_row(
+      "told to end",
+      fmt::format("{}.h5 holds the last state saved; -restart {}.h5 goes on from it", name, name));
+}
+
+std::string describe_finished(const std::string& file, const model::StepNumbers& end,
+                              double accuracy, bool folded) {
+  return report_row(
+      "finished",
+      fmt::format("{}: at rest at load 1, {:.3g} mm reached, {:.3g} mm asked for{}; nothing is "
+                  "left to do",
+                  file, end.displacement_error, accuracy,
+                  folded ? fmt::format(", {} prisms inside out (-allow_folded accepts them)",
+                                       end.inverted_prisms)
+                         : ""));
+}
+
 std::string describe_failure(const solve::Summary& s, bool stretched) {
   if (s.path.complete()) return "";
   return fmt::format("NOT CONVERGED: the run ended at load {:.4g} with {} to go ({}).{}\n",

@@ -57,6 +57,13 @@ std::string describe_folds(const model::Model& model, const std::vector<double>&
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 
+/// A run has been told to end, and what it has reached so far is safe.
+std::string describe_saved(const std::string& name);
+
+/// A result, of which `end` is the last step, that a run to `accuracy` mm has nothing to add to.
+std::string describe_finished(const std::string& file, const model::StepNumbers& end,
+                              double accuracy, bool folded);
+
 /// Why a run did not come to rest and what to change, loudly in one line; nothing where it did.
 /// `stretched`: it began in an initial equilibrium.
 std::string describe_failure(const solve::Summary& summary, bool stretched);

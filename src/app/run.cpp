@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -16,6 +20,7 @@
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
+#include "repose/results/result_file.h"
 #include "repose/surface/write.h"
 #include "sensitivity.h"
 #include "strategy.h"
@@ -62,6 +67,25 @@ std::string unsettled(const solve::Tearing& tearing) {
   return tearing.stopped ? "a signal or the time limit: more may tear" : "more may tear";
 }
 
+/// While it lives, a signal makes what is written so far the result at once: the ranks may be
+/// killed before their search ends.
+class Saving {
+ public:
+  Saving(base::Interrupt& interrupt, Writer& writer, const std::string& name)
+      : interrupt_(interrupt) {
+    if (base::rank(comm) > 0) return;
+    interrupt_.on_signal([&writer, name] {
+      if (writer.save()) say(describe_saved(name));
+    });
+  }
+  ~Saving() { interrupt_.on_signal({}); }
+  Saving(const Saving&) = delete;
+  Saving& operator=(const Saving&) = delete;
+
+ private:
+  base::Interrupt& interrupt_;
+};
+
 /// One run of a job by a strategy, under one deadline.
 class Run {
  public:
@@ -75,15 +99,13 @@ class Run {
     strategy_.settings.stages = &stages_;
   }
 
-  /// Begins where another run left off.
-  void restart(const std::filesystem::path& file) {
-    const results::Restart from = results::read_restart(comm, file, job_.model);
-    start_ = {from.position, from.guess};
-    strategy_.settings.path.start_load = from.load;
-  }
+  /// Begins where another run left off. Returns how that ended, if nothing is left to do.
+  std::optional<base::Exit> restart(const std::filesystem::path& file, bool folds_allowed);
   base::Exit solve(double checkpoint_interval, bool folds_allowed);
 
  private:
+  bool is_done(const model::StepNumbers& end) const;
+  void copy_result(const std::filesystem::path& file) const;
   solve::Tearing tear();
   Coarser solve_coarser();
   solve::Summary search(Writer& writer);
@@ -98,7 +120,51 @@ class Run {
   base::Stages& stages_;
   base::Interrupt interrupt_;
   solve::Start start_;
+  std::filesystem::path earlier_;  // the result it goes on from, …
+  int64_t kept_ = 0;               // … and of its steps how many
 };
+
+/// Whether a rest position at load 1 is all that is asked for.
+bool Run::is_done(const model::StepNumbers& end) const {
+  const solve::Settings& settings = strategy_.settings;
+  const mechanics::Weights& weights = settings.weights;
+  const bool penalty = end.volume == model::VolumeTerm::penalty;
+  const auto equal = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); };
+  return end.displacement_error <= settings.path.accuracy &&
+         end.functional == settings.functional && end.volume == weights.volume &&
+         equal(end.lambda, weights.elastic) &&
+         (!penalty || equal(end.bulk_modulus, weights.volume_weight)) && !settings.stability &&
+         !strategy_.sensitivity && !strategy_.tears;
+}
+
+/// Makes a finished result that of this run's name, unless it is. On rank 0.
+void Run::copy_result(const std::filesystem::path& file) const {
+  std::ifstream one(file, std::ios::binary), other(name_ + ".h5", std::ios::binary);
+  using Bytes = std::istreambuf_iterator<char>;
+  if (other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes())) return;
+  results::ResultFile copy(MPI_COMM_SELF, name_, job_.model);
+  copy.keep(file, results::step_count(file));
+  copy.commit();
+}
+
+std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool folds_allowed) {
+  const results::Restart from = results::read_restart(comm, file, job_.model);
+  start_ = {from.position, from.guess};
+  strategy_.settings.path.start_load = from.load;
+  earlier_ = file;
+  kept_ = strategy_.tears ? 0 : from.kept;
+  bool done = false, folded = false;
+  base::on_first_rank(comm, [&] {
+    if (!from.end || !is_done(*from.end)) return;
+    done = true;
+    folded = from.end->inverted_prisms > 0 && !folds_allowed;
+    say(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
+    copy_result(file);
+  });
+  for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  if (!done) return {};
+  return folded ? base::Exit::not_converged : base::Exit::done;
+}
 
 /// Springs tear, in rounds of searches; the run then begins with the state that these left.
 solve::Tearing Run::tear() {
@@ -148,8 +214,7 @@ Coarser Run::solve_coarser() {
 /// it: of a large model it is a fifth of the memory.
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
-  if (writer.makes_checkpoints())
-    settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
+  settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
                       strategy_.sensitivity || !job_.held.empty();
   solve::Summary summary =
@@ -185,7 +250,7 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
 /// Writes the displacement of the given skin, in the place of which another was solved, to
 /// NAME_given_skin.vtp. Collective.
 std::string Run::write_given_skin(const Writer& writer) const {
-  if (!job_.remeshed || !job_.cuts.empty()) return "";
+  if (!job_.remeshed || job_.is_cut) return "";
   const std::string file = name_ + "_given_skin.vtp";
   const auto write = [&](const auto& solved, const std::vector<Vec3>& initial,
                          const std::vector<Vec3>& position) {
@@ -218,6 +283,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const Coarser coarser = solve_coarser();
   Writer writer(comm, name_, job_.model, job_.raised ? &*job_.raised : nullptr, coarser,
                 checkpoint_interval, unsettled(tearing));
+  if (kept_ > 0) writer.keep(earlier_, kept_);
+  const Saving saving(interrupt_, writer, name_);
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
@@ -262,8 +329,10 @@ base::Exit run(const base::Options& options) {
   };
   Run run(job, std::move(strategy), name, stages,
           number("time_limit", std::numeric_limits<double>::infinity()));
-  if (options.has("restart")) run.restart(options.text("restart"));
-  return run.solve(number("checkpoint_interval", 0), options.flag("allow_folded"));
+  const bool folds_allowed = options.flag("allow_folded");
+  if (options.has("restart"))
+    if (const auto ended = run.restart(options.text("restart"), folds_allowed)) return *ended;
+  return run.solve(number("checkpoint_interval", 0), folds_allowed);
 }
 
 }  // namespace repose::app

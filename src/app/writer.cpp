@@ -37,6 +37,7 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
     numbers.reason += "; " + unsettled_;
   }
   file_.append(numbers, rows);
+  begun_ = true;
   last_.numbers = numbers;
   last_.rows.position = rows.position;
   last_.rows.pressure = rows.pressure;
@@ -48,7 +49,15 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
   if (due()) write_checkpoint(nullptr);
 }
 
+void Writer::keep(const std::filesystem::path& earlier, int64_t count) {
+  file_.keep(earlier, count);
+}
+
 void Writer::look_in(double load, const solve::Look& look) {
+  if (!begun_)
+    look([&](const auto& numbers, const auto& rows) { file_.append_under_way(numbers, rows); });
+  begun_ = true;
+  if (!makes_checkpoints()) return;
   const bool news = !saved_ || load == 1;
   if (reached_ && news && due()) write_checkpoint(load == 1 ? look : nullptr);
 }

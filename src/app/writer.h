@@ -31,7 +31,12 @@ class Writer {
   void operator()(model::StepNumbers numbers, model::StepRows rows);
   /// At an iteration of a search.
   void look_in(double load, const solve::Look& look);
+  /// Begins with steps of an earlier result.
+  void keep(const std::filesystem::path& earlier, int64_t count);
   void commit() { file_.commit(); }
+  /// Makes what is written so far the result, at once. On rank 0, from any thread. Returns whether
+  /// there was anything to save.
+  bool save() { return file_.save(); }
 
   bool makes_checkpoints() const { return interval_ > 0; }
   bool compares() const { return coarser_.compared.has_value(); }
@@ -65,6 +70,7 @@ class Writer {
   const Coarser& coarser_;
   std::string comparison_, unsettled_;
   results::ResultFile file_;
+  bool begun_ = false;           // the file holds a step of this run
   Step last_;                    // the rows that reactions and those above need
   std::optional<Step> reached_;  // where checkpoints are made: the last rest position, …
   bool saved_ = false;           // … and whether a checkpoint has it

@@ -1,7 +1,15 @@
 #include "repose/base/interrupt.h"
 
+#include <unistd.h>
+
 #include <array>
+#include <atomic>
+#include <cerrno>
 #include <csignal>
+#include <cstring>
+#include <thread>
+
+#include "repose/base/error.h"
 
 namespace repose::base {
 
@@ -10,10 +18,66 @@ namespace {
 constexpr std::array<int, 3> signals = {SIGINT, SIGTERM, SIGUSR1};
 std::array<struct sigaction, signals.size()> before;
 volatile std::sig_atomic_t received = 0;
+std::atomic<int> wake = -1;  // the pipe to the listener, if there is one
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler reads it");
 
-extern "C" void remember(int) { received = 1; }
+constexpr char signalled = 's', ended = 'e';
+
+void send(int pipe, char word) {
+  while (write(pipe, &word, 1) < 0 && errno == EINTR) {
+  }
+}
+
+extern "C" void remember(int) {
+  const int reason = errno;
+  received = 1;
+  if (wake >= 0) send(wake, signalled);
+  errno = reason;
+}
 
 }  // namespace
+
+/// A thread that sleeps until a signal arrives.
+class Interrupt::Listener {
+ public:
+  explicit Listener(std::function<void()> work) : work_(std::move(work)) {
+    if (pipe(ends_.data()) != 0)
+      throw InternalError(std::string("no pipe for signals: ") + std::strerror(errno));
+    sigset_t all, usual;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &usual);  // signals are the main thread's
+    thread_ = std::thread([this] { listen(); });
+    pthread_sigmask(SIG_SETMASK, &usual, nullptr);
+    wake = ends_[1];
+    if (received != 0) send(ends_[1], signalled);
+  }
+  ~Listener() {
+    wake = -1;
+    send(ends_[1], ended);
+    thread_.join();
+    for (const int end : ends_) close(end);
+  }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+ private:
+  void listen() {
+    for (char word = 0; word != ended;) {
+      const ssize_t length = read(ends_[0], &word, 1);
+      if (length < 0 && errno != EINTR) return;
+      if (length == 1 && word == signalled) work_();
+    }
+  }
+
+  std::function<void()> work_;
+  std::array<int, 2> ends_ = {-1, -1};
+  std::thread thread_;
+};
+
+void Interrupt::on_signal(std::function<void()> work) {
+  listener_.reset();
+  if (work && signals_) listener_ = std::make_unique<Listener>(std::move(work));
+}
 
 Interrupt::Interrupt(MPI_Comm comm, double limit, bool heeds_signals)
     : comm_(comm), limit_(limit), signals_(heeds_signals) {
@@ -26,6 +90,7 @@ Interrupt::Interrupt(MPI_Comm comm, double limit, bool heeds_signals)
 }
 
 Interrupt::~Interrupt() {
+  listener_.reset();
   if (!signals_) return;
   for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &before[k], nullptr);
 }

@@ -7,6 +7,21 @@
 
 namespace repose::results {
 
+std::vector<double> shape_row(const model::Body& body) {
+  std::vector<double> row;
+  if (body.bone >= 0) return std::vector<double>(model::shape_numbers, 0.0);
+  const model::Body::Shape& shape = body.shape;
+  const auto put = [&](const Vec3& v) { row.insert(row.end(), {v.x(), v.y(), v.z()}); };
+  if (const auto* ball = std::get_if<scene::Sphere>(&shape))
+    put(ball->center), row.push_back(ball->radius);
+  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
+    put(capsule->from), put(capsule->to), row.push_back(capsule->radius);
+  if (const auto* box = std::get_if<scene::Box>(&shape)) put(box->center), put(box->size);
+  if (const auto* half = std::get_if<scene::HalfSpace>(&shape)) put(half->point), put(half->normal);
+  row.resize(model::shape_numbers, 0.0);
+  return row;
+}
+
 namespace {
 
 /// How many numbers a value is, if it is not one.
@@ -64,23 +79,6 @@ void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
   }
 }
 
-/// What a body's shape is made of, in a row of model::shape_numbers; zeros for a bone, which has
-/// its surface.
-std::vector<double> numbers_of(const model::Body& body) {
-  std::vector<double> row;
-  if (body.bone >= 0) return std::vector<double>(model::shape_numbers, 0.0);
-  const model::Body::Shape& shape = body.shape;
-  const auto put = [&](const Vec3& v) { row.insert(row.end(), {v.x(), v.y(), v.z()}); };
-  if (const auto* ball = std::get_if<scene::Sphere>(&shape))
-    put(ball->center), row.push_back(ball->radius);
-  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
-    put(capsule->from), put(capsule->to), row.push_back(capsule->radius);
-  if (const auto* box = std::get_if<scene::Box>(&shape)) put(box->center), put(box->size);
-  if (const auto* half = std::get_if<scene::HalfSpace>(&shape)) put(half->point), put(half->normal);
-  row.resize(model::shape_numbers, 0.0);
-  return row;
-}
-
 void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
   const hsize_t count = bodies.size();
   std::vector<std::string> names;
@@ -95,7 +93,7 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
     bone.push_back(body.bone);
     kind.push_back(body.bone >= 0 ? 0 : static_cast<int8_t>(1 + body.shape.index()));
     push.push_back(body.push);
-    const std::vector<double> row = numbers_of(body);
+    const std::vector<double> row = shape_row(body);
     shape.insert(shape.end(), row.begin(), row.end());
     const auto* mesh = std::get_if<surface::Surface>(&body.shape);
     if (!mesh || body.bone >= 0) continue;

@@ -17,6 +17,10 @@ void write_model(const base::Hdf5File& file, const model::Model& model,
 /// Work on a file that all ranks do, and all fail if one does.
 using OnDisk = std::function<void(const std::function<void()>&)>;
 
+/// What a body's shape is made of, in a row of model::shape_numbers; zeros for a bone, which has
+/// its surface.
+std::vector<double> shape_row(const model::Body& body);
+
 /// Writes every rank's slabs, none of which is empty. Collective; `file` is open on all ranks.
 void fill_model(MPI_Comm comm, hid_t file, const model::ModelRows& slabs, const OnDisk& on_disk);
 

@@ -5,10 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <regex>
+#include <sstream>
 
 #include "repose/base/error.h"
 #include "repose/base/whole_file.h"
@@ -24,17 +27,36 @@ bool is_at(const std::filesystem::path& path, int descriptor) {
          open_one.st_ino == there.st_ino && open_one.st_dev == there.st_dev;
 }
 
-/// Who holds the lock, as it wrote into the file.
+/// Who holds the lock, as it wrote into the file, or empty.
 std::string holder_of(int descriptor) {
   std::array<char, 200> text = {};
   const ssize_t length = pread(descriptor, text.data(), text.size(), 0);
-  return length > 0 ? std::string(text.data(), length) : "another run";
+  return {text.data(), static_cast<size_t>(std::max<ssize_t>(length, 0))};
+}
+
+std::string this_host() {
+  std::array<char, 100> host = {};
+  gethostname(host.data(), host.size() - 1);
+  return host.data();
+}
+
+/// When a process began, in clock ticks since the system did (proc(5)), or empty: there is none.
+std::string start_of(const std::string& process) {
+  std::ifstream stream("/proc/" + process + "/stat");
+  std::string text, field;
+  std::getline(stream, text);
+  const auto name_end = text.rfind(')');
+  if (name_end == std::string::npos) return "";
+  std::istringstream fields(text.substr(name_end + 1));
+  constexpr int start = 22, after_name = 2;  // fields are counted from 1
+  for (int k = after_name; k < start; ++k) fields >> field;
+  return field;
 }
 
 void write_holder(int descriptor) {
-  std::array<char, 100> host = {};
-  gethostname(host.data(), host.size() - 1);
-  const std::string text = fmt::format("process {} on {}", getpid(), host.data());
+  const std::string process = std::to_string(getpid());
+  const std::string text =
+      fmt::format("process {} on {} since tick {}", process, this_host(), start_of(process));
   // Who it is only helps a person: without the text it is "another run".
   if (ftruncate(descriptor, 0) != 0 || pwrite(descriptor, text.data(), text.size(), 0) < 0) return;
 }
@@ -47,6 +69,13 @@ bool is_ending(const std::string& rest) {
 }
 
 }  // namespace
+
+bool may_live(const std::string& holder) {
+  static const std::regex words("process ([0-9]+) on (\\S+) since tick ([0-9]+)");
+  std::smatch found;
+  if (!std::regex_match(holder, found, words) || found[2] != this_host()) return true;
+  return start_of(found[1]) == found[3];
+}
 
 NameLock::NameLock(const std::filesystem::path& name)
     : name_(name), file_(name.string() + ".lock") {
@@ -68,12 +97,15 @@ bool NameLock::acquire() {
   if (descriptor_ < 0)
     base::refuse("{}: cannot be written: {}; choose another -output", file_.string(),
                  std::strerror(errno));
-  const bool held = flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
-  if (!held && errno == EWOULDBLOCK) {
-    const std::string holder = holder_of(descriptor_);
+  const bool held = flock(descriptor_, LOCK_EX | LOCK_NB) == 0, knows_locks = errno == EWOULDBLOCK;
+  const std::string holder = holder_of(descriptor_);
+  // Where the file system knows no locks, the file's text has to do.
+  if (!held && (knows_locks || (!holder.empty() && may_live(holder)))) {
     close(descriptor_);
-    base::refuse("{}.h5: {} is at work on it; choose another -output or wait for its end",
-                 name_.string(), holder);
+    base::refuse(
+        "{}.h5: {} is at work on it; choose another -output or wait for its end; where that "
+        "process has ended, delete {}",
+        name_.string(), holder.empty() ? "another run" : holder, file_.string());
   }
   if (!held || is_at(file_, descriptor_)) return true;
   close(descriptor_);

@@ -1,8 +1,14 @@
 #include "repose/results/restart.h"
 
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "model_write.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/results/model_file.h"
+#include "repose/results/result_file.h"
 
 namespace repose::results {
 
@@ -11,29 +17,99 @@ namespace {
 struct Found {
   StoredStep step;
   bool guess = false;
+  int64_t row = 0;  // of the step in the file
 };
+
+bool is_rest(const model::StepNumbers& numbers) {
+  return numbers.converged || numbers.reason == stopped_at_rest;
+}
 
 Found find_step(const std::filesystem::path& file, const model::Model& model) {
   const int64_t count = step_count(file);
+  if (count == 0) base::refuse("{}: no step to go on from; start without -restart", file.string());
   Found found;
-  for (int64_t step = count - 1; step >= 0 && !found.step.numbers.converged; --step)
+  for (int64_t step = count - 1; step >= 0 && !is_rest(found.step.numbers); --step) {
     found.step = read_step(file, step, model);
-  const bool none = !found.step.numbers.converged;
-  if (count > 0 && (none || found.step.numbers.load == 0)) {
-    StoredStep end = read_step(file, count - 1, model);
-    if (end.numbers.load == 1) return {std::move(end), true};
+    found.row = step;
   }
-  if (none)
-    base::refuse("{}: no converged step to go on from; start without -restart", file.string());
+  if (is_rest(found.step.numbers) && found.step.numbers.load > 0) return found;
+  StoredStep end = read_step(file, count - 1, model);
+  if (end.numbers.load == 1) return {std::move(end), true, 0};
+  found.row = 0;
+  found.step.numbers.load = 0;
   return found;
 }
 
-void refuse_another_model(const std::filesystem::path& file, const model::Model& model) {
-  if (read_model(file).points.position != model.points.position)
+void refuse_another_model(const std::filesystem::path& file, const model::Model& stored,
+                          const model::Model& model) {
+  if (stored.points.position != model.points.position)
     base::refuse(
         "{}: -restart needs a result of the same model, but its points differ from the "
         "input's; give the scene or model it was made from",
         file.string());
+}
+
+/// The numbers of arrays, one list an array.
+class Numbers {
+ public:
+  template <class Row>
+  void operator()(const char*, const std::vector<Row>& rows) {
+    lists_.emplace_back();
+    for (const Row& row : rows) add(row);
+  }
+  /// Equal but for rounding: an initial equilibrium is found by the ranks that there are.
+  bool agree_with(const Numbers& other) const {
+    return std::equal(lists_.begin(), lists_.end(), other.lists_.begin(), other.lists_.end(),
+                      are_close);
+  }
+
+ private:
+  template <class Row>
+  void add(const Row& row) {
+    if constexpr (std::is_arithmetic_v<Row> || std::is_enum_v<Row>)
+      lists_.back().push_back(static_cast<double>(row));
+    else
+      for (int k = 0; k < static_cast<int>(row.size()); ++k) lists_.back().push_back(row.data()[k]);
+  }
+  static bool are_close(const std::vector<double>& one, const std::vector<double>& other) {
+    constexpr double rounding = 1e-9;
+    double largest = 0;
+    for (const double number : one) largest = std::max(largest, std::abs(number));
+    return std::equal(one.begin(), one.end(), other.begin(), other.end(),
+                      [&](double a, double b) { return std::abs(a - b) <= rounding * largest; });
+  }
+  std::vector<std::vector<double>> lists_;
+};
+
+void add_contact(const model::Contact& contact, Numbers& numbers) {
+  model::for_each_array(contact.touches, numbers);
+  numbers("contact", std::vector{contact.stiffness, contact.spacing});
+  for (const model::Body& body : contact.bodies) {
+    numbers("push", std::vector{body.push});
+    numbers("shape", shape_row(body));
+    const auto* mesh = std::get_if<surface::Surface>(&body.shape);
+    if (body.bone < 0 && mesh) numbers("mesh", mesh->points);
+  }
+}
+
+Numbers numbers_of(const model::Model& m) {
+  Numbers numbers;
+  numbers("gravity", std::vector{m.gravity});
+  model::for_each_array(m.points, numbers);
+  model::for_each_array(m.prisms, numbers);
+  model::for_each_array(m.edges, numbers);
+  numbers("bone_transform", m.bone_transform);
+  if (!m.contact.empty()) add_contact(m.contact, numbers);
+  numbers("points", m.springs.points);
+  numbers("rest_length", m.springs.rest_length);
+  numbers("stiffness", m.springs.stiffness);
+  numbers("exponent", m.springs.exponent);
+  numbers("reference", m.springs.reference);
+  for (const model::TermElements& elements : m.elements) {
+    numbers("points", elements.points);
+    numbers("numbers", elements.numbers);
+  }
+  return numbers;
 }
 
 }  // namespace
@@ -42,14 +118,20 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
   Restart restart;
   std::vector<Vec3> all;
   base::on_first_rank(comm, [&] {
-    refuse_another_model(file, model);
+    const model::Model stored = read_model(file);
+    refuse_another_model(file, stored, model);
     Found found = find_step(file, model);
     restart.guess = found.guess;
     restart.load = found.guess ? 0 : found.step.numbers.load;
+    const bool same = !is_checkpoint(file) && numbers_of(stored).agree_with(numbers_of(model));
+    if (same) restart.kept = found.row;
+    const bool last = found.row + 1 == step_count(file);
+    if (same && last && restart.load == 1) restart.end = found.step.numbers;
     all = std::move(found.step.rows.position);
   });
   MPI_Bcast(&restart.guess, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&restart.load, 1, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(&restart.kept, 1, MPI_INT64_T, 0, comm);
   restart.position = base::scatter(comm, all);
   return restart;
 }

@@ -1,10 +1,13 @@
 #include "repose/results/result_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <mutex>
 #include <optional>
 
 #include "model_write.h"
+#include "reader.h"
 #include "repose/base/agreement.h"
 #include "repose/base/hdf5.h"
 #include "repose/base/log.h"
@@ -32,6 +35,8 @@ void say_where(const std::filesystem::path& file, Work&& work) {
                  reason.what());
   }
 }
+
+std::string group_of(size_t step) { return fmt::format("step/{:04}", step); }
 
 PetscLogEvent write_event() {
   static const PetscLogEvent event = base::log_event("RpWrite");
@@ -72,6 +77,25 @@ model::StepNumbers of_first_rank(MPI_Comm comm, const model::StepNumbers& mine) 
   return numbers;
 }
 
+/// The arrays of a step's points that other steps may be without, and whether they are vectors.
+std::vector<std::pair<std::string, bool>> optional_fields(hid_t file, const std::string& group) {
+  const base::Hdf5Group points(H5Gopen2(file, group.c_str(), H5P_DEFAULT));
+  H5G_info_t info;
+  base::check_hdf5(H5Gget_info(points, &info));
+  std::vector<std::pair<std::string, bool>> fields;
+  for (hsize_t k = 0; k < info.nlinks; ++k) {
+    std::array<char, 200> text = {};
+    base::check_hdf5(H5Lget_name_by_idx(points, ".", H5_INDEX_NAME, H5_ITER_INC, k, text.data(),
+                                        text.size(), H5P_DEFAULT));
+    const std::string name = text.data();
+    if (name == "position" || name == "displacement" || name == "residual_force") continue;
+    const base::Hdf5Dataset dataset(H5Dopen2(points, name.c_str(), H5P_DEFAULT));
+    const base::Hdf5Space space(H5Dget_space(dataset));
+    fields.emplace_back(name, base::check_hdf5(H5Sget_simple_extent_ndims(space)) > 1);
+  }
+  return fields;
+}
+
 struct WriteAttribute {
   hid_t group;
   void operator()(const char* name, bool value) const {
@@ -96,8 +120,9 @@ struct WriteAttribute {
 struct ResultFile::State {
   MPI_Comm comm;
   std::filesystem::path name;
-  std::optional<UnfinishedFile> unfinished;  // rank 0
-  base::Hdf5File file;                       // closed before `unfinished` is removed
+  std::mutex mutex;                          // rank 0: held while what save() takes changes
+  std::optional<UnfinishedFile> unfinished;  // rank 0; none once it is saved
+  base::Hdf5File file;                       // open while a step is written
   FileCounts counts;
   MergedBones bones;                              // rank 0
   std::optional<model::PrescribedMotion> motion;  // rank 0
@@ -106,6 +131,11 @@ struct ResultFile::State {
   std::vector<OptionalField> fields;
   std::vector<double> loads;  // of the steps written
   std::vector<bool> moved;    // whether they hold bone surfaces
+  bool savable = false;       // a result that is not committed
+  bool is_whole = false;      // the part is closed, and nothing has failed
+  bool provisional = false;   // the last of these steps is to be replaced
+  bool marked = false;        // the last step reads as that of a run that ended there, …
+  std::string reason;         // … and this is what it says otherwise
 
   base::Slab slab(int64_t rows) const {
     return base::slab(rows, base::rank(comm), base::size(comm));
@@ -129,6 +159,17 @@ struct ResultFile::State {
   void write_field(hid_t group, const model::PointField& field);
   void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
+  void note_field(const std::string& field, bool vector, size_t step);
+  void go_on_with_copy();
+  void open_part(int64_t room);
+  void close_part();
+  void settle_last();
+  void write_step(const model::StepNumbers& numbers, const model::StepRows& rows);
+  void mark_last(bool as_end);
+  void append(const model::StepNumbers& numbers, const model::StepRows& rows, bool under_way);
+  void copy_steps(const std::filesystem::path& earlier, int64_t count);
+  std::vector<XdmfBlock> views_of_steps() const;
+  std::vector<std::unique_ptr<UnfinishedFile>> describe() const;
   void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
   void publish();
 };
@@ -195,15 +236,20 @@ void ResultFile::State::write_dataset(hid_t group, const char* dataset, int64_t 
   on_disk([&] { write_rows(comm, created, mine, values); });
 }
 
+/// A step has an array that others may be without.
+void ResultFile::State::note_field(const std::string& field, bool vector, size_t step) {
+  auto known = std::find_if(fields.begin(), fields.end(),
+                            [&](const OptionalField& other) { return other.name == field; });
+  if (known == fields.end()) known = fields.insert(known, {field, vector, {}});
+  known->in_step.resize(step + 1);
+  known->in_step.back() = true;
+}
+
 /// A dataset that other steps may be without.
 void ResultFile::State::write_field(hid_t group, const model::PointField& field) {
   write_dataset(group, field.name.c_str(), counts.points, field.vector ? 3 : 0, slab(counts.points),
                 field.values.data());
-  auto known = std::find_if(fields.begin(), fields.end(),
-                            [&](const OptionalField& other) { return other.name == field.name; });
-  if (known == fields.end()) known = fields.insert(known, {field.name, field.vector, {}});
-  known->in_step.resize(loads.size() + 1);
-  known->in_step.back() = true;
+  note_field(field.name, field.vector, loads.size());
 }
 
 void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
@@ -269,12 +315,11 @@ void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
   });
 }
 
-void ResultFile::State::publish() {
-  for (OptionalField& field : fields) field.in_step.resize(loads.size());
-  const std::vector<XdmfBlock> blocks = views(counts, fields, moved);
-  add_vtkhdf(blocks);
+/// The XDMF files of the steps that there are, unfinished; one of an earlier run that would
+/// describe nothing is removed.
+std::vector<std::unique_ptr<UnfinishedFile>> ResultFile::State::describe() const {
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
-  for (const XdmfBlock& block : blocks) {
+  for (const XdmfBlock& block : views_of_steps()) {
     const std::filesystem::path document = with_ending(name, "_" + block.name + ".xdmf");
     if (block.cells == 0) {
       std::error_code ignored;
@@ -284,8 +329,121 @@ void ResultFile::State::publish() {
     documents.push_back(std::make_unique<UnfinishedFile>(document));
     documents.back()->write(xdmf_document(block, name.filename().string() + ".h5", loads));
   }
+  return documents;
+}
+
+std::vector<XdmfBlock> ResultFile::State::views_of_steps() const {
+  std::vector<OptionalField> of_steps = fields;
+  for (OptionalField& field : of_steps) field.in_step.resize(loads.size());
+  return views(counts, of_steps, moved);
+}
+
+void ResultFile::State::publish() {
+  add_vtkhdf(views_of_steps());
+  const auto documents = describe();
   unfinished->commit();
-  for (auto& document : documents) document->commit();
+  for (const auto& document : documents) document->commit();
+}
+
+/// On rank 0: what was saved is not touched any more.
+void ResultFile::State::go_on_with_copy() {
+  if (unfinished) return;
+  unfinished.emplace(with_ending(name, ".h5"));
+  part = unfinished->part();
+  std::error_code error;
+  std::filesystem::copy_file(unfinished->file(), part,
+                             std::filesystem::copy_options::overwrite_existing, error);
+  if (error)
+    base::refuse("{}: cannot be written: {}; free space or choose another -output",
+                 unfinished->file().string(), error.message());
+}
+
+void ResultFile::State::open_part(int64_t room) {
+  is_whole = false;
+  base::on_first_rank(comm, [&] {
+    go_on_with_copy();
+    if (room > 0) unfinished->reserve(room);
+  });
+  base::share(comm, part);
+  on_disk([&] { file = base::open_hdf5(part, comm); });
+}
+
+void ResultFile::State::close_part() {
+  on_disk([&] { file.close(); });
+  is_whole = true;
+}
+
+/// Takes away what the next step replaces, or lets the last step say that the path went on.
+void ResultFile::State::settle_last() {
+  if (marked) mark_last(false);
+  if (provisional) {
+    const std::string last = group_of(loads.size() - 1);
+    on_disk([&] { base::check_hdf5(H5Ldelete(file, last.c_str(), H5P_DEFAULT)); });
+    loads.pop_back();
+    moved.pop_back();
+    for (OptionalField& field : fields) field.in_step.resize(loads.size());
+    std::erase_if(fields, [](const OptionalField& field) {
+      return std::find(field.in_step.begin(), field.in_step.end(), true) == field.in_step.end();
+    });
+  }
+  provisional = false;
+}
+
+void ResultFile::State::write_step(const model::StepNumbers& numbers, const model::StepRows& rows) {
+  const base::Hdf5Group step = create_group(file, group_of(loads.size()));
+  on_disk([&] { model::for_each_number(numbers, WriteAttribute{step}); });
+  counts.pressure = numbers.volume == model::VolumeTerm::exact || counts.stress;
+  write_points(step, rows);
+  write_elements(step, rows);
+  moved.push_back(write_bones(step, numbers.load));
+  loads.push_back(numbers.load);
+}
+
+/// Whether the last step, a rest position at a load below 1, reads as that of a run that ended
+/// there.
+void ResultFile::State::mark_last(bool as_end) {
+  const base::Hdf5Group step(H5Gopen2(file, group_of(loads.size() - 1).c_str(), H5P_DEFAULT));
+  on_disk([&] {
+    for (const char* name : {"converged", "reason"}) base::check_hdf5(H5Adelete(step, name));
+    const WriteAttribute write{step};
+    write("converged", !as_end);
+    write("reason", as_end ? std::string(stopped_at_rest) : reason);
+  });
+  marked = as_end;
+}
+
+void ResultFile::State::append(const model::StepNumbers& numbers, const model::StepRows& rows,
+                               bool under_way) {
+  const std::scoped_lock lock(mutex);
+  base::together(comm, [&] { require_rows(rows); });
+  const model::StepNumbers same = of_first_rank(comm, numbers);
+  open_part(step_bytes());
+  settle_last();
+  write_step(same, rows);
+  provisional = under_way;
+  reason = same.reason;
+  if (savable && same.converged && same.load < 1) mark_last(true);
+  close_part();
+}
+
+/// On rank 0.
+void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t count) {
+  const Reader in(earlier);
+  unfinished->reserve(static_cast<int64_t>(std::filesystem::file_size(earlier)));
+  say_where(unfinished->file(), [&] {
+    const base::Hdf5File source = base::open_hdf5(earlier);
+    base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
+    for (int64_t k = 0; k < count; ++k) {
+      const std::string step = group_of(k);
+      base::check_hdf5(
+          H5Ocopy(source, step.c_str(), whole, step.c_str(), H5P_DEFAULT, H5P_DEFAULT));
+      loads.push_back(in.number(step, "load"));
+      moved.push_back(in.has(step + "/bone_surface"));
+      for (const auto& [field, vector] : optional_fields(whole, step + "/point"))
+        note_field(field, vector, k);
+    }
+    whole.close();
+  });
 }
 
 void ResultFile::open(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
@@ -297,7 +455,8 @@ void ResultFile::open(MPI_Comm comm, const std::filesystem::path& name, const mo
   base::on_first_rank(comm, [&] { s.create(model, slabs, kind); });
   base::share(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
-  s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
+  s.savable = kind == Kind::result;
+  s.is_whole = true;
 }
 
 ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
@@ -312,7 +471,9 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
                        const model::ModelRows& slabs, Kind kind)
     : state_(std::make_unique<State>()) {
   open(comm, name, frame, &slabs, kind);
+  state_->on_disk([&] { state_->file = base::open_hdf5(state_->part, comm); });
   fill_model(comm, state_->file, slabs, [this](const auto& work) { state_->on_disk(work); });
+  state_->close_part();
   state_->initial = slabs.points.position;
   state_->outward = slabs.outward;
 }
@@ -321,25 +482,52 @@ ResultFile::~ResultFile() = default;
 
 void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows& rows) {
   const base::Logged logged(write_event());
+  state_->append(numbers, rows, false);
+}
+
+void ResultFile::append_under_way(const model::StepNumbers& numbers, const model::StepRows& rows) {
+  const base::Logged logged(write_event());
+  state_->append(numbers, rows, true);
+}
+
+void ResultFile::keep(const std::filesystem::path& earlier, int64_t count) {
   State& s = *state_;
-  base::together(s.comm, [&] { s.require_rows(rows); });
-  base::on_first_rank(s.comm, [&] { s.unfinished->reserve(s.step_bytes()); });
-  const model::StepNumbers same = of_first_rank(s.comm, numbers);
-  const base::Hdf5Group step = s.create_group(s.file, fmt::format("step/{:04}", s.loads.size()));
-  s.on_disk([&] { model::for_each_number(same, WriteAttribute{step}); });
-  s.counts.pressure = same.volume == model::VolumeTerm::exact || s.counts.stress;
-  s.write_points(step, rows);
-  s.write_elements(step, rows);
-  s.moved.push_back(s.write_bones(step, same.load));
-  s.loads.push_back(same.load);
-  s.on_disk([&] { base::check_hdf5(H5Fflush(s.file, H5F_SCOPE_GLOBAL)); });
+  const std::scoped_lock lock(s.mutex);
+  base::on_first_rank(s.comm, [&] { s.copy_steps(earlier, count); });
+  s.loads.resize(count);
+  MPI_Bcast(s.loads.data(), static_cast<int>(count), MPI_DOUBLE, 0, s.comm);
+  s.moved.resize(count);
+}
+
+bool ResultFile::save() noexcept {
+  State& s = *state_;
+  try {
+    const std::scoped_lock lock(s.mutex);
+    if (!s.savable || !s.is_whole || !s.unfinished || s.loads.empty()) return false;
+    const auto documents = s.describe();
+    std::filesystem::rename(s.part, s.unfinished->file());
+    s.unfinished.reset();
+    for (const auto& document : documents) document->commit();
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
 }
 
 void ResultFile::commit() {
   const base::Logged logged(write_event());
   State& s = *state_;
-  s.on_disk([&] { s.file.close(); });
-  base::on_first_rank(s.comm, [&] { s.publish(); });
+  const std::scoped_lock lock(s.mutex);
+  if (s.provisional || s.marked) {
+    s.open_part(0);
+    s.settle_last();
+    s.close_part();
+  }
+  s.savable = false;
+  base::on_first_rank(s.comm, [&] {
+    s.go_on_with_copy();
+    s.publish();
+  });
 }
 
 }  // namespace repose::results

@@ -11,7 +11,9 @@ using base::check;
 
 namespace {
 
-constexpr int most_halvings = 5;      // of a step that fails or strays
+constexpr int most_halvings = 5;  // of a step that fails or strays
+// Evaluations of steps that are made again, at most, and so many more for each of a step taken.
+constexpr int64_t most_refused = 2000, refused_a_taken = 2;
 constexpr double trusted_miss = 0.5;  // of the predicted increment; beyond, a step is halved
 
 // The way of the fastest point in an automatic step, mm, at most: longer steps may jump between the
@@ -45,6 +47,7 @@ Halvings& Halvings::operator+=(const Halvings& more) {
 
 LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& settings)
     : objective_(problem.objective()),
+      function_(problem.function()),
       predictor_(objective_, problem.elastic_solver()),
       search_(search),
       settings_(settings),
@@ -65,7 +68,7 @@ int64_t LoadPath::inverted(Vec displacement) {
 
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   discrete::Positions& positions = objective_.positions();
-  const int64_t folded_before = inverted(displacement);
+  const int64_t folded_before = inverted(displacement), evaluated = function_.evaluations();
   const auto own = search_.predict(displacement, load, increment_);
   const bool predicted = own ? *own : predictor_.predict(displacement, load, increment_);
   Attempt attempt;
@@ -73,6 +76,7 @@ LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
   attempt.outcome = search_.run(trial_, settings_.accuracy);
+  attempt.evaluations = function_.evaluations() - evaluated;
   result_.iterations += attempt.outcome.iterations;
   attempt.folded = inverted(trial_) > folded_before;
   if (!predicted) return attempt;
@@ -118,6 +122,7 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
 void LoadPath::take_back(const Attempt& tried, Vec displacement) {
   objective_.positions().set_load(result_.load);
   search_.go_back(displacement);
+  refused_ += tried.evaluations;
   Halvings& h = result_.halvings;
   ++(!tried.outcome.converged ? h.failed : tried.folded ? h.folded : h.strayed);
 }
@@ -141,9 +146,23 @@ void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
   }
 }
 
+bool LoadPath::in_vain(const Attempt& tried) const {
+  const int64_t taken = function_.evaluations() - tried.evaluations - begun_ - refused_;
+  return refused_ > most_refused + refused_a_taken * taken;
+}
+
+/// Of the step that ends the path without rest.
+void LoadPath::explain_failure() {
+  if (result_.last.converged || result_.last.stopped || result_.halvings.count() == 0) return;
+  result_.last.reason += fmt::format("; {} load steps have been halved, which took {} evaluations",
+                                     result_.halvings.count(), refused_);
+}
+
 PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   discrete::Positions& positions = objective_.positions();
   result_ = {};
+  refused_ = 0;
+  begun_ = function_.evaluations();
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   settle(displacement, on_step);
   if (guess && result_.last.converged && !result_.last.stopped && result_.load < 1)
@@ -157,8 +176,10 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     const double target = result_.load + step;
     const double load = target > 1 - 1e-3 * longest ? 1 : target;
     const Attempt tried = attempt(displacement, load);
-    if (tried.outcome.stopped || halvings == most_halvings || follows(tried, coarser)) {
+    const bool last = halvings == most_halvings || in_vain(tried);
+    if (tried.outcome.stopped || last || follows(tried, coarser)) {
       accept(tried.outcome, load, displacement);
+      explain_failure();
       step = std::min(longest, 2 * step);
       halvings = std::max(0, halvings - 1);
       coarser.reset();

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "initial_hessian.h"
+#include "progress_test.h"
 #include "repose/base/error.h"
 #include "repose/base/petsc.h"
 
@@ -120,7 +121,10 @@ struct Minimiser::Callbacks {
         self.stopped_ = !self.watch_({iteration, self.function_.positions().load(), value, force,
                                       self.error_, self.function_.evaluations(), x});
       check(TaoDefaultConvergenceTest(tao, nullptr));
-      const bool over = done || self.stopped_ || self.stalled(iteration, value);
+      const bool stalled =
+          self.stalled(iteration, value) ||
+          self.progress_->stalls({self.function_.evaluations(), value, force, self.error_});
+      const bool over = done || self.stopped_ || stalled;
       self.slowed_ = !over && self.initial_ && self.initial_->needs_renewal(force, length);
       if (over || self.slowed_) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     });
@@ -137,6 +141,7 @@ Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver
       solver_(solver),
       estimate_(estimate),
       watch_(watch),
+      progress_(std::make_unique<ProgressTest>()),
       gradient_(function.positions().make_vector()),
       saved_(function.positions().make_vector()),
       trial_(function.positions().make_vector()),
@@ -328,6 +333,15 @@ std::string Minimiser::reason_of(const Outcome& outcome, TaoConvergedReason reas
   return stalled_ ? "the objective no longer decreases beyond rounding" : reason_text(reason);
 }
 
+std::string Minimiser::no_progress(Vec displacement) {
+  function_.positions().update(displacement);
+  const Vec3 at = place_of_largest(function_.positions(), gradient_);
+  return fmt::format(
+      "no progress in {} evaluations: the largest force stays at {:.3g} N, now near ({:.1f}, "
+      "{:.1f}, {:.1f}) mm",
+      ProgressTest::patience, progress_->smallest_force(), at.x(), at.y(), at.z());
+}
+
 Outcome Minimiser::summary(Vec displacement) {
   measure(displacement, !closed_);
   const int corrections = polish(displacement);
@@ -342,6 +356,8 @@ Outcome Minimiser::summary(Vec displacement) {
   outcome.iterations = iterations_ + corrections;
   outcome.stopped = stopped_;
   outcome.reason = reason_of(outcome, reason);
+  if (!outcome.converged && !outcome.stopped && progress_->stalled())
+    outcome.reason = no_progress(displacement);
   if (corrections > 0)
     outcome.reason += fmt::format(", {} Newton corrections at the rounding level", corrections);
   if (!outcome.stable)
@@ -364,6 +380,7 @@ bool Minimiser::worth_going_on(int64_t iterations) {
 void Minimiser::search(Vec displacement, bool near) {
   PetscInt iterations = 0;
   iterations_ = 0;
+  progress_->begin();
   do {
     if (initial_ && near && !slowed_)
       initial_->refresh(displacement);

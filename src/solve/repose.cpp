@@ -156,7 +156,9 @@ class Searcher {
   Problem& problem() { return problem_; }
   Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
-  int64_t evaluations() { return problem_.function().evaluations(); }
+  /// Of the searches.
+  int64_t evaluations() { return problem_.function().evaluations() - looks_; }
+  void count_look() { ++looks_; }
   int64_t assemblies() const { return problem_.assemblies(); }
 
  private:
@@ -166,6 +168,7 @@ class Searcher {
   std::optional<ForceSearch> force_search_;
   std::optional<ExactVolume> exact_volume_;
   std::optional<ContactSearch> contact_;
+  int64_t looks_ = 0;  // evaluations for those who look at a state
 };
 
 /// Lets the one who asks for it look at the state of each iteration.
@@ -177,6 +180,7 @@ void show_states(Searcher& searcher, const Settings& settings,
       const base::VecHandle gradient = objective.positions().make_vector();
       Outcome outcome;
       outcome.objective = searcher.problem().function().evaluate(i.displacement, gradient);
+      searcher.count_look();
       outcome.gradient_max = discrete::largest_block(gradient);
       outcome.displacement_error = std::numeric_limits<double>::infinity();
       outcome.iterations = i.number;

@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -58,6 +59,32 @@ def test_a_signal_ends_the_run_and_keeps_its_state(run, environment, tmp_path, c
     assert step["converged"] == 0 and step["load"] < 1 and b"stopped" in step["reason"]
     assert run("repose-check", "early.h5").returncode == 0
     assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.fixture
+def busy():
+    """Two processes that take what they get of the processors."""
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    yield
+    for loop in loops:
+        loop.kill()
+        loop.wait()
+
+
+@pytest.mark.parametrize("lines", [1, 1, 1, 1, 8, 8, 8, 8])
+def test_ctrl_c_at_mpirun_leaves_a_result_though_ranks_are_killed(run, environment, tmp_path, busy,
+                                                                  lines):
+    process = begin(tmp_path, environment, SCENE, "-output", "early", ranks=2)
+    iterations(process, lines)
+    process.send_signal(signal.SIGINT)
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode != 0
+    step = last(tmp_path / "early.h5")
+    assert step["converged"] == 0 and step["load"] < 1
+    assert run("repose-check", "early.h5").returncode == 0
+    again = run("repose-solve", SCENE, "-restart", "early.h5", "-output", "early")
+    assert (again.returncode, again.stderr) == (0, "")
+    assert not list(tmp_path.glob("*.part")) + list(tmp_path.glob("*.lock"))
 
 
 def test_a_batch_system_that_ends_the_ranks_is_heard(run, environment, tmp_path):

@@ -2,6 +2,8 @@
 #include <mpi.h>
 
 #include <chrono>
+#include <functional>
+#include <memory>
 
 namespace repose::base {
 
@@ -18,13 +20,20 @@ class Interrupt {
 
   bool wanted();  ///< the same on all ranks; stays true. Collective.
 
+  /// Calls `work` on a thread of its own as soon as a signal arrives, and at once if one has;
+  /// mpirun kills its ranks a second after the signal, wherever their search is. `work` must not
+  /// throw and must not communicate. An empty one ends this. Not collective.
+  void on_signal(std::function<void()> work);
+
  private:
+  class Listener;
   using Clock = std::chrono::steady_clock;
   MPI_Comm comm_;
   double limit_;
   bool signals_;
   Clock::time_point begin_ = Clock::now();
   bool wanted_ = false;
+  std::unique_ptr<Listener> listener_;
 };
 
 }  // namespace repose::base

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "repose/model/model.h"
 #include "repose/model/step.h"
@@ -12,9 +13,13 @@ namespace repose::results {
 /// What a file is: where a run ended, or a state on its way, from which it can be gone on.
 enum class Kind { result, checkpoint };
 
+/// Why a run ended whose last step is a rest position on the way to load 1.
+inline constexpr std::string_view stopped_at_rest = "stopped before it was done, at rest so far";
+
 /// Writes NAME.h5 in parallel: to a part file of its own first, renamed by commit(). Destroyed
-/// without commit(), the part is removed: the result is complete or absent. All members are
-/// collective. A folder that is missing or not writable and a full disk are an InputError on all
+/// without commit(), the part is removed: the result is complete or absent. All members but save()
+/// are collective. Between two calls the part is closed and readable, so that save() can take it as
+/// it is. A folder that is missing or not writable and a full disk are an InputError on all
 /// ranks. The file's bytes do not depend on the number of ranks, but for what tells of it: datasets
 /// are contiguous (chunks with parallel gzip took twelve times as long for 28 % less space).
 class ResultFile {
@@ -31,12 +36,24 @@ class ResultFile {
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
 
-  /// Appends one /step/NNNN and flushes it to the disk. Each rank gives its slabs; the numbers are
+  /// Appends one /step/NNNN. Each rank gives its slabs; the numbers are
   /// rank 0's. Where bones have moved at this load their surfaces are stored where they are then
   /// (bone_surface/points f64 [P,3], all bones' in turn).
   void append(const model::StepNumbers& numbers, const model::StepRows& rows);
 
-  /// Closes, fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
+  /// Begins with the first `count` steps of an earlier result of the same model. Before any append.
+  void keep(const std::filesystem::path& earlier, int64_t count);
+
+  /// Writes a step that has not converged and that the next append replaces.
+  void append_under_way(const model::StepNumbers& numbers, const model::StepRows& rows);
+
+  /// Makes the part, as it was between the latest two calls, NAME.h5, with its XDMF files: at once,
+  /// on rank 0 only and from any thread. Its last step says that it has not converged, and of a
+  /// rest position at a load below 1 `stopped_at_rest`. What is appended later goes to a copy.
+  /// Returns whether there was a step to save.
+  bool save() noexcept;
+
+  /// fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
   /// NAME_skin.xdmf and NAME_bones.xdmf (each a part, then renamed) for what the model has; one of
   /// an earlier run that would describe nothing is removed. Nothing may be appended afterwards.
   void commit();

@@ -52,8 +52,9 @@ struct PathOutcome {
 };
 
 /// Continuation along the bones' motion, with one step controller: predict to first order, solve,
-/// accept, or halve where the search fails, folds tissue or ends far from the prediction. All
-/// members collective.
+/// accept, or halve where the search fails, folds tissue or ends far from the prediction. It gives
+/// up where steps have been halved to the end, or where most evaluations go into steps that are
+/// made again. All members collective.
 class LoadPath {
  public:
   using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
@@ -72,6 +73,7 @@ class LoadPath {
     bool folded = false;  // more inverted prisms than at the start of the step
     double expected = 0;  // largest predicted displacement, mm
     double miss = 0;      // largest distance of the end from the prediction, mm
+    int64_t evaluations = 0;
   };
   double longest_step() const;
   int64_t inverted(Vec displacement);
@@ -81,13 +83,18 @@ class LoadPath {
   void leap(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
   void take_back(const Attempt& tried, Vec displacement);
+  bool in_vain(const Attempt& tried) const;
+  void explain_failure();
 
   discrete::Objective& objective_;
+  const discrete::Function& function_;
   Predictor predictor_;
   RestSearch& search_;
   PathSettings settings_;
   base::VecHandle trial_, increment_;
   PathOutcome result_;
+  int64_t begun_ = 0;    // evaluations before this path
+  int64_t refused_ = 0;  // evaluations of steps that were made again
 };
 
 }  // namespace repose::solve

@@ -12,6 +12,7 @@
 namespace repose::solve {
 
 class InitialHessian;
+class ProgressTest;
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
@@ -75,12 +76,15 @@ class Minimiser : public RestSearch {
   double measure(Vec displacement, bool last);
   int polish(Vec displacement);
   std::string reason_of(const Outcome& outcome, TaoConvergedReason reason) const;
+  /// Why the search stalls and where. Collective.
+  std::string no_progress(Vec displacement);
   Outcome summary(Vec displacement);
 
   discrete::Function& function_;
   linear::TangentSolver& solver_;
   ErrorEstimate estimate_;
   Watch watch_;
+  std::unique_ptr<ProgressTest> progress_;
   TaoHandle tao_;
   std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
   bool may_close_ = false;                   // … in the search under way

@@ -1,5 +1,7 @@
 #include "repose/results/restart.h"
 
+#include <functional>
+
 #include "files.h"
 #include "repose/results/model_file.h"
 
@@ -48,12 +50,75 @@ TEST(Restart, IsFromTheStartWhereASearchOnTheWayWasUnderWay) {
   EXPECT_FALSE(restart.guess);
 }
 
-TEST(Restart, IsRefusedWhereNothingWasReached) {
-  EXPECT_NE(refusal([] {
-              restart_of({{0.5, false}});
-            }).find("no converged step"),
-            std::string::npos);
-  EXPECT_NE(refusal([] { restart_of({}); }).find("no converged step"), std::string::npos);
+TEST(Restart, IsFromTheStartWhereNothingWasReached) {
+  const Restart restart = restart_of({{0, false}});
+  EXPECT_EQ(restart.load, 0);
+  EXPECT_FALSE(restart.guess);
+  EXPECT_NE(refusal([] { restart_of({}); }).find("no step to go on from"), std::string::npos);
+}
+
+/// Of a result with steps at these loads, all at rest, of `m`.
+Restart restart_of_result(const Folder& folder, const std::vector<double>& loads,
+                          const model::Model& m) {
+  const model::Model stored = small_model();
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), stored);
+  for (const double load : loads) {
+    model::StepNumbers numbers = small_numbers(load);
+    numbers.converged = true;
+    file.append(numbers, small_rows(stored, load));
+  }
+  file.commit();
+  return read_restart(MPI_COMM_SELF, folder.path("a.h5"), m);
+}
+
+TEST(Restart, KnowsAFinishedResult) {
+  const Folder folder;
+  const Restart restart = restart_of_result(folder, {0, 0.5, 1}, small_model());
+  ASSERT_TRUE(restart.end);
+  EXPECT_EQ(restart.end->load, 1);
+  EXPECT_EQ(restart.kept, 2);
+}
+
+TEST(Restart, KeepsTheStepsBefore) {
+  const Folder folder;
+  const Restart restart = restart_of_result(folder, {0, 0.25, 0.5}, small_model());
+  EXPECT_FALSE(restart.end);
+  EXPECT_EQ(restart.load, 0.5);
+  EXPECT_EQ(restart.kept, 2);
+}
+
+TEST(Restart, OfAModelThatDiffersKeepsNothing) {
+  const std::vector<std::function<void(model::Model&)>> changes = {
+      [](model::Model& m) { m.points.target.back().z() += 1e-3; },
+      [](model::Model& m) { m.springs.stiffness[0] *= 1.01; },
+      [](model::Model& m) { m.prisms.rest_volume[0] *= 1.01; },
+      [](model::Model& m) { m.gravity.z() = 0; },
+      [](model::Model& m) { m.bone_transform[1](2, 3) += 1; }};
+  for (const auto& change : changes) {
+    const Folder folder;
+    model::Model m = small_model();
+    change(m);
+    const Restart restart = restart_of_result(folder, {0, 1}, m);
+    EXPECT_FALSE(restart.end);
+    EXPECT_EQ(restart.kept, 0);
+    EXPECT_EQ(restart.load, 1);
+  }
+}
+
+TEST(Restart, IsFromTheRestPositionAtWhichASignalEndedTheRun) {
+  const Folder folder;
+  const model::Model m = small_model();
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  for (const double load : {0.0, 0.5}) {
+    model::StepNumbers numbers = small_numbers(load);
+    numbers.converged = true;
+    file.append(numbers, small_rows(m, load));
+  }
+  EXPECT_TRUE(file.save());
+  EXPECT_FALSE(read_step(folder.path("a.h5"), 1, m).numbers.converged);
+  const Restart restart = read_restart(MPI_COMM_SELF, folder.path("a.h5"), m);
+  EXPECT_EQ(restart.load, 0.5);
+  EXPECT_EQ(restart.kept, 1);
 }
 
 TEST(Restart, IsRefusedForAnotherModel) {

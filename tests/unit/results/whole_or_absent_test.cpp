@@ -2,6 +2,7 @@
 #include <sstream>
 
 #include "files.h"
+#include "repose/results/model_file.h"
 #include "results/unfinished_file.h"
 
 namespace repose::results {
@@ -37,6 +38,58 @@ TEST(WholeOrAbsent, NothingIsLeftWithoutCommit) {
     EXPECT_EQ(folder.content(), parts("a.h5", 2)) << "each has its own";
   }
   EXPECT_EQ(folder.content(), "");
+}
+
+/// (load, converged) of the steps that a.h5 has.
+std::vector<std::pair<double, bool>> steps_of(const Folder& folder, const model::Model& m) {
+  std::vector<std::pair<double, bool>> steps;
+  for (int64_t k = 0; k < step_count(folder.path("a.h5")); ++k) {
+    const model::StepNumbers numbers = read_step(folder.path("a.h5"), k, m).numbers;
+    steps.emplace_back(numbers.load, numbers.converged);
+  }
+  return steps;
+}
+
+TEST(WholeOrAbsent, WhatIsSavedOnTheWayIsAResultAndTheRunGoesOn) {
+  using Steps = std::vector<std::pair<double, bool>>;
+  const Folder folder;
+  const model::Model m = small_model();
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  EXPECT_FALSE(file.save()) << "there is no step";
+  const auto at = [](double load, bool converged) {
+    model::StepNumbers numbers = small_numbers(load);
+    numbers.converged = converged;
+    return numbers;
+  };
+  file.append_under_way(at(0, false), small_rows(m, 0));
+  EXPECT_TRUE(file.save());
+  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
+  EXPECT_EQ(steps_of(folder, m), (Steps{{0, false}}));
+  EXPECT_FALSE(file.save()) << "it is saved";
+  file.append(at(0, true), small_rows(m, 0));
+  file.append(at(0.5, true), small_rows(m, 0.5));
+  EXPECT_EQ(steps_of(folder, m), (Steps{{0, false}})) << "what is saved stays as it is";
+  EXPECT_TRUE(file.save());
+  EXPECT_EQ(steps_of(folder, m), (Steps{{0, true}, {0.5, false}}));
+  file.append(at(1, true), small_rows(m, 1));
+  file.commit();
+  EXPECT_FALSE(file.save());
+  EXPECT_EQ(steps_of(folder, m), (Steps{{0, true}, {0.5, true}, {1, true}}));
+}
+
+TEST(WholeOrAbsent, KeptStepsAreThoseOfTheEarlierResult) {
+  const Folder folder;
+  const model::Model m = small_model();
+  write_small_result(folder.path("a"), m);
+  const int64_t count = step_count(folder.path("a.h5"));
+  ResultFile file(MPI_COMM_SELF, folder.path("b"), m);
+  file.keep(folder.path("a.h5"), count);
+  file.commit();
+  EXPECT_EQ(text_of(folder.path("a_tissue.xdmf")).size(),
+            text_of(folder.path("b_tissue.xdmf")).size());
+  for (int64_t k = 0; k < count; ++k)
+    EXPECT_EQ(read_step(folder.path("b.h5"), k, m).rows.position,
+              read_step(folder.path("a.h5"), k, m).rows.position);
 }
 
 TEST(WholeOrAbsent, AnEarlierResultStaysUntilCommit) {

@@ -26,10 +26,12 @@ class Scripted : public solve::RestSearch {
  public:
   std::function<Vec3(double step)> move = [](double) { return Vec3::Zero(); };
   std::function<bool(double step)> fails = [](double) { return false; };
+  int evaluations_of_failures = 0;
   double accepted = 0;
   int taken_back = 0;
 
-  explicit Scripted(const discrete::Positions& positions) : positions_(positions) {}
+  explicit Scripted(solve::Problem& problem)
+      : problem_(problem), positions_(problem.objective().positions()) {}
   solve::Outcome run(Vec displacement, double) override {
     const double step = positions_.load() - accepted;
     const base::VecHandle way = positions_.make_vector();
@@ -37,17 +39,20 @@ class Scripted : public solve::RestSearch {
     check(VecAXPY(displacement, 1, way));
     solve::Outcome outcome;
     outcome.converged = !fails(step);
+    for (int k = 0; k < evaluations_of_failures && !outcome.converged; ++k)
+      problem_.function().evaluate(displacement, way);
     return outcome;
   }
   void go_back(Vec) override { ++taken_back; }
 
  private:
+  solve::Problem& problem_;
   const discrete::Positions& positions_;
 };
 
 struct Path : testing::MovedBlock {
   solve::Problem problem{positions, {1, mechanics::VolumeTerm::penalty, 0.4}, false};
-  Scripted search{positions};
+  Scripted search{problem};
   solve::PathSettings settings{.accuracy = 1e-3, .load_steps = 4};
   base::VecHandle displacement = positions.make_vector();
   std::vector<double> loads;
@@ -94,6 +99,17 @@ TEST(LoadPath, EndsWhereEveryStepFails) {
   EXPECT_FALSE(result.complete());
   EXPECT_EQ(result.halvings.failed, 5);
   EXPECT_EQ(result.load, 0.25 / 32);
+}
+
+TEST(LoadPath, EndsWhereMostEvaluationsAreInVain) {
+  Path path;
+  path.search.fails = [](double step) { return step > 1.0 / 64; };  // it could go on for long
+  path.search.evaluations_of_failures = 1000;
+  const solve::PathOutcome outcome = path.run();
+  EXPECT_FALSE(outcome.last.converged);
+  EXPECT_EQ(outcome.halvings.failed, 3);
+  EXPECT_NE(outcome.last.reason.find("3 load steps have been halved, which took 3000"),
+            std::string::npos);
 }
 
 TEST(LoadPath, HalvesAStepThatFoldsTissue) {

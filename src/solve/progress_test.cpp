@@ -1,0 +1,55 @@
+#include "progress_test.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "repose/base/agreement.h"
+#include "repose/base/petsc.h"
+
+namespace repose::solve {
+
+using base::check;
+
+bool ProgressTest::stalls(const State& now) {
+  constexpr double tenth = 0.1, negligible = 1e-9;  // the latter of the objective
+  if (!begun_) {
+    begun_ = true;
+    first_objective_ = now.objective;
+  }
+  const double decrease = first_objective_ - best_.objective;
+  const double step = std::max({tenth * decrease, negligible * std::abs(now.objective), 0.0});
+  const bool lower = now.objective < best_.objective - step;
+  const bool weaker = now.largest_force < (1 - tenth) * best_.largest_force;
+  const bool nearer = now.distance < (1 - tenth) * best_.distance;
+  if (lower || weaker || nearer) best_.evaluations = now.evaluations;
+  if (lower) best_.objective = now.objective;
+  if (weaker) best_.largest_force = now.largest_force;
+  if (nearer) best_.distance = now.distance;
+  stalled_ = now.evaluations - best_.evaluations >= patience;
+  return stalled_;
+}
+
+Vec3 place_of_largest(const discrete::Positions& positions, Vec vector) {
+  const discrete::Part& part = positions.part();
+  struct {
+    double length;
+    int rank;
+  } largest{-1, base::rank(positions.comm())};
+  Vec3 place = Vec3::Zero();
+  const PetscScalar* values = nullptr;
+  check(VecGetArrayRead(vector, &values));
+  for (int64_t i = 0; i < part.owned_points; ++i) {
+    if (part.unknown[i] < 0) continue;
+    const PetscScalar* block = values + 3 * (part.unknown[i] - part.first_unknown);
+    const double length = Eigen::Map<const Vec3>(block).norm();
+    if (length <= largest.length) continue;
+    largest.length = length;
+    place = positions.local()[i];
+  }
+  check(VecRestoreArrayRead(vector, &values));
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, positions.comm());
+  MPI_Bcast(place.data(), 3, MPI_DOUBLE, largest.rank, positions.comm());
+  return place;
+}
+
+}  // namespace repose::solve
