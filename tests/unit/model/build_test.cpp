@@ -40,6 +40,7 @@ bool remarked(const BuildReport& report, const std::string& part) {
 
 TEST(Build, every_point_is_in_the_set_it_belongs_to) {
   scene::Scene scene = patches::scene_of(3, {"jaw"});
+  scene.rim = scene::Rim::fixed;
   scene.tissue.release = 0;
   scene.moves[0] = RigidMotion::rotation({1, 0, 0}, {0, 10, -20}, 8);
   const BuiltModel built = build_model(scene, patches::square(6, 60), {kFlatBone});
@@ -84,7 +85,6 @@ TEST(Build, only_the_longest_border_is_the_rim) {
 TEST(Build, an_automatic_rim_is_held_over_bone_that_rests_only) {
   const surface::Surface half = patches::box({-50, -50, -25}, {50, 150, -10});
   scene::Scene scene = patches::scene_of(2, {"skull"});
-  scene.rim = scene::Rim::automatic;
   const auto boundary = [&] {
     std::vector<double> x;
     const Points points = build_model(scene, patches::square(20, 100), {half}).model.points;
@@ -166,6 +166,7 @@ struct TwoJaws {
 
 TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
   TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::fixed;
   jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
   const BuiltModel built = build_model(jaws.scene, jaws.skin, jaws.bones);
   int64_t released = 0;
@@ -186,6 +187,7 @@ TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
 TEST(Build, tissue_on_a_moving_bone_lets_go_near_the_fixed_rim) {
   scene::Scene scene = patches::scene_of(3, {"jaw"});
   const surface::Surface skin = patches::square(6, 60);
+  scene.rim = scene::Rim::fixed;
   scene.tissue.release = 10.1;
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
   scene.moves[0] = RigidMotion::translation({0, -6, 0});
