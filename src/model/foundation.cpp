@@ -6,6 +6,7 @@
 #include "point_sets.h"
 #include "release.h"
 #include "repose/base/error.h"
+#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -51,7 +52,7 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
   if (scene.rim != scene::Rim::automatic) return rim;
   for (size_t c = 0; c < rim.size(); ++c) {
     const int32_t bone = attachment.bone[c];
-    rim[c] = rim[c] && bone >= 0 && scene.moves[bone].is_identity();
+    rim[c] = rim[c] && bone >= 0 && travel(columns.deep[c], scene.moves[bone]) <= negligible_travel;
   }
   let_go();
   return rim;

@@ -114,8 +114,9 @@ std::vector<Key> tissue_keys() {
       {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
        Range::above(0)},
       {"tissue.release", number, "10",
-       "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
-       Range::at_least(0)},
+       "Tissue lets go of bone this near to a piece that moves differently by 4 mm or more, and "
+       "proportionally nearer where by less; 0 never does.",
+       "mm", Range::at_least(0)},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks): attach_regions of contact."},
       {"tissue.turgor", number, "0",

@@ -196,6 +196,34 @@ TEST(Build, tissue_on_a_moving_bone_lets_go_near_the_fixed_rim) {
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
 }
 
+TEST(Build, tissue_lets_go_the_farther_the_more_differently_pieces_move) {
+  TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::free;
+  jaws.scene.moves[0] = RigidMotion::translation({0, 5, 0});
+  const auto released_at = [&](double difference) {
+    jaws.scene.moves[1] = RigidMotion::translation({0, 5 + difference, 0});
+    return build_model(jaws.scene, jaws.skin, jaws.bones).report.released;
+  };
+  for (const double difference : {-1e-6, 0.0, 1e-6, 0.001}) EXPECT_EQ(released_at(difference), 0);
+  // Rows of 41 columns, 2.5 mm apart, the first 1.2 mm from the gap, of both jaws alike.
+  EXPECT_EQ(released_at(1), 41 * 2);   // within 2.5 mm
+  EXPECT_EQ(released_at(-2), 41 * 4);  // 5 mm
+  EXPECT_EQ(released_at(4), 41 * 8);   // 10 mm
+  EXPECT_EQ(released_at(6), 41 * 8);   // at most
+}
+
+TEST(Build, a_rim_is_held_where_its_bone_hardly_moves) {
+  scene::Scene scene = patches::scene_of(3, {"jaw"});
+  const auto boundary_at = [&](const RigidMotion& move) {
+    scene.moves[0] = move;
+    return count(build_model(scene, patches::square(6, 60), {kFlatBone}).model).boundary / 3;
+  };
+  EXPECT_EQ(boundary_at({}), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1e-9, 0})), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 0.05, 0})), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1, 0})), 0);
+}
+
 TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {
   TwoJaws jaws;
   jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
