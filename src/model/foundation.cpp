@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "border.h"
 #include "orientation.h"
 #include "point_sets.h"
 #include "release.h"
@@ -75,6 +76,8 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
   Attachment attachment = attach_columns(columns, field, scene.tissue);
   std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
+  if (const std::string border = describe_near_border(scene, bones, mesh, field); !border.empty())
+    report.remarks.push_back(border);
   release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
                    attachment);
   return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),

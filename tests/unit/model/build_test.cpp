@@ -224,6 +224,24 @@ TEST(Build, a_rim_is_held_where_its_bone_hardly_moves) {
   EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1, 0})), 0);
 }
 
+TEST(Build, a_border_near_a_bone_that_moves_is_reported) {
+  const surface::Surface skin = patches::square(20, 100);
+  const surface::Surface jaw = patches::box({40, 40, -25}, {60, 60, -10});
+  scene::Scene scene = patches::scene_of(2, {"skull", "jaw"});
+  const surface::Surface skull = patches::box({-30, -30, -60}, {130, 130, -30});
+  const auto remarks = [&](const Vec3& move) {
+    scene.moves[1] = RigidMotion::translation(move);
+    return build_model(scene, skin, {skull, jaw}).report;
+  };
+  EXPECT_FALSE(remarked(remarks({0, 0, 0}), "the skin ends"));
+  EXPECT_FALSE(remarked(remarks({20, 0, 0}), "the skin ends")) << "it comes within 22 mm";
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "the skin ends 14.1 mm from bone 'jaw'"));
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "0.2 to 0.3 mm"));
+  scene.rim = scene::Rim::fixed;
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "1.7 to 3.5 mm"));
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "rim: auto"));
+}
+
 TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {
   TwoJaws jaws;
   jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
