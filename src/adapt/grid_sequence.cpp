@@ -111,11 +111,11 @@ class SequenceSolver {
   solve::Start start_for(const Model& model) const {
     if (sequence_.levels.empty()) return {};
     std::vector<Vec3> all;
-    if (base::rank(comm_) == 0) {
+    base::on_first_rank(comm_, [&] {
       const Model& before = sequence_.last.model;
       const auto moved = sum(sequence_.last_position, before.points.position, -1);
       all = sum(model.points.position, Transfer(before, model).carry(moved), 1);
-    }
+    });
     return {base::scatter(comm_, all), true};
   }
 

@@ -165,9 +165,10 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.tears = job.tearing.has_value();
   s.verifies_path = options.flag("verify_path");
   const Wish wish = wish_of(options);
-  const std::vector<Obstacle> all = obstacles(options, job, s);
-  require_path(first_obstacle(all, &Obstacle::to_path), s);
+  std::vector<Obstacle> all;  // on rank 0, which alone has all of the job
   base::on_first_rank(comm, [&] {
+    all = obstacles(options, job, s);
+    require_path(first_obstacle(all, &Obstacle::to_path), s);
     choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s);
     choose_sensitivity(options, job, s);
   });

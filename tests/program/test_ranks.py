@@ -76,6 +76,33 @@ def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
     assert np.abs(found[0] - found[1]).max() < 0.1
 
 
+LIPS = ("mouth: {path: [[-20, -92, -23], [-10, -99, -23], [0, -101, -23], [10, -99, -23], "
+        "[20, -92, -23]]}\n")
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_a_remeshed_skin_with_parted_lips_ends_on_any_ranks(run, tmp_path, ranks):
+    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    text = text.replace("  layers: 4", "  layers: 4\n  edge: 8", 1) + LIPS
+    (tmp_path / "lips.yaml").write_text(text)
+    result = run("repose-solve", "lips.yaml", ranks=ranks)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "incision               along" in result.stdout
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_what_only_rank_0_knows_is_refused_on_all_ranks(run, tmp_path, ranks):
+    text = (PROJECT / "meshes/paper_jaw_advance.yaml").read_text()
+    text = text.replace(": paper_", f": {PROJECT}/meshes/paper_")
+    forces = LOADED.partition("forces:")[1:]
+    tears = [text.partition("moves:")[0], "tearing: {limit: 0.5}\n", *forces]
+    (tmp_path / "tears.yaml").write_text("".join(tears))
+    result = run("repose-solve", "tears.yaml", "-verify_path", ranks=ranks)
+    assert result.returncode == 1
+    assert "error: -verify_path: the tissue may tear; leave the option out" in result.stderr
+
+
 @pytest.mark.parametrize("options, why", [
     ("head_springs_advance.yaml", "its tissue is springs"),
     ("head_instrument.yaml", "it has instruments"),
