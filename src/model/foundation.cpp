@@ -48,11 +48,12 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
       if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
   };
   if (scene.rim == scene::Rim::fixed) let_go();
+  const std::vector<int32_t> sliding = attachment.slides_on;
   release_near_other_pieces(columns.deep, field, scene.moves,
                             {scene.tissue.release, scene.tissue.released}, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
   for (size_t c = 0; c < rim.size(); ++c) {
-    const int32_t bone = attachment.bone[c];
+    const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
     rim[c] = rim[c] && bone >= 0 && travel(columns.deep[c], scene.moves[bone]) <= negligible_travel;
   }
   let_go();

@@ -222,6 +222,8 @@ TEST(Build, a_rim_is_held_where_its_bone_hardly_moves) {
   EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1e-9, 0})), 24);
   EXPECT_EQ(boundary_at(RigidMotion::translation({0, 0.05, 0})), 24);
   EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1, 0})), 0);
+  scene.tissue.attach = scene::Attach::slide;
+  EXPECT_EQ(boundary_at({}), 24);
 }
 
 TEST(Build, a_border_near_a_bone_that_moves_is_reported) {
