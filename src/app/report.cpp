@@ -130,6 +130,18 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
   return text;
 }
 
+std::string describe_pierced(const std::vector<std::string>& bodies,
+                             const solve::PiercedColumns& pierced) {
+  if (pierced.columns == 0) return "";
+  return report_row(
+      "pierced by bone",
+      fmt::format(
+          "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
+          "by {} at ({:.1f}, {:.1f}, {:.1f}) mm; use a finer skin (tissue.edge) or move less",
+          pierced.columns, pierced.depth, bodies[pierced.body], pierced.where.x(),
+          pierced.where.y(), pierced.where.z()));
+}
+
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s) {
   std::string text;
   for (size_t k = 0; k < s.contacts.size(); ++k) {

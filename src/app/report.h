@@ -32,6 +32,10 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 /// passes.
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s);
 
+/// Columns that bone enters between their points; empty if there is none.
+std::string describe_pierced(const std::vector<std::string>& bodies,
+                             const solve::PiercedColumns& pierced);
+
 /// What tore and where, in two rows; nothing where no limit was asked for.
 std::string describe_tearing(const solve::Tearing& tearing);
 

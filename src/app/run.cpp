@@ -297,7 +297,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing));
   if (path) say(describe_path(*path));
-  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
+  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
+      describe_pierced(job_.bodies, summary.pierced));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());

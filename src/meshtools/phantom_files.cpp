@@ -70,7 +70,8 @@ constexpr TissueText solid{
 
 constexpr TissueText springs{
     "  springs:\n"
-    "    default: {stiffness: 1.0, law: quartic, reference: 1.0}   # N/mm, mm\n",
+    "    default: {stiffness: 1.0, law: quartic, reference: 1.0}   # N/mm, mm\n"
+    "boundary: {rim: fixed}     # the border of the patch stays where it is, as in the paper\n",
     "solve:\n"
     "  volume: {form: penalty, poisson: 0.4967}   # the tissue keeps its volume, nearly\n"};
 

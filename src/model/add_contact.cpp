@@ -10,6 +10,7 @@
 #include "repose/base/error.h"
 #include "repose/model/build.h"
 #include "repose/model/instruments.h"
+#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -28,13 +29,6 @@ std::vector<double> layer_areas(const SkinMesh& mesh, const Model& model) {
       for (const size_t p : {a, b, c}) area[p] += share;
     }
   return area;
-}
-
-/// mm, the farthest that a body's points go.
-double travel(const surface::Surface& body, const scene::RigidMotion& move) {
-  double most = 0;
-  for (const Vec3& x : body.points) most = std::max(most, (move.apply(x) - x).norm());
-  return most;
 }
 
 void add(int64_t point, int32_t body, Binding binding, double area, Touches& touches) {

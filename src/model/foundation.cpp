@@ -2,10 +2,12 @@
 
 #include <algorithm>
 
+#include "border.h"
 #include "orientation.h"
 #include "point_sets.h"
 #include "release.h"
 #include "repose/base/error.h"
+#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -46,12 +48,13 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
       if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
   };
   if (scene.rim == scene::Rim::fixed) let_go();
+  const std::vector<int32_t> sliding = attachment.slides_on;
   release_near_other_pieces(columns.deep, field, scene.moves,
                             {scene.tissue.release, scene.tissue.released}, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
   for (size_t c = 0; c < rim.size(); ++c) {
-    const int32_t bone = attachment.bone[c];
-    rim[c] = rim[c] && bone >= 0 && scene.moves[bone].is_identity();
+    const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
+    rim[c] = rim[c] && bone >= 0 && travel(columns.deep[c], scene.moves[bone]) <= negligible_travel;
   }
   let_go();
   return rim;
@@ -74,6 +77,8 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
   Attachment attachment = attach_columns(columns, field, scene.tissue);
   std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
+  if (const std::string border = describe_near_border(scene, bones, mesh, field); !border.empty())
+    report.remarks.push_back(border);
   release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
                    attachment);
   return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),

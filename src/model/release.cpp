@@ -2,19 +2,29 @@
 
 #include <algorithm>
 
-#include "repose/model/collision.h"
+#include "travel.h"
 
 namespace repose::model {
 namespace {
 
-/// For each bone, the bones that move differently from it.
-std::vector<std::vector<int32_t>> others(const std::vector<scene::RigidMotion>& moves) {
-  std::vector<std::vector<int32_t>> differing(moves.size());
-  for (size_t own = 0; own < moves.size(); ++own)
-    for (size_t other = 0; other < moves.size(); ++other)
-      if (!move_alike(moves[own], moves[other]))
-        differing[own].push_back(static_cast<int32_t>(other));
-  return differing;
+constexpr double full_difference = 4;  // mm, of displacements, from which the distance is the whole
+constexpr double alike = 1e-9;         // mm: pieces whose displacements differ by less move alike
+
+/// mm, up to which tissue lets go of bone whose displacement differs by so many mm there.
+double reach(const Release& release, double difference) {
+  if (difference <= alike) return -1;
+  return release.distance * std::min(1.0, difference / full_difference);
+}
+
+/// Whether tissue at `point`, which holds to the bone `own`, lets go of it because of another one.
+bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones,
+                   const std::vector<scene::RigidMotion>& moves, const Release& release) {
+  const Vec3 moved = moves[own].apply(point);
+  for (int32_t piece = 0; piece < bones.size(); ++piece) {
+    const double near = reach(release, (moves[piece].apply(point) - moved).norm());
+    if (near >= 0 && bones.distance(piece, point) <= near) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -23,14 +33,9 @@ void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& b
                                const std::vector<scene::RigidMotion>& moves, const Release& release,
                                Attachment& attachment) {
   if (!(release.distance > 0)) return;
-  const std::vector<std::vector<int32_t>> differing = others(moves);
   for (size_t v = 0; v < deep.size(); ++v) {
-    if (attachment.bone[v] < 0) continue;
-    const std::vector<int32_t>& pieces = differing[attachment.bone[v]];
-    if (std::none_of(pieces.begin(), pieces.end(), [&](int32_t piece) {
-          return bones.distance(piece, deep[v]) <= release.distance;
-        }))
-      continue;
+    const int32_t own = attachment.bone[v];
+    if (own < 0 || !is_near_other(deep[v], own, bones, moves, release)) continue;
     attachment.settle(v, release.how);
     ++attachment.released;
   }
@@ -43,11 +48,12 @@ void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& ri
   std::vector<Vec3> fixed;
   for (size_t v = 0; v < deep.size(); ++v)
     if (rim[v]) fixed.push_back(deep[v]);
-  const double reach = release.distance * release.distance;
   for (size_t v = 0; v < deep.size(); ++v) {
-    if (attachment.bone[v] < 0 || moves[attachment.bone[v]].is_identity()) continue;
-    if (std::none_of(fixed.begin(), fixed.end(),
-                     [&](const Vec3& p) { return (p - deep[v]).squaredNorm() <= reach; }))
+    if (attachment.bone[v] < 0) continue;
+    const double near = reach(release, travel(deep[v], moves[attachment.bone[v]]));
+    if (near < 0 || std::none_of(fixed.begin(), fixed.end(), [&](const Vec3& p) {
+          return (p - deep[v]).squaredNorm() <= near * near;
+        }))
       continue;
     attachment.settle(v, release.how);
     ++attachment.released;

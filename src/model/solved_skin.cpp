@@ -5,6 +5,7 @@
 #include "bone_field.h"
 #include "region.h"
 #include "repose/meshtools/face.h"
+#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -20,7 +21,8 @@ meshtools::FaceRequest request_of(const Anatomy& anatomy) {
     request.regions.push_back(contains_of_skin(region));
   if (!scene.instruments.empty()) return request;
   for (size_t b = 0; b < anatomy.bones.size(); ++b)
-    if (!scene.moves[b].is_identity()) request.beneath.push_back(anatomy.bones[b]);
+    if (travel(anatomy.bones[b], scene.moves[b]) > negligible_travel)
+      request.beneath.push_back(anatomy.bones[b]);
   for (const scene::Force& force : scene.forces) request.places.push_back(force.at);
   for (const scene::Incision& cut : scene.incisions)
     request.places.insert(request.places.end(), cut.path.begin(), cut.path.end());

@@ -114,8 +114,9 @@ std::vector<Key> tissue_keys() {
       {"tissue.free_thickness", number, "12", "Thickness where there is no bone beneath.", "mm",
        Range::above(0)},
       {"tissue.release", number, "10",
-       "Tissue lets go of bone this near to a piece that moves differently; 0 never does.", "mm",
-       Range::at_least(0)},
+       "Tissue lets go of bone this near to a piece that moves differently by 4 mm or more, and "
+       "proportionally nearer where by less; 0 never does.",
+       "mm", Range::at_least(0)},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks): attach_regions of contact."},
       {"tissue.turgor", number, "0",
@@ -287,25 +288,23 @@ std::vector<Key> spring_keys() {
 }
 
 std::vector<Key> load_keys() {
-  return {
-      {"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
-      {"scan_gravity", vector, "",
-       "Gravity field when the surfaces were recorded, for example lying in a CT; default: "
-       "gravity.",
-       "N/kg"},
-      {"boundary", map, "", "What holds the skin where it ends."},
-      {.path = "boundary.rim",
-       .kind = choice,
-       .standard = "fixed",
-       .sentence =
-           "The outermost border of an open skin; auto, the default with tissue.edge: fixed over "
-           "bone that rests, free elsewhere.",
-       .choices = {"fixed", "free", "auto"}},
-      {"forces", list, "", "External forces on the skin."},
-      {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
-      {"forces[].radius", number, "required", "Spread over the skin points within, by area.", "mm",
-       Range::above(0)},
-      {"forces[].force", vector, "required", "The total force.", "N"}};
+  return {{"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
+          {"scan_gravity", vector, "",
+           "Gravity field when the surfaces were recorded, for example lying in a CT; default: "
+           "gravity.",
+           "N/kg"},
+          {"boundary", map, "", "What holds the skin where it ends."},
+          {.path = "boundary.rim",
+           .kind = choice,
+           .standard = "auto",
+           .sentence = "The outermost border of an open skin; auto: fixed over bone that "
+                       "does not move, free elsewhere.",
+           .choices = {"fixed", "free", "auto"}},
+          {"forces", list, "", "External forces on the skin."},
+          {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
+          {"forces[].radius", number, "required", "Spread over the skin points within, by area.",
+           "mm", Range::above(0)},
+          {"forces[].force", vector, "required", "The total force.", "N"}};
 }
 
 /// The forms translate and rotate, below an entry of moves and below an item of a transform.

@@ -281,7 +281,6 @@ void read_surroundings(Scene& scene, const Map& map) {
     scene.scan_gravity = before->vector();
     if (!scene.gravity) before->refuse("needs gravity, the field of now ([0, 0, 0] for none)");
   }
-  if (scene.tissue.edge) scene.rim = Rim::automatic;
   if (const auto boundary = map.find("boundary")) set_choice<Rim>(scene.rim, Map(*boundary), "rim");
   if (const auto bodies = map.find("instruments")) scene.instruments = read_instruments(*bodies);
   if (const auto cuts = map.find("incisions"))

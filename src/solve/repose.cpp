@@ -11,6 +11,7 @@
 
 #include "contact_search.h"
 #include "exact_volume.h"
+#include "pierced_columns.h"
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
@@ -337,6 +338,7 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
         steps.add(outcome, load, seconds, displacement);
       });
   summary.contacts = contacts_of(searcher.objective());
+  summary.pierced = find_pierced_columns(searcher.objective());
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

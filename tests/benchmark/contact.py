@@ -24,7 +24,7 @@ from measure import run
 from page import PROJECT, option_parser, print_table
 from tissue import last, model_of
 
-SURFACES = ["face.ply", "skull.ply", "mandible.ply"]
+SURFACES = ["skin.ply", "skull.ply", "mandible.ply"]
 JAW = "mouth"  # the scene whose moves the three of the jaw replace
 TURN = "{bone: mandible, rotate: {axis: [0.9995, 0.0038, -0.0327], center: [2.4, -208.2, 398.3], angle: 8}}"
 CASES = {

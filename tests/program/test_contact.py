@@ -19,7 +19,7 @@ def folder(tmp_path_factory):
     for file in (PROJECT / "meshes").glob("*head_*"):
         (top / file.name).symlink_to(file)
     if DATA.is_dir():
-        for name in ("face.ply", "skull.ply", "mandible.ply"):
+        for name in ("skin.ply", "skull.ply", "mandible.ply"):
             (top / name).symlink_to(DATA / name)
     return top
 

@@ -1,4 +1,4 @@
-"""A real head (CT, 4072 skin vertices) whose jaw opens by 8° and comes 6 mm forward. The data are not
+"""A real head (CT) whose jaw opens by 8° and comes 6 mm forward. The data are not
 shipped: they lie beside the project, in ../shared/data/head."""
 
 from collections import defaultdict
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA}
 def folder(tmp_path_factory):
     """The scene and the surfaces it names."""
     top = tmp_path_factory.mktemp("real_head")
-    for name in ("face.ply", "skull.ply", "mandible.ply"):
+    for name in ("skin.ply", "skull.ply", "mandible.ply"):
         (top / name).symlink_to(DATA / name)
     (top / "scene.yaml").symlink_to(PROJECT / "meshes/real_head_springs.yaml")
     return top

@@ -254,7 +254,7 @@ struct Scene {
   Tissue tissue;
   std::optional<Vec3> gravity;       ///< N/kg
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
-  Rim rim = Rim::fixed;
+  Rim rim = Rim::automatic;
   std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Collision> collision;
   std::optional<Contact> contact;  ///< unset: what is free is not kept out of bones

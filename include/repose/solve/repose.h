@@ -41,6 +41,14 @@ struct BodyContact {
   Vec3 where = Vec3::Zero();  ///< mm, the deepest one at the start
 };
 
+/// Columns that a bone enters between their two deepest points.
+struct PiercedColumns {
+  int64_t columns = 0;
+  int32_t body = -1;          ///< of the model's contact: that at the deepest place
+  double depth = 0;           ///< mm, there
+  Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
+};
+
 /// What a run came to, for the closing table.
 struct Summary {
   PathOutcome path;
@@ -52,6 +60,7 @@ struct Summary {
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
   std::vector<BodyContact>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
+  PiercedColumns pierced;
 };
 
 /// Where a search begins.

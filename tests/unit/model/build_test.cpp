@@ -40,6 +40,7 @@ bool remarked(const BuildReport& report, const std::string& part) {
 
 TEST(Build, every_point_is_in_the_set_it_belongs_to) {
   scene::Scene scene = patches::scene_of(3, {"jaw"});
+  scene.rim = scene::Rim::fixed;
   scene.tissue.release = 0;
   scene.moves[0] = RigidMotion::rotation({1, 0, 0}, {0, 10, -20}, 8);
   const BuiltModel built = build_model(scene, patches::square(6, 60), {kFlatBone});
@@ -97,7 +98,6 @@ TEST(Build, only_the_longest_border_is_the_rim) {
 TEST(Build, an_automatic_rim_is_held_over_bone_that_rests_only) {
   const surface::Surface half = patches::box({-50, -50, -25}, {50, 150, -10});
   scene::Scene scene = patches::scene_of(2, {"skull"});
-  scene.rim = scene::Rim::automatic;
   const auto boundary = [&] {
     std::vector<double> x;
     const Points points = build_model(scene, patches::square(20, 100), {half}).model.points;
@@ -179,6 +179,7 @@ struct TwoJaws {
 
 TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
   TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::fixed;
   jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
   const BuiltModel built = build_model(jaws.scene, jaws.skin, jaws.bones);
   int64_t released = 0;
@@ -199,12 +200,61 @@ TEST(Build, tissue_lets_go_near_a_piece_that_moves_differently) {
 TEST(Build, tissue_on_a_moving_bone_lets_go_near_the_fixed_rim) {
   scene::Scene scene = patches::scene_of(3, {"jaw"});
   const surface::Surface skin = patches::square(6, 60);
+  scene.rim = scene::Rim::fixed;
   scene.tissue.release = 10.1;
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
   scene.moves[0] = RigidMotion::translation({0, -6, 0});
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 16);  // the ring next to the rim
   scene.rim = scene::Rim::free;
   EXPECT_EQ(build_model(scene, skin, {kFlatBone}).report.released, 0);
+}
+
+TEST(Build, tissue_lets_go_the_farther_the_more_differently_pieces_move) {
+  TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::free;
+  jaws.scene.moves[0] = RigidMotion::translation({0, 5, 0});
+  const auto released_at = [&](double difference) {
+    jaws.scene.moves[1] = RigidMotion::translation({0, 5 + difference, 0});
+    return build_model(jaws.scene, jaws.skin, jaws.bones).report.released;
+  };
+  for (const double difference : {-1e-6, 0.0, 1e-6, 0.001}) EXPECT_EQ(released_at(difference), 0);
+  // Rows of 41 columns, 2.5 mm apart, the first 1.2 mm from the gap, of both jaws alike.
+  EXPECT_EQ(released_at(1), 41 * 2);   // within 2.5 mm
+  EXPECT_EQ(released_at(-2), 41 * 4);  // 5 mm
+  EXPECT_EQ(released_at(4), 41 * 8);   // 10 mm
+  EXPECT_EQ(released_at(6), 41 * 8);   // at most
+}
+
+TEST(Build, a_rim_is_held_where_its_bone_hardly_moves) {
+  scene::Scene scene = patches::scene_of(3, {"jaw"});
+  const auto boundary_at = [&](const RigidMotion& move) {
+    scene.moves[0] = move;
+    return count(build_model(scene, patches::square(6, 60), {kFlatBone}).model).boundary / 3;
+  };
+  EXPECT_EQ(boundary_at({}), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1e-9, 0})), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 0.05, 0})), 24);
+  EXPECT_EQ(boundary_at(RigidMotion::translation({0, 1, 0})), 0);
+  scene.tissue.attach = scene::Attach::slide;
+  EXPECT_EQ(boundary_at({}), 24);
+}
+
+TEST(Build, a_border_near_a_bone_that_moves_is_reported) {
+  const surface::Surface skin = patches::square(20, 100);
+  const surface::Surface jaw = patches::box({40, 40, -25}, {60, 60, -10});
+  scene::Scene scene = patches::scene_of(2, {"skull", "jaw"});
+  const surface::Surface skull = patches::box({-30, -30, -60}, {130, 130, -30});
+  const auto remarks = [&](const Vec3& move) {
+    scene.moves[1] = RigidMotion::translation(move);
+    return build_model(scene, skin, {skull, jaw}).report;
+  };
+  EXPECT_FALSE(remarked(remarks({0, 0, 0}), "the skin ends"));
+  EXPECT_FALSE(remarked(remarks({20, 0, 0}), "the skin ends")) << "it comes within 22 mm";
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "the skin ends 14.1 mm from bone 'jaw'"));
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "0.2 to 0.3 mm"));
+  scene.rim = scene::Rim::fixed;
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "1.7 to 3.5 mm"));
+  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "rim: auto"));
 }
 
 TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {

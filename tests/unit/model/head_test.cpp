@@ -45,10 +45,11 @@ TEST_P(Head, is_a_valid_model_with_positive_prisms) {
       ASSERT_GT((corner[4] - corner[3]).cross(corner[5] - corner[3]).dot(down), 0) << m;
     }
   }
-  EXPECT_EQ(count(model).boundary, 184 * layers);  // the rim of face.ply
+  // Of the 184 columns on the rim of face.ply, those over the skull, or where the jaw hardly moves
+  EXPECT_EQ(count(model).boundary, 108 * layers);
   EXPECT_GT(built.report.attached, 2000);
   EXPECT_GT(built.report.released, 100);
-  EXPECT_EQ(built.report.attached + built.report.free_deep + 184, 4072);
+  EXPECT_EQ(built.report.attached + built.report.free_deep + 108, 4072);
   EXPECT_LT(built.report.shortened, 40);
   EXPECT_GT(built.report.thickness_min, 0.9);
   EXPECT_LT(built.report.thickness_max, 30);

@@ -47,7 +47,7 @@ TEST(Scene, MinimalHasTheDefaults) {
   EXPECT_TRUE(scene.tissue.springs.empty());
   EXPECT_TRUE(scene.tissue.mass.empty());
   EXPECT_FALSE(scene.gravity);
-  EXPECT_EQ(scene.rim, Rim::fixed);
+  EXPECT_EQ(scene.rim, Rim::automatic);
   ASSERT_EQ(scene.moves.size(), 2u);
   EXPECT_TRUE(scene.moves[0].is_identity());
   EXPECT_EQ(scene.solve.functional, Functional::energy);

@@ -1,0 +1,85 @@
+#include "pierced_columns.h"
+
+#include <algorithm>
+
+#include "repose/base/agreement.h"
+
+namespace repose::solve {
+namespace {
+
+constexpr double reported_depth = 1.2;  // mm
+constexpr int samples = 9;
+
+/// A sampled place inside a body.
+struct Sample {
+  double depth = 0;  // mm
+  Vec3 where = Vec3::Zero();
+};
+
+/// The deepest sample between two points, both left out.
+Sample deepest_between(const Vec3& from, const Vec3& to, const mechanics::RigidBody& body) {
+  Sample deepest;
+  for (int k = 1; k <= samples; ++k) {
+    const Vec3 x = from + (to - from) * (static_cast<double>(k) / (samples + 1));
+    const double depth = -body.distance(body.beside(x)).value;
+    if (depth > deepest.depth) deepest = {depth, x};
+  }
+  return deepest;
+}
+
+/// Owned points above a deepest one of their column, which is the next row.
+std::vector<int64_t> second_deepest(MPI_Comm comm, const discrete::Part& part) {
+  const model::Points& points = part.model.points;
+  int32_t last = 0;
+  for (const int32_t layer : points.layer) last = std::max(last, layer);
+  MPI_Allreduce(MPI_IN_PLACE, &last, 1, MPI_INT32_T, MPI_MAX, comm);
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i + 1 < part.owned_points; ++i)
+    if (points.layer[i + 1] == last && points.layer[i] + 1 == last &&
+        points.column[i] == points.column[i + 1])
+      rows.push_back(i);
+  return rows;
+}
+
+/// Sums the columns, and takes the deepest place of any rank.
+void combine(MPI_Comm comm, PiercedColumns& found) {
+  struct {
+    double depth;
+    int rank;
+  } deepest{found.depth, base::rank(comm)};
+  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
+  MPI_Allreduce(MPI_IN_PLACE, &found.columns, 1, MPI_INT64_T, MPI_SUM, comm);
+  found.depth = deepest.depth;
+  MPI_Bcast(&found.body, 1, MPI_INT32_T, deepest.rank, comm);
+  MPI_Bcast(found.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+}
+
+}  // namespace
+
+PiercedColumns find_pierced_columns(discrete::Objective& objective) {
+  const discrete::Positions& positions = objective.positions();
+  const discrete::Part& part = positions.part();
+  PiercedColumns found;
+  if (!part.contact) return found;
+  const std::vector<mechanics::RigidBody>& moved = objective.touches().bodies();
+  const auto now = positions.local();
+  const std::vector<Vec3>& before = part.model.points.position;
+  for (const int64_t i : second_deepest(positions.comm(), part)) {
+    bool pierced = false;
+    for (size_t k = 0; k < moved.size(); ++k) {
+      if (moved[k].bone() < 0) continue;
+      const Sample sample = deepest_between(now[i], now[i + 1], moved[k]);
+      if (sample.depth <= reported_depth ||
+          deepest_between(before[i], before[i + 1], part.bodies[k]).depth > reported_depth)
+        continue;
+      pierced = true;
+      if (sample.depth > found.depth)
+        found = {found.columns, static_cast<int32_t>(k), sample.depth, sample.where};
+    }
+    found.columns += pierced;
+  }
+  combine(positions.comm(), found);
+  return found;
+}
+
+}  // namespace repose::solve

@@ -1,0 +1,12 @@
+#pragma once
+#include "repose/discrete/objective.h"
+#include "repose/solve/repose.h"
+
+namespace repose::solve {
+
+/// Finds columns whose deepest segment is inside a bone between its two points: nine samples of the
+/// signed distance along it, deeper than 1.2 mm at the objective's last update and not so
+/// initially. Needs the model's contact with bones; without it nothing is found. Collective.
+PiercedColumns find_pierced_columns(discrete::Objective& objective);
+
+}  // namespace repose::solve

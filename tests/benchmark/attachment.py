@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""How the skin follows a plan through moves that are alike: jaw and chin 5 mm forward, the chin by a
+little less to a little more. Writes the table of a page.
+
+    tests/benchmark/attachment.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
+                                  [-output docs/guide/surgery.md] [-heads head,real_head]
+
+Each row is the change of the skin from the row before. Needs: apt-get install
+--no-install-recommends python3-h5py python3-numpy
+"""
+
+import pathlib
+import tempfile
+
+import numpy as np
+
+from measure import run
+from page import PROJECT, option_parser, print_table
+from tissue import last, model_of
+
+FORWARD = 5  # mm
+MORE = [-2, -1.5, -1, -0.5, -0.25, -0.1, -0.001, 0, 0.001, 0.1, 0.25, 0.5, 1, 1.5, 2]  # mm
+HEAD = ("| head | chin farther than the jaw by, mm | step, mm | released columns | skin changes by, mm: "
+        "largest, 95 % |\n|---" + "|--:" * 4 + "|")
+
+
+def scene_of(head, more):
+    text = (PROJECT / f"meshes/{head}_genioplasty.yaml").read_text().partition("moves:\n")[0]
+    return (f"{text}moves:\n  - {{bone: mandible, translate: [0, {-FORWARD}, 0]}}\n"
+            f"  - {{bone: chin, translate: [0, {-FORWARD - more}, 0]}}\n")
+
+
+def solve(chosen, folder, head, more):
+    """Released columns and the displacement of the skin."""
+    (folder / "scene.yaml").write_text(scene_of(head, more))
+    done = run([chosen.bin / "repose-solve", "scene.yaml", "-output", "face", "-accuracy",
+                chosen.accuracy], folder, ends=[0])
+    released = done.said["columns"].partition("(")[2].partition(" ")[0]
+    on_skin = model_of(folder / "face.h5")["point/layer"] == 0
+    return released, last(folder / "face.h5")["point/displacement"][on_skin]
+
+
+def rows(chosen, folder):
+    for head in chosen.heads.split(","):
+        before = None
+        for more in MORE:
+            released, skin = solve(chosen, folder, head, more)
+            if before is not None:
+                change = np.linalg.norm(skin - before[1], axis=1)
+                yield (f"| {head} | {more:g} | {more - before[0]:.3g} | {released} | "
+                       f"{change.max():.3f}, {np.quantile(change, 0.95):.3f} |")
+            before = more, skin
+
+
+def main():
+    chosen = option_parser(__doc__, accuracy=0.01, heads="head,real_head",
+                           head=str(PROJECT.parent / "shared/data/head")).parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for file in [*(PROJECT / "meshes").glob("head_*"),
+                     *pathlib.Path(chosen.head).glob("[sm]*.ply")]:
+            (folder / file.name).symlink_to(file.resolve())
+        print_table(HEAD, rows(chosen, folder), chosen.output, "attachment")
+
+
+if __name__ == "__main__":
+    main()
