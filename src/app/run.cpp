@@ -17,6 +17,7 @@
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/surface/write.h"
+#include "self_contact.h"
 #include "sensitivity.h"
 #include "strategy.h"
 #include "verify_path.h"
@@ -90,6 +91,8 @@ class Run {
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
   std::string write_given_skin(const Writer& writer) const;
+  std::string describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
+                                    const Writer& writer) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
 
   Job& job_;
@@ -204,6 +207,17 @@ std::string Run::write_given_skin(const Writer& writer) const {
   return report_row("given skin", file + ": its vertices, with displacement");
 }
 
+/// Skin that ends inside other skin at load 1. Collective.
+std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
+                                       const Writer& writer) const {
+  if (!summary.path.complete()) return "";
+  const std::vector<Vec3> position =
+      job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+  std::string text;
+  base::on_first_rank(comm, [&] { text = skin.describe_self_contact(position); });
+  return text;
+}
+
 /// What the answer would be if the scene's assumptions were others. Collective.
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
@@ -218,6 +232,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const Coarser coarser = solve_coarser();
   Writer writer(comm, name_, job_.model, job_.raised ? &*job_.raised : nullptr, coarser,
                 checkpoint_interval, unsettled(tearing));
+  const SolvedSkin skin(job_);
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
@@ -231,6 +246,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing));
   if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
+  say(describe_self_contact(skin, summary, writer));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
