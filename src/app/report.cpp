@@ -142,6 +142,32 @@ std::string describe_pierced(const std::vector<std::string>& bodies,
           pierced.where.y(), pierced.where.z()));
 }
 
+namespace {
+
+/// Depths as the search sees them, then as they are.
+std::string describe_penetration(const std::vector<std::string>& bodies, const solve::Summary& s) {
+  if (!std::isfinite(s.last.penetration)) return "";
+  std::string text = report_row(
+      "penetration", fmt::format("{:.2g} mm at most, into smoothed surfaces", s.last.penetration));
+  if (!std::isfinite(s.last.penetration_exact)) return text;
+  text += report_row(
+      "exact penetration",
+      fmt::format("{:.2g} mm at most, into the bodies' own triangles", s.last.penetration_exact));
+  for (size_t k = 0; k < bodies.size() && k < s.contacts.size(); ++k) {
+    const solve::PenetrationDepth& depth = s.contacts[k].exact;
+    if (depth.points == 0) continue;
+    text += report_row(
+        "exact penetration",
+        fmt::format("{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at ({:.1f}, "
+                    "{:.1f}, {:.1f}) mm; a finer contact.grid follows its surface more closely",
+                    depth.points, solve::PenetrationDepth::reported, bodies[k], depth.deepest,
+                    depth.where.x(), depth.where.y(), depth.where.z()));
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s) {
   std::string text;
   for (size_t k = 0; k < s.contacts.size(); ++k) {
@@ -159,9 +185,7 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
         fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N", on.points,
                     name, on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
   }
-  if (std::isfinite(s.last.penetration))
-    text += report_row("penetration", fmt::format("{:.2g} mm at most", s.last.penetration));
-  return text;
+  return text + describe_penetration(bodies, s);
 }
 
 std::string describe_tearing(const solve::Tearing& t) {

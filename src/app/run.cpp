@@ -22,6 +22,7 @@
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/surface/write.h"
+#include "self_contact.h"
 #include "sensitivity.h"
 #include "strategy.h"
 #include "verify_path.h"
@@ -112,6 +113,8 @@ class Run {
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
   std::string write_given_skin(const Writer& writer) const;
+  std::string describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
+                                    const Writer& writer) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
 
   Job& job_;
@@ -269,6 +272,17 @@ std::string Run::write_given_skin(const Writer& writer) const {
   return report_row("given skin", file + ": its vertices, with displacement");
 }
 
+/// Skin that ends inside other skin at load 1. Collective.
+std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
+                                       const Writer& writer) const {
+  if (!summary.path.complete()) return "";
+  const std::vector<Vec3> position =
+      job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+  std::string text;
+  base::on_first_rank(comm, [&] { text = skin.describe_self_contact(position); });
+  return text;
+}
+
 /// What the answer would be if the scene's assumptions were others. Collective.
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
@@ -285,6 +299,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
                 checkpoint_interval, unsettled(tearing));
   if (kept_ > 0) writer.keep(earlier_, kept_);
   const Saving saving(interrupt_, writer, name_);
+  const SolvedSkin skin(job_);
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
@@ -299,6 +314,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
       describe_pierced(job_.bodies, summary.pierced));
+  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
+  say(describe_self_contact(skin, summary, writer));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());

@@ -97,6 +97,21 @@ void choose_coarse(const Wish& wish, const std::string& obstacle, const Job& job
   if (!s.resolutions.empty()) s.coarse = wish.coarse;
 }
 
+/// Refuses what minimises without regard to contact.
+void require_contact_kept(const Strategy& s, const Job& job) {
+  if (!job.touches) return;
+  const char* remedy = "leave contact and sliding instruments out of the scene";
+  if (s.settings.weights.volume == scene::VolumeTerm::exact)
+    base::refuse(
+        "volume exact does not keep tissue out of what it touches; choose volume penalty, or {}",
+        remedy);
+  if (is_force(s))
+    base::refuse(
+        "functional force does not keep tissue out of what it touches; choose functional energy, "
+        "or {}",
+        remedy);
+}
+
 /// Refuses to verify a path that is not a matter of load steps.
 void require_path(const std::string& obstacle, const Strategy& s) {
   if (s.verifies_path && !obstacle.empty())
@@ -164,6 +179,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.settings.initial_equilibrium = job.initial_equilibrium;
   s.tears = job.tearing.has_value();
   s.verifies_path = options.flag("verify_path");
+  require_contact_kept(s, job);
   const Wish wish = wish_of(options);
   std::vector<Obstacle> all;  // on rank 0, which alone has all of the job
   base::on_first_rank(comm, [&] {

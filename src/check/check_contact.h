@@ -6,10 +6,14 @@
 
 namespace repose::check {
 
-/// Whether what a step says of contact follows from the model and the positions: gaps to bodies; no
-/// pull but where points slide; no pressure across a gap wider than the step's displacement error;
-/// nothing deeper than its penetration; forces along the bodies' normals, pressure times area,
-/// where a point touches one body only and no side of a cut.
+/// Checks what a step states about contact against the bodies' own triangles and closed forms
+/// (obstacle.h), which share nothing with the distances that the solver uses. The solver smooths
+/// meshes on a grid: a stated gap below 3 mm must lie between the exact one and the exact one
+/// averaged in the same way, within a tenth of the spacing and 0.05 mm. The penetration must be
+/// that of the deepest stated gap, the exact penetration that of the triangles within 1e-4 mm.
+/// Forces must be pressure times area along the body's normal where that is well defined, never
+/// pull except where points slide, and not act across a gap wider than the step's displacement
+/// error. Gaps between the sides of cuts come from the solver's own surfaces.
 void check_contact(const model::Model& model, const model::PrescribedMotion& motion,
                    const model::StepNumbers& numbers, const model::StepRows& rows,
                    base::Comparison& comparison);

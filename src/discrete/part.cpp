@@ -111,6 +111,7 @@ void pass(Archive& archive, Part& part) {
           c.walls.weight, c.walls.area, part.contact);
   pass_elements(archive, m.elements);
   pass_bodies(archive, part.bodies);
+  pass_meshes(archive, part.body_meshes);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
           part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,

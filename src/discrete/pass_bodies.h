@@ -54,4 +54,13 @@ inline void pass_bodies(Receiver& archive, std::vector<mechanics::RigidBody>& bo
   }
 }
 
+/// Sends or receives triangles; names stay behind.
+template <class Archive>
+void pass_meshes(Archive& archive, std::vector<surface::Surface>& meshes) {
+  auto count = static_cast<int64_t>(meshes.size());
+  archive(count);
+  meshes.resize(count);
+  for (surface::Surface& mesh : meshes) archive(mesh.points, mesh.triangles);
+}
+
 }  // namespace repose::discrete

@@ -103,6 +103,17 @@ void pick_points(const Plan& plan, Part& part) {
   part.unknown = pick(plan.unknown, part.point_row);
 }
 
+/// [bodies] Triangles of the model's bodies at load 0; empty for closed forms.
+std::vector<surface::Surface> body_meshes(const Model& model) {
+  std::vector<surface::Surface> meshes;
+  for (const model::Body& body : model.contact.bodies) {
+    const auto* shape = std::get_if<surface::Surface>(&body.shape);
+    if (body.bone >= 0) shape = &model.bone_surfaces[body.bone];
+    meshes.push_back(shape ? *shape : surface::Surface{});
+  }
+  return meshes;
+}
+
 /// The constraints of the points that a rank owns.
 model::Contact pick_contact(const Plan& plan, LocalNumbers& local, int rank) {
   const model::Contact& all = plan.model.contact;
@@ -187,6 +198,7 @@ Part make_part(const Plan& plan, const Share& share, LocalNumbers& local) {
   part.model.contact = pick_contact(plan, local, rank);
   part.contact = !model.contact.empty();
   part.bodies = plan.bodies;
+  if (!plan.bodies.empty()) part.body_meshes = body_meshes(model);
   part.point_row = local.release();
   pick_points(plan, part);
   part.solid = model::is_solid(model);

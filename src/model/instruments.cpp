@@ -167,4 +167,16 @@ std::vector<std::vector<int64_t>> hold_by_instruments(const scene::Scene& scene,
   return held;
 }
 
+struct MeshDepth::Tree {
+  explicit Tree(const surface::Surface& mesh) : tree(mesh) {}
+  surface::DistanceTree tree;
+};
+
+MeshDepth::MeshDepth(const surface::Surface& mesh) : tree_(std::make_unique<Tree>(mesh)) {}
+MeshDepth::~MeshDepth() = default;
+
+double MeshDepth::at(const Vec3& point) const {
+  return tree_->tree.contains(point) ? tree_->tree.nearest(point).distance : 0;
+}
+
 }  // namespace repose::model

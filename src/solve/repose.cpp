@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "contact_search.h"
+#include "exact_penetration.h"
 #include "exact_volume.h"
 #include "pierced_columns.h"
 #include "repose/base/agreement.h"
@@ -273,12 +274,16 @@ class Steps {
         settings_(settings),
         natural_(natural),
         receive_(receive),
-        summary_(summary) {}
+        summary_(summary),
+        penetration_(searcher.objective().positions().part()) {}
 
   void add(const Outcome& outcome, double load, double seconds, Vec displacement) {
     discrete::Objective& objective = searcher_.objective();
     model::StepNumbers& last = summary_.last;
     last = numbers_of(objective, settings_, outcome, load);
+    depths_ = penetration_.measure(objective);
+    for (const PenetrationDepth& depth : depths_)
+      last.penetration_exact = std::fmax(last.penetration_exact, depth.deepest);
     last.epsilon = searcher_.epsilon();
     const bool start = load == 0 && settings_.initial_equilibrium;
     const bool end = load == 1 || !outcome.converged;
@@ -299,12 +304,17 @@ class Steps {
     receive_(last, rows);
   }
 
+  /// [bodies] at the last step.
+  const std::vector<PenetrationDepth>& depths() const { return depths_; }
+
  private:
   Searcher& searcher_;
   const Settings& settings_;
   const discrete::NaturalRows& natural_;
   const Receiver& receive_;
   Summary& summary_;
+  ExactPenetration penetration_;
+  std::vector<PenetrationDepth> depths_;
   int64_t evaluations_ = 0;  // up to the step before
 };
 
@@ -339,6 +349,7 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
       });
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
+  for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.assemblies = searcher.assemblies();

@@ -88,4 +88,14 @@ std::vector<std::pair<int64_t, int64_t>> self_intersections(const Surface& surfa
   return pairs;
 }
 
+std::vector<std::pair<int64_t, int64_t>> new_intersections(const Surface& before,
+                                                           const Surface& now) {
+  std::vector<std::pair<int64_t, int64_t>> pairs = self_intersections(now);
+  std::erase_if(pairs, [&](const auto& pair) {
+    const Triangle &a = before.triangles[pair.first], &b = before.triangles[pair.second];
+    return meet(a, corners(before, a), b, corners(before, b));
+  });
+  return pairs;
+}
+
 }  // namespace repose::surface

@@ -24,6 +24,8 @@ struct Part {
   /// of cuts are all on one rank.
   bool contact = false;
   std::vector<mechanics::RigidBody> bodies;  ///< [model.contact.bodies], on every rank
+  /// [bodies] triangles of each body at load 0, on every rank; empty for closed forms.
+  std::vector<surface::Surface> body_meshes;
   int64_t owned_points = 0, owned_springs = 0, owned_prisms = 0, owned_edges = 0;
   std::vector<int64_t> point_row;   ///< [local points] row in the whole model
   std::vector<int64_t> spring_row;  ///< [owned_springs]

@@ -35,6 +35,21 @@ class PushedShape {
   std::unique_ptr<Body> body_;
 };
 
+/// Measures how deep points are inside a closed mesh, by its triangles.
+class MeshDepth {
+ public:
+  /// Throws InputError for a mesh without area.
+  explicit MeshDepth(const surface::Surface& mesh);
+  ~MeshDepth();
+
+  /// mm, 0 outside.
+  double at(const Vec3& point) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
 /// Makes held points of the free skin points that an instrument to which the skin sticks sweeps
 /// over or ends on: their
 /// target is where the push takes them, on the surface of the instrument at the end of its push. A

@@ -35,8 +35,12 @@ struct StepNumbers {
   double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
   /// mm, estimate for the skin of a model coarser than the scene asks for; NaN for the scene's own.
   double discretisation_error = std::numeric_limits<double>::quiet_NaN();
-  /// mm, the deepest that anything passes what it touches; NaN where nothing is touched.
+  /// mm, largest depth past what is touched, by the smoothed distances that the search uses; NaN
+  /// without contact.
   double penetration = std::numeric_limits<double>::quiet_NaN();
+  /// mm, largest depth of a point inside a rigid body's own triangles (or closed form), less its
+  /// initial depth; NaN without contact with rigid bodies.
+  double penetration_exact = std::numeric_limits<double>::quiet_NaN();
   /// N mm, what contact adds to the objective, which vanishes as multipliers become exact;
   /// likewise.
   double contact_energy = std::numeric_limits<double>::quiet_NaN();
@@ -45,7 +49,7 @@ struct StepNumbers {
 /// A number of a step that a file may do without; it is NaN then.
 inline bool is_optional(std::string_view name) {
   return name.ends_with("_eigenvalue") || name == "discretisation_error" || name == "penetration" ||
-         name == "contact_energy";
+         name == "penetration_exact" || name == "contact_energy";
 }
 
 /// Calls visit(name, member) for every number of a step, in the order of the file.
@@ -76,6 +80,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("largest_eigenvalue", numbers.largest_eigenvalue);
   visit("discretisation_error", numbers.discretisation_error);
   visit("penetration", numbers.penetration);
+  visit("penetration_exact", numbers.penetration_exact);
   visit("contact_energy", numbers.contact_energy);
 }
 

@@ -32,6 +32,14 @@ struct Settings {
   PathSettings path;
 };
 
+/// Depth of free points inside a rigid body, beyond their initial depth.
+struct PenetrationDepth {
+  static constexpr double reported = 0.1;  ///< mm, depth from which points are counted
+  int64_t points = 0;                      ///< deeper than that
+  double deepest = 0;                      ///< mm
+  Vec3 where = Vec3::Zero();               ///< mm, current place of the deepest point
+};
+
 /// What the tissue presses on.
 struct BodyContact {
   int64_t points = 0;         ///< that press
@@ -39,6 +47,7 @@ struct BodyContact {
   int64_t inside = 0;         ///< points that were inside the body at the start, and stay so
   double deepest = 0;         ///< mm, of these
   Vec3 where = Vec3::Zero();  ///< mm, the deepest one at the start
+  PenetrationDepth exact;     ///< into a rigid body's own triangles, at the last step
 };
 
 /// Columns that a bone enters between their two deepest points.

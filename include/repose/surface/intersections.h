@@ -20,4 +20,9 @@ std::vector<bool> without_area(const Surface& surface);
 /// O(T log T + pairs).
 std::vector<std::pair<int64_t, int64_t>> self_intersections(const Surface& surface);
 
+/// Pairs of triangles that meet in `now` and did not in `before`, which has the same triangles;
+/// order and exactness as self_intersections().
+std::vector<std::pair<int64_t, int64_t>> new_intersections(const Surface& before,
+                                                           const Surface& now);
+
 }  // namespace repose::surface

@@ -1,5 +1,7 @@
 #include "repose/surface/defects.h"
 
+#include "repose/surface/intersections.h"
+
 #include "shapes.h"
 
 namespace repose::surface {
@@ -148,6 +150,19 @@ TEST(Defects, unsound_arrays_and_nothing_at_all) {
   s = cube();
   s.points[2].z() = std::numeric_limits<double>::infinity();
   EXPECT_NE(refusal([&] { inspect(s); }).find("cube: vertex 2"), std::string::npos);
+}
+
+/// A sheet that is folded over its middle, so that its far edge comes through the near half.
+TEST(NewIntersections, a_fold_is_found_and_what_met_before_is_not) {
+  const Surface flat = patch(6);
+  EXPECT_TRUE(new_intersections(flat, flat).empty());
+  Surface folded = flat;
+  for (Vec3& p : folded.points)
+    if (p.x() > 25) p = {25 - 0.8 * (p.x() - 25), p.y() + 1, 12 - 0.6 * (p.x() - 25)};
+  const auto pairs = new_intersections(flat, folded);
+  EXPECT_FALSE(pairs.empty());
+  EXPECT_EQ(pairs, self_intersections(folded));
+  EXPECT_TRUE(new_intersections(folded, folded).empty());
 }
 
 }  // namespace

@@ -1,0 +1,64 @@
+#include "exact_penetration.h"
+
+#include <algorithm>
+
+#include "repose/base/agreement.h"
+
+namespace repose::solve {
+
+namespace {
+
+void combine_ranks(MPI_Comm comm, PenetrationDepth& on) {
+  MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
+  struct {
+    double depth;
+    int rank;
+  } deepest{on.deepest, base::rank(comm)};
+  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
+  on.deepest = deepest.depth;
+  MPI_Bcast(on.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+}
+
+}  // namespace
+
+ExactPenetration::ExactPenetration(const discrete::Part& part)
+    : part_(part), meshes_(part.body_meshes.size()) {}
+
+/// mm inside a body, 0 outside, of a point given by RigidBody::beside().
+double ExactPenetration::depth(size_t body, const mechanics::RigidBody& shape, const Vec3& beside) {
+  const surface::Surface& mesh = part_.body_meshes[body];
+  if (mesh.triangles.empty()) return std::max(0.0, -shape.distance(beside).value);
+  if (!meshes_[body]) meshes_[body] = std::make_unique<model::MeshDepth>(mesh);
+  return meshes_[body]->at(beside);
+}
+
+void ExactPenetration::measure_own(discrete::Objective& objective,
+                                   std::vector<PenetrationDepth>& depths) {
+  const double near = 2 * part_.model.contact.spacing;  // mm, smoothing moves bodies by less
+  const std::vector<mechanics::RigidBody>& bodies = objective.touches().bodies();
+  const model::Touches& touches = part_.model.contact.touches;
+  for (size_t c = 0; c < touches.point.size(); ++c) {
+    const int32_t body = touches.body[c];
+    const Vec3& now = objective.positions().local()[touches.point[c]];
+    const Vec3 beside = bodies[body].beside(now);
+    if (bodies[body].distance(beside).value > near) continue;
+    double deeper = depth(body, bodies[body], beside);
+    if (deeper > 0)
+      deeper -= depth(body, bodies[body], part_.model.points.position[touches.point[c]]);
+    PenetrationDepth& on = depths[body];
+    on.points += deeper > PenetrationDepth::reported;
+    if (deeper <= on.deepest) continue;
+    on.deepest = deeper;
+    on.where = now;
+  }
+}
+
+std::vector<PenetrationDepth> ExactPenetration::measure(discrete::Objective& objective) {
+  MPI_Comm comm = objective.positions().comm();
+  std::vector<PenetrationDepth> depths(part_.bodies.size());
+  base::together(comm, [&] { measure_own(objective, depths); });
+  for (PenetrationDepth& on : depths) combine_ranks(comm, on);
+  return depths;
+}
+
+}  // namespace repose::solve

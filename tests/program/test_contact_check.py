@@ -1,0 +1,112 @@
+"""repose-check on contact: it measures by the bones' triangles, so that a result which is wrong
+about them is refused, whatever wrote it."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from conftest import PROJECT, runner
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory, environment):
+    """A result with tissue pressed on a bone's mesh."""
+    top = tmp_path_factory.mktemp("contact_check")
+    done = runner(top, environment)("repose-solve", PROJECT / "meshes/head_solid.yaml", "-output",
+                                    "good", "-load_steps", 1)
+    assert (done.returncode, done.stderr) == (0, ""), done
+    assert "exact penetration" in done.stdout
+    with h5py.File(top / "good.h5") as h5:
+        assert (h5["step/0001/point/contact_pressure"][:] > 0).any()
+    return top / "good.h5"
+
+
+def last_step(h5):
+    return h5[sorted(h5["step"].values(), key=lambda step: step.name)[-1].name]
+
+
+def state(attribute, change):
+    def spoil(h5):
+        last_step(h5).attrs[attribute] = change(last_step(h5).attrs[attribute])
+    return spoil
+
+
+def in_array(name, change):
+    def spoil(h5):
+        step = last_step(h5)
+        pressed = int(np.argmax(step["point/contact_pressure"][:]))
+        values = step[f"point/{name}"][:]
+        values[pressed] = change(values[pressed])
+        step[f"point/{name}"][...] = values
+    return spoil
+
+
+def no_pressures(h5):
+    last_step(h5)["point/contact_pressure"][...] = 0
+
+
+def grown_bones(h5):
+    """Bones 3 mm thicker than those that the solver kept tissue off."""
+    for bone in h5["model/bone_surface"].values():
+        points, triangles = bone["points"][:], bone["triangles"][:]
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        normals = np.zeros_like(points)
+        for k in range(3):
+            np.add.at(normals, triangles[:, k], np.cross(b - a, c - a))
+        bone["points"][...] = points + 3 * normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def moved_bone(h5):
+    transform = h5["model/bone_transform"][:]
+    transform[1, 1, 3] += 1
+    h5["model/bone_transform"][...] = transform
+
+
+SPOILED = {
+    "penetration stated 0.1 mm too deep": (state("penetration", lambda v: v + 0.1), "penetration"),
+    "exact penetration stated as none": (state("penetration_exact", lambda v: 0.0),
+                                         "penetration_exact"),
+    "exact penetration that is not there": (state("penetration_exact", lambda v: v + 0.01),
+                                            "penetration_exact"),
+    "a gap where tissue presses": (in_array("contact_gap", lambda v: v + 4), "contact_gap of point"),
+    "a force that pulls": (in_array("contact_force", lambda v: -v), "force"),
+    "a force twice as large": (in_array("contact_force", lambda v: 2 * v), "contact_force of point"),
+    "no pressures": (no_pressures, "contact_force"),
+    "thicker bones": (grown_bones, "contact_gap of point"),
+    "a bone elsewhere": (moved_bone, "position"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_a_result_that_is_wrong_about_contact_is_refused(good, tmp_path, environment, case):
+    spoil, words = SPOILED[case]
+    file = tmp_path / "spoiled.h5"
+    shutil.copyfile(good, file)
+    with h5py.File(file, "r+") as h5:
+        spoil(h5)
+    result = runner(tmp_path, environment)("repose-check", file)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result.stderr
+    wrong = [line for line in result.stdout.splitlines() if "DISAGREE" in line or "NOT SO" in line]
+    assert any(words in line for line in wrong), wrong
+
+
+def test_a_good_result_is_accepted_with_its_exact_penetration_and_without(good, tmp_path,
+                                                                          environment):
+    """Results of earlier versions do not state it."""
+    run = runner(tmp_path, environment)
+    result = run("repose-check", good)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    file = tmp_path / "earlier.h5"
+    shutil.copyfile(good, file)
+    with h5py.File(file, "r+") as h5:
+        for step in h5["step"].values():
+            del step.attrs["penetration_exact"]
+    result = run("repose-check", file)
+    assert (result.returncode, result.stderr) == (0, ""), result
+
+
+def test_skin_that_stays_apart_is_not(run, tmp_path):
+    done = run("repose-solve", PROJECT / "meshes/head_solid.yaml", "-output", "apart")
+    assert done.returncode == 0 and "self-contact" not in done.stdout, done
