@@ -16,6 +16,7 @@
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
+#include "repose/solve/supported.h"
 #include "repose/surface/write.h"
 #include "sensitivity.h"
 #include "strategy.h"
@@ -237,11 +238,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
 
-}  // namespace
-
-base::Exit run(const base::Options& options) {
+base::Exit run_input(const base::Options& options, const std::filesystem::path& input) {
   base::Stages stages(comm);
-  const std::filesystem::path input = options.arguments()[0];
   const bool dry = options.flag("dry_run");
   const std::string name = dry ? "" : result_name(options, input);
   std::optional<results::NameLock> lock;
@@ -264,6 +262,22 @@ base::Exit run(const base::Options& options) {
           number("time_limit", std::numeric_limits<double>::infinity()));
   if (options.has("restart")) run.restart(options.text("restart"));
   return run.solve(number("checkpoint_interval", 0), options.flag("allow_folded"));
+}
+
+}  // namespace
+
+base::Exit run(const base::Options& options) {
+  solve::require_supported_types();
+  const std::filesystem::path input = options.arguments()[0];
+  try {
+    return run_input(options, input);
+  } catch (const base::InputError& error) {
+    // A refusal on the way to the rest position of a model does not know its file.
+    const std::string text = error.what();
+    const bool named = text.find(input.filename().string()) != std::string::npos;
+    if (input.extension() != ".h5" || named) throw;
+    throw base::InputError(fmt::format("{}: {}", input.string(), text));
+  }
 }
 
 }  // namespace repose::app
