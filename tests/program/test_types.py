@@ -65,7 +65,7 @@ def expected():
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("option, value", WORKING, ids=" ".join)
+@pytest.mark.parametrize("option, value", WORKING)
 def test_a_type_of_the_table_works(run, scenes, tmp_path, expected, option, value, ranks):
     tissue = list(TISSUES)[(WORKING.index((option, value)) + ranks) % 2]  # the other on other ranks
 
