@@ -70,12 +70,4 @@ mpi_environment() {
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
   # Ranks that wait let others go on: on a busy machine a message takes no time slice then.
   export OMPI_MCA_mpi_yield_when_idle=1
-  # All ranks are on this machine: no network, which Open MPI 5 complains about where it is odd, and
-  # whose libraries take most of a start, one second of it asleep at the end.
-  export OMPI_MCA_pml=ob1 OMPI_MCA_btl=^tcp,ofi,openib
-  # A container's system-call filter forbids ranks to read each other's memory directly.
-  if grep -q '^Seccomp:[[:space:]]*2' /proc/self/status 2>/dev/null; then
-    export OMPI_MCA_btl_vader_single_copy_mechanism=none
-    export OMPI_MCA_btl_sm_single_copy_mechanism=none
-  fi
 }

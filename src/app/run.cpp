@@ -21,6 +21,7 @@
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
+#include "repose/solve/supported.h"
 #include "repose/surface/write.h"
 #include "self_contact.h"
 #include "sensitivity.h"
@@ -322,11 +323,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
 
-}  // namespace
-
-base::Exit run(const base::Options& options) {
+base::Exit run_input(const base::Options& options, const std::filesystem::path& input) {
   base::Stages stages(comm);
-  const std::filesystem::path input = options.arguments()[0];
   const bool dry = options.flag("dry_run");
   const std::string name = dry ? "" : result_name(options, input);
   std::optional<results::NameLock> lock;
@@ -351,6 +349,22 @@ base::Exit run(const base::Options& options) {
   if (options.has("restart"))
     if (const auto ended = run.restart(options.text("restart"), folds_allowed)) return *ended;
   return run.solve(number("checkpoint_interval", 0), folds_allowed);
+}
+
+}  // namespace
+
+base::Exit run(const base::Options& options) {
+  solve::require_supported_types();
+  const std::filesystem::path input = options.arguments()[0];
+  try {
+    return run_input(options, input);
+  } catch (const base::InputError& error) {
+    // A refusal on the way to the rest position of a model does not know its file.
+    const std::string text = error.what();
+    const bool named = text.find(input.filename().string()) != std::string::npos;
+    if (input.extension() != ".h5" || named) throw;
+    throw base::InputError(fmt::format("{}: {}", input.string(), text));
+  }
 }
 
 }  // namespace repose::app

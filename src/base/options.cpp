@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <sstream>
 
 #include "petsc_option_names.h"
 #include "repose/base/error.h"
@@ -137,7 +138,40 @@ std::vector<std::string> left_in_database() {
   return result;
 }
 
+/// Refuses a viewer, `type:file:format`, that PETSc could not open: it would say so at the end of a
+/// run, on one rank.
+void check_viewer(const std::string& name, const std::string& value) {
+  constexpr std::array types{"",    "ascii", "binary", "draw",   "socket",  "hdf5",
+                             "vtk", "saws",  "glvis",  "matlab", "exodusii"};
+  const auto ends = [&](const char* end) { return name.ends_with(end); };
+  const std::size_t colon = value.find(':');
+  if (!(ends("_view") || ends("_monitor") || ends("_reason")) || colon == std::string::npos) return;
+  const std::string type = value.substr(0, colon), rest = value.substr(colon + 1);
+  if (std::find(types.begin(), types.end(), type) == types.end())
+    refuse("-{} {}: viewer {} must be one of {}", name, value, type, fmt::join(types, " "));
+  const std::filesystem::path file = rest.substr(0, rest.find(':'));
+  std::error_code error;
+  if (file.has_parent_path() && !std::filesystem::is_directory(file.parent_path(), error))
+    refuse("-{} {}: there is no folder {}; make it first", name, value,
+           file.parent_path().string());
+}
+
 }  // namespace
+
+std::vector<std::pair<std::string, std::string>> petsc_options() {
+  char* text = nullptr;
+  base::check(PetscOptionsGetAll(nullptr, &text));
+  std::istringstream stream(text);
+  base::check(PetscFree(text));
+  std::vector<std::pair<std::string, std::string>> options;
+  for (std::string word; stream >> word;) {
+    if (const std::string name = name_of(word); !name.empty())
+      options.emplace_back(name, "");
+    else if (!options.empty() && options.back().second.empty())
+      options.back().second = word;
+  }
+  return options;
+}
 
 Options::Options(int argc, char* const* argv, std::string description,
                  std::vector<Argument> arguments, std::vector<Option> table)
@@ -225,6 +259,7 @@ void Options::read_database() {
     std::vector<std::string>& values = given_[option.name];
     if (!bare || option.kind == OptionKind::flag) values.push_back(bare ? "true" : value.data());
   }
+  for (const auto& [name, value] : petsc_options()) check_viewer(name, value);
   for (const std::string& name : left_in_database())
     if (!begins_as_petsc(name) && name != "help") unknown_.push_back(name);
 }

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "mpi_environment.h"
+
 namespace repose::base {
 
 namespace {
@@ -37,13 +39,14 @@ void check_options(PetscErrorCode code) {
 }
 
 Session::Session(int argc, char** argv, const char* help) {
-  setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0);
-  setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
+  set_mpi_variables();
   // With more, models are shared out over ranks in another way in every run (Scotch 7).
   setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
   ignore_broken_pipes();
-  check(PetscInitialize(&argc, &argv, nullptr, help));
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
+  if (const PetscErrorCode code = PetscInitialize(&argc, &argv, nullptr, help))
+    refuse("PETSc does not start with its options (command line, -options_file, PETSC_OPTIONS): {}",
+           text_of(code));
   // PETSc takes these for faults, of which it prints a page.
   std::signal(SIGTERM, SIG_DFL);
   std::signal(SIGHUP, SIG_DFL);
@@ -52,7 +55,6 @@ Session::Session(int argc, char** argv, const char* help) {
 Session::~Session() {
   // PETSc flushes it, and takes a broken pipe or a full disk there for a fault.
   if (std::fflush(stdout) != 0 && !std::freopen("/dev/null", "w", stdout)) std::fclose(stdout);
-  PetscPopErrorHandler();
   PetscFinalize();
 }
 

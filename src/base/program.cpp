@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <ctime>
 #include <fstream>
+#include <optional>
+#include <thread>
 
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
@@ -37,10 +39,30 @@ int guarded(Options& options, const std::function<Exit()>& work) {
   }
 }
 
+/// Ends a program that PETSc does not start in, which some ranks may not know.
+int leave(const InputError& error) {
+  constexpr std::chrono::seconds while_the_first_prints{1};
+  int started = 0;
+  MPI_Initialized(&started);
+  const bool first = !started || rank(MPI_COMM_WORLD) == 0;
+  if (!first) std::this_thread::sleep_for(while_the_first_prints);
+  std::fprintf(stderr, "error: %s\n", error.what());
+  std::fflush(stderr);
+  if (started && size(MPI_COMM_WORLD) > 1)
+    MPI_Abort(MPI_COMM_WORLD, static_cast<int>(Exit::bad_input));
+  if (started) MPI_Finalize();
+  return static_cast<int>(Exit::bad_input);
+}
+
 }  // namespace
 
 int run_program(Options& options, const std::function<Exit()>& work) {
-  Session session(options.petsc_argc(), options.petsc_argv(), nullptr);
+  std::optional<Session> session;
+  try {
+    session.emplace(options.petsc_argc(), options.petsc_argv(), nullptr);
+  } catch (const InputError& error) {
+    return leave(error);
+  }
   if (options.help_wanted()) {
     say(stdout, options.help());
     return static_cast<int>(Exit::done);

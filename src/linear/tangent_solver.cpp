@@ -53,8 +53,15 @@ constexpr double price_of_columns = 10, price_of_factors = 20;
 
 double price_of_renewal(double usual) {
   PetscReal price = usual;
-  check(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
+  base::check_options(PetscOptionsGetReal(nullptr, nullptr, "-pc_renewal_price", &price, nullptr));
   return price;
+}
+
+/// MINRES has no natural norm.
+void choose_norm(KSP krylov) {
+  PetscBool minres = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPMINRES, &minres));
+  if (minres) check(KSPSetNormType(krylov, KSP_NORM_PRECONDITIONED));
 }
 
 bool is_columns(PC pc) {
@@ -80,6 +87,7 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
   choose_preconditioner();
   lend_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
+  choose_norm(krylov_);
   if (is_columns(preconditioner())) lag_ = LagPolicy(price_of_renewal(price_of_columns));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
 }

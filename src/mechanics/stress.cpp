@@ -14,7 +14,7 @@ PrismState prism_state(double shear, double volume_slope, const std::array<Vec3,
   const Eigen::SelfAdjointEigenSolver<Mat3> squares(f.transpose() * f, Eigen::EigenvaluesOnly);
   PrismState state;
   state.stretch = squares.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
-  const Vec3 along = shear / std::abs(f.determinant()) * state.stretch.cwiseAbs2();
+  const Vec3 along = shear / f.determinant() * state.stretch.cwiseAbs2();
   state.pressure = -along.mean() - volume_slope;
   const Vec3 apart = along.array() - along.mean();
   state.von_mises = std::sqrt(1.5) * apart.norm();

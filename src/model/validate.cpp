@@ -2,11 +2,13 @@
 #include <cmath>
 #include <set>
 
+#include "array_check.h"
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/model/model.h"
 #include "repose/model/prism_geometry.h"
 #include "repose/scene/rigid_motion.h"
+#include "repose/surface/defects.h"
 #include "repose/surface/edges.h"
 
 namespace repose::model {
@@ -15,104 +17,164 @@ namespace {
 
 using base::refuse;
 
-/// Refuses what is wrong with one array, naming it as the file does.
-class Array {
- public:
-  Array(const std::string& file, const char* name) : file_(file), name_(name) {}
+// No energy of numbers up to these overflows.
+constexpr double farthest = 1e7, largest = 1e30;
+constexpr Limits place{-farthest, farthest, "mm"}, any{-largest, largest, ""};
 
-  void has_rows(size_t rows, size_t expected) const {
-    if (rows != expected)
-      refuse("{}: /model/{}: has {} rows, expected {}, one for each", file_, name_, rows, expected);
-  }
-  void is_finite(const std::vector<Vec3>& values) const {
-    for (size_t i = 0; i < values.size(); ++i)
-      if (!values[i].allFinite())
-        refuse("{}: /model/{}: row {} is ({}, {}, {}), expected finite numbers", file_, name_, i,
-               values[i][0], values[i][1], values[i][2]);
-  }
-  void is_finite(const std::vector<double>& values) const {
-    for (size_t i = 0; i < values.size(); ++i)
-      if (!std::isfinite(values[i]))
-        refuse("{}: /model/{}: row {} is {}, expected a finite number", file_, name_, i, values[i]);
-  }
-  void is_not_negative(const std::vector<double>& values, const char* unit) const {
-    for (size_t i = 0; i < values.size(); ++i)
-      if (!std::isfinite(values[i]) || values[i] < 0)
-        refuse("{}: /model/{}: row {} is {} {}, expected a finite number, 0 or more", file_, name_,
-               i, values[i], unit);
-  }
-  void is_positive(const std::vector<double>& values, const char* unit, const char* remedy) const {
-    for (size_t i = 0; i < values.size(); ++i)
-      if (!std::isfinite(values[i]) || values[i] <= 0)
-        refuse("{}: /model/{}: row {} is {} {}, expected a finite number above 0: {}", file_, name_,
-               i, values[i], unit, remedy);
-  }
-  void is_within(int64_t value, size_t row, int64_t first, int64_t last) const {
-    if (value < first || value > last)
-      refuse("{}: /model/{}: row {} is {}, expected {} to {}", file_, name_, row, value, first,
-             last);
-  }
-  template <class Int>
-  void all_within(const std::vector<Int>& values, int64_t first, int64_t last) const {
-    for (size_t i = 0; i < values.size(); ++i)
-      is_within(static_cast<int64_t>(values[i]), i, first, last);
-  }
-  template <size_t K>
-  void all_index(const std::vector<std::array<int64_t, K>>& rows, size_t count) const {
-    for (size_t i = 0; i < rows.size(); ++i)
-      for (const int64_t index : rows[i]) is_within(index, i, 0, static_cast<int64_t>(count) - 1);
-  }
-
- private:
-  const std::string& file_;
-  const char* name_;
-};
-
-void validate_points(const Points& p, int64_t bones, const std::string& file) {
-  const size_t n = p.position.size();
-  if (n == 0) refuse("{}: /model/point/position: has no row; a model has at least one point", file);
-  Array(file, "point/set").has_rows(p.set.size(), n);
-  Array(file, "point/target").has_rows(p.target.size(), n);
-  Array(file, "point/layer").has_rows(p.layer.size(), n);
-  Array(file, "point/column").has_rows(p.column.size(), n);
-  Array(file, "point/bone").has_rows(p.bone.size(), n);
-  Array(file, "point/mass").has_rows(p.mass.size(), n);
-  Array(file, "point/external_force").has_rows(p.external_force.size(), n);
-  Array(file, "point/position").is_finite(p.position);
-  Array(file, "point/target").is_finite(p.target);
-  Array(file, "point/external_force").is_finite(p.external_force);
-  Array(file, "point/mass").is_not_negative(p.mass, "kg");
-  Array(file, "point/set").all_within(p.set, 0, 3);
-  Array(file, "point/layer").all_within(p.layer, 0, INT32_MAX);
-  Array(file, "point/column").all_within(p.column, 0, INT64_MAX);
-  Array(file, "point/bone").all_within(p.bone, -1, bones - 1);
-  for (size_t i = 0; i < n; ++i)
-    if (p.set[i] == PointSet::bone && p.bone[i] < 0)
-      refuse(
-          "{}: /model/point/bone: row {} is -1, but point/set makes it a bone point; name its bone",
-          file, i);
+constexpr Limits at_least_zero(const char* unit) { return {0, largest, unit}; }
+constexpr Limits positive(const char* unit, const char* remedy) {
+  return {0, largest, unit, true, remedy};
 }
 
-void validate_springs(const Springs& s, size_t points, size_t sets, const std::string& file) {
+// The table of the format: for each array its shape, allowed values and what it refers to.
+
+void check_points(const Points& p, size_t bones, const ArrayCheck& check) {
+  const size_t n = p.position.size();
+  if (n == 0) check.refuse("point/position", "has no row; a model has at least one point");
+  check.vectors("point/position", p.position, n, place);
+  check.vectors("point/target", p.target, n, place);
+  check.integers("point/set", p.set, n, 0, 3);
+  check.integers("point/layer", p.layer, n, 0, INT32_MAX);
+  check.integers("point/column", p.column, n, 0, INT64_MAX);
+  check.integers("point/bone", p.bone, n, -1, static_cast<int64_t>(bones) - 1);
+  check.numbers("point/mass", p.mass, n, at_least_zero("kg"));
+  check.vectors("point/external_force", p.external_force, n, any);
+}
+
+void check_springs(const Springs& s, size_t points, size_t sets, const ArrayCheck& check) {
   const size_t n = s.points.size();
-  Array(file, "spring/set").has_rows(s.set.size(), n);
-  Array(file, "spring/rest_length").has_rows(s.rest_length.size(), n);
-  Array(file, "spring/stiffness").has_rows(s.stiffness.size(), n);
-  Array(file, "spring/exponent").has_rows(s.exponent.size(), n);
-  Array(file, "spring/reference").has_rows(s.reference.size(), n);
-  Array(file, "spring/points").all_index(s.points, points);
-  for (size_t j = 0; j < n; ++j)
-    if (s.points[j][0] == s.points[j][1])
-      refuse(
-          "{}: /model/spring/points: row {} is ({}, {}), expected two different points: a spring "
-          "between a point and itself holds nothing; remove it",
-          file, j, s.points[j][0], s.points[j][1]);
-  Array(file, "spring/set").all_within(s.set, 0, static_cast<int64_t>(sets) - 1);
-  Array(file, "spring/rest_length").is_not_negative(s.rest_length, "mm");
-  Array(file, "spring/stiffness").is_not_negative(s.stiffness, "N/mm");
-  Array(file, "spring/exponent").all_within(s.exponent, 0, 2);
-  Array(file, "spring/reference")
-      .is_positive(s.reference, "mm", "1 is the paper's, the initial length makes it a strain");
+  check.indices("spring/points", s.points, points);
+  check.integers("spring/set", s.set, n, 0, static_cast<int64_t>(sets) - 1);
+  check.numbers("spring/rest_length", s.rest_length, n, {0, farthest, "mm"});
+  check.numbers("spring/stiffness", s.stiffness, n, at_least_zero("N/mm"));
+  check.integers("spring/exponent", s.exponent, n, 0, 2);
+  check.numbers("spring/reference", s.reference, n,
+                positive("mm", "1 is the paper's, the initial length makes it a strain"));
+}
+
+void check_prisms(const Prisms& p, size_t points, bool solid, const ArrayCheck& check) {
+  const size_t n = p.points.size(), of_solid = solid ? n : 0;
+  check.indices("prism/points", p.points, points);
+  check.numbers("prism/rest_volume", p.rest_volume, n,
+                positive("mm³", "order prism/points so that it is, and mend flat prisms"));
+  check.numbers("prism/modulus", p.modulus, of_solid, positive("N/mm²", "κ is Lamé's λ + μ"));
+  check.numbers("prism/shear_modulus", p.shear_modulus, of_solid,
+                positive("N/mm²", "it is Lamé's μ"));
+  check.numbers("prism/target_volume", p.target_volume, of_solid, any);
+  check.numbers("prism/nodal_modulus", p.nodal_modulus, p.nodal_modulus.empty() ? 0 : n,
+                positive("N/mm²", "it is Lamé's λ"));
+}
+
+void check_edges(const Edges& edges, size_t points, const ArrayCheck& check) {
+  check.indices("edge/points", edges.points, points);
+  check.numbers("edge/weight", edges.weight, edges.points.size(), any);
+}
+
+void check_elements(const std::vector<TermElements>& all, size_t points, const ArrayCheck& check) {
+  constexpr int64_t most_points = 32, most_numbers = 1024;
+  for (size_t k = 0; k < all.size(); ++k) {
+    const std::string name = fmt::format("element/{}", k);
+    const TermElements& of = all[k];
+    check.integer(name, 0, of.points_each, 1, most_points);
+    check.integer(name, 0, of.numbers_each, 0, most_numbers);
+    check.integers(name + "/points", of.points, of.size() * static_cast<size_t>(of.points_each), 0,
+                   static_cast<int64_t>(points) - 1);
+    check.numbers(name + "/numbers", of.numbers, of.size() * static_cast<size_t>(of.numbers_each),
+                  any);
+  }
+}
+
+void check_surface(const std::string& group, const surface::Surface& mesh,
+                   const ArrayCheck& check) {
+  check.vectors(group + "/points", mesh.points, mesh.points.size(), place);
+  check.indices(group + "/triangles", mesh.triangles, mesh.points.size());
+}
+
+void check_bones(const Model& m, const ArrayCheck& check) {
+  const size_t n = m.bones.size();
+  check.rows("bone_transform", m.bone_transform.size(), m.bone_transform.empty() ? 0 : n);
+  for (size_t b = 0; b < m.bone_transform.size(); ++b)
+    for (const double value : m.bone_transform[b].reshaped())
+      check.number("bone_transform", b, value, place);
+  check.rows("bone_surface", m.bone_surfaces.size(), m.bone_surfaces.empty() ? 0 : n);
+  for (size_t b = 0; b < m.bone_surfaces.size(); ++b)
+    check_surface(fmt::format("bone_surface/{}", b), m.bone_surfaces[b], check);
+}
+
+void check_touches(const Contact& contact, size_t points, size_t bones, const ArrayCheck& check) {
+  const Touches& touches = contact.touches;
+  const size_t n = touches.point.size(), bodies = contact.bodies.size();
+  constexpr double finest = 1e-3;  // mm, of a grid
+  check.number("contact attribute stiffness", 0, contact.stiffness, positive("N/mm³", ""));
+  check.number("contact attribute grid", 0, contact.spacing, {finest, farthest, "mm"});
+  check.integers("contact/point", touches.point, n, 0, static_cast<int64_t>(points) - 1);
+  check.integers("contact/body_row", touches.body, n, 0, static_cast<int64_t>(bodies) - 1);
+  check.integers("contact/binding", touches.binding, n, 0, 1);
+  check.numbers("contact/area", touches.area, n, at_least_zero("mm²"));
+  for (size_t k = 0; k < bodies; ++k) {
+    check.integer("contact/body_bone", k, contact.bodies[k].bone, -1,
+                  static_cast<int64_t>(bones) - 1);
+    for (const double value : contact.bodies[k].push)
+      check.number("contact/body_push", k, value, place);
+  }
+}
+
+void check_walls(const Walls& walls, size_t point_count, const ArrayCheck& check) {
+  const auto points = static_cast<int64_t>(point_count);
+  int64_t places = 0;
+  for (size_t k = 0; k < walls.size.size(); ++k) {
+    for (const int64_t n : walls.size[k]) check.integer("contact/wall/net", k, n, 2, points);
+    places += walls.size[k][0] * walls.size[k][1];
+    check.integer("contact/wall/net", k, places, 4, points * points);
+  }
+  const auto shares = static_cast<int64_t>(walls.point.size());
+  check.integers("contact/wall/begin", walls.begin,
+                 walls.empty() ? 0 : static_cast<size_t>(2 * places + 1), 0, shares);
+  for (size_t c = 1; c < walls.begin.size(); ++c)
+    check.integer("contact/wall/begin", c, walls.begin[c], walls.begin[c - 1] + 1, shares);
+  if (!walls.empty()) {
+    check.integer("contact/wall/begin", 0, walls.begin.front(), 0, 0);
+    check.integer("contact/wall/begin", walls.begin.size() - 1, walls.begin.back(), shares, shares);
+  }
+  check.integers("contact/wall/point", walls.point, walls.point.size(), 0, points - 1);
+  check.numbers("contact/wall/weight", walls.weight, walls.point.size(), any);
+  check.numbers("contact/wall/area", walls.area, static_cast<size_t>(places), at_least_zero("mm²"));
+}
+
+void check_arrays(const Model& m, const ArrayCheck& check) {
+  const size_t points = m.points.position.size(), bones = m.bones.size();
+  constexpr double heaviest = 1e6;  // N/kg
+  for (const double value : m.gravity)
+    check.number("attribute gravity", 0, value, {-heaviest, heaviest, "N/kg"});
+  check_points(m.points, bones, check);
+  check_springs(m.springs, points, m.spring_sets.size(), check);
+  check_prisms(m.prisms, points, is_solid(m) || !m.edges.points.empty(), check);
+  check_edges(m.edges, points, check);
+  check_elements(m.elements, points, check);
+  check.indices("skin/points", m.skin, points);
+  check_bones(m, check);
+  if (m.contact.empty()) return;
+  check_touches(m.contact, points, bones, check);
+  check_walls(m.contact.walls, points, check);
+}
+
+// What arrays must be to one another.
+
+void require_bones(const Points& p, const ArrayCheck& check) {
+  for (size_t i = 0; i < p.set.size(); ++i)
+    if (p.set[i] == PointSet::bone && p.bone[i] < 0)
+      check.refuse(
+          "point/bone",
+          fmt::format("row {} is -1, but point/set makes it a bone point; name its bone", i));
+}
+
+void require_rigid(const Model& m, const ArrayCheck& check) {
+  for (size_t b = 0; b < m.bone_transform.size(); ++b) try {
+      scene::RigidMotion::from_matrix(m.bone_transform[b]);
+    } catch (const base::InputError& error) {
+      check.refuse("bone_transform",
+                   fmt::format("row {} (bone {}): {}", b, m.bones[b], error.what()));
+    }
 }
 
 // A millionth, and what rounding the coordinates to single precision may do to the volume.
@@ -125,117 +187,112 @@ double volume_tolerance(const Vec3 corners[6]) {
   return 1e-6 * std::abs(prism_volume(corners)) + 2e-7 * coordinate * extent * extent;
 }
 
-void refuse_wrong_volume(const Model& m, const std::string& file) {
+void require_volumes(const Model& m, const ArrayCheck& check) {
   for (size_t i = 0; i < m.prisms.points.size(); ++i) {
     Vec3 corners[6];
     for (int j = 0; j < 6; ++j) corners[j] = m.points.position[m.prisms.points[i][j]];
     const double volume = prism_volume(corners), stored = m.prisms.rest_volume[i];
     if (!(std::abs(volume - stored) <= volume_tolerance(corners)))
-      refuse(
-          "{}: /model/prism/rest_volume: row {} is {} mm³, but the prism's volume at "
-          "point/position is {} mm³; write that volume, order prism/points so that it is above 0",
-          file, i, stored, volume);
+      check.refuse(
+          "prism/rest_volume",
+          fmt::format("row {} is {} mm³, but the prism's volume at point/position is {} mm³; write "
+                      "that volume, order prism/points so that it is above 0",
+                      i, stored, volume));
   }
 }
 
-void validate_nodal(const Prisms& p, const std::string& file) {
-  if (p.nodal_modulus.empty()) return;
-  Array(file, "prism/nodal_modulus").has_rows(p.nodal_modulus.size(), p.points.size());
-  Array(file, "prism/nodal_modulus").is_positive(p.nodal_modulus, "N/mm²", "it is Lamé's λ");
-  for (size_t m = 0; m < p.points.size(); ++m)
+void require_parts_of_moduli(const Prisms& p, const ArrayCheck& check) {
+  for (size_t m = 0; m < p.nodal_modulus.size(); ++m)
     if (!(p.nodal_modulus[m] < p.modulus[m]))
-      refuse("{}: /model/prism/nodal_modulus: row {} is {} N/mm²; must be below prism/modulus, {}",
-             file, m, p.nodal_modulus[m], p.modulus[m]);
+      check.refuse("prism/nodal_modulus",
+                   fmt::format("row {} is {} N/mm²; must be below prism/modulus, {}", m,
+                               p.nodal_modulus[m], p.modulus[m]));
 }
 
-/// A solid's material and edges, all of them or none.
-void validate_solid(const Model& m, const std::string& file) {
-  const Prisms& p = m.prisms;
-  if (!is_solid(m) && m.edges.points.empty()) return;
-  const size_t n = p.points.size();
-  Array(file, "prism/modulus").has_rows(p.modulus.size(), n);
-  Array(file, "prism/shear_modulus").has_rows(p.shear_modulus.size(), n);
-  Array(file, "prism/target_volume").has_rows(p.target_volume.size(), n);
-  Array(file, "prism/modulus").is_positive(p.modulus, "N/mm²", "κ is Lamé's λ + μ");
-  Array(file, "prism/shear_modulus").is_positive(p.shear_modulus, "N/mm²", "it is Lamé's μ");
-  Array(file, "prism/target_volume").is_finite(p.target_volume);
-  validate_nodal(p, file);
-  Array(file, "edge/weight").has_rows(m.edges.weight.size(), m.edges.points.size());
-  Array(file, "edge/points").all_index(m.edges.points, m.points.position.size());
-  Array(file, "edge/weight").is_finite(m.edges.weight);
-  if (!m.springs.points.empty())
-    refuse("{}: /model/spring: has {} rows beside /model/edge; a model is of springs or a solid",
-           file, m.springs.points.size());
+void require_one_tissue(const Model& m, const ArrayCheck& check) {
+  if (!m.springs.points.empty() && (is_solid(m) || !m.edges.points.empty()))
+    check.refuse("spring",
+                 fmt::format("has {} rows beside /model/edge; a model is of springs or a solid",
+                             m.springs.points.size()));
 }
 
-void validate_prisms(const Model& m, const std::string& file) {
-  const Prisms& p = m.prisms;
-  Array(file, "prism/rest_volume").has_rows(p.rest_volume.size(), p.points.size());
-  Array(file, "prism/points").all_index(p.points, m.points.position.size());
-  Array(file, "prism/rest_volume")
-      .is_positive(p.rest_volume, "mm³", "order prism/points so that it is, and mend flat prisms");
-  refuse_wrong_volume(m, file);
-}
-
-void validate_bones(const Model& m, const std::string& file) {
-  if (!m.bone_transform.empty())
-    Array(file, "bone_transform").has_rows(m.bone_transform.size(), m.bones.size());
-  for (size_t b = 0; b < m.bone_transform.size(); ++b) try {
-      scene::RigidMotion::from_matrix(m.bone_transform[b]);
-    } catch (const base::InputError& error) {
-      refuse("{}: /model/bone_transform: row {} (bone {}): {}", file, b, m.bones[b], error.what());
+void require_different_points(const Model& m, const ArrayCheck& check) {
+  check.different("spring/points", m.springs.points);
+  check.different("prism/points", m.prisms.points);
+  check.different("edge/points", m.edges.points);
+  for (size_t k = 0; k < m.elements.size(); ++k)
+    for (size_t e = 0; e < m.elements[k].size(); ++e) {
+      const auto points = m.elements[k].points_of(e);
+      if (std::set<int64_t>(points.begin(), points.end()).size() != points.size())
+        check.refuse(fmt::format("element/{}", k),
+                     fmt::format("element {} has one of its points twice", e));
     }
-  if (!m.bone_surfaces.empty())
-    Array(file, "bone_surface").has_rows(m.bone_surfaces.size(), m.bones.size());
-  for (size_t b = 0; b < m.bone_surfaces.size(); ++b) {
-    const std::string group = fmt::format("bone_surface/{}/", b);
-    Array(file, (group + "points").c_str()).is_finite(m.bone_surfaces[b].points);
-    Array(file, (group + "triangles").c_str())
-        .all_index(m.bone_surfaces[b].triangles, m.bone_surfaces[b].points.size());
-  }
 }
 
-void validate_walls(const Walls& walls, int64_t points, const std::string& file) {
-  int64_t places = 0;
-  for (size_t k = 0; k < walls.size.size(); ++k) {
-    for (const int64_t n : walls.size[k])
-      Array(file, "contact/wall/net").is_within(n, k, 2, points);
-    places += walls.size[k][0] * walls.size[k][1];
-    Array(file, "contact/wall/net").is_within(places, k, 4, points * points);
-  }
-  Array(file, "contact/wall/begin")
-      .has_rows(walls.begin.size(), walls.empty() ? 0 : static_cast<size_t>(2 * places + 1));
-  const auto shares = static_cast<int64_t>(walls.point.size());
-  for (size_t c = 1; c < walls.begin.size(); ++c)
-    Array(file, "contact/wall/begin")
-        .is_within(walls.begin[c], c, c == 1 ? 1 : walls.begin[c - 1] + 1, shares);
-  if (!walls.empty()) {
-    Array(file, "contact/wall/begin").is_within(walls.begin.front(), 0, 0, 0);
-    Array(file, "contact/wall/begin").is_within(walls.begin.back(), 2 * places, shares, shares);
-  }
-  Array(file, "contact/wall/point").all_within(walls.point, 0, points - 1);
-  Array(file, "contact/wall/weight").has_rows(walls.weight.size(), walls.point.size());
-  Array(file, "contact/wall/weight").is_finite(walls.weight);
-  Array(file, "contact/wall/area").has_rows(walls.area.size(), static_cast<size_t>(places));
-  Array(file, "contact/wall/area").is_not_negative(walls.area, "mm²");
+void require_closed(const std::string& name, const surface::Surface& mesh,
+                    const ArrayCheck& check) {
+  if (mesh.triangles.empty())
+    check.refuse(name, "has no triangles; tissue can only touch a closed surface");
+  if (const surface::Defects defects = surface::inspect(mesh, false); !defects.outward)
+    check.refuse(name, fmt::format("must be a closed surface that faces outward; it has {}",
+                                   surface::describe(defects)));
 }
 
-void validate_contact(const Model& m, const std::string& file) {
+/// Shapes of bodies, in rows of contact/body_shape or as a mesh.
+class ShapeCheck {
+ public:
+  ShapeCheck(size_t row, const ArrayCheck& check) : row_(row), check_(check) {}
+
+  void operator()(const scene::Sphere& ball) const {
+    at(ball.center);
+    above_zero(ball.radius);
+  }
+  void operator()(const scene::Capsule& capsule) const {
+    at(capsule.from);
+    at(capsule.to);
+    above_zero(capsule.radius);
+  }
+  void operator()(const scene::Box& box) const {
+    at(box.center);
+    for (const double size : box.size) above_zero(size);
+  }
+  void operator()(const scene::HalfSpace& half) const {
+    at(half.point);
+    at(half.normal);
+    above_zero(half.normal.norm());
+  }
+  void operator()(const surface::Surface& mesh) const {
+    const std::string group = fmt::format("contact/body_mesh/{}", row_);
+    check_surface(group, mesh, check_);
+    require_closed(group, mesh, check_);
+  }
+
+ private:
+  void at(const Vec3& numbers) const {
+    for (const double value : numbers) check_.number("contact/body_shape", row_, value, place);
+  }
+  void above_zero(double value) const {
+    check_.number("contact/body_shape", row_, value,
+                  {0, farthest, "mm", true, "a radius, a box's size, the length of a normal"});
+  }
+
+  size_t row_;
+  const ArrayCheck& check_;
+};
+
+void require_bodies(const Model& m, const ArrayCheck& check) {
   if (m.contact.empty()) return;
-  const auto points = static_cast<int64_t>(m.points.position.size());
-  const Touches& touches = m.contact.touches;
-  Array(file, "contact attributes stiffness and grid")
-      .is_positive({m.contact.stiffness, m.contact.spacing}, "N/mm³ or mm", "both are");
-  Array(file, "contact/point").all_within(touches.point, 0, points - 1);
-  const auto bodies = static_cast<int64_t>(m.contact.bodies.size());
-  Array(file, "contact/body_row").all_within(touches.body, 0, bodies - 1);
-  for (size_t c = 0; c < touches.binding.size(); ++c)
-    Array(file, "contact/binding").is_within(static_cast<int64_t>(touches.binding[c]), c, 0, 1);
-  Array(file, "contact/area").is_not_negative(touches.area, "mm²");
-  for (size_t k = 0; k < m.contact.bodies.size(); ++k)
-    Array(file, "contact/body_bone")
-        .is_within(m.contact.bodies[k].bone, k, -1, static_cast<int64_t>(m.bones.size()) - 1);
-  validate_walls(m.contact.walls, points, file);
+  for (size_t k = 0; k < m.contact.bodies.size(); ++k) {
+    const Body& body = m.contact.bodies[k];
+    if (body.bone < 0)
+      std::visit(ShapeCheck(k, check), body.shape);
+    else if (m.bone_surfaces.empty())
+      check.refuse("bone_surface",
+                   fmt::format("is missing, but contact/body_bone row {} is bone {}", k,
+                               m.bones[body.bone]));
+    else
+      require_closed(fmt::format("bone_surface/{}", body.bone), m.bone_surfaces[body.bone], check);
+  }
 }
 
 void refuse_unattached(const Model& m, const std::string& file) {
@@ -251,30 +308,6 @@ void refuse_unattached(const Model& m, const std::string& file) {
           "it with a spring (/model/spring) or, of a solid, an edge (/model/edge), or make it a "
           "boundary point (set 1)",
           file, i);
-}
-
-void validate_elements(const Model& m, const std::string& file) {
-  constexpr int64_t most_points = 32, most_numbers = 1024;
-  for (size_t k = 0; k < m.elements.size(); ++k) {
-    const TermElements& of = m.elements[k];
-    const std::string name = fmt::format("element/{}", k), points_name = name + "/points",
-                      numbers_name = name + "/numbers";
-    Array(file, name.c_str()).is_within(of.points_each, 0, 1, most_points);
-    Array(file, name.c_str()).is_within(of.numbers_each, 0, 0, most_numbers);
-    const auto each = static_cast<size_t>(of.points_each);
-    const auto numbers_each = static_cast<size_t>(of.numbers_each);
-    Array(file, points_name.c_str()).has_rows(of.points.size(), of.size() * each);
-    Array(file, numbers_name.c_str()).has_rows(of.numbers.size(), of.size() * numbers_each);
-    Array(file, points_name.c_str())
-        .all_within(of.points, 0, static_cast<int64_t>(m.points.position.size()) - 1);
-    Array(file, numbers_name.c_str()).is_finite(of.numbers);
-    for (size_t e = 0; e < of.size(); ++e) {
-      const auto points = of.points_of(e);
-      const std::set<int64_t> different(points.begin(), points.end());
-      if (different.size() != points.size())
-        refuse("{}: /model/element/{}: element {} has one of its points twice", file, k, e);
-    }
-  }
 }
 
 void refuse_floating(const Model& m, const std::string& file) {
@@ -320,16 +353,15 @@ Counts count(const Model& model) {
 }
 
 void validate(const Model& model, const std::string& file) {
-  const size_t points = model.points.position.size();
-  if (!model.gravity.allFinite()) refuse("{}: /model attribute gravity: is not finite", file);
-  validate_points(model.points, static_cast<int64_t>(model.bones.size()), file);
-  validate_springs(model.springs, points, model.spring_sets.size(), file);
-  validate_prisms(model, file);
-  validate_solid(model, file);
-  Array(file, "skin/points").all_index(model.skin, points);
-  validate_bones(model, file);
-  validate_contact(model, file);
-  validate_elements(model, file);
+  const ArrayCheck check(file);
+  check_arrays(model, check);
+  require_bones(model.points, check);
+  require_different_points(model, check);
+  require_volumes(model, check);
+  require_parts_of_moduli(model.prisms, check);
+  require_one_tissue(model, check);
+  require_rigid(model, check);
+  require_bodies(model, check);
   refuse_unattached(model, file);
   refuse_floating(model, file);
 }

@@ -89,6 +89,19 @@ std::vector<model::TermElements> read_elements(const Reader& in) {
   return all;
 }
 
+constexpr int8_t bone_kind = 0, mesh_kind = 5;
+
+void require_kind(const Reader& in, int64_t k, int8_t kind, int32_t bone) {
+  if (kind < bone_kind || kind > mesh_kind)
+    in.refuse("/model/contact/body_kind",
+              fmt::format("row {} is {}, expected {} to {}", k, kind, bone_kind, mesh_kind));
+  if ((kind == bone_kind) != (bone >= 0))
+    in.refuse("/model/contact/body_kind",
+              fmt::format("row {} is {}, but body_bone is {}; a body of kind 0 names its bone, "
+                          "another has -1",
+                          k, kind, bone));
+}
+
 model::Body::Shape read_shape(const Reader& in, int64_t k, int8_t kind, const double* of) {
   const auto vector = [&](int first) { return Vec3(of[first], of[first + 1], of[first + 2]); };
   if (kind == 1) return scene::Sphere{vector(0), of[3]};
@@ -96,7 +109,7 @@ model::Body::Shape read_shape(const Reader& in, int64_t k, int8_t kind, const do
   if (kind == 3) return scene::Box{vector(0), vector(3)};
   if (kind == 4) return scene::HalfSpace{vector(0), vector(3)};
   surface::Surface mesh;
-  if (kind == 0) return mesh;
+  if (kind == bone_kind) return mesh;
   const std::string group = fmt::format("/model/contact/body_mesh/{}", k);
   mesh.name = group;
   mesh.points = in.vectors(group + "/points", Shape::any);
@@ -115,10 +128,12 @@ model::Contact read_contact(const Reader& in) {
   const auto kind = in.integers<int8_t>(group + "/body_kind", bodies);
   const auto push = in.vectors(group + "/body_push", bodies);
   const auto shape = in.numbers(group + "/body_shape", {bodies, {model::shape_numbers}});
-  for (int64_t k = 0; k < bodies; ++k)
+  for (int64_t k = 0; k < bodies; ++k) {
+    require_kind(in, k, kind[k], bone[k]);
     contact.bodies.push_back({names[k], bone[k],
                               read_shape(in, k, kind[k], shape.data() + model::shape_numbers * k),
                               push[k]});
+  }
   model::Touches& touches = contact.touches;
   touches.point = in.integers<int64_t>(group + "/point", Shape::any);
   const auto c = static_cast<int64_t>(touches.point.size());

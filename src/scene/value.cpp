@@ -1,12 +1,16 @@
 #include "value.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "repose/base/text.h"
 
 namespace repose::scene {
 
 namespace {
+
+// Of vectors and matrices, in mm, N, N/kg or none; no energy of such numbers overflows.
+constexpr double largest_component = 1e7;
 
 std::string joined(const std::string& above, const std::string& name) {
   return above.empty() ? name : fmt::format("{}.{}", above, name);
@@ -90,7 +94,12 @@ std::vector<double> Value::numbers() const {
   const Key& key = find_key(path_);
   const std::string wanted = base::wanted_number(false, key.unit, key.range, {});
   std::vector<double> result;
-  for (const Value& element : elements()) result.push_back(element.number_as(wanted));
+  for (const Value& element : elements()) {
+    result.push_back(element.number_as(wanted));
+    if (std::abs(result.back()) > largest_component)
+      refuse("must be {} of no more than {:g}, one is {}", wanted, largest_component,
+             element.shown());
+  }
   return result;
 }
 
@@ -179,9 +188,11 @@ void Value::add_entry(Entry entry, std::vector<Entry>& found) const {
 
 Map::Map(const Value& value) : itself_(value), entries_(value.entries()) {
   for (const Value::Entry& entry : entries_) check_known(entry);
-  for (const Key* key : keys_below(itself_.path_))
-    if (key->required() && !find(last_word(key->path)))
-      itself_.refuse("lacks the key '{}': {}", last_word(key->path), wanted(*key));
+  for (const Key* key : keys_below(itself_.path_)) {
+    if (key->required()) at(last_word(key->path));
+    const auto given = key->kind == KeyKind::choice ? find(last_word(key->path)) : std::nullopt;
+    if (given) given->choice();
+  }
 }
 
 void Map::check_known(const Value::Entry& entry) const {
@@ -216,8 +227,7 @@ std::optional<Value> Map::find(const std::string& name) const {
 
 Value Map::at(const std::string& name) const {
   if (auto value = find(name)) return *value;
-  throw base::InternalError(
-      fmt::format("scene key {} is not required in the table", joined(itself_.path_, name)));
+  itself_.refuse("lacks the key '{}': {}", name, wanted(find_key(joined(itself_.path_, name))));
 }
 
 }  // namespace repose::scene

@@ -8,6 +8,7 @@
 #include "progress_test.h"
 #include "repose/base/error.h"
 #include "repose/base/petsc.h"
+#include "repose/solve/supported.h"
 
 namespace repose::solve {
 
@@ -39,18 +40,6 @@ bool uses_hessian(Tao tao) {
   check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(tao), &newton, TAONLS, TAONTR,
                                   TAONTL, TAOBNLS, TAOBNTR, TAOBNTL, ""));
   return newton;
-}
-
-/// PETSc's GLTR (3.18) writes behind its workspace where it meets negative curvature.
-void refuse_lanczos(KSP krylov) {
-  PetscBool lanczos = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPGLTR, &lanczos));
-  const char* prefix = nullptr;
-  check(KSPGetOptionsPrefix(krylov, &prefix));
-  if (lanczos)
-    base::refuse(
-        "-{}ksp_type gltr: this method of PETSc's overwrites memory; take stcg, nash or cg",
-        prefix ? prefix : "");
 }
 
 std::string reason_text(TaoConvergedReason reason) {
@@ -152,6 +141,7 @@ Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver
 Minimiser::~Minimiser() = default;
 
 void Minimiser::make_tao() {
+  require_supported_types();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
@@ -173,7 +163,6 @@ void Minimiser::make_tao() {
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   base::check_options(KSPSetFromOptions(inner));
-  refuse_lanczos(inner);
   const char* prefix = nullptr;
   check(KSPGetOptionsPrefix(inner, &prefix));
   PetscBool given = PETSC_FALSE;

@@ -169,6 +169,26 @@ CASES = {
         ["scene.yaml:9:", "mandibel", "mandible"]),
     "axis of no length": (
         lambda i: i.scene("axis: [1,", "axis: [0,"), ["scene.yaml:9:", "axis"]),
+    "curve without a radius": (
+        lambda i: i.scene("  mass:", "  unattached: [{curve: [[0, -80, 0], [0, -80, 30]]}]\n  mass:"),
+        ["scene.yaml:7:", "radius"]),
+    "ball of negative radius": (
+        lambda i: i.scene("forces:", "instruments: [{push: [0, 1, 0], sphere: "
+                          "{center: [0, -120, 0], radius: -5}}]\nforces:"), ["radius", "-5"]),
+    "box of negative size": (
+        lambda i: i.scene("forces:", "instruments: [{push: [0, 1, 0], box: "
+                          "{center: [0, -120, 0], size: [5, -5, 5]}}]\nforces:"), ["box.size"]),
+    "half-space without a normal": (
+        lambda i: i.scene("forces:", "instruments: [{push: [0, 1, 0], half_space: "
+                          "{point: [0, -120, 0]}}]\nforces:"), ["normal"]),
+    "law that is not modeled": (
+        lambda i: i.scene("  mass:", "  material: {law: ogden}\n  mass:"),
+        ["scene.yaml:7:", "ogden", "neo_hookean"]),
+    "move that is too far": (
+        lambda i: i.scene("center: [0, 10, 20]", "center: [0, 1e300, 20]"),
+        ["scene.yaml:9:", "center", "1e300"]),
+    "force that is too large": (
+        lambda i: i.scene("[0, 0, -0.1]", "[0, 0, -1e300]"), ["scene.yaml:11:", "1e300"]),
     "force beside the skin": (
         lambda i: i.scene("[0, -90, 0]", "[0, -9000, 0]"), ["scene.yaml", "forces[0]", "skin"]),
     "missing mesh": (

@@ -112,7 +112,7 @@ def test_trust_region_and_line_search_find_the_same_face_of_the_finer_head(solve
 
 
 @pytest.mark.parametrize("options", [
-    ["-pc_type", "columns"], ["-pc_type", "pbjacobi"], ["-pc_type", "bjacobi"],
+    ["-pc_type", "columns"], ["-pc_type", "pbjacobi"],
     [*FACTORS], ["-pc_type", "lu"],
     ["-ksp_type", "preonly"], ["-ksp_type", "minres", "-ksp_norm_type", "preconditioned"],
     ["-tao_ntr_ksp_type", "nash"]],

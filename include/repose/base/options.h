@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "repose/base/text.h"
@@ -101,6 +102,10 @@ class Options {
   mutable std::vector<char*> petsc_pointers_;
   bool help_wanted_ = false;
 };
+
+/// All options in PETSc's database, as (name without its dash, value); the value is empty where
+/// there is none. PETSc must be initialised. Not collective.
+std::vector<std::pair<std::string, std::string>> petsc_options();
 
 /// Sets a PETSc option for its life; what the person gave stands again after.
 class ScopedOption {

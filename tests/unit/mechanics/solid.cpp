@@ -147,6 +147,20 @@ TEST_F(SolidBlock, StateOfAPrism) {
   EXPECT_NEAR(state.von_mises, mises, 1e-12);
 }
 
+// F = diag(1, 1, −a): σ = μ F Fᵀ/J + φ′ with J = −a < 0.
+TEST_F(SolidBlock, StateOfAnInvertedPrism) {
+  const double a = 0.7, slope = modulus_ * (-a - 1) - shear_;
+  std::array<Vec3, 6> before, now;
+  for (int c = 0; c < 6; ++c) {
+    before[c] = model_.points.position[model_.prisms.points[5][c]];
+    now[c] = Vec3(1, 1, -a).asDiagonal() * before[c];
+  }
+  const PrismState state = prism_state(shear_, slope, before, now);
+  EXPECT_LE((state.stretch - Vec3(1, 1, a)).norm(), 1e-12);
+  EXPECT_NEAR(state.pressure, shear_ * (2 + a * a) / (3 * a) - slope, 1e-12);
+  EXPECT_NEAR(state.von_mises, shear_ * (1 - a * a) / a, 1e-12);
+}
+
 TEST_F(SolidBlock, VolumesThatAllChangeAlikePressAlikeAveragedOrNot) {
   std::vector<Vec3> x = model_.points.position;
   for (Vec3& p : x) p = Vec3(1.1, 0.9, 1.3).asDiagonal() * p;

@@ -320,6 +320,8 @@ INSTANTIATE_TEST_SUITE_P(
 model::Model touching_model() {
   model::Model m = small_model();
   m.contact.stiffness = 0.1;
+  m.bone_surfaces[0].points = {{0, 0, -5}, {2, 0, -5}, {0, 2, -5}, {0, 0, -3}};
+  m.bone_surfaces[0].triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   m.contact.bodies = {{m.bones[0], 0}};
   m.contact.touches = {{4}, {0}, {model::Binding::touches}, {2.0}};
   m.contact.walls = {{{2, 2}}, {0}, {}, std::vector<double>(8, 1.0), {0, 1, 0, 0}};

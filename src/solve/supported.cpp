@@ -1,0 +1,79 @@
+#include "repose/solve/supported.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "repose/base/error.h"
+#include "repose/base/options.h"
+
+namespace repose::solve {
+
+namespace {
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));  // as PETSc compares names
+  });
+  return text;
+}
+
+bool matches(const std::string& pattern, const std::string& name) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string::npos) return name == pattern;
+  const std::string end = pattern.substr(star + 1);
+  return name.size() >= pattern.size() && name.starts_with(pattern.substr(0, star)) &&
+         name.ends_with(end);
+}
+
+void require_supported(const std::string& name, const std::string& value) {
+  for (const SupportedTypes& types : supported_types()) {
+    if (!matches(types.option, lower(name))) continue;
+    if (types.values.empty()) base::refuse("-{} {}: {}", name, value, types.use);
+    if (std::find(types.values.begin(), types.values.end(), value) != types.values.end()) return;
+    base::refuse("-{} {}: must be one of {} ({})", name, value.empty() ? "(no value)" : value,
+                 fmt::join(types.values, ", "), types.use);
+  }
+}
+
+}  // namespace
+
+const std::vector<SupportedTypes>& supported_types() {
+  static const std::vector<SupportedTypes> table{
+      {"tao_type",
+       {"lmvm", "ntr", "nls", "ntl", "bntr", "bnls", "bntl", "bqnkls", "bqnktr", "bqnktl", "blmvm",
+        "bqnls", "bncg", "cg"},
+       "the search for the rest position"},
+      {"tao_ls_type", {"more-thuente", "armijo", "gpcg"}, "its line search"},
+      {"tao_*_ksp_type", {"stcg", "nash"}, "linear systems of a Newton method's steps"},
+      {"tao_*_pc_type", {}, "the preconditioner is chosen by -pc_type"},
+      {"tao_*_mat_type", {"lmvmbfgs"}, "the approximation of the inverse Hessian"},
+      {"ksp_type",
+       {"cg", "groppcg", "pipecg", "pipeprcg", "fcg", "cr", "minres", "preonly", "stcg", "nash"},
+       "linear systems of the error estimate"},
+      {"pc_type",
+       {"columns", "none", "jacobi", "pbjacobi", "sor", "gamg", "ml", "hypre",
+        "cholesky", "lu"},
+       "the preconditioner of both"},
+      {"eps_type", {}, "the eigenvalue solver follows from the number of unknowns; leave it out"},
+      {"st_type", {}, "the spectral transformation follows from -stability; leave it out"}};
+  return table;
+}
+
+void require_supported_types() {
+  for (const auto& [name, value] : base::petsc_options()) require_supported(name, value);
+}
+
+std::string describe_supported_types() {
+  std::string text = "| option | values | chooses |\n|---|---|---|\n";
+  for (const SupportedTypes& types : supported_types()) {
+    std::string values = types.values.empty() ? "none" : "";
+    for (const std::string& value : types.values)
+      values += fmt::format("{}`{}`", values.empty() ? "" : ", ", value);
+    text += fmt::format("| `-{}` | {} | {} |\n", types.option, values, types.use);
+  }
+  return text;
+}
+
+}  // namespace repose::solve
