@@ -23,8 +23,13 @@ import pathlib
 import re
 import sys
 
-import h5py
-import numpy as np
+try:
+    import h5py
+    import numpy as np
+except ImportError as missing:
+    print(f"report.py: {missing.name} is missing: apt-get install --no-install-recommends "
+          "python3-numpy python3-h5py", file=sys.stderr)
+    sys.exit(1)
 
 HERE = pathlib.Path(__file__).resolve().parent
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
