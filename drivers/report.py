@@ -129,7 +129,7 @@ class Result:
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0
-        moved = step["bone_surface/points"][:] if "bone_surface" in step else None
+        moved = step["bone_surface/points"][:] if "bone_surface/points" in step else None
         for b, name in enumerate(names):
             if str(b) not in surfaces or not len(surfaces[str(b)]["points"]):
                 continue

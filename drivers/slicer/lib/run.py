@@ -331,7 +331,7 @@ def hand_back(chosen, result, numbers):
             arrays["uncertainty"] = error + of_mesh
         if chosen["predictedSkin"]:
             write_vtp(chosen["predictedSkin"], points, triangles.reshape(-1, 3), arrays)
-        moved, first = step["bone_surface/points"][:] if "bone_surface" in step else None, 0
+        moved, first = step["bone_surface/points"][:] if "bone_surface/points" in step else None, 0
         for b, number in enumerate(numbers):
             surface = h5[f"model/bone_surface/{b}"]
             count = len(surface["points"])
