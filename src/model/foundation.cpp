@@ -72,7 +72,7 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
-  Attachment attachment = attach_columns(columns, field, scene.tissue);
+  Attachment attachment = attach_columns(columns, field, scene);
   std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
   release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
                    attachment);
