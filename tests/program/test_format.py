@@ -1,5 +1,8 @@
 """That formats.md is enough to recompute a result: by a reader that was written from it alone."""
 
+import re
+
+import h5py
 import numpy as np
 import pytest
 
@@ -137,3 +140,27 @@ def test_what_is_no_unknown_is_where_the_page_says(result):
         expected, x = prescribed(result, numbers["load"]), arrays["point/position"]
         fixed = result.model["point/set"] != 0
         assert close(expected[fixed], x[fixed], 100) and np.isnan(expected[~fixed]).all()
+
+
+SCENES = [("head_solid.yaml", "-stability"), ("head_instrument.yaml",), ("head_incision.yaml",),
+          ("paper_jaw_opening.yaml",)]
+
+
+@pytest.mark.parametrize("scene", [" ".join(map(str, scene)) for scene in SCENES])
+def test_everything_in_a_result_is_named_on_the_page(solved, scene):
+    page = (PROJECT / "docs/reference/formats.md").read_text()
+    words = set(re.findall(r"[A-Za-z_0-9]+", page))
+    name, *options = scene.split()
+    found = set()
+
+    def note(path, item):
+        parts = [part for part in path.split("/") if not part.isdigit()]
+        found.update(parts, item.attrs)
+
+    with h5py.File(solved(name, *options)) as h5:
+        note("", h5)
+        for top in ("model", "step"):
+            note(top, h5[top])
+            h5[top].visititems(note)
+    assert found - {""} - words == set()
+    assert len(found) > 50
