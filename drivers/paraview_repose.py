@@ -5,18 +5,25 @@ and press the macro's button. Without ParaView's window:
 
     pvpython drivers/paraview_repose.py NAME [picture.png] [state.pvsm]
 
+Without a display: xvfb-run -a pvpython …
 NAME is the result without ending. It reads NAME_skin.xdmf and NAME_bones.xdmf, which ParaView reads
 from version 5.6 on; the time slider shows the load steps.
 """
 
+import ctypes
+import ctypes.util
 import os
 import sys
 
-from paraview.simple import (AddCameraLink, AssignViewToLayout, Calculator, ColorBy,
-                             CreateLayout, CreateRenderView, GetActiveSource, GetAnimationScene,
-                             GetColorTransferFunction, GetParaViewVersion, GetScalarBar,
-                             RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show, Slice,
-                             Text, XDMFReader)
+try:
+    from paraview.simple import (AddCameraLink, AssignViewToLayout, Calculator, ColorBy,
+                                 CreateLayout, CreateRenderView, GetActiveSource, GetAnimationScene,
+                                 GetColorTransferFunction, GetParaViewVersion, GetScalarBar,
+                                 RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show,
+                                 Slice, Text, XDMFReader)
+except ImportError as missing:
+    raise SystemExit(f"paraview_repose.py: {missing.name} is missing: run pvpython of ParaView; "
+                     "apt-get install --no-install-recommends python3-paraview xvfb xauth") from None
 
 BLUE, RED, INK = (0.12, 0.44, 0.71), (0.75, 0.22, 0.17), (0.15, 0.15, 0.15)
 SKIN, IVORY = (0.87, 0.68, 0.58), (0.96, 0.92, 0.8)
@@ -34,6 +41,26 @@ def result_name():
         if file.endswith(part):
             return file.removesuffix(part)
     raise SystemExit("paraview_repose.py: select a result's NAME_skin.xdmf or NAME.h5 first")
+
+
+def require_display():
+    """Refuses what would crash: a ParaView that draws in X windows only, and no X server."""
+    from vtkmodules import vtkRenderingOpenGL2
+    needs_display = hasattr(vtkRenderingOpenGL2, "vtkXOpenGLRenderWindow") and \
+        GetParaViewVersion() < 6
+    if needs_display and not has_display():
+        raise SystemExit("paraview_repose.py: no display: xvfb-run -a pvpython "
+                         f"{' '.join(sys.argv)}")
+
+
+def has_display():
+    """Whether an X server answers at DISPLAY."""
+    library = ctypes.util.find_library("X11")
+    if not library or not os.environ.get("DISPLAY"):
+        return False
+    connect = ctypes.CDLL(library).XOpenDisplay
+    connect.restype = ctypes.c_void_p
+    return bool(connect(None))
 
 
 def view(layout, hint, title):
@@ -109,6 +136,10 @@ def profile(source, name, made, colour):
 
 def main():
     name = result_name()
+    if len(sys.argv) > 1:
+        require_display()
+    if not os.path.isfile(name + "_skin.xdmf"):
+        raise SystemExit(f"paraview_repose.py: {name}_skin.xdmf is missing: NAME is the result's path")
     skin = XDMFReader(registrationName="skin", FileNames=[name + "_skin.xdmf"])
     scene = GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()

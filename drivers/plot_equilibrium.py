@@ -46,10 +46,19 @@ def spring_forces(model, which):
     return force
 
 
+def refuse(message):
+    print(f"plot_equilibrium.py: {message}", file=sys.stderr)
+    sys.exit(1)
+
+
 def initial_forces(file, gravity=None):
     """Free skin points, and the forces on them before and after the equilibrium, [K, 3] each."""
+    if not h5py.is_hdf5(file):
+        refuse(f"{file}: not there, or no result file; give NAME.h5 of repose-solve")
     with h5py.File(file) as h5:
         model = h5["model"]
+        if "spring/points" not in model:
+            refuse(f"{file}: holds no springs; give the result of a scene with tissue.springs")
         field = np.array(gravity if gravity else model.attrs["gravity"], float)
         skin = list(model["spring_set"][()]).index(b"layer 0")
         weight = model["point/mass"][()][:, None] * field if "point/mass" in model else 0
@@ -90,7 +99,11 @@ def main():
     if len(sys.argv) not in (3, 6):
         print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
         sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
-    draw_forces(*initial_forces(sys.argv[1], [float(g) for g in sys.argv[3:]]), sys.argv[2])
+    try:
+        gravity = [float(g) for g in sys.argv[3:]]
+    except ValueError as problem:
+        refuse(f"GX GY GZ: {problem}")
+    draw_forces(*initial_forces(sys.argv[1], gravity), sys.argv[2])
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ VIEWS = {"front": (0, -1, 0), "side": (1, 0, 0)}
 LIGHT = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
 SKIN = np.array([0.87, 0.68, 0.58])
 COLUMN = 3.2  # inches
+SOURCES = ("laws.csv", "equilibrium.csv", "opening.h5", "forward.h5", "turned.h5")
 
 
 def columns_of(file):
@@ -120,9 +121,14 @@ def draw_states(panels, target):
 
 def main():
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        print(__doc__)
+        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
         sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
     path = lambda name: os.path.join(sys.argv[1], name)
+    for name in SOURCES:
+        if not os.path.isfile(path(name)):
+            print(f"plot_paper.py: {path(name)} is missing: give the folder that repose-paper wrote",
+                  file=sys.stderr)
+            sys.exit(1)
     draw_laws(path("laws.csv"), path("paper_laws.png"))
     draw_equilibrium(path("equilibrium.csv"), path("paper_equilibrium.png"))
     opening, forward, turned = (read(path(f"{n}.h5")) for n in ("opening", "forward", "turned"))

@@ -26,18 +26,35 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
 
+# Study → the column that it varies, and how a value of it reads.
+STUDIES = {"layers": ("layers", "{} layers"), "springs": ("layers", "{} layers of springs"),
+           "volume": ("volume", "{} volume"), "load steps": ("load_steps", "{} load steps"),
+           "mesh": ("edge_mm", "{} mm edges")}
+MAPPED = ("layers", "springs", "volume", "mesh")  # studies of the discrete model
 MARKS = {"ntr": "o", "nls": "s", "lmvm": "^", "cg": "v", "bnls": "D", "bntr": "P"}
 INK, ACCENT = "#303030", "#b02020"
 NUMBERS = ("accuracy_mm", "cpu_s", "evaluations", "estimate_mm", "error_mm", "skin_rms_mm",
            "skin_95_mm", "skin_max_mm")
 
 
+def refuse(message):
+    print(f"plot_tradeoff.py: {message}", file=sys.stderr)
+    sys.exit(1)
+
+
 def read(name):
     """The rows of NAME.csv, numbers as numbers."""
-    with open(name + ".csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    try:
+        with open(name + ".csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            row.update({key: float(row[key]) for key in NUMBERS})
+    except (OSError, KeyError, ValueError) as problem:
+        refuse(f"{name}.csv: not a table of repose-tradeoff: {problem}")
     for row in rows:
-        row.update({key: float(row[key]) for key in NUMBERS})
+        if row["study"] not in ("solver", *STUDIES):
+            refuse(f"{name}.csv: unknown study '{row['study']}'; this script draws solver, "
+                   f"{', '.join(STUDIES)}")
     return rows
 
 
@@ -61,6 +78,10 @@ def front(rows, cost, error):
 def draw_methods(axes, rows, cost, label):
     """True error over cost, a line a method; the front is marked and named."""
     rows = [row for row in rows if row["study"] == "solver" and row["error_mm"] > 0]
+    axes.set_xlabel(label)
+    axes.set_ylabel("true error, mm")
+    if not rows:
+        return
     unit = min(row["cpu_s"] for row in rows) if cost == "cpu_s" else 1
     for method in dict.fromkeys(row["method"] for row in rows):
         own = sorted((row for row in rows if row["method"] == method),
@@ -72,17 +93,12 @@ def draw_methods(axes, rows, cost, label):
                 mfc="none", mec=ACCENT, label="cheapest")
     if max(row[cost] for row in rows) < 10 * min(row[cost] for row in rows):
         axes.set_xscale("linear")
-    axes.set_xlabel(label)
-    axes.set_ylabel("true error, mm")
     axes.legend(fontsize=7)
 
 
 def draw_choices(axes, rows):
     """How far the skin is from the reference for each layer count, volume term and load step."""
-    rows = [row for row in rows if row["skin_95_mm"] == row["skin_95_mm"]]
-    key = {"layers": "layers", "volume": "volume", "load steps": "load_steps", "mesh": "edge_mm"}
-    unit = {"mesh": "mm edges"}
-    names = [f"{row[key[row['study']]]} {unit.get(row['study'], row['study'])}" for row in rows]
+    names = [STUDIES[row["study"]][1].format(row[STUDIES[row["study"]][0]]) for row in rows]
     place = np.arange(len(rows))
     axes.barh(place, [max(row["skin_max_mm"], 1e-6) for row in rows], color="0.85", label="largest")
     axes.barh(place, [max(row["skin_95_mm"], 1e-6) for row in rows], color="0.6", height=0.5,
@@ -98,7 +114,7 @@ def draw_choices(axes, rows):
 
 
 def draw_study(name, rows):
-    others = [row for row in rows if row["study"] != "solver"]
+    others = [row for row in rows if row["study"] != "solver" and np.isfinite(row["skin_95_mm"])]
     count = 3 if others else 2
     figure, panels = plt.subplots(1, count, figsize=(4 * count, 3.6))
     draw_methods(panels[0], rows, "evaluations", "evaluations of value and gradient")
@@ -115,7 +131,9 @@ def draw_map(name):
         titles = next(csv.reader(file))[3:]
     values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))
     triangles = np.genfromtxt(name + "_triangles.csv", delimiter=",", skip_header=1, dtype=int)
-    shown = [k for k, title in enumerate(titles) if title.startswith(("layers", "volume", "mesh"))]
+    shown = [k for k, title in enumerate(titles) if title.startswith(MAPPED)]
+    if not shown:
+        return
     points, error = values[:, :3], values[:, 3:]
     largest = np.percentile(error[:, shown].max(axis=1), 99)
     figure, panels = plt.subplots(1, len(shown), figsize=(1.7 * len(shown), 2.6), squeeze=False)
@@ -147,6 +165,9 @@ def judge_estimates(rows):
         ratio = np.array([row["estimate_mm"] / row["error_mm"] for row in own])
         elsewhere = np.sum(ratio < 0.1)
         ratio = ratio[ratio >= 0.1]
+        if len(ratio) == 0:
+            print(f"| {method} | {len(own)} | – | – | – | {elsewhere} |")
+            continue
         low, middle, high = np.percentile(ratio, [5, 50, 95])
         print(f"| {method} | {len(own)} | {np.mean(ratio < 1):.1%} | {np.mean(ratio > 10):.1%} | "
               f"{middle:.2f} ({low:.2f} … {high:.2f}) | {elsewhere} |")
@@ -160,8 +181,7 @@ def main():
     for name in sys.argv[1:]:
         rows = read(name)
         draw_study(name, rows)
-        if any(row["study"] in ("layers", "volume", "mesh") for row in rows):
-            draw_map(name)
+        draw_map(name)
         every += rows
     judge_estimates(every)
 

@@ -21,6 +21,7 @@ python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
 """
 
 import argparse
+import ctypes
 import ctypes.util
 import importlib.util
 import json
@@ -89,12 +90,22 @@ def arguments():
     return chosen
 
 
+def has_display():
+    """Whether an X server answers at DISPLAY."""
+    library = ctypes.util.find_library("X11")
+    if not library or not os.environ.get("DISPLAY"):
+        return False
+    connect = ctypes.CDLL(library).XOpenDisplay
+    connect.restype = ctypes.c_void_p
+    return bool(connect(None))
+
+
 def find_screen():
     """Where there is no display VTK draws without one from 9.4 on. An older one does on a screen in
     memory; where this interpreter has none, ParaView's does. That would take options for its own,
     so they travel in the environment."""
     own = importlib.util.find_spec("vtkmodules") is not None
-    if "DISPLAY" in os.environ and own:
+    if own and has_display():
         return
     if own:
         from vtkmodules.vtkCommonCore import vtkVersion
@@ -117,10 +128,15 @@ def find_screen():
 def load_modules():
     """After find_screen."""
     global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-    import h5py
-    import numpy as np
-    import vtkmodules.all as vtk
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    try:
+        import h5py
+        import numpy as np
+        import vtkmodules.all as vtk
+        from vtkmodules.util.numpy_support import (numpy_to_vtk, numpy_to_vtkIdTypeArray,
+                                                   vtk_to_numpy)
+    except ImportError as missing:
+        refuse(f"{missing.name} is missing: pip install vtk h5py, or apt-get install "
+               "--no-install-recommends python3-numpy python3-h5py")
 
 
 # ----- what is drawn

@@ -22,13 +22,21 @@ import os
 import pathlib
 import re
 import sys
+import xml.etree.ElementTree
 
-import h5py
-import numpy as np
+try:
+    import h5py
+    import numpy as np
+except ImportError as missing:
+    print(f"report.py: {missing.name} is missing: apt-get install --no-install-recommends "
+          "python3-numpy python3-h5py", file=sys.stderr)
+    sys.exit(1)
 
 HERE = pathlib.Path(__file__).resolve().parent
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
+BEYOND = "skin beyond the solved part"
 STILL = 0.005  # mm: what moves less is said not to move
+MOST_TRIANGLES = 80_000  # of the skin, and of all bones, in the interactive view
 LARGE_VOLUME, LARGE_ERROR = 0.2, 0.5  # relative, mm: beyond, the page warns
 MAGMA = ("fcf3dc", "fed395", "f1605d", "832681", "4a1079")  # light to dark
 SKIN = (0.87, 0.68, 0.58)
@@ -98,6 +106,7 @@ class Result:
             self.origin = {name: text(h5.attrs[name]) for name in
                            ("program", "command", "ranks", "libraries") if name in h5.attrs}
             self.read(h5["model"], h5["step"][sorted(h5["step"])[-1]])
+        self.given = given_skin(pathlib.Path(file.removesuffix(".h5") + "_given_skin.vtp"))
         self.end = self.steps[-1]
         self.movement = np.linalg.norm(self.after - self.before, axis=1)
 
@@ -124,7 +133,7 @@ class Result:
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0
-        moved = step["bone_surface/points"][:] if "bone_surface" in step else None
+        moved = step["bone_surface/points"][:] if "bone_surface/points" in step else None
         for b, name in enumerate(names):
             if str(b) not in surfaces or not len(surfaces[str(b)]["points"]):
                 continue
@@ -133,6 +142,18 @@ class Result:
             first += len(points)
             self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
                                "motion": rigid(points, after)})
+
+
+def given_skin(file):
+    """Points before and after and triangles of the skin as it was given, or nothing."""
+    if not file.is_file():
+        return None
+    found = {item.get("Name"): np.frombuffer(
+        base64.b64decode(item.text)[8:], "<f8" if item.get("type") == "Float64" else "<i8")
+        for item in xml.etree.ElementTree.parse(file).iter("DataArray")}
+    before = found["Points"].reshape(-1, 3)
+    return {"before": before, "after": before + found["displacement"].reshape(-1, 3),
+            "corners": found["connectivity"].reshape(-1, 3)}
 
 
 class Figure(str):
@@ -185,10 +206,13 @@ def read_landmarks(file):
 
 def on_skin(result, point):
     """The nearest place of the skin before, where it is after, and the distance."""
-    corners = result.corners
-    near = np.argsort(((result.before - point)**2).sum(1))[:8]
+    return on_surface(result.before, result.after, result.corners, point)
+
+
+def on_surface(before, after, corners, point):
+    near = np.argsort(((before - point)**2).sum(1))[:8]
     faces = corners[np.isin(corners, near).any(1)]
-    a, b, c = (result.before[faces[:, k]] for k in range(3))
+    a, b, c = (before[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.maximum((normal**2).sum(1), 1e-300)
     weights = np.stack([(np.cross(c - b, point - b) * normal).sum(1) / area,
@@ -196,15 +220,15 @@ def on_skin(result, point):
                         (np.cross(b - a, point - a) * normal).sum(1) / area], axis=1)
     weights = np.maximum(weights, 0)
     weights /= weights.sum(1, keepdims=True)
-    places = np.einsum("fk,fkx->fx", weights, result.before[faces])
+    places = np.einsum("fk,fkx->fx", weights, before[faces])
     best = np.argmin(((places - point)**2).sum(1))
-    there = weights[best] @ result.after[faces[best]]
+    there = weights[best] @ after[faces[best]]
     return places[best], there, np.linalg.norm(places[best] - point)
 
 
 def place_landmarks(result, landmarks):
-    """[{name, on, before, after}] of those on the skin or on a bone, a bone's go with the bone; and
-    the names of the others."""
+    """[{name, on, before, after}] of those on the skin, on a bone (with which they go) or on the
+    given skin beyond the one that was solved; and the names of the others."""
     placed, lost = [], []
     for name, point in landmarks.items():
         before, after, distance = on_skin(result, point)
@@ -216,6 +240,11 @@ def place_landmarks(result, landmarks):
                 distance = away
                 best = {"name": name, "on": bone["name"], "before": point,
                         "after": turn @ point + shift}
+        if distance > NEAR and result.given:
+            given = result.given
+            before, after, distance = on_surface(given["before"], given["after"], given["corners"],
+                                                 point)
+            best = {"name": name, "on": BEYOND, "before": before, "after": after}
         if distance <= NEAR:
             placed.append(best)
         else:
@@ -225,7 +254,7 @@ def place_landmarks(result, landmarks):
 
 def known_places(placed):
     """{name of NAMES: (before, after)} of the landmarks on the skin."""
-    by_name = {mark["name"].lower(): mark for mark in placed if mark["on"] == "skin"}
+    by_name = {mark["name"].lower(): mark for mark in placed if mark["on"] in ("skin", BEYOND)}
     found = {}
     for name, others in NAMES.items():
         for other in others:
@@ -406,17 +435,49 @@ def png(figure):
     return "data:image/png;base64," + base64.b64encode(stored.getvalue()).decode()
 
 
+def coarser(before, after, corners, most):
+    """The surface with at most so many triangles: vertices in one cell of a grid become one."""
+    if len(corners) <= most:
+        return before, after, corners
+    low, one = before.min(0), before[corners[:, 0]] - before[corners[:, 1]]
+    edge = np.linalg.norm(one, axis=1).mean()
+    while True:
+        cells, row, count = np.unique(np.floor((before - low) / edge), axis=0, return_inverse=True,
+                                      return_counts=True)
+        row = row.ravel()
+        faces = row[corners]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
+        _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+        if len(first) <= most:
+            break
+        edge *= 1.1
+    middle = [np.stack([np.bincount(row, points[:, k]) for k in range(3)], 1) / count[:, None]
+              for points in (before, after)]
+    return *middle, faces[np.sort(first)]
+
+
+def packed(before, after, corners):
+    """A surface in text: whole numbers of 16 bits times `step`, from `low` on, mm."""
+    def encoded(values, kind):
+        return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
+
+    both = np.concatenate([before, after])
+    low = both.min(0)
+    step = max(float(np.ptp(both, axis=0).max()) / 65535, 1e-9)
+    whole = {name: encoded(np.rint((points - low) / step), "<u2")
+             for name, points in (("before", before), ("after", after))}
+    return whole | {"low": list(low), "step": step, "triangles": encoded(corners, "<u4")}
+
+
 def meshes(result):
     """What the interactive view draws, as JSON."""
-    def packed(before, after, corners):
-        return {name: base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
-                for name, values, kind in (("before", before, "<f4"), ("after", after, "<f4"),
-                                           ("triangles", corners, "<u4"))}
-
+    drawn = sum(len(b["corners"]) for b in result.bones)
     low, high = result.before.min(0), result.before.max(0)
     return json.dumps({
-        "skin": packed(result.before, result.after, result.corners),
-        "bones": [packed(b["before"], b["after"], b["corners"]) for b in result.bones],
+        "skin": packed(*coarser(result.before, result.after, result.corners, MOST_TRIANGLES)),
+        "bones": [packed(*coarser(b["before"], b["after"], b["corners"],
+                                  MOST_TRIANGLES * len(b["corners"]) // max(drawn, 1)))
+                  for b in result.bones],
         "middle": list((low + high) / 2), "radius": float(np.linalg.norm(high - low) / 2),
         "largest": float(result.movement.max()),
         "scale": [[int(c[k:k + 2], 16) / 255 for k in (0, 2, 4)] for c in MAGMA]})

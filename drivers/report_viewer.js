@@ -5,7 +5,6 @@
   const canvas = control("view"), data = JSON.parse(control("meshes").textContent);
   const gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
   if (!gl) { control("no-view").hidden = false; canvas.hidden = true; return; }
-
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const vertexSource = `#version 300 es
     in vec3 p0, p1, n0, n1;
@@ -54,7 +53,8 @@
     return sum;
   }
   function mesh(stored) {
-    const [p0, p1] = [stored.before, stored.after].map(text => new Float32Array(bytes(text)));
+    const [p0, p1] = [stored.before, stored.after].map(text => Float32Array.from(
+      new Uint16Array(bytes(text)), (whole, i) => stored.low[i % 3] + stored.step * whole));
     const corners = new Uint32Array(bytes(stored.triangles)), array = gl.createVertexArray();
     gl.bindVertexArray(array);
     const attributes = {p0, p1, n0: normals(p0, corners), n1: normals(p1, corners)};

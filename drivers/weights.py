@@ -16,7 +16,12 @@ import subprocess
 import sys
 import tempfile
 
-import h5py
+try:
+    import h5py
+except ImportError as missing:
+    print(f"weights.py: {missing.name} is missing: "
+          "apt-get install --no-install-recommends python3-h5py", file=sys.stderr)
+    sys.exit(1)
 
 PROJECT = pathlib.Path(__file__).resolve().parents[1]
 LAMBDAS = ("1e-9", "1e-6", "1e-3", "0.5", "0.999", "0.999999", "0.999999999")
@@ -70,6 +75,11 @@ def arguments():
 def main():
     chosen = arguments()
     program = os.path.join(chosen.bin, "repose-solve")
+    for file in (program, chosen.scene):
+        if not os.path.isfile(file):
+            print(f"weights.py: {file}: no such file; -bin names the folder of repose-solve",
+                  file=sys.stderr)
+            sys.exit(1)
     run = lambda *options: solve(program, chosen.scene, options)
     penalties = {k: run("-volume", "penalty", "-bulk_modulus", k) for k in MODULI}
     papers = {l: run("-volume", "paper", "-lambda", l) for l in LAMBDAS}

@@ -2,26 +2,22 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <map>
 
 #include "repose/meshtools/compare.h"
-#include "repose/surface/distance.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::adapt {
 
 namespace {
 
-constexpr int neighbours = 16;
+constexpr size_t neighbours = 16;
+constexpr int most_rings = 4;            // of edges around the nearest triangle
 constexpr double fade = 20;              // mm
 constexpr double ridge = 0.01;           // of the mean square extent of the neighbours
 constexpr double beyond_farthest = 1.1;  // where the weights end
 
-/// The points of a solved skin.
-struct SkinPoints {
-  const surface::Surface& skin;
-  const std::vector<Vec3>& displacement;
-};
-
-/// Those of a model, by themselves.
+/// The skin of a model by itself.
 struct OwnSkin {
   surface::Surface skin;
   std::vector<Vec3> displacement;
@@ -41,26 +37,88 @@ OwnSkin skin_of(const model::Model& model, const std::vector<Vec3>& displacement
   return points;
 }
 
+/// A copy whose triangles share the points that lie at one place, as the sides of cuts do.
+surface::Surface welded(const surface::Surface& skin) {
+  std::map<std::array<double, 3>, int64_t> first;
+  surface::Surface whole = skin;
+  for (Triangle& triangle : whole.triangles)
+    for (int64_t& p : triangle) {
+      const Vec3& at = skin.points[p];
+      p = first.try_emplace({at.x(), at.y(), at.z()}, p).first->second;
+    }
+  return whole;
+}
+
+/// The solved skin and its displacement.
+class SolvedSkin {
+ public:
+  SolvedSkin(const surface::Surface& skin, const std::vector<Vec3>& displacement)
+      : skin_(skin),
+        displacement_(displacement),
+        whole_(welded(skin)),
+        distance_(whole_),
+        tree_(whole_),
+        beside_(skin.points.size()) {
+    for (const Triangle& t : skin.triangles)
+      for (int k = 0; k < 3; ++k)
+        for (const int other : {1, 2}) beside_[t[k]].push_back(t[(k + other) % 3]);
+  }
+
+  /// The share of the motion that is left at a place: 1 over the skin, 0 far beyond its rim.
+  double share_at(const Vec3& at) const {
+    const auto off = distance_.at(at);
+    return off.beyond_rim ? std::clamp(1 - std::abs(off.distance) / fade, 0.0, 1.0) : 1.0;
+  }
+  Vec3 motion_at(const Vec3& at) const;
+
+ private:
+  std::vector<int64_t> points_near(const Vec3& at) const;
+
+  const surface::Surface& skin_;
+  const std::vector<Vec3>& displacement_;
+  surface::Surface whole_;
+  meshtools::SignedDistance distance_;
+  surface::TriangleTree tree_;
+  std::vector<std::vector<int64_t>> beside_;  // [points] the other ends of its edges
+};
+
+/// The nearest points, nearest first, of those around the nearest triangle: so they are on one side
+/// of a cut.
+std::vector<int64_t> SolvedSkin::points_near(const Vec3& at) const {
+  const Triangle& nearest = skin_.triangles[tree_.nearest(at).triangle];
+  std::vector<int64_t> found(nearest.begin(), nearest.end());
+  for (int ring = 0; ring < most_rings && found.size() < neighbours; ++ring)
+    for (size_t k = 0, count = found.size(); k < count; ++k)
+      for (const int64_t p : beside_[found[k]])
+        if (std::find(found.begin(), found.end(), p) == found.end()) found.push_back(p);
+  std::sort(found.begin(), found.end(), [&](int64_t p, int64_t q) {
+    return (skin_.points[p] - at).squaredNorm() < (skin_.points[q] - at).squaredNorm();
+  });
+  found.resize(std::min(found.size(), neighbours));
+  return found;
+}
+
 /// The affine motion of the nearest points at `at`, weighted by (1 − d²/h²)².
-Vec3 motion_at(const Vec3& at, const SkinPoints& from, const std::vector<int64_t>& near) {
-  const double reach = beyond_farthest * (from.skin.points[near.back()] - at).norm() + 1e-9;
+Vec3 SolvedSkin::motion_at(const Vec3& at) const {
+  const std::vector<int64_t> near = points_near(at);
+  const double reach = beyond_farthest * (skin_.points[near.back()] - at).norm() + 1e-9;
   double sum = 0;
   Vec3 middle = Vec3::Zero(), mean = Vec3::Zero();
   std::vector<double> weight;
   for (const int64_t row : near) {
-    const double share = (from.skin.points[row] - at).norm() / reach;
+    const double share = (skin_.points[row] - at).norm() / reach;
     weight.push_back(std::pow(1 - share * share, 2));
     sum += weight.back();
-    middle += weight.back() * from.skin.points[row];
-    mean += weight.back() * from.displacement[row];
+    middle += weight.back() * skin_.points[row];
+    mean += weight.back() * displacement_[row];
   }
   middle /= sum;
   mean /= sum;
   Mat3 spread = Mat3::Zero(), change = Mat3::Zero();
   for (size_t k = 0; k < near.size(); ++k) {
-    const Vec3 beside = from.skin.points[near[k]] - middle;
+    const Vec3 beside = skin_.points[near[k]] - middle;
     spread += weight[k] * beside * beside.transpose();
-    change += weight[k] * (from.displacement[near[k]] - mean) * beside.transpose();
+    change += weight[k] * (displacement_[near[k]] - mean) * beside.transpose();
   }
   const double extent = spread.trace() / 3;
   spread += ridge * extent * Mat3::Identity();
@@ -75,20 +133,15 @@ Vec3 motion_at(const Vec3& at, const SkinPoints& from, const std::vector<int64_t
 surface::PointData displacement_of_given(const surface::Surface& given,
                                          const surface::Surface& skin,
                                          const std::vector<Vec3>& displacement) {
-  const SkinPoints from{skin, displacement};
-  const surface::PointTree tree(from.skin.points);
-  const meshtools::SignedDistance distance(from.skin);
+  const SolvedSkin solved(skin, displacement);
   surface::PointData data;
   data.vectors.push_back({"displacement", {}});
   data.fields.push_back({"solved", {}});
   for (const Vec3& point : given.points) {
-    const auto off = distance.at(point);
-    const double share =
-        off.beyond_rim ? std::clamp(1 - std::abs(off.distance) / fade, 0.0, 1.0) : 1.0;
+    const double share = solved.share_at(point);
     data.fields[0].values.push_back(share);
-    data.vectors[0].values.push_back(
-        share > 0 ? Vec3(share * motion_at(point, from, tree.nearest(point, neighbours)))
-                  : Vec3::Zero());
+    data.vectors[0].values.push_back(share > 0 ? Vec3(share * solved.motion_at(point))
+                                               : Vec3::Zero());
   }
   return data;
 }

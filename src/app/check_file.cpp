@@ -13,13 +13,17 @@ constexpr double tolerance = 1e-9;
 
 void check_bones(const results::MergedBones& bones, const model::PrescribedMotion& motion,
                  const results::StoredStep& step, base::Comparison& comparison) {
-  if (step.bone_points.empty()) return;
   const std::vector<Vec3> moved = results::moved_points(bones, motion, step.numbers.load);
   double scale = 0;
   for (const Vec3& point : moved) scale = std::max(scale, point.lpNorm<Eigen::Infinity>());
-  comparison.array("bone_surface/points",
-                   {step.bone_points.data()->data(), 3 * step.bone_points.size()},
-                   {moved.data()->data(), 3 * moved.size()}, scale);
+  const auto check = [&](const char* name, const std::vector<Vec3>& stored,
+                         const std::vector<Vec3>& again) {
+    if (stored.empty()) return;
+    comparison.array(name, {stored.data()->data(), 3 * stored.size()},
+                     {again.data()->data(), 3 * again.size()}, scale);
+  };
+  check("bone_surface/points", step.bone_points, moved);
+  check("bone_surface/displacement", step.bone_displacement, results::displacements(bones, moved));
 }
 
 /// What the steps say of each other: the path leads from smaller to larger loads, to the end or to

@@ -254,7 +254,7 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
 /// Writes the displacement of the given skin, in the place of which another was solved, to
 /// NAME_given_skin.vtp. Collective.
 std::string Run::write_given_skin(const Writer& writer) const {
-  if (!job_.remeshed || job_.is_cut) return "";
+  if (!job_.remeshed) return "";
   const std::string file = name_ + "_given_skin.vtp";
   const auto write = [&](const auto& solved, const std::vector<Vec3>& initial,
                          const std::vector<Vec3>& position) {

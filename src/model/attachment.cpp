@@ -15,8 +15,9 @@ constexpr double gap = 1.5;            // mm
 constexpr double gap_per_depth = 0.5;  // of the column's thickness
 
 /// What each column is to do, by region.
-std::vector<scene::Attach> wishes(const Columns& columns, const scene::Tissue& tissue,
+std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& scene,
                                   Attachment& attachment) {
+  const scene::Tissue& tissue = scene.tissue;
   constexpr double near = 2;  // mm: columns end on the surface of what is segmented
   constexpr std::array words = {"hold to it", "slide along it", "touch it", "do not know of it"};
   std::vector<scene::Attach> wish(columns.deep.size(), tissue.attach);
@@ -33,9 +34,10 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Tissue& t
     }
     if (met == 0 && how == scene::Attach::slide)
       base::refuse(
-          "region {} of tissue that slides on bone or teeth holds no column that ends at bone; "
-          "move it to where tissue meets bone, or make it larger",
-          k);
+          "{}: region {} of tissue.attach_regions and teeth, counted from 0 in this order, is to "
+          "slide and holds no column that ends at bone; move it to where tissue meets bone, or "
+          "make it larger",
+          scene.file.string(), k);
     attachment.remarks.push_back(
         fmt::format("attach region {}: {} columns end at bone there and {}", k, met,
                     words[static_cast<size_t>(how)]));
@@ -53,7 +55,7 @@ void Attachment::settle(size_t column, scene::Attach how) {
 }
 
 Attachment attach_columns(const Columns& columns, const BoneField& bones,
-                          const scene::Tissue& tissue) {
+                          const scene::Scene& scene) {
   Attachment attachment;
   attachment.bone.assign(columns.deep.size(), -1);
   attachment.slides_on.assign(columns.deep.size(), -1);
@@ -67,7 +69,7 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];
   }
-  const std::vector<scene::Attach> wish = wishes(columns, tissue, attachment);
+  const std::vector<scene::Attach> wish = wishes(columns, scene, attachment);
   for (size_t v = 0; v < wish.size(); ++v)
     if (attachment.bone[v] >= 0) attachment.settle(v, wish[v]);
   return attachment;

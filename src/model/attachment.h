@@ -23,10 +23,10 @@ struct Attachment {
 };
 
 /// Ties a column that ends at bone, or short of it by no more than 1.5 mm or half its thickness, to
-/// the bone nearest to its deepest point; then all do what `tissue` wants, by region (a mesh or a
-/// label holds what is up to 2 mm from it). Throws InputError where a region holds no column that
-/// ends at bone and is to slide.
+/// the bone nearest to its deepest point; then all do what the scene's tissue is to, by region (a
+/// mesh or a label holds what is up to 2 mm from it). Throws InputError where a region holds no
+/// column that ends at bone and is to slide.
 Attachment attach_columns(const Columns& columns, const BoneField& bones,
-                          const scene::Tissue& tissue);
+                          const scene::Scene& scene);
 
 }  // namespace repose::model

@@ -75,7 +75,7 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
-  Attachment attachment = attach_columns(columns, field, scene.tissue);
+  Attachment attachment = attach_columns(columns, field, scene);
   std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
   if (const std::string border = describe_near_border(scene, bones, mesh, field); !border.empty())
     report.remarks.push_back(border);

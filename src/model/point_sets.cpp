@@ -18,17 +18,38 @@ double nearest_skin(const SkinMesh& mesh, const BoneField& bones, int32_t bone) 
 /// Why no tissue is attached to a bone, and what to do about it.
 std::string why_bare(const scene::Scene& scene, const SkinMesh& mesh, const BoneField& bones,
                      int32_t bone, int64_t reached) {
+  if (reached > 0 && scene.tissue.attach != scene::Attach::fixed)
+    return fmt::format(
+        "tissue.attach or a region lets all {} columns go that reach it; attach some to be fixed "
+        "or slide, by tissue.attach or tissue.attach_regions",
+        reached);
   if (reached > 0)
     return fmt::format(
-        "all {} columns that reach it are let go: on the fixed rim, by tissue.attach or a region, "
-        "or within {} mm of a piece that moves differently; set tissue.release smaller, or attach "
-        "some to be fixed or slide",
+        "all {} columns that reach it are let go: on the fixed rim, by a region, or within {} mm "
+        "of a piece that moves differently; set tissue.release smaller, or attach some to be fixed "
+        "or slide",
         reached, scene.tissue.release);
   return fmt::format(
       "no column of tissue reaches it: it is {:.1f} mm from the skin and tissue.attach_within is "
       "{} "
       "mm, or other bone lies between; set attach_within greater or take the bone out",
       nearest_skin(mesh, bones, bone), scene.tissue.attach_within);
+}
+
+[[noreturn]] void refuse_unheld(const scene::Scene& scene, const Attachment& attachment) {
+  const std::string file = scene.file.string();
+  const int64_t reached =
+      std::accumulate(attachment.reached.begin(), attachment.reached.end(), int64_t{0});
+  if (reached > 0)
+    base::refuse(
+        "{}: nothing holds the tissue: none of the {} columns that reach bone moves with it and no "
+        "rim is fixed; set tissue.attach: fixed, attach: fixed in a region of "
+        "tissue.attach_regions, or boundary: {{rim: fixed}}",
+        file, reached);
+  base::refuse(
+      "{}: nothing holds the tissue: no column is attached to bone within {} mm and no rim is "
+      "fixed; set tissue.attach_within greater or boundary: {{rim: fixed}}",
+      file, scene.tissue.attach_within);
 }
 
 }  // namespace
@@ -80,11 +101,7 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
         "{}: no point of the tissue is free to move: all {} columns lie on the fixed rim; "
         "use a finer skin mesh or boundary: {{rim: free}}",
         file, mesh.points.size());
-  if (counts.bone + counts.boundary == 0)
-    base::refuse(
-        "{}: nothing holds the tissue: no column is attached to bone within {} mm and no "
-        "rim is fixed; set tissue.attach_within greater or boundary: {{rim: fixed}}",
-        file, scene.tissue.attach_within);
+  if (counts.bone + counts.boundary == 0) refuse_unheld(scene, attachment);
 }
 
 }  // namespace repose::model

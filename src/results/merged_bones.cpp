@@ -32,4 +32,10 @@ std::vector<Vec3> moved_points(const MergedBones& bones, const model::Prescribed
   return moved;
 }
 
+std::vector<Vec3> displacements(const MergedBones& bones, const std::vector<Vec3>& moved) {
+  std::vector<Vec3> displacement(bones.points.size(), Vec3::Zero());
+  for (size_t i = 0; i < moved.size(); ++i) displacement[i] = moved[i] - bones.points[i];
+  return displacement;
+}
+
 }  // namespace repose::results

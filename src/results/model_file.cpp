@@ -293,6 +293,8 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   }
   const std::string bones = group + "/bone_surface/points";
   if (in.has(bones)) stored.bone_points = in.vectors(bones, Shape::any);
+  if (const std::string path = group + "/bone_surface/displacement"; in.has(path))
+    stored.bone_displacement = in.vectors(path, Shape::any);
   return stored;
 }
 

@@ -148,7 +148,7 @@ struct ResultFile::State {
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
     return (88 + 24 * static_cast<int64_t>(fields.size())) * counts.points + 16 * counts.springs +
-           48 * counts.prisms + 24 * counts.bone_points + (int64_t{1} << 16);
+           48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
   }
   void create(const model::Model& model, const model::ModelRows* slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
@@ -288,17 +288,20 @@ void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) 
   write_dataset(spring, "tension", counts.springs, 0, springs, rows.tension.data());
 }
 
-/// Returns whether there was anything to write.
+/// Writes the displacement of the bones and, if any has moved, where they are; returns whether any
+/// has.
 bool ResultFile::State::write_bones(hid_t step, double load) const {
+  if (counts.bone_triangles == 0) return false;
   std::vector<Vec3> at_load;
   if (motion) at_load = moved_points(bones, *motion, load);
-  int moved = !at_load.empty() && counts.bone_triangles > 0;
+  int moved = !at_load.empty();
   MPI_Bcast(&moved, 1, MPI_INT, 0, comm);
-  if (moved == 0) return false;
   const base::Hdf5Group group = create_group(step, "bone_surface");
-  const base::Slab mine{0, static_cast<int64_t>(at_load.size())};
-  write_dataset(group, "points", counts.bone_points, 3, mine, flat(at_load));
-  return true;
+  const base::Slab mine{0, static_cast<int64_t>(bones.points.size())};
+  const std::vector<Vec3> displacement = displacements(bones, at_load);
+  write_dataset(group, "displacement", counts.bone_points, 3, mine, flat(displacement));
+  if (moved != 0) write_dataset(group, "points", counts.bone_points, 3, mine, flat(at_load));
+  return moved != 0;
 }
 
 /// The first block with a cell and the bones, for readers that open the file itself.

@@ -99,6 +99,7 @@ XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
       .cells = counts.bone_triangles,
       .geometry = {},
       .arrays = {{.name = "bone", .path = "/model/bone_surfaces/bone", .type = short_integer},
+                 point_vector("displacement", "step/bone_surface/displacement"),
                  point_vector("initial_position", "/model/bone_surfaces/points")}};
   for (size_t step = 0; step < moved.size(); ++step)
     block.geometry.push_back(moved[step] ? fmt::format("/step/{:04}/bone_surface/points", step)

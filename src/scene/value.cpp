@@ -205,15 +205,34 @@ void Map::check_known(const Value::Entry& entry) const {
   refuse_unknown(entry);
 }
 
+namespace {
+
+/// In quotes the known key of such a name, but for a letter, with the shortest path; empty for
+/// none.
+std::string key_elsewhere(const std::string& name) {
+  const auto rank = [&](const Key& key) {
+    return std::pair(base::edit_distance(name, last_word(key.path)),
+                     std::count(key.path.begin(), key.path.end(), '.'));
+  };
+  const Key* best = nullptr;
+  for (const Key& key : all_keys())
+    if (rank(key).first <= 1 && (!best || rank(key) < rank(*best))) best = &key;
+  if (!best) return "";
+  const bool at_top = best->path.find('.') == std::string::npos;
+  return fmt::format("'{}'{}", best->path, at_top ? " at the top of the scene" : "");
+}
+
+}  // namespace
+
 void Map::refuse_unknown(const Value::Entry& entry) const {
   std::vector<std::string> siblings;
   for (const Key* key : keys_below(itself_.path_)) siblings.push_back(last_word(key->path));
-  std::string best = base::nearest(entry.name, siblings);
+  const std::string sibling = base::nearest(entry.name, siblings);
   // A known key in the wrong place is likelier than a sibling with most of its letters wrong.
-  if (base::edit_distance(entry.name, best) > 2)
-    for (const Key& key : all_keys())
-      if (base::edit_distance(entry.name, last_word(key.path)) <= 1) best = key.path;
-  itself_.refuse_at(entry.mark, fmt::format("has an unknown key {}; the nearest known one is '{}'",
+  std::string best;
+  if (base::edit_distance(entry.name, sibling) > 2) best = key_elsewhere(entry.name);
+  if (best.empty()) best = fmt::format("'{}'", sibling);
+  itself_.refuse_at(entry.mark, fmt::format("has an unknown key {}; the nearest known one is {}",
                                             base::shown(entry.name), best));
 }
 

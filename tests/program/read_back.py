@@ -28,8 +28,11 @@ def held_by(h5, step, view):
     points, moved = model["point"], step["point"]
     if view == "bones":
         points = model["bone_surfaces"]
-        moved = step.get("bone_surface", points)
-        at_points = {"initial_position": points["points"]}
+        moved = step["bone_surface"]
+        if "points" not in moved:
+            moved = points
+        at_points = {"initial_position": points["points"],
+                     "displacement": step["bone_surface/displacement"]}
         at_cells = {"bone": points["bone"]}
     else:
         at_points = {name: points[name] for name in ("set", "layer", "column")}
@@ -159,7 +162,7 @@ def compare_grids(read, held, view, where):
         for name, values in shown.items():
             blank = np.full(values.shape, np.nan)  # of a step that does not have it
             compare(values, stored.get(name, blank), f"{where}, {name}")
-        complete = view in ("tissue", "whole") or view == "springs" and stored is held[3]
+        complete = view in ("tissue", "bones", "whole") or view == "springs" and stored is held[3]
         if complete and not stored.keys() <= shown.keys():
             sys.exit(f"{where}: not shown is {', '.join(stored.keys() - shown.keys())}")
     return 2 + len(read[2]) + len(read[3])

@@ -169,7 +169,9 @@ def write_result(file, functional, volume):
         for b in range(2):
             h5[f"model/bone_surface/{b}/points"] = bone
             h5[f"model/bone_surface/{b}/triangles"] = np.array([[0, 1, 2]])
-        h5["step/0000/bone_surface/points"] = np.vstack([bone, moved(bone, LOAD)])
+        there = np.vstack([bone, moved(bone, LOAD)])
+        h5["step/0000/bone_surface/points"] = there
+        h5["step/0000/bone_surface/displacement"] = there - np.vstack([bone, bone])
         for name, values in arrays.items():
             h5[f"step/0000/{name}"] = values
         for name, value in numbers.items():
@@ -191,7 +193,7 @@ def test_agrees_with_numpy(run, tmp_path, functional, volume):
 ATTRIBUTES = ["f_e", "potential", "f_f", "f_v", "penalty", "objective", "gradient_max",
               "volume_error_max"]
 ARRAYS = ["point/displacement", "point/residual_force", "prism/volume_ratio", "spring/elongation",
-          "spring/tension", "bone_surface/points"]
+          "spring/tension", "bone_surface/points", "bone_surface/displacement"]
 
 
 def refused(result, *words):

@@ -97,8 +97,17 @@ def test_tissue_that_a_bone_only_pushes_is_told_of_not_refused(folder, environme
 
 
 BAD = {
-    "teeth far from bone": ("  layers: 4", "  layers: 4\n  teeth: [{sphere: {center: [0, -400, 0], radius: 5}}]",
-                            "teeth"),
+    "teeth far from bone": ("moves:", "teeth: [{sphere: {center: [0, -400, 0], radius: 5}}]\nmoves:",
+                            "bad.yaml: region 0 of tissue.attach_regions and teeth"),
+    "all slides and no rim is fixed": ("tissue:", "boundary: {rim: free}\ntissue:\n  attach: slide",
+                                       "set tissue.attach: fixed"),
+    "all is let go": ("tissue:", "tissue:\n  attach: free", "by tissue.attach or tissue.attach_regions"),
+    "teeth in the tissue": ("  layers: 4", "  layers: 4\n  teeth: []",
+                            "the nearest known one is 'teeth' at the top of the scene"),
+    "attach at the top": ("moves:", "attach: slide\nmoves:",
+                          "the nearest known one is 'tissue.attach'"),
+    "attach of contact": ("moves:", "contact: {attach: slide}\nmoves:",
+                          "the nearest known one is 'tissue.attach'"),
     "lips off the skin": ("moves:", "mouth: {path: [[0, -300, 0], [20, -300, 0]]}\nmoves:", "mouth"),
     "one point of lips": ("moves:", "mouth: {path: [[0, -90, -40]]}\nmoves:", "mouth"),
     "no such word": ("  layers: 4", "  attach: glued\n  layers: 4", "attach"),

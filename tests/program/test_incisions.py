@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
+from heads import read_vtp
 from tissue import apart, last, model_of, same_face
 
 PATH = "[[47, -80, 8], [49, -75, -8], [46.5, -70, -24]]"
@@ -131,3 +132,28 @@ def rim_path(folder):
         points.append(mesh.points[vertex].tolist())
         vertex = border[vertex]
     return str(points)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_given_skin_parts_with_the_lips(run, tmp_path, ranks):
+    """Remeshed and solved with parted lips; the given one goes along, each side with its own lip."""
+    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    text = text.replace("  layers: 4", "  layers: 3\n  edge: 8", 1)
+    text += "mouth: {path: [[-20, -92, -35], [0, -98, -35], [20, -92, -35]]}\n"
+    file = cut(run, tmp_path, scene=text, ranks=ranks, accuracy=0.1)
+    model, step = model_of(file), last(file)
+    one, twin = (rows[model["point/layer"][rows] == 0] for rows in doubled(model))
+    lips = np.concatenate([one, twin])
+    opening = np.linalg.norm(step["point/position"][one] - step["point/position"][twin], axis=1)
+    given = read_vtp(file.with_name("cut_given_skin.vtp"))
+    found = []
+    for row in (one[np.argmax(opening)], twin[np.argmax(opening)]):
+        # the neighbors of the lip on its side, without the line itself
+        faces = model["skin/points"][(model["skin/points"] == row).any(1)]
+        middle = model["point/position"][np.setdiff1d(faces, lips)].mean(0)
+        vertex = np.argmin(np.linalg.norm(given["Points"] - middle, axis=1))
+        assert given["solved"][vertex] == 1
+        found.append(given["displacement"][vertex])
+    apart_by = np.linalg.norm(found[0] - found[1])
+    assert opening.max() > 2 and apart_by > 0.5 * opening.max(), (opening.max(), apart_by)

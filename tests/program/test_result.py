@@ -257,6 +257,9 @@ def test_views_open_as_time_series(face, view):
             expected = (sum(len(s["triangles"]) for s in surfaces),
                         sum(len(s["points"]) for s in surfaces))
         assert (cells[0].type, len(cells[0].data), len(points)) == ("triangle", *expected)
+        for (_, at_points, _), step in zip(series, path):
+            assert np.array_equal(at_points["displacement"], step["bone_surface/displacement"])
+            assert np.isfinite(at_points["displacement"]).all()
         return
     kind, count, point_count = CELLS[view]
     assert [(block.type, len(block.data)) for block in cells] == [(kind, count)]

@@ -360,6 +360,36 @@ def test_what_is_wrong_is_said_in_one_line(panel, tmp_path, case):
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
+def test_a_preview_says_that_it_is_one(panel, head, tmp_path):
+    result = panel(*head(), "--preview", "--accuracy", 0.1, "--predictedSkin",
+                   tmp_path / "skin.vtp", "--returnparameterfile", tmp_path / "numbers")
+    assert (result.returncode, result.stderr) == (0, "")
+    numbers = returned(tmp_path / "numbers")
+    assert re.match(r"PREVIEW, to 1 mm: the face is within \S+ mm of rest", numbers["verdict"])
+    assert "accuracy reached" not in numbers["verdict"]
+    assert float(numbers["accuracyReached"]) <= 1
+
+
+@pytest.fixture(scope="module")
+def program():
+    """The program behind the panel as a module."""
+    text = (PANEL.parent / "lib/run.py").read_text()
+    names = {"__file__": str(PANEL.parent / "lib/run.py"), "__name__": "panel"}
+    exec(compile(text.removesuffix("sys.exit(main())\n"), "run.py", "exec"), names)
+    return names
+
+
+@pytest.mark.parametrize("status", [0, 2])
+@pytest.mark.parametrize("error", [0.05, 0.1, 0.2, np.inf])
+@pytest.mark.parametrize("preview", [False, True])
+def test_an_accuracy_is_claimed_only_where_it_is_reached(program, status, error, preview):
+    told = {"load": 1.0, "displacement_error": error, "reason": b"why"}
+    said = program["verdict"](status, told, 0.1, preview)
+    reached = status == 0 and error <= 0.1
+    assert said.startswith("ACCURACY NOT REACHED" if not reached else
+                           "PREVIEW, to 0.1 mm" if preview else "accuracy reached: ")
+
+
 @pytest.fixture
 def long_run(panel, tmp_path):
     """A run of the panel that has begun to search, and its solver's process."""
@@ -394,9 +424,12 @@ def wait_for_end(pid, seconds=60):
     return False
 
 
-def test_cancel_ends_the_solver_and_hands_nothing_over(long_run, tmp_path):
+@pytest.mark.parametrize("signals", [["TERM"], ["INT"], ["HUP"], ["TERM", "INT", "TERM", "HUP"]])
+def test_cancel_ends_the_solver_and_hands_nothing_over(long_run, tmp_path, signals):
     process, solver = long_run
-    process.send_signal(signal.SIGTERM)
+    for name in signals:
+        process.send_signal(signal.Signals[f"SIG{name}"])
+        time.sleep(0.05)
     process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGTERM
     assert wait_for_end(solver)
@@ -404,10 +437,16 @@ def test_cancel_ends_the_solver_and_hands_nothing_over(long_run, tmp_path):
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
-def test_a_killed_panel_leaves_no_solver_behind(long_run):
+def test_a_killed_panel_leaves_no_solver_and_the_next_one_no_folder(long_run, panel, tmp_path):
     process, solver = long_run
+    (running,) = (tmp_path / "temporary").glob("repose_*")  # beside mpirun's own
+    assert panel("--skin", "none.ply").returncode == 1
+    assert running.exists(), "of a run that lives"
     os.kill(process.pid, signal.SIGKILL)
     assert wait_for_end(solver)
+    process.wait()
+    assert panel("--skin", "none.ply").returncode == 1
+    assert not running.exists()
 
 
 @pytest.mark.parametrize("tissue", [e.text for e in xml.etree.ElementTree.parse(

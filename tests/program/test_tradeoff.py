@@ -85,12 +85,46 @@ def test_two_ranks_find_the_same_errors(run, folder, tmp_path):
         assert float(two["error_mm"]) <= float(two["estimate_mm"])
 
 
-def test_the_pictures_can_be_drawn(folder):
+def draw(folder, name):
     pytest.importorskip("matplotlib")
-    done = subprocess.run([sys.executable, PROJECT / "drivers/plot_tradeoff.py", "few"],
+    done = subprocess.run([sys.executable, PROJECT / "drivers/plot_tradeoff.py", name],
                           cwd=folder, text=True, capture_output=True)
-    assert done.returncode == 0, done.stderr
-    assert (folder / "few.png").stat().st_size > 10000 and "| all | " in done.stdout
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (folder / f"{name}.png").stat().st_size > 10000 and "| all | " in done.stdout
+
+
+def test_the_pictures_can_be_drawn(folder):
+    draw(folder, "few")
+    assert (folder / "few_map.png").stat().st_size > 10000
+
+
+def test_a_solid_is_compared_with_springs_and_drawn(run, tmp_path):
+    result = run("repose-tradeoff", PROJECT / "meshes/head_solid.yaml", "-methods", "ntr",
+                 "-accuracies", "1", "-load_steps", ",", "-layers", "2,3", "-edges", ",",
+                 "-reference", "1e-3", "-output", "solid")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert {row["study"] for row in rows(tmp_path / "solid.csv")} == {"solver", "layers", "springs"}
+    with open(tmp_path / "solid_map.csv", newline="") as file:
+        assert next(csv.reader(file))[3:] == ["layers: 2", "layers: 3", "springs: 2", "springs: 3"]
+    draw(tmp_path, "solid")
+    assert (tmp_path / "solid_map.png").stat().st_size > 10000
+
+
+def test_runs_that_did_not_end_are_drawn_too(folder, tmp_path):
+    """Without errors, for the reference was not reached, and without another study than solver."""
+    unknown = dict.fromkeys(("error_mm", "skin_rms_mm", "skin_95_mm", "skin_max_mm"), "nan")
+    for part in ("_map.csv", "_triangles.csv"):
+        shutil.copy(folder / f"few{part}", tmp_path / f"nan{part}")
+    with open(tmp_path / "nan_map.csv", newline="") as file:
+        points = [row[:3] for row in csv.reader(file)]
+    with open(tmp_path / "nan_map.csv", "w", newline="") as file:
+        csv.writer(file).writerows(points)
+    table = [row | unknown for row in rows(folder / "few.csv")]
+    with open(tmp_path / "nan.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, table[0].keys())
+        writer.writeheader()
+        writer.writerows(table)
+    draw(tmp_path, "nan")
 
 
 def test_a_comma_leaves_a_study_out(run, tmp_path):

@@ -18,7 +18,8 @@ MOVING = {"PointData/displacement": "point/displacement", "PointData/advance": "
 STAYING = {"PointData/set": "point/set", "PointData/layer": "point/layer",
            "PointData/column": "point/column", "PointData/initial_position": "point/position"}
 OF_BONES = {"CellData/bone": "bone_surfaces/bone",
-            "PointData/initial_position": "bone_surfaces/points"}
+            "PointData/initial_position": "bone_surfaces/points",
+            "PointData/displacement": "bone_surface/displacement"}
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def of_both_parts(name, tissue, model, step, bones_rows):
     if name == "Points":
         bones = where_bones_are(model, step)
     elif name in OF_BONES:
-        bones = model[OF_BONES[name]]
+        bones = {**model, **step}[OF_BONES[name]]
     else:
         bones = np.full((bones_rows, *tissue.shape[1:]),
                         np.nan if tissue.dtype.kind == "f" else -1, tissue.dtype)
@@ -76,6 +77,23 @@ def test_what_moves_is_every_step_and_what_stays_is_the_models(opening):
         assert names == (MOVING.keys() | STAYING.keys() | OF_BONES.keys()) - {"Points"}
         for place in ("PointData", "CellData"):
             assert set(root[f"Steps/{place}Offsets"]) == set(root[place])
+
+
+def test_bones_have_their_motion_at_every_step(opening):
+    """Finite, and that which the plan says: a screw about the jaw's hinge."""
+    model = model_of(opening)
+    before, count = model["bone_surfaces/points"], len(model["point/position"])
+    jaw = np.zeros(len(before), bool)
+    jaw[model["bone_surfaces/triangles"][model["bone_surfaces/bone"] == 1]] = True
+    with h5py.File(opening) as h5:
+        root = h5["VTKHDF"]
+        for begin, load in zip(root["Steps/PointDataOffsets/displacement"][:],
+                               root["Steps/Values"][:]):
+            shown = root["PointData/displacement"][begin + count:begin + count + len(before)]
+            c, s = np.cos(np.radians(8 * load)), np.sin(np.radians(8 * load))
+            turned = before @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]).T
+            assert np.isfinite(shown).all() and (shown[~jaw] == 0).all()
+            assert np.abs(shown[jaw] - (turned - before)[jaw]).max() < 1e-9
 
 
 def test_nothing_is_stored_twice(opening):

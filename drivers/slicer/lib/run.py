@@ -2,6 +2,7 @@
 the result. Reads the parameters from Repose.xml, so that panel and program agree. In mm and LPS."""
 
 import base64
+import fcntl
 import json
 import math
 import os
@@ -22,6 +23,8 @@ TISSUE = {**{preset: {"material": {"preset": preset}}
                       "turgor": 0.1}}
 MOVING = 0.1  # mm: skin that moves less does not count for the mean
 PATIENCE = 10  # s that a cancelled solver has to end by itself
+PREVIEW = 1  # mm, the accuracy of a preview
+TEMPORARY = "repose_panel_"  # what the names of temporary folders begin with
 ITERATION = re.compile(r"load (\S+)  iteration .* evaluations  (?:(\S+) mm to go)?")
 
 
@@ -193,15 +196,18 @@ def solver():
     return found
 
 
+def accuracy_of(chosen):
+    """The accuracy of the search, mm."""
+    return max(chosen["accuracy"], PREVIEW) if chosen["preview"] else chosen["accuracy"]
+
+
 def command(chosen, scene):
     line = [solver(), str(scene), "-output", str(scene.with_name("result")), "-monitor_mm"]
-    accuracy = chosen["accuracy"]
     if chosen["preview"]:
         line += ["-profile", "preview"]
-        accuracy = max(accuracy, 1)
     elif chosen["uncertainty"]:
         line.append("-discretisation")
-    line += ["-accuracy", str(accuracy)]
+    line += ["-accuracy", str(accuracy_of(chosen))]
     if chosen["timeLimit"]:
         line += ["-time_limit", str(chosen["timeLimit"])]
     ranks, mpirun = chosen["processors"], shutil.which("mpirun")
@@ -236,7 +242,7 @@ def solve(chosen, scene):
     """Runs the solver to its end; its exit status and what it printed. Its failures are Refusals.
     Where this program is killed, the solver ends at its next line, which nobody reads."""
     line = command(chosen, scene)
-    progress = Progress(float(line[line.index("-accuracy") + 1]))
+    progress = Progress(accuracy_of(chosen))
     process = subprocess.Popen(line, cwd=scene.parent, text=True, errors="replace",
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=open(scene.with_name("stderr"), "w", encoding="utf-8"))
@@ -325,7 +331,7 @@ def hand_back(chosen, result, numbers):
             arrays["uncertainty"] = error + of_mesh
         if chosen["predictedSkin"]:
             write_vtp(chosen["predictedSkin"], points, triangles.reshape(-1, 3), arrays)
-        moved, first = step["bone_surface/points"][:] if "bone_surface" in step else None, 0
+        moved, first = step["bone_surface/points"][:] if "bone_surface/points" in step else None, 0
         for b, number in enumerate(numbers):
             surface = h5[f"model/bone_surface/{b}"]
             count = len(surface["points"])
@@ -342,10 +348,13 @@ def hand_back(chosen, result, numbers):
             "invertedPrisms": int(told["inverted_prisms"])}, told
 
 
-def verdict(status, told, accuracy):
+def verdict(status, told, accuracy, preview):
     """One line for the panel."""
     load, error = told["load"], told["displacement_error"]
-    if status == 0:
+    if status == 0 and error <= accuracy:
+        if preview:
+            return (f"PREVIEW, to {accuracy:g} mm: the face is within {error:.3g} mm of rest; "
+                    "apply without First look for the result")
         return f"accuracy reached: {error:.3g} mm of {accuracy:g} mm"
     reason = told["reason"].decode() if isinstance(told["reason"], bytes) else str(told["reason"])
     near = f"about {error:.3g} mm" if math.isfinite(error) else "at no known distance"
@@ -358,7 +367,7 @@ def work(chosen, folder):
     print("<filter-start><filter-name>Repose</filter-name></filter-start>", flush=True)
     status, printed = solve(chosen, scene)
     returned, told = hand_back(chosen, scene.with_name("result.h5"), numbers)
-    returned = {"verdict": verdict(status, told, chosen["accuracy"]), **returned}
+    returned = {"verdict": verdict(status, told, accuracy_of(chosen), chosen["preview"]), **returned}
     if chosen["resultFile"]:
         shutil.copyfile(scene.with_name("result.h5"), chosen["resultFile"])
     if chosen["returnparameterfile"]:
@@ -369,19 +378,56 @@ def work(chosen, folder):
     print("<filter-progress>1</filter-progress>", flush=True)
 
 
+# ----- the program
+
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+
+
 def cancel(*_):
+    """Ends the run. Further signals must not interrupt the cleaning."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     raise Cancelled
+
+
+def lock(folder):
+    """Marks a temporary folder as in use for as long as this process lives."""
+    held = open(folder / "new", "w", encoding="ascii")
+    fcntl.flock(held, fcntl.LOCK_EX)
+    (folder / "new").rename(folder / "lock")
+    return held
+
+
+def remove_abandoned():
+    """Removes the temporary folders of processes that were killed."""
+    for abandoned in pathlib.Path(tempfile.gettempdir()).glob(f"{TEMPORARY}*/lock"):
+        try:
+            with open(abandoned, encoding="ascii") as held:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(abandoned.parent, ignore_errors=True)
+        except OSError:  # in use, or another user's
+            continue
+
+
+def run():
+    import h5py  # a missing module is reported before the search
+    import numpy
+    remove_abandoned()
+    with tempfile.TemporaryDirectory(prefix=TEMPORARY, ignore_cleanup_errors=True) as name:
+        folder = pathlib.Path(name).resolve()
+        with lock(folder):
+            work(parse(sys.argv[1:]), folder)
 
 
 def main():
     if "--xml" in sys.argv[1:]:
         sys.stdout.write((FOLDER / "Repose.xml").read_text(encoding="utf-8"))
         return 0
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, cancel)
     try:
-        with tempfile.TemporaryDirectory(prefix="repose_") as folder:
-            work(parse(sys.argv[1:]), pathlib.Path(folder).resolve())
+        for number in SIGNALS:
+            signal.signal(number, cancel)
+        run()
     except ModuleNotFoundError as missing:
         print(f"Repose: {missing.name} is missing: apt-get install python3-numpy python3-h5py",
               file=sys.stderr)

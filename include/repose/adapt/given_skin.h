@@ -5,8 +5,9 @@
 namespace repose::adapt {
 
 /// The displacement of the solved skin carried to the vertices of a given one, which may be dense,
-/// dirty and larger: an affine motion fitted to the 16 nearest skin points of the model by moving
-/// least squares, for what lies farther off than they do (ears, inner walls) that at their border.
+/// dirty and larger: an affine motion fitted to the 16 nearest skin points of the model around the
+/// nearest triangle, all of one side of a cut, by moving least squares; for what lies farther off
+/// than they do (ears, inner walls) that at their border.
 /// Beyond the rim of the solved skin it fades to nothing over 20 mm. The fields are `displacement`
 /// (mm) and `solved`, the share of it that is left (1 over the solved skin). `displacement` is that
 /// of the points of the solved `skin`, or of all of a model. Serial.

@@ -18,4 +18,7 @@ MergedBones merge_bones(const std::vector<surface::Surface>& surfaces);
 std::vector<Vec3> moved_points(const MergedBones& bones, const model::PrescribedMotion& motion,
                                double load);
 
+/// [P] How far the points have gone, mm, from where moved_points() says they are.
+std::vector<Vec3> displacements(const MergedBones& bones, const std::vector<Vec3>& moved);
+
 }  // namespace repose::results

@@ -25,6 +25,7 @@ struct StoredStep {
   model::StepRows rows;            ///< all rows
   std::vector<Vec3> displacement;  ///< [N] mm
   std::vector<Vec3> bone_points;   ///< mm, of all bone surfaces in turn; empty: none, or not moved
+  std::vector<Vec3> bone_displacement;  ///< mm, of the same points; empty: none
 };
 
 /// Whether a file is a checkpoint of a run that went on.

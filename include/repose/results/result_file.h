@@ -37,8 +37,8 @@ class ResultFile {
   ResultFile& operator=(const ResultFile&) = delete;
 
   /// Appends one /step/NNNN. Each rank gives its slabs; the numbers are
-  /// rank 0's. Where bones have moved at this load their surfaces are stored where they are then
-  /// (bone_surface/points f64 [P,3], all bones' in turn).
+  /// rank 0's. bone_surface/displacement f64 [P,3] holds how far the points of all bone surfaces in
+  /// turn have gone at this load, bone_surface/points where they are; the latter only if any moved.
   void append(const model::StepNumbers& numbers, const model::StepRows& rows);
 
   /// Begins with the first `count` steps of an earlier result of the same model. Before any append.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "../../layered_patch.h"
 
 namespace repose::adapt {
@@ -37,6 +39,51 @@ TEST(GivenSkin, follows_an_affine_motion_and_fades_beyond_the_rim) {
   EXPECT_LT((carried[3] - 0.5 * motion({48, 16, 0})).norm(), 0.7);
   EXPECT_EQ(data.fields[0].values[4], 0);
   EXPECT_EQ(carried[4], Vec3::Zero());
+}
+
+/// A flat skin of 4 mm squares, slit along y = 16 from x = 16 to x = 36.
+surface::Surface slit_skin() {
+  const test::PatchSize size{.columns_x = 13, .columns_y = 9};
+  surface::Surface skin{"skin", {}, test::patch_skin(size).triangles};
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 13; ++x) skin.points.push_back({4.0 * x, 4.0 * y, 0});
+  std::map<int64_t, int64_t> twin;
+  for (size_t p = 0, count = skin.points.size(); p < count; ++p) {
+    const Vec3 at = skin.points[p];
+    if (at.y() != 16 || at.x() < 18 || at.x() > 34) continue;
+    twin[static_cast<int64_t>(p)] = static_cast<int64_t>(skin.points.size());
+    skin.points.push_back(at);
+  }
+  for (Triangle& t : skin.triangles) {
+    const double middle =
+        (skin.points[t[0]].y() + skin.points[t[1]].y() + skin.points[t[2]].y()) / 3;
+    for (int64_t& p : t)
+      if (middle > 16 && twin.contains(p)) p = twin[p];
+  }
+  return skin;
+}
+
+TEST(GivenSkin, parts_where_the_solved_skin_does) {
+  const surface::Surface skin = slit_skin();
+  ASSERT_EQ(skin.points.size(), 13 * 9 + 4u);
+  std::vector<Vec3> displacement(skin.points.size(), Vec3::Zero());
+  const auto open = [](double x) { return std::max(0.0, 1 - std::abs(x - 26) / 10); };
+  for (const Triangle& t : skin.triangles)
+    for (const int64_t p : t) {
+      const double middle =
+          (skin.points[t[0]].y() + skin.points[t[1]].y() + skin.points[t[2]].y()) / 3;
+      displacement[p].y() = (middle > 16 ? 3 : -3) * open(skin.points[p].x());
+    }
+  surface::Surface given{"given", {}, {}};
+  for (const double y : {15.9, 16.1, 14.0, 18.0})
+    for (const double z : {0.0, 1.0}) given.points.push_back({26, y, z});
+  given.triangles = {{0, 1, 2}};
+  const surface::PointData data = displacement_of_given(given, skin, displacement);
+  for (size_t p = 0; p < given.points.size(); ++p) {
+    const double side = given.points[p].y() > 16 ? 1 : -1;
+    EXPECT_EQ(data.fields[0].values[p], 1) << "the sides of the slit are no rim";
+    EXPECT_GT(side * data.vectors[0].values[p].y(), 1.5) << given.points[p].transpose();
+  }
 }
 
 }  // namespace

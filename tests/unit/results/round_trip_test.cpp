@@ -86,6 +86,12 @@ TEST(RoundTrip, BonesAreStoredWhereTheyAreAtTheLoad) {
   ASSERT_EQ(moved.size(), 6u);
   EXPECT_EQ(moved[0], m.bone_surfaces[0].points[0]);
   EXPECT_LT((moved[3] - m.bone_surfaces[1].points[0] - Vec3(0, 0, 2)).norm(), 1e-14);
+  for (const Vec3& still : read_step(folder.path("a.h5"), 0, m).bone_displacement)
+    EXPECT_EQ(still, Vec3(0, 0, 0));
+  const std::vector<Vec3> motion = read_step(folder.path("a.h5"), 1, m).bone_displacement;
+  ASSERT_EQ(motion.size(), 6u);
+  EXPECT_EQ(motion[0], Vec3(0, 0, 0));
+  EXPECT_EQ(motion[3], Vec3(moved[3] - m.bone_surfaces[1].points[0]));
 }
 
 TEST(RoundTrip, ModelWithoutAnythingOptional) {

@@ -1,0 +1,166 @@
+"""That formats.md is enough to recompute a result: by a reader that was written from it alone."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from format_reader import Contact, File, advance, motions, prescribed, solid
+
+FIELD_ERROR_MM = 0.15
+ROUNDING = 1e-9
+SCENE = (PROJECT / "meshes/head_solid.yaml").read_text().partition("moves:")[0].replace(
+    ": head_", f": {PROJECT}/meshes/head_").replace("layers: 4", "layers: 3") + """  attach_regions:
+    - {sphere: {center: [30, -60, -60], radius: 25}, attach: slide}
+mouth: {path: [[-20, -92, -35], [0, -98, -35], [20, -92, -35]]}
+instruments:
+  - {sphere: {center: [57, -90, -10], radius: 10}, push: [-9, 12, 0], skin: slide}
+forces:
+  - {at: [-50, -75, -30], radius: 10, force: [-0.02, -0.05, 0]}
+moves:
+  - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: -1}}
+"""
+NOT_RECOMPUTED = {"load", "functional", "volume", "lambda", "bulk_modulus", "epsilon", "iterations",
+                  "evaluations", "seconds", "reason", "converged", "displacement_error"}
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory, environment):
+    from conftest import runner
+    folder = tmp_path_factory.mktemp("format")
+    (folder / "touching.yaml").write_text(SCENE)
+    done = runner(folder, environment)("repose-solve", "touching.yaml", "-accuracy", 0.1)
+    assert (done.returncode, done.stderr) == (0, ""), done
+    for body in ("mandible", "instruments[0]", "the sides of cuts"):
+        assert f"points press on {body}" in done.stdout
+    return File(folder / "touching.h5")
+
+
+@pytest.fixture(scope="module")
+def contact(result):
+    return Contact(result)
+
+
+def close(value, stored, scale, tolerance=ROUNDING):
+    return np.abs(value - stored).max(initial=0) <= tolerance * scale
+
+
+def test_every_number_of_every_step_follows_from_the_page(result, contact):
+    for arrays, numbers in result.steps:
+        again = tissue(result, arrays)
+        again |= touching(result, contact, arrays, numbers)
+        assert again.keys() - arrays.keys() == numbers.keys() - NOT_RECOMPUTED
+        assert arrays.keys() - again.keys() == {"point/position"}
+        for name, (value, scale) in again.items():
+            stored = arrays[name] if name in arrays else numbers[name]
+            assert np.shape(value) == np.shape(stored), name
+            assert close(value, stored, scale), (name, np.abs(value - stored).max(), scale)
+
+
+def tissue(result, arrays):
+    """{name: (value, scale of its rounding)} of all but contact's own numbers."""
+    x, model = arrays["point/position"], result.model
+    soft, displacement = model["point/set"] == 0, x - model["point/position"]
+    again = solid(result, x)
+    load = model["point/mass"][:, None] * result.gravity + model["point/external_force"]
+    force = np.where(soft[:, None], again.pop("force") + load + arrays["point/contact_force"], 0)
+    size = np.linalg.norm(force, axis=1)
+    found = {name: (value, max(1, np.abs(value).max())) for name, value in again.items()}
+    potential = -(load * displacement)[soft].sum()
+    return found | {
+        "point/displacement": (displacement, 1), "point/residual_force": (force, 1),
+        "point/advance": (advance(result, displacement), 1), "f_f": (size.sum(), 1),
+        "gradient_max": (size.max(), 1), "potential": (potential, 1), "penalty": (0.0, 1)}
+
+
+def touching(result, contact, arrays, numbers):
+    """The same of contact and of what it is part of."""
+    x, load = arrays["point/position"], numbers["load"]
+    near = max(FIELD_ERROR_MM, numbers["displacement_error"])
+    gap, deepest, acting = contact.measure(x, load, near)
+    pressure, scale = pressures(acting, arrays["point/contact_force"])
+    of_point = np.zeros(len(x))
+    np.add.at(of_point, [entry[0] for entry in acting], pressure)
+    energy, slack = energy_of(result, acting, pressure, numbers)
+    force = arrays["point/contact_force"]
+    bones = moved_bones(result, load)
+    found = {
+        "point/contact_gap": (gap, FIELD_ERROR_MM / ROUNDING),
+        "penetration": (deepest, FIELD_ERROR_MM / ROUNDING),
+        "point/contact_pressure": (of_point, scale / ROUNDING),
+        "point/contact_force": (force, 1),
+        "contact_energy": (energy, slack / ROUNDING),
+        "objective": (numbers["f_e"] + numbers["potential"] + numbers["contact_energy"], 1),
+        "bone_surface/displacement": (bones - result.model["bone_surfaces/points"], 1)}
+    if "bone_surface/points" in arrays:
+        found["bone_surface/points"] = (bones, 100)
+    return found
+
+
+def pressures(acting, force):
+    """The pressure of each constraint from the forces on the points, whose rows all must agree."""
+    rows = sorted({point for *_, unit in acting for point in unit})
+    place = {point: 3 * k for k, point in enumerate(rows)}
+    matrix = np.zeros((3 * len(rows), len(acting)))
+    for k, (*_, unit) in enumerate(acting):
+        for point, direction in unit.items():
+            matrix[place[point]:place[point] + 3, k] = direction
+    given = force[rows].ravel()
+    found = np.linalg.lstsq(matrix, given, rcond=None)[0]
+    assert np.abs(matrix @ found - given).max() <= FIELD_ERROR_MM / 10 * np.abs(given).max()
+    assert np.abs(np.delete(force, rows, 0)).max() == 0
+    return found, FIELD_ERROR_MM / 10 * np.abs(found).max()
+
+
+def energy_of(result, acting, pressure, numbers):
+    """The energy of contact from pressures and gaps, and how far the multipliers, which are not in
+    the file, may leave it from that."""
+    stiffness, left = result.contact["stiffness"], numbers["displacement_error"] / 2
+    gap, area = (np.array([entry[k] for entry in acting]) for k in (1, 2))
+    presses = np.abs(pressure) > 1e-6 * np.abs(pressure).max()
+    energy = -(area * gap * (pressure + stiffness * gap / 2))[presses].sum()
+    lag = np.maximum(np.abs(gap), left)
+    return energy, 8 * (area * stiffness * lag**2).sum() + (
+        FIELD_ERROR_MM * area * np.abs(pressure))[presses].sum()
+
+
+def moved_bones(result, load):
+    points, bone = result.model["bone_surfaces/points"], result.model["bone_surfaces/bone"]
+    moved = points.copy()
+    for b, (turn, shift) in enumerate(motions(result, load)):
+        rows = np.unique(result.model["bone_surfaces/triangles"][bone == b])
+        moved[rows] = points[rows] @ turn.T + shift
+    return moved
+
+
+def test_what_is_no_unknown_is_where_the_page_says(result):
+    for arrays, numbers in result.steps:
+        expected, x = prescribed(result, numbers["load"]), arrays["point/position"]
+        fixed = result.model["point/set"] != 0
+        assert close(expected[fixed], x[fixed], 100) and np.isnan(expected[~fixed]).all()
+
+
+SCENES = [("head_solid.yaml", "-stability"), ("head_instrument.yaml",), ("head_incision.yaml",),
+          ("paper_jaw_opening.yaml",)]
+
+
+@pytest.mark.parametrize("scene", [" ".join(map(str, scene)) for scene in SCENES])
+def test_everything_in_a_result_is_named_on_the_page(solved, scene):
+    page = (PROJECT / "docs/reference/formats.md").read_text()
+    words = set(re.findall(r"[A-Za-z_0-9]+", page))
+    name, *options = scene.split()
+    found = set()
+
+    def note(path, item):
+        parts = [part for part in path.split("/") if not part.isdigit()]
+        found.update(parts, item.attrs)
+
+    with h5py.File(solved(name, *options)) as h5:
+        note("", h5)
+        for top in ("model", "step"):
+            note(top, h5[top])
+            h5[top].visititems(note)
+    assert found - {""} - words == set()
+    assert len(found) > 50
