@@ -181,7 +181,8 @@ void Objective::add_blocks(std::span<const Block> blocks, std::span<const Vec3> 
 
 void Objective::hessian_action(std::span<const Vec3> direction, Vec product) {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
-  mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
+  mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_,
+                                mechanics::nodal_slopes(loops_.nodal, positions_.local()));
   add_blocks(blocks(true), direction, work_);
   positions_.keep_owned(work_, product);
 }

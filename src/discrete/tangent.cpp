@@ -49,7 +49,7 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     objective.positions().spread(direction, self->direction_);
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
-                                  self->direction_, self->work_);
+                                  self->direction_, self->work_, self->nodal_slopes_);
     Objective::add_blocks(self->blocks_, self->direction_, self->work_);
     objective.positions().keep_owned(self->work_, product);
   } catch (const std::exception&) {
@@ -93,6 +93,7 @@ void Tangent::assemble(Vec displacement) {
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
   if (same) return;
   at_.assign(now.begin(), now.end());
+  nodal_slopes_ = mechanics::nodal_slopes(objective_.loops().nodal, at_);
   blocks_ = objective_.blocks(true);
   convex_blocks_ = objective_.blocks(false);
   ++assemblies_;

@@ -42,6 +42,7 @@ class Tangent : public Hessian {
   base::MatHandle coupled_;                               // exact_ and what averaged volumes couple
   std::vector<Objective::Block> blocks_, convex_blocks_;  // at the last assembly
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
+  std::vector<double> nodal_slopes_;    // there, where volumes are averaged
   std::vector<Vec3> direction_, work_;  // [local points]
   int64_t filled_at_ = -1;              // assemblies() when exact_ was filled
 };
