@@ -123,9 +123,7 @@ void share(MPI_Comm comm, Job& job) {
   job.touches = job.raised ? job.raised->part.contact : !job.model.contact.empty();
   for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
   MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);
-  job.is_cut = !job.cuts.empty();
-  for (bool* flag :
-       {&job.solid, &job.touches, &job.remeshed, &job.is_cut, &job.initial_equilibrium})
+  for (bool* flag : {&job.solid, &job.touches, &job.remeshed, &job.initial_equilibrium})
     MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
 }
 

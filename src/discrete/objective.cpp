@@ -207,7 +207,8 @@ void Objective::add_blocks(std::span<const Block> blocks, std::span<const Vec3> 
 
 void Objective::hessian_action(std::span<const Vec3> direction, Vec product, bool contact) {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
-  mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_);
+  mechanics::add_hessian_action(loops_, positions_.local(), weights_, direction, work_,
+                                mechanics::nodal_slopes(loops_.nodal, positions_.local()));
   add_blocks(term_blocks(true), direction, work_);
   if (contact) add_blocks(contact_blocks(true), direction, work_);
   positions_.keep_owned(work_, product);

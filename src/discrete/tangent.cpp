@@ -51,7 +51,7 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     objective.positions().spread(direction, self->direction_);
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
-                                  self->direction_, self->work_);
+                                  self->direction_, self->work_, self->nodal_slopes_);
     Objective::add_blocks(self->blocks_, self->direction_, self->work_);
     objective.positions().keep_owned(self->work_, product);
   } catch (const std::exception&) {
@@ -95,7 +95,10 @@ void Tangent::assemble(Vec displacement) {
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
   if (same && !contact_changed_) return;
   at_.assign(now.begin(), now.end());
-  if (!same) ++states_;
+  if (!same) {
+    ++states_;
+    nodal_slopes_ = mechanics::nodal_slopes(objective_.loops().nodal, at_);
+  }
   set_contact(objective_.contact_blocks(true), objective_.contact_blocks(false));
 }
 

@@ -228,23 +228,25 @@ double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
 
 double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
                            const Weights& weights, std::span<Vec3> gradient) {
-  double value = add_prism_gradient(loops.prisms, position, weights, gradient);
-  if (!loops.nodal.empty())
-    value += weights.volume_weight *
-             add_nodal_gradient(loops.nodal, position, weights.volume_weight, gradient);
-  return value;
+  if (loops.nodal.empty()) return add_prism_gradient(loops.prisms, position, weights, gradient);
+  const double weight = weights.volume_weight;
+  return weight * add_nodal_gradient(loops.nodal, position, weight, gradient);
 }
 
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
-                        std::span<const Vec3> direction, std::span<Vec3> product) {
+                        std::span<const Vec3> direction, std::span<Vec3> product,
+                        std::span<const double> nodal_slopes) {
   for (const SpringLoop& loop : loops.springs)
     with_exponent(loop.exponent, [&]<int p>() {
       spring_action<p>(loop, position, weights.elastic, direction, product);
     });
   if (loops.edges.size() > 0) add_edge_gradient(loops.edges, direction, weights.elastic, product);
   if (weights.volume == VolumeTerm::none) return;
-  prism_action(loops.prisms, position, weights, direction, product);
-  add_nodal_action(loops.nodal, position, weights.volume_weight, direction, product);
+  if (loops.nodal.empty())
+    prism_action(loops.prisms, position, weights, direction, product);
+  else
+    add_nodal_action(loops.nodal, position, nodal_slopes, weights.volume_weight, direction,
+                     product);
 }
 
 std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,

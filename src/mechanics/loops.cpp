@@ -82,11 +82,8 @@ void add_material(const model::Prisms& prisms, PrismLoop& loop) {
   for (size_t e = 0; e < loop.row.size(); ++e) {
     const int64_t row = loop.row[e];
     const double averaged = prisms.nodal_modulus.empty() ? 0 : prisms.nodal_modulus[row];
-    const double own = prisms.modulus[row] - averaged, v0 = loop.rest_volume[e];
-    loop.compliance[e] /= own;
-    loop.target_volume[e] = prisms.target_volume[row];
-    if (averaged > 0)  // the same pressure at rest
-      loop.target_volume[e] = v0 + (prisms.target_volume[row] - v0) * prisms.modulus[row] / own;
+    loop.compliance[e] /= prisms.modulus[row] - averaged;
+    loop.target_volume[e] = own_target_volume(prisms, row);
     loop.shear_modulus.push_back(prisms.shear_modulus[row]);
     if (averaged > 0) loop.nodal_modulus.push_back(averaged);
   }
@@ -127,7 +124,7 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
     loops.fixed_edges = make_edge_loop(part, owned_edges, false);
     loops.fixed_prisms = make_prism_loop(part, owned_prisms, false);
   }
-  loops.nodal = make_nodal_volumes(part, owned_points);
+  loops.nodal = make_nodal_volumes(part, owned_points, owned_prisms);
   for (const model::TermElements& elements : part.elements)
     loops.terms.emplace_back(elements, part.points, owned_points);
   return loops;

@@ -33,8 +33,8 @@ constexpr int64_t layers = 4;
 constexpr int64_t sizes[] = {35, 354};       // columns along a side: 5e3 and 5e5 points
 constexpr double out_of_all_caches = 1.5e9;  // bytes of STREAM's three arrays
 
-/// The patch as a solid of ν = 0.45 in place of springs.
-mechanics::Loops solid_loops(model::Model model) {
+/// The patch as a solid of ν = 0.45 in place of springs, its volumes averaged around points or not.
+mechanics::Loops solid_loops(model::Model model, bool averaged) {
   model.springs = {};
   model::Prisms& prisms = model.prisms;
   const model::Moduli of = model::moduli({0.015, 0.45});
@@ -42,6 +42,7 @@ mechanics::Loops solid_loops(model::Model model) {
   prisms.modulus.assign(prisms.points.size(), of.volume);
   for (const double volume : prisms.rest_volume)
     prisms.target_volume.push_back(volume * (1 + of.shear / of.volume));
+  if (averaged) prisms.nodal_modulus.assign(prisms.points.size(), of.volume - of.shear);
   model::assemble_edges("patch", model);
   return mechanics::make_loops(model, 0, static_cast<int64_t>(prisms.points.size()),
                                static_cast<int64_t>(model.edges.points.size()),
@@ -49,15 +50,18 @@ mechanics::Loops solid_loops(model::Model model) {
 }
 
 struct Workload {
-  mechanics::Loops springs, prisms, solid;  // the first two for products of one kind
+  mechanics::Loops springs, prisms;  // for products of one kind
+  mechanics::Loops solid, averaged;
   std::vector<Vec3> position, direction, result;
+  std::vector<double> slopes;  // of the averaged volumes
 
   explicit Workload(int64_t columns) {
     const model::Model model = test::layered_patch({columns, columns, layers, 1.0, 0.8});
     springs = mechanics::make_loops(model, static_cast<int64_t>(model.springs.points.size()),
                                     static_cast<int64_t>(model.prisms.points.size()));
     std::swap(prisms.prisms, springs.prisms);
-    solid = solid_loops(model);
+    solid = solid_loops(model, false);
+    averaged = solid_loops(model, true);
     std::mt19937 engine(1);
     std::uniform_real_distribution<double> noise(-0.1, 0.1);
     for (const Vec3& x : model.points.position) {
@@ -65,6 +69,7 @@ struct Workload {
       position.push_back(x + direction.back());
     }
     result.assign(position.size(), Vec3::Zero());
+    slopes = mechanics::nodal_slopes(averaged.nodal, position);
   }
   const mechanics::SpringLoop& spring_loop() const { return springs.springs[0]; }
   const mechanics::PrismLoop& prism_loop() const { return prisms.prisms; }
@@ -96,7 +101,8 @@ const Kernel kernels[] = {
      }},
     {"spring Hessian action", springs, 4,
      [](Workload& w) {
-       mechanics::add_hessian_action(w.springs, w.position, springs_only, w.direction, w.result);
+       mechanics::add_hessian_action(w.springs, w.position, springs_only, w.direction, w.result,
+                                     {});
      }},
     {"prism energy and gradient", prisms, 3,
      [](Workload& w) {
@@ -105,7 +111,7 @@ const Kernel kernels[] = {
      }},
     {"prism Hessian action", prisms, 4,
      [](Workload& w) {
-       mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result);
+       mechanics::add_hessian_action(w.prisms, w.position, with_penalty, w.direction, w.result, {});
      }},
     {"solid edge energy and gradient", edges, 3,
      [](Workload& w) {
@@ -120,7 +126,18 @@ const Kernel kernels[] = {
      }},
     {"solid prism with its edges, Hessian action", prisms, 4,
      [](Workload& w) {
-       mechanics::add_hessian_action(w.solid, w.position, of_solid, w.direction, w.result);
+       mechanics::add_hessian_action(w.solid, w.position, of_solid, w.direction, w.result, {});
+     }},
+    {"solid prism of averaged volume with its edges, energy and gradient", prisms, 3,
+     [](Workload& w) {
+       benchmark::DoNotOptimize(
+           mechanics::add_edge_gradient(w.averaged.edges, w.position, 1.0, w.result) +
+           mechanics::add_volume_gradient(w.averaged, w.position, of_solid, w.result));
+     }},
+    {"solid prism of averaged volume with its edges, Hessian action", prisms, 4,
+     [](Workload& w) {
+       mechanics::add_hessian_action(w.averaged, w.position, of_solid, w.direction, w.result,
+                                     w.slopes);
      }},
 };
 

@@ -163,14 +163,14 @@ BREAKS = [
     # averaged volumes
     (
         "a point averages half its prisms' volumes",
-        "for (const int32_t p : nodal.points[m]) sum[p] += share * change;",
-        "for (const int32_t p : nodal.points[m]) sum[p] += 0.5 * share * change;",
+        "const double change = share * sum[p], pressure",
+        "const double change = 0.5 * share * sum[p], pressure",
         MECHANICS + "(derivatives|solid)",
     ),
     (
         "averaged volumes do not bend",
-        "product[points[c]] += vec3(bend * v.gradient[c] + slope * turned[c]);",
-        "product[points[c]] += vec3(bend * v.gradient[c]);",
+        "const Pair bend = weight * unit * (own * rate + above + below);",
+        "const Pair bend = weight * unit * own * rate;",
         MECHANICS + "derivatives",
     ),
     (

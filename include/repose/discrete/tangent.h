@@ -52,6 +52,7 @@ class Tangent : public Hessian {
   std::vector<Objective::Block> blocks_;  // of terms and contact, at the last assembly
   std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
+  std::vector<double> nodal_slopes_;    // there, where volumes are averaged
   std::vector<Vec3> direction_, work_;  // [local points]
   bool contact_changed_ = true;
   int64_t filled_at_ = -1;  // assemblies() when exact_ was filled

@@ -35,8 +35,10 @@ VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
                      double target_volume);
 
 /// Σ scale · (∂²Φ/∂x²) d of all terms, added to `product`: the action of the exact Hessian.
+/// `nodal_slopes`: those at `position` (nodal_volumes.h); empty where volumes are not averaged.
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
-                        std::span<const Vec3> direction, std::span<Vec3> product);
+                        std::span<const Vec3> direction, std::span<Vec3> product,
+                        std::span<const double> nodal_slopes);
 
 /// What a state of the tissue amounts to, over the counted elements (to be summed over ranks).
 struct Totals {

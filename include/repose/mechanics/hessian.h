@@ -126,7 +126,7 @@ void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
     std::array<Vec3, 6> corners;
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     PrismTerm term{prisms.compliance[e], prisms.target_volume[e]};
-    if (!nodal.empty()) term.nodal_slope = nodal[prisms.row[e]];
+    if (!nodal.empty()) term.nodal_slope = nodal[loops.nodal.place[prisms.row[e]]];
     if (!nodal.empty() && !most_slope.empty())
       term.nodal_curvature = prisms.nodal_modulus[e] / prisms.rest_volume[e];
     const double most = most_slope.empty() ? std::numeric_limits<double>::max() : most_slope[e];

@@ -96,7 +96,8 @@ inline Eigen::VectorXd hessian_action(const mechanics::Loops& loops,
                                       const mechanics::Weights& weights, const std::vector<Vec3>& x,
                                       const std::vector<Vec3>& d) {
   std::vector<Vec3> product(x.size(), Vec3::Zero());
-  mechanics::add_hessian_action(loops, x, weights, d, product);
+  mechanics::add_hessian_action(loops, x, weights, d, product,
+                                mechanics::nodal_slopes(loops.nodal, x));
   return flattened(product);
 }
 

@@ -96,7 +96,7 @@ void expect_finite(int exponent, double length, double rest) {
   std::vector<Vec3> product(2, Vec3::Zero());
   Loops alone;
   alone.springs = {loop};
-  add_hessian_action(alone, x, {}, std::vector<Vec3>{Vec3(1, 2, 3), Vec3::Zero()}, product);
+  add_hessian_action(alone, x, {}, std::vector<Vec3>{Vec3(1, 2, 3), Vec3::Zero()}, product, {});
   EXPECT_TRUE(product[0].allFinite() && product[1].allFinite());
 }
 

@@ -197,22 +197,21 @@ Expansion<6> volume_oracle(const std::array<int32_t, 6>& points, const std::vect
 /// by. Returns by how much the energy grows with each prism's volume.
 std::vector<double> check_nodal(const NodalVolumes& nodal, const Weights& weights,
                                 const std::vector<Vec3>& x, OracleSums& sums) {
-  std::vector<double> excess(x.size(), 0.0), slopes;
-  for (size_t m = 0; m < nodal.points.size(); ++m)
-    for (const int32_t p : nodal.points[m])
-      excess[p] += (volume_oracle(nodal.points[m], x).value - nodal.rest_volume[m]) / 6;
+  std::vector<double> excess(x.size(), 0.0), slopes(nodal.rest_volume.size());
+  nodal.for_each_prism([&](int64_t m, const std::array<int32_t, 6>& points) {
+    for (const int32_t p : points)
+      excess[p] += (volume_oracle(points, x).value - nodal.rest_volume[m]) / 6;
+  });
   for (int64_t p = 0; p < nodal.counted; ++p)
     sums.add_value(weights.volume_weight * 0.5 * nodal.stiffness[p] * excess[p] * excess[p]);
-  for (const auto& points : nodal.points) {
-    double slope = 0;
+  nodal.for_each_prism([&](int64_t m, const std::array<int32_t, 6>& points) {
     for (const int32_t p : points)
-      slope += weights.volume_weight * nodal.stiffness[p] * excess[p] / 6;
+      slopes[m] += weights.volume_weight * nodal.stiffness[p] * excess[p] / 6;
     Expansion<6> oracle = volume_oracle(points, x);
-    oracle.gradient *= slope;
+    oracle.gradient *= slopes[m];
     oracle.value = 0;
     sums.add<6>(points, oracle);
-    slopes.push_back(slope);
-  }
+  });
   return slopes;
 }
 
@@ -224,7 +223,8 @@ void check_prisms(const Loops& loops, const Weights& weights, const std::vector<
     auto oracle = prism_oracle(loop, e, weights, x);
     sums.add<6>(loop.points[e], oracle);
     if (!nodal.empty())
-      oracle.hessian += nodal[loop.row[e]] * volume_oracle(loop.points[e], x).hessian;
+      oracle.hessian +=
+          nodal[loops.nodal.place[loop.row[e]]] * volume_oracle(loop.points[e], x).hessian;
     Eigen::Matrix<double, 18, 18> hessian;
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j) hessian.block<3, 3>(3 * i, 3 * j) = blocks[i][j];

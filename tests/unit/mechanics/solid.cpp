@@ -170,6 +170,47 @@ TEST_F(SolidBlock, VolumesThatAllChangeAlikePressAlikeAveragedOrNot) {
   for (const double m : volume_slopes(model_, x)) EXPECT_NEAR(m, slope, 1e-12);
 }
 
+/// Takes the last prism away, so that stacks differ in length and one of them stands alone.
+model::Model without_last_prism(model::Model model) {
+  model::Prisms& prisms = model.prisms;
+  prisms.points.pop_back();
+  for (auto* values : {&prisms.rest_volume, &prisms.shear_modulus, &prisms.modulus,
+                       &prisms.target_volume, &prisms.nodal_modulus})
+    values->pop_back();
+  return model;
+}
+
+/// Turns the corners of the second prisms of all stacks, so that they are part of none.
+model::Model with_turned_prisms(model::Model model) {
+  for (auto& p : model.prisms.points)
+    if (model.points.layer[p[0]] == 1) p = {p[1], p[2], p[0], p[4], p[5], p[3]};
+  return model;
+}
+
+TEST(AveragedVolumes, DoNotDependOnHowPrismsAreStacked) {
+  const model::Model stacked = without_last_prism(test::averaged_solid());
+  const model::Model turned = with_turned_prisms(stacked);
+  const auto loops_of = [](const model::Model& model) {
+    return make_loops(model, 0, static_cast<int64_t>(model.prisms.points.size()),
+                      static_cast<int64_t>(model.edges.points.size()),
+                      static_cast<int64_t>(model.points.position.size()));
+  };
+  const Loops one = loops_of(stacked), other = loops_of(turned);
+  EXPECT_GT(one.nodal.stacks.front().count % 2, 0);
+  EXPECT_GT(one.nodal.stacks.back().prisms, other.nodal.stacks.back().prisms);
+  const auto x = test::positions(stacked, test::State::stretched);
+  test::Random random(5);
+  std::vector<Vec3> d;
+  for (size_t i = 0; i < x.size(); ++i) d.push_back(random.vector());
+  const auto a = test::evaluate(one, solid_weights, x), b = test::evaluate(other, solid_weights, x);
+  EXPECT_NEAR(a.value, b.value, 1e-12 * std::abs(a.value));
+  EXPECT_LE((a.gradient - b.gradient).norm(), 1e-12 * a.gradient.norm());
+  const Eigen::VectorXd product = test::hessian_action(one, solid_weights, x, d);
+  EXPECT_LE((product - test::hessian_action(other, solid_weights, x, d)).norm(),
+            1e-12 * product.norm());
+  EXPECT_NEAR(nodal_energy(one.nodal, x), nodal_energy(other.nodal, x), 1e-12 * a.value);
+}
+
 TEST_F(SolidBlock, LimitedSlopesMakeTheHessianSemidefinite) {
   for (const auto& info : test::all_states) {
     if (info.state == test::State::far || info.state == test::State::nearly_coincident) continue;

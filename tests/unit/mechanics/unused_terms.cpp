@@ -15,7 +15,7 @@ namespace repose::mechanics {
     for (const SpringLoop& loop : loops.springs)
       value += weights.elastic * add_spring_gradient(loop, x, weights.elastic, sums);
     value += add_prism_gradient(loops.prisms, x, weights, sums);
-    add_hessian_action(loops, x, weights, x, sums);
+    add_hessian_action(loops, x, weights, x, sums, {});
   }
   return value;
 }
