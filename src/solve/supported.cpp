@@ -53,8 +53,7 @@ const std::vector<SupportedTypes>& supported_types() {
        {"cg", "groppcg", "pipecg", "pipeprcg", "fcg", "cr", "minres", "preonly", "stcg", "nash"},
        "linear systems of the error estimate"},
       {"pc_type",
-       {"columns", "none", "jacobi", "pbjacobi", "sor", "gamg", "ml", "hypre",
-        "cholesky", "lu"},
+       {"columns", "none", "jacobi", "pbjacobi", "sor", "gamg", "ml", "hypre", "cholesky", "lu"},
        "the preconditioner of both"},
       {"eps_type", {}, "the eigenvalue solver follows from the number of unknowns; leave it out"},
       {"st_type", {}, "the spectral transformation follows from -stability; leave it out"}};
