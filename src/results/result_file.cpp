@@ -441,7 +441,7 @@ void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t
       base::check_hdf5(
           H5Ocopy(source, step.c_str(), whole, step.c_str(), H5P_DEFAULT, H5P_DEFAULT));
       loads.push_back(in.number(step, "load"));
-      moved.push_back(in.has(step + "/bone_surface"));
+      moved.push_back(in.has(step + "/bone_surface/points"));
       for (const auto& [field, vector] : optional_fields(whole, step + "/point"))
         note_field(field, vector, k);
     }

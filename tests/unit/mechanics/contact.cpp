@@ -167,6 +167,49 @@ TEST(WallDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
   }
 }
 
+/// Expects that gaps change along a direction as their gradients say.
+template <class Gaps>
+void expect_linear(const std::vector<Vec3>& position, Gaps&& gaps) {
+  constexpr double step = 1e-5;
+  const std::vector<Vec3> way = random_points(static_cast<int>(position.size()), 1, 9);
+  std::vector<Vec3> moved = position;
+  for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * way[i];
+  const std::vector<LinearGap> before = gaps(position), after = gaps(moved);
+  ASSERT_EQ(before.size(), after.size());
+  ASSERT_GE(before.size(), 6u);
+  for (size_t k = 0; k < before.size(); ++k) {
+    double slope = 0;
+    for (const auto& [p, gradient] : before[k].gradient) slope += gradient.dot(way[p]);
+    EXPECT_NEAR((after[k].gap - before[k].gap) / step, slope, 1e-4);
+  }
+}
+
+TEST(LinearGap, HasTheGradientOfTheGap) {
+  Touching made = touching(0.4, model::Binding::touches);
+  expect_linear(made.position,
+                [&](const std::vector<Vec3>& x) { return made.loop.linear_gaps(x, 5); });
+  const Facing sides = facing(0.3);
+  WallLoop loop(sides.walls, 0.7);
+  expect_linear(sides.position, [&](const std::vector<Vec3>& x) {
+    loop.look(x);
+    return loop.linear_gaps(5);
+  });
+}
+
+TEST(LinearGap, GoesWithABodyThatMoves) {
+  Touching made = touching(0.4, model::Binding::touches);
+  std::vector<LinearGap> gaps = made.loop.linear_gaps(made.position, 5);
+  const Mat3 further = Eigen::AngleAxisd(0.3, Vec3(0, 1, 1).normalized()).toRotationMatrix();
+  for (RigidBody& body : made.loop.bodies()) body.place(further * turn, further * shift);
+  made.loop.carry(made.position, gaps);
+  for (const LinearGap& gap : gaps) {
+    const auto& [p, normal] = gap.gradient.front();
+    const Vec3 beside =
+        further * made.position[p];  // where the point would have gone with its body
+    EXPECT_NEAR(gap.gap, 0.4 + normal.dot(made.position[p] - beside), 1e-9);
+  }
+}
+
 TEST(SplineWeights, ReproduceStraightLinesAndGoOnStraight) {
   for (const int controls : {2, 3, 4, 7})
     for (double at = -1; at <= controls; at += 0.37) {

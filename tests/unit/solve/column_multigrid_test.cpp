@@ -133,6 +133,35 @@ TEST(ColumnMultigrid, TakesTheNumbersAnew) {
   EXPECT_LT(discrete::largest_block(after), 1e-5 * discrete::largest_block(before));
 }
 
+TEST(ColumnMultigrid, AddsAndTakesBackExtraBlocksOnEachLevel) {
+  Preconditioned s(slab(12));
+  linear::ColumnMultigrid multigrid = s.make();
+  const auto few = [&](double weight) {
+    return [&s, weight](const discrete::BlockVisitor& visit) {
+      for (int32_t p = 0; p < s.part.owned_points; p += 7)
+        if (s.part.unknown[p] >= 0) visit(p, p, weight * Mat3::Identity());
+    };
+  };
+  const base::VecHandle a = s.vector(4, 1.0);
+  base::VecHandle plain = s.positions.make_vector(), refilled = s.positions.make_vector(),
+                  added = s.positions.make_vector();
+  multigrid.apply(a, plain);
+  multigrid.refill([&](const discrete::BlockVisitor& visit) {
+    s.blocks(visit);
+    few(3)(visit);
+  });
+  multigrid.apply(a, refilled);
+  multigrid.refill(s.blocks);
+  multigrid.set_extra(few(50));
+  multigrid.set_extra(few(3));
+  multigrid.apply(a, added);
+  const double length = discrete::largest_block(refilled);
+  check(VecAXPY(added, -1, refilled));
+  EXPECT_LT(discrete::largest_block(added), 1e-4 * length);
+  check(VecAXPY(refilled, -1, plain));
+  EXPECT_GT(discrete::largest_block(refilled), 0.01 * length);
+}
+
 TEST(ColumnMultigrid, ServesGraphsWithoutLayers) {
   model::Model graph = slab(12);
   for (int64_t p = 0; p + 2 < static_cast<int64_t>(graph.points.position.size()); p += 4)

@@ -120,6 +120,27 @@ TEST(Contact, APenaltyThatIsFarTooSoftIsStiffened) {
   EXPECT_NEAR(rest.summary.last.penetration, deepest, 1e-9);
 }
 
+TEST(Contact, TheEstimateHoldsWherePointsTouchTwoPlanes) {
+  model::Model m = solid_block(4, 4, 4, poisson, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  const std::vector<double> top = face_areas(m, Vec3::UnitZ(), 0);
+  for (const double slope : {-0.6, 0.6}) {
+    const Vec3 normal(slope, 0, -1), on(5, 5, 0);
+    bind_face(m, plane(on, normal, {0, 0, -1.5}), Binding::touches, top);
+  }
+  const Rest exact = testing::find_rest(m, settings(1e-7));
+  EXPECT_TRUE(exact.summary.path.complete()) << exact.summary.last.reason;
+  for (const double accuracy : {0.1, 0.03, 0.01, 0.001}) {
+    const Rest rest = testing::find_rest(m, settings(accuracy));
+    EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+    double error = 0;
+    for (size_t i = 0; i < rest.rows.position.size(); ++i)
+      error = std::max(error, (rest.rows.position[i] - exact.rows.position[i]).norm());
+    EXPECT_LE(error, rest.summary.last.displacement_error + 1e-7) << accuracy;
+  }
+}
+
 TEST(Contact, ABlockThatSlidesAlongAPlaneMeetsNoResistance) {
   model::Model m = solid_block(6, 5, 4, poisson, 0, [](int, int, int a) {
     return a == 0 ? PointSet::held : PointSet::soft_tissue;
