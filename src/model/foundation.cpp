@@ -52,10 +52,14 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
   release_near_other_pieces(columns.deep, field, scene.moves,
                             {scene.tissue.release, scene.tissue.released}, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
+  const std::vector<char> border = rim;
   for (size_t c = 0; c < rim.size(); ++c) {
     const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
     rim[c] = rim[c] && bone >= 0 && travel(columns.deep[c], scene.moves[bone]) <= negligible_travel;
   }
+  const bool held = std::ranges::any_of(rim, [](char on) { return on != 0; }) ||
+                    std::ranges::any_of(attachment.bone, [](int32_t bone) { return bone >= 0; });
+  if (!held) rim = border;  // nothing else holds the tissue
   let_go();
   return rim;
 }

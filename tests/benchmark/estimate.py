@@ -176,7 +176,9 @@ class Study:
         with h5py.File(self.folder / "ended.h5", "r+") as h5:
             h5["step"][max(h5["step"])].attrs["converged"] = 1
         file = self.solve(problem, "own", "-accuracy", KNOWN, "-restart", "ended.h5")
-        return known(steps(file)[0]) if file else None
+        load = float(last(ended)["load"])
+        settled = [step for step in steps(file) if float(step["load"]) == load] if file else []
+        return known(settled[0]) if settled else None
 
     def run(self, problem, rest, solver, accuracy, how):
         """One run; nothing where its rest position cannot be found."""

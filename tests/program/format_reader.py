@@ -197,6 +197,18 @@ class Mesh:
         sign = np.where(self.windings(index, at) != 0, -1, 1)
         return np.minimum(sign * np.sqrt(squared), self.reach)
 
+    def exact(self, at):
+        """Signed distances of places to the triangles themselves."""
+        found = np.empty(len(at))
+        for row, place in enumerate(at):
+            off = np.linalg.norm(self.middle - place, axis=1)
+            near = off - self.radius <= (off + self.radius).min()
+            distance = np.sqrt(
+                closest_on_triangles(place[None], *(x[near] for x in self.corners)).min())
+            x, sign = self.crossings(place[1:])
+            found[row] = distance if sign[x > place[0]].sum() == 0 else -distance
+        return found
+
     def windings(self, index, at):
         """Winding numbers: signed crossings with the half-line in +x."""
         number = np.zeros(len(at), int)
@@ -316,6 +328,22 @@ class Contact:
             value[rows], gradient = body((position[self.point[rows]] - shift) @ turn)
             slope[rows] = gradient @ turn.T
         return value, slope
+
+    def exact_penetration(self, position, load):
+        """Largest depth inside the bodies' own triangles, less that at the start."""
+        moved, deepest = motions(self.file, load), 0.0
+        value, _ = self.distances(position, load)
+        for d, body in enumerate(self.bodies):
+            bone, rows = self.file.model["contact/body_bone"][d], self.body == d
+            rows &= value < 2 * self.file.contact["grid"]
+            turn, shift = moved[bone] if bone >= 0 else \
+                (np.eye(3), load * self.file.model["contact/body_push"][d])
+            places = ((position[self.point[rows]] - shift) @ turn,
+                      self.file.model["point/position"][self.point[rows]])
+            now, start = (np.maximum(0, -(body.exact(at) if isinstance(body, Mesh) else body(at)[0]))
+                          for at in places)
+            deepest = max(deepest, (now - start).max(initial=0))
+        return deepest
 
     def measure(self, position, load, pressing):
         """Gaps of points, the penetration and, of each constraint nearer than `pressing` mm: its

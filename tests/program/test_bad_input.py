@@ -217,7 +217,7 @@ CASES = {
     "option of unknown choice": (
         lambda i: i.option("-volume", "penalti"), ["-volume", "penalti", "penalty"]),
     "PETSc's option of unknown choice": (
-        lambda i: i.option("-tao_type", "fast"), ["option", "fast"]),
+        lambda i: i.option("-tao_type", "fast"), ["-tao_type fast", "must be one of"]),
     "PETSc's option not a number": (
         lambda i: i.option("-tao_max_it", "many"), ["option", "many"]),
     "initial Hessian of unknown name": (

@@ -109,6 +109,7 @@ bones:
   - {{name: skull, file: {meshes}/paper_skull.ply}}
   - {{name: mandible, file: {meshes}/paper_mandible.ply}}
 tissue: {{layers: 4}}
+boundary: {{rim: fixed}}
 contact: {{bones: off, cuts: off}}
 moves: [{{bone: mandible, translate: [0, -3, 0]}}]
 """

@@ -14,12 +14,13 @@ bones:
   - {name: mandible, file: paper_mandible.ply}
 tissue:
   layers: 4
+boundary: {rim: fixed}
 moves:
   - {bone: mandible, translate: [0, -3, 0]}
 """
 SKIN = "  material: {skin: {thickness: 1.5, young: 0.075}}\n"
 VARIED = {
-    "a rim let go": SCENE + "boundary: {rim: free}\n",
+    "a rim let go": SCENE.replace("fixed", "free"),
     "a skin of 1.5 mm, five times as stiff": SCENE.replace("moves", SKIN + "moves"),
     "a lower Poisson's ratio (0.40 for 0.45, 0.45 for 0.49)":
         SCENE.replace("moves", "  material: {poisson: 0.4}\nmoves"),
