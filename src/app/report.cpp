@@ -66,8 +66,12 @@ std::string remedy(const solve::Summary& s, bool stretched) {
            "balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
   if (!s.path.last.stable)
-    return " The tissue buckles there, or is between several rest positions: move the bones less, "
-           "or give the tissue tension.";
+    return std::string(
+               " The tissue buckles there, or is between several rest positions: move the bones "
+               "less, or give the tissue tension") +
+           (std::isfinite(s.last.penetration)
+                ? ", and leave contact.stiffness and contact.grid to the program."
+                : ".");
   if (std::isfinite(s.last.penetration))
     return " Tissue meets bone, an instrument or itself there: leave contact.stiffness and "
            "contact.grid to the program, or move less.";
@@ -132,7 +136,7 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 
 std::string describe_pierced(const std::vector<std::string>& bodies,
                              const solve::PiercedColumns& pierced) {
-  if (pierced.columns == 0) return "";
+  if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 knows their names
   return report_row(
       "pierced by bone",
       fmt::format(

@@ -243,7 +243,7 @@ Outcome ContactSearch::rounds(Vec displacement, double accuracy) {
     outcome.reason = fmt::format("contact comes to no end: {:.3g} mm of gaps remain", left);
   }
   outcome.iterations = iterations;
-  return outcome;
+  return outcome.converged ? outcome : stopped(displacement, outcome);  // multipliers have moved
 }
 
 void ContactSearch::go_back(Vec) {

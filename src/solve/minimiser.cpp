@@ -112,7 +112,8 @@ struct Minimiser::Callbacks {
       check(TaoDefaultConvergenceTest(tao, nullptr));
       const bool stalled =
           self.stalled(iteration, value) ||
-          self.progress_->stalls({self.function_.evaluations(), value, force, self.error_});
+          (self.function_.positions().part().solid &&  // springs converge as slowly
+           self.progress_->stalls({self.function_.evaluations(), value, force, self.error_}));
       const bool over = done || self.stopped_ || stalled;
       self.slowed_ = !over && self.initial_ && self.initial_->needs_renewal(force, length);
       if (over || self.slowed_) check(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
