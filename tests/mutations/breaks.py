@@ -100,7 +100,7 @@ BREAKS = [
     ),
     (
         "no margin for soft points",
-        "constexpr double margin = 50;",
+        "const double margin = positions_.part().solid ? 50 : 200;",
         "constexpr double margin = 0;",
         f"{SOLVE}|extremes",
     ),
