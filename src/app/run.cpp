@@ -315,7 +315,6 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
       describe_pierced(job_.bodies, summary.pierced));
-  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary));
   say(describe_self_contact(skin, summary, writer));
   say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   say(given);

@@ -12,9 +12,9 @@ SCENE = """skin: paper_skin.ply
 bones:
   - {name: skull, file: paper_skull.ply}
   - {name: mandible, file: paper_mandible.ply}
+boundary: {rim: fixed}
 tissue:
   layers: 4
-boundary: {rim: fixed}
 moves:
   - {bone: mandible, translate: [0, -3, 0]}
 """
