@@ -81,14 +81,28 @@ class Bodies {
   double distance(int32_t body, const Vec3& beside) const {
     return shapes_[body].distance(beside, reach);
   }
-  /// The same for a mesh, averaged by a cubic B-spline at points of a grid that has one of them, or
+  /// The same for a mesh by the solver's cubic B-spline, on a grid that has one of its points, or
   /// the middle of a cell, at the point.
   double smoothed_distance(int32_t body, const Vec3& beside, bool in_cell) const {
+    if (!is_mesh(body)) return distance(body, beside);
+    const double here = averaged_distance(body, beside, in_cell);
+    double second_differences = -6 * here;
+    for (int a = 0; a < 3; ++a)
+      for (const double side : {-spacing_, spacing_})
+        second_differences += averaged_distance(body, beside + side * Vec3::Unit(a), in_cell);
+    return here - second_differences / 6;
+  }
+  Vec3 normal(int32_t body, const Vec3& point, double radius) const {
+    return poses_[body].topLeftCorner<3, 3>() * shapes_[body].normal(beside(body, point), radius);
+  }
+
+ private:
+  /// With the distances themselves as coefficients.
+  double averaged_distance(int32_t body, const Vec3& beside, bool in_cell) const {
     static const std::vector<std::pair<double, double>> at_point = {
         {-1, 1.0 / 6}, {0, 2.0 / 3}, {1, 1.0 / 6}};
     static const std::vector<std::pair<double, double>> at_middle = {
         {-1.5, 1.0 / 48}, {-0.5, 23.0 / 48}, {0.5, 23.0 / 48}, {1.5, 1.0 / 48}};
-    if (!is_mesh(body)) return distance(body, beside);
     const auto& nodes = in_cell ? at_middle : at_point;
     double sum = 0;
     for (const auto& [x, wx] : nodes)
@@ -97,11 +111,7 @@ class Bodies {
           sum += wx * wy * wz * shapes_[body].distance(beside + spacing_ * Vec3(x, y, z), kept_);
     return sum;
   }
-  Vec3 normal(int32_t body, const Vec3& point, double radius) const {
-    return poses_[body].topLeftCorner<3, 3>() * shapes_[body].normal(beside(body, point), radius);
-  }
 
- private:
   static constexpr double reach = considered + 2;  // mm
   double spacing_;                                 // mm
   double kept_;                                    // mm, up to which the solver keeps distances

@@ -57,7 +57,7 @@ mechanics::TouchLoop rounded_touches(MPI_Comm comm, const Part& part) {
   if (!part.contact) return {};
   const double times = rounding_times(comm, part.model.contact);
   std::vector<mechanics::RigidBody> bodies;
-  for (const mechanics::RigidBody& body : part.bodies) bodies.push_back(body.smoothed(times));
+  for (const mechanics::RigidBody& body : part.bodies) bodies.push_back(body.rounded(times));
   model::Touches touches = part.model.contact.touches;
   if (!touches.point.empty()) touches.offset = mechanics::touch_offsets(part.model, bodies);
   return {touches, part.model.contact.stiffness, std::move(bodies)};

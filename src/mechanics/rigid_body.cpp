@@ -63,10 +63,10 @@ Distance RigidBody::distance(const Vec3& beside) const {
   return d;
 }
 
-RigidBody RigidBody::smoothed(double times) const {
+RigidBody RigidBody::rounded(double times) const {
   const auto* field = std::get_if<surface::DistanceField>(shape_.get());
   RigidBody body = *this;
-  if (field) body.shape_ = std::make_shared<const Shape>(field->coarser(times));
+  if (field) body.shape_ = std::make_shared<const Shape>(field->rounded(times));
   return body;
 }
 

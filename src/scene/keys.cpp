@@ -160,8 +160,8 @@ std::vector<Key> contact_keys() {
        .choices = {"on", "off"}},
       {"contact.grid", number, "",
        "Spacing of the grids from which distances to meshes are read, which round edges of bones "
-       "by some tenths of it; when not given half the thickness of thin bone near the tissue, 0.5 "
-       "to 1 mm.",
+       "by a fifth of it; when not given half the thickness of thin bone near the tissue, 0.5 to "
+       "0.75 mm, and 0.5 mm where bone is cut.",
        "mm", Range::between(0.1, 10)},
       {"contact.stiffness", number, "",
        "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",

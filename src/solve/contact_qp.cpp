@@ -216,7 +216,8 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
   return false;
 }
 
-bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
+/// Rounds of minimizations and new multipliers.
+bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int most_rounds = 3;  // the next program goes on with the multipliers
   constexpr double share = 0.1;   // of the step
   check(VecSet(step, 0));
@@ -230,8 +231,20 @@ bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
     const double changed = move_multipliers();
     if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;
   }
-  give_multipliers();
   return true;
+}
+
+bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
+  const std::vector<double> multiplier = multiplier_;
+  bool found = search(displacement, slope, tolerance, step);
+  reduced_ = !found;
+  if (reduced_) {
+    multiplier_ = multiplier;
+    curvature_ = convex_curvature_;
+    found = search(displacement, slope, tolerance, step);
+  }
+  if (found) give_multipliers();
+  return found;
 }
 
 }  // namespace repose::solve

@@ -17,15 +17,20 @@ class ContactQp {
   ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
             linear::TangentSolver& solver);
 
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< K, N/mm³
+
   /// Takes the gaps at `displacement` to first order. Collective.
   void linearize(Vec displacement);
   /// The same where bodies and fixed points go on to `load`: each point stays beside the place of
   /// its body that it is beside. `way` [local points] mm, of fixed points. Collective.
   void linearize(Vec displacement, double load, std::span<const Vec3> way);
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
-  /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Returns
-  /// whether that was reached without negative curvature. Collective.
+  /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Where negative
+  /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a
+  /// minimum was reached. Collective.
   bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
+  /// Whether the latest solve met negative curvature.
+  bool reduced() const { return reduced_; }
 
  private:
   void add_gaps();
@@ -40,6 +45,7 @@ class ContactQp {
   void add_pushes(std::span<const double> pressure, Vec to);
   double line_search(double slope, double curvature);
   bool minimize(Vec displacement, Vec slope, double tolerance, Vec step);
+  bool search(Vec displacement, Vec slope, double tolerance, Vec step);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
@@ -51,6 +57,7 @@ class ContactQp {
   std::vector<double> closed_;              // [gaps] mm, ∇g · d
   std::vector<double> closing_;             // [gaps] mm, the same of a direction
   std::vector<char> active_;                // [gaps]
+  bool reduced_ = false;
   std::vector<discrete::Objective::Block> curvature_, convex_curvature_;
   std::vector<Vec3> moved_;                              // [local points] a direction, mm
   base::VecHandle force_, left_, direction_, response_;  // force_: H d

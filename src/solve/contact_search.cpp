@@ -45,6 +45,14 @@ void ContactSearch::keep_multipliers() {
   walls_before_.assign(q.begin(), q.end());
 }
 
+/// Takes so many times the model's stiffness from now on.
+void ContactSearch::stiffen(int times) {
+  times_ = times;
+  stiffness_ = times * objective_.positions().part().model.contact.stiffness;
+  qp_.set_stiffness(stiffness_);
+  set_stiffness(stiffness_);
+}
+
 void ContactSearch::set_stiffness(double stiffness) {
   objective_.touches().set_stiffness(stiffness);
   objective_.walls().set_stiffness(stiffness);
@@ -142,21 +150,26 @@ Outcome ContactSearch::approach(Vec displacement, double accuracy, const Approac
 bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
   constexpr int most_halved = 6;
   constexpr double rounding = 1e-12;
-  const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
-  for (int k = 0; k <= most_halved; ++k) {
+  const auto try_step = [&](double share) {
     check(VecCopy(displacement, trial_));
-    check(VecAXPY(trial_, std::ldexp(1.0, -k), step_));
-    value = objective_.evaluate(trial_, gradient_);
-    if (value > merit + rounding * std::abs(merit)) continue;
-    check(VecCopy(trial_, displacement));
-    return true;
-  }
-  return false;
+    check(VecAXPY(trial_, share, step_));
+    return objective_.evaluate(trial_, gradient_);
+  };
+  const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
+  const double largest = merit + rounding * std::abs(merit);
+  double share = 1;
+  value = try_step(share);
+  for (int k = 0; k < most_halved && value > largest; ++k) value = try_step(share /= 2);
+  if (value > largest) return false;
+  check(VecCopy(trial_, displacement));
+  return true;
 }
 
+/// Steps of quadratic programs until one is shorter than half of `accuracy`.
 ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
   constexpr int most_steps = 12;
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
+  constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   double value = objective_.evaluate(displacement, gradient_);
   for (int n = 0; n < most_steps; ++n) {
     subtract_contact();
@@ -166,7 +179,8 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
     const double length = discrete::largest_block(step_);
     if (!take_step(displacement, tissue, value)) return End::failed;
     ++iterations;
-    if (length <= near * accuracy) return End::reached;
+    if (length <= (qp_.reduced() ? at_saddle : near * accuracy))
+      return qp_.reduced() ? End::failed : End::reached;
     if (watch_ && !watch_({iterations, objective_.positions().load(), value,
                            discrete::largest_block(gradient_), length, objective_.evaluations(),
                            displacement}))
@@ -186,64 +200,46 @@ Outcome ContactSearch::finish(Vec displacement, double accuracy) {
 }
 
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
+  outcome.converged = false;
+  outcome.stopped = true;
+  outcome.reason = stopped_reason;
   outcome.objective = objective_.evaluate(displacement, gradient_);
   outcome.gradient_max = discrete::largest_block(gradient_);
   return outcome;
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
+  constexpr int most_rounds = 8, stiffest = 16;
+  Outcome outcome;
   if (!kept_) {
     keep_multipliers();
-    Outcome outcome = finish(displacement, accuracy);
+    outcome = finish(displacement, accuracy);
     if (outcome.converged) return outcome;
   }
   kept_ = false;
-  Outcome outcome = approach(displacement, accuracy, to_rounded);
-  int64_t iterations = outcome.iterations;
-  if (!outcome.stopped) {
-    outcome = approach(displacement, accuracy, to_exact);
-    iterations += outcome.iterations;
-  }
-  if (outcome.stopped) return stopped(displacement, outcome);
-  const End end = newton(displacement, accuracy, iterations);
-  if (end == End::reached) outcome = finish(displacement, accuracy);
-  if (end == End::stopped) {
-    outcome.converged = false;
-    outcome.stopped = true;
-    outcome.reason = stopped_reason;
-    outcome = stopped(displacement, outcome);
-  }
-  if (end == End::failed || (!outcome.converged && !outcome.stopped))
-    outcome = rounds(displacement, accuracy);
-  outcome.iterations += iterations;
-  return outcome;
-}
-
-Outcome ContactSearch::rounds(Vec displacement, double accuracy) {
-  constexpr int most_rounds = 30;
-  // Multipliers that go from one state to another and back do so no more under a stiffer penalty.
-  constexpr double slow = 0.9, stiffer = 2, stiffest = 16;
-  Outcome outcome;
+  stiffen(1);
   int64_t iterations = 0;
-  set_stiffness(stiffness_);
-  double stiffness = stiffness_, least = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < most_rounds && !outcome.stopped; ++round) {
-    outcome = minimiser_.run(displacement, (1 - missed) * accuracy);
-    iterations += outcome.iterations;
-    objective_.positions().update(displacement);
-    const double left = violation();
-    outcome.displacement_error += contact_safety * left;
-    const bool over = outcome.converged && outcome.displacement_error <= accuracy;
-    if (!outcome.converged || over) break;
-    move_multipliers();
-    if (left > slow * least && stiffness < stiffest * stiffness_) stiffness *= stiffer;
-    set_stiffness(stiffness);
-    least = std::min(least, left);
-    outcome.converged = false;
-    outcome.reason = fmt::format("contact comes to no end: {:.3g} mm of gaps remain", left);
+  double finer = accuracy;
+  const Approach to_fine{false, accuracy, accuracy, to_exact.finer};
+  for (int round = 0; round < most_rounds; ++round) {
+    const auto stages =
+        round == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
+    for (const Approach& to : stages) {
+      const Outcome near = approach(displacement, accuracy, to);
+      iterations += near.iterations;
+      if (near.stopped) return stopped(displacement, outcome);
+    }
+    const End end = newton(displacement, finer, iterations);
+    if (end == End::stopped) return stopped(displacement, outcome);
+    outcome = finish(displacement, accuracy);
+    if (outcome.converged) break;
+    if (end == End::reached) finer /= 4;
+    stiffen(std::min(2 * times_, stiffest));
   }
-  outcome.iterations = iterations;
-  return outcome.converged ? outcome : stopped(displacement, outcome);  // multipliers have moved
+  outcome.iterations += iterations;
+  if (!outcome.converged && outcome.displacement_error > accuracy)
+    outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
+  return outcome;
 }
 
 void ContactSearch::go_back(Vec) {

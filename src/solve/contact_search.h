@@ -8,8 +8,8 @@ namespace repose::solve {
 /// step to a load is predicted with its contact by a quadratic program; quasi-Newton searches on
 /// the augmented Lagrangian with a soft penalty come near, first to bodies with rounded edges;
 /// sequential quadratic programs (Nocedal & Wright 2006, chapter 18) end it, multipliers included.
-/// Where these fail, rounds of minimization and new multipliers follow (Hestenes 1969; Powell 1969;
-/// Simo & Laursen 1992 for contact). The multipliers of a load are where the next begins.
+/// Where these fail, both are repeated with a finer search and a stiffer penalty. The multipliers of
+/// a load are where the next begins.
 class ContactSearch : public RestSearch {
  public:
   struct Approach {
@@ -29,6 +29,7 @@ class ContactSearch : public RestSearch {
  private:
   void keep_multipliers();
   void set_stiffness(double stiffness);
+  void stiffen(int times);
   double violation();
   void move_multipliers();
   void subtract_contact();
@@ -38,14 +39,14 @@ class ContactSearch : public RestSearch {
   bool take_step(Vec displacement, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
-  Outcome rounds(Vec displacement, double accuracy);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   Minimiser& minimiser_;
   Minimiser::Watch watch_;
   ContactQp qp_;
-  double stiffness_;                           // N/mm³, of the model's contact
+  double stiffness_;                           // N/mm³, of the penalty
+  int times_ = 1;                              // it is so many times the model's
   bool kept_ = false;                          // before_ are those before a prediction
   std::vector<double> before_, walls_before_;  // multipliers before the last search
   base::VecHandle gradient_, slope_, step_, trial_;

@@ -29,7 +29,7 @@ TriangleTree::Box box_of(const Surface& surface) {
 DistanceField::DistanceField(Surface surface, double spacing, double reach)
     : surface_(std::move(surface)) {
   const TriangleTree::Box box = box_of(surface_);
-  const double margin = reach + 3 * spacing;
+  const double margin = reach + 4 * spacing;
   const Vec3 origin = box.low - Vec3::Constant(margin);
   const Vec3 blocks = (box.high - origin + Vec3::Constant(margin)) / (b * spacing);
   if (!((blocks + Vec3::Ones()).prod() <= max_blocks))
@@ -37,15 +37,17 @@ DistanceField::DistanceField(Surface surface, double spacing, double reach)
         "{}: distances to this mesh on a grid of {:g} mm would need {:.2g} grid points, expected "
         "at most {:.2g}; make contact.grid larger",
         surface_.name, spacing, blocks.prod() * cells, max_blocks * cells);
-  grid_ = {origin, spacing, reach, {}};
+  grid_ = {origin, spacing, reach, {}, false};
   for (int a = 0; a < 3; ++a) grid_.blocks[a] = 1 + static_cast<int64_t>(blocks[a]);
 }
 
-DistanceField DistanceField::coarser(double times) const {
+DistanceField DistanceField::rounded(double times) const {
   constexpr double reach = 4;  // spacings, at least: what a stencil spans
   if (surface_.triangles.empty()) return {};
   const double spacing = times * grid_.spacing;
-  return {surface_, spacing, std::max(grid_.reach, reach * spacing)};
+  DistanceField field(surface_, spacing, std::max(grid_.reach, reach * spacing));
+  field.grid_.rounded = true;
+  return field;
 }
 
 Vec3 DistanceField::Grid::point(const Index& at) const {
@@ -70,8 +72,8 @@ class DistanceField::Values {
     return begin < 0 ? farthest() : cell_value(begin, at);
   }
 
-  /// [4³] The values from grid point `first` on, x running fastest; false if all are `reach`.
-  bool gather(const Index& first, std::array<float, 64>& values) {
+  /// [4³] The coefficients from grid point `first` on, x running fastest; false if all are `reach`.
+  bool gather(const Index& first, std::array<float, 64>& coefficients) {
     const Index low{first[0] / b, first[1] / b, first[2] / b},
         high{(first[0] + 3) / b, (first[1] + 3) / b, (first[2] + 3) / b};
     std::array<int64_t, 8> begin;
@@ -87,8 +89,8 @@ class DistanceField::Values {
       const Index at{first[0] + n % 4, first[1] + n / 4 % 4, first[2] + n / 16};
       const int64_t from =
           begin[(at[0] / b > low[0]) + 2 * (at[1] / b > low[1]) + 4 * (at[2] / b > low[2])];
-      values[n] = from < 0 ? farthest() : cell_value(from, at);
-      any = any || values[n] < farthest();
+      coefficients[n] = from < 0 ? farthest() : coefficient(from, at);
+      any = any || coefficients[n] != farthest();
     }
     return any;
   }
@@ -110,6 +112,7 @@ class DistanceField::Values {
       } else {
         place = static_cast<int32_t>(value_.size() / cells);
         value_.resize(value_.size() + cells, NAN);
+        if (!grid_.rounded) coefficient_.resize(value_.size(), NAN);
       }
     }
     return place == far ? -1 : place * cells;
@@ -119,6 +122,22 @@ class DistanceField::Values {
     float& value = value_[begin + ((at[2] % b) * b + at[1] % b) * b + at[0] % b];
     if (std::isnan(value)) value = static_cast<float>(std::min(signed_distance(at), grid_.reach));
     return value;
+  }
+
+  /// The value, less a sixth of its second differences unless the field is rounded.
+  float coefficient(int64_t begin, const Index& at) {
+    if (grid_.rounded) return cell_value(begin, at);
+    const auto cell = begin + ((at[2] % b) * b + at[1] % b) * b + at[0] % b;
+    if (!std::isnan(coefficient_[cell])) return coefficient_[cell];
+    double sum = 0;
+    for (int a = 0; a < 3; ++a)
+      for (const int side : {-1, 1}) {
+        Index beside = at;
+        beside[a] += side;
+        sum += this->at(beside);
+      }
+    const float here = this->at(at);
+    return coefficient_[cell] = static_cast<float>(here - (sum - 6 * here) / 6);
   }
 
   /// mm. Where the middle of a block or a point of a stencil is as far outside, the others are
@@ -160,6 +179,7 @@ class DistanceField::Values {
   Grid grid_;
   std::vector<int32_t> place_;  // [blocks] which of the kept ones, or unknown or far
   std::vector<float> value_;    // [kept blocks][8³] mm, not a number where it is not known
+  std::vector<float> coefficient_;  // the same
   TriangleTree tree_;
   std::unordered_map<int64_t, std::vector<LineCrossing>> lines_;  // by (j, k)
   Vec3 last_point_ = Vec3::Zero();
@@ -186,7 +206,7 @@ struct DistanceField::Stencil {
 bool DistanceField::locate(const Vec3& point, Stencil& stencil) const {
   for (int a = 0; a < 3; ++a) {
     const double at = (point[a] - grid_.origin[a]) / grid_.spacing;
-    if (!(at >= 1 && at < static_cast<double>(b * grid_.blocks[a] - 2))) return false;
+    if (!(at >= 2 && at < static_cast<double>(b * grid_.blocks[a] - 3))) return false;
     stencil.first[a] = static_cast<int64_t>(at) - 1;
     const double t = at - static_cast<double>(stencil.first[a] + 1), u = 1 - t;
     stencil.weight[a] = {u * u * u / 6, 2.0 / 3 - t * t * (1 - t / 2),

@@ -71,18 +71,25 @@ def exact_distance(x, corners):
 
 
 class Field:
-    """A mesh's distance: a cubic B-spline whose coefficients are exact distances at a grid's points,
-    computed where they are needed."""
+    """A mesh's distance: the cubic B-spline that is exact for cubics, of exact distances at a grid's
+    points, computed where they are needed."""
 
     def __init__(self, points, triangles, spacing):
         self.corners, self.spacing = points[triangles], spacing
         self.reach = max(REACH, 4 * spacing)
-        margin = self.reach + 3 * spacing
+        margin = self.reach + 4 * spacing
         self.origin = self.corners.min((0, 1)) - margin
         self.end = (self.corners.max((0, 1)) + margin - self.origin) / spacing
         self.known = {}
 
     def coefficients(self, index):
+        """[..., 3] of grid points to [...]: distances less a sixth of their second differences."""
+        second = -6 * self.distances(index)
+        for step in np.eye(3, dtype=int):
+            second += self.distances(index + step) + self.distances(index - step)
+        return self.distances(index) - second / 6
+
+    def distances(self, index):
         """[..., 3] of grid points to [...]."""
         flat = index.reshape(-1, 3)
         missing = {tuple(at) for at in flat.tolist()} - self.known.keys()
@@ -97,7 +104,7 @@ class Field:
         value = np.full(len(x), self.reach)
         slope, bend = np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         at = (x - self.origin) / self.spacing
-        inside = np.flatnonzero((at >= 1).all(1) & (at < self.end - 2).all(1))
+        inside = np.flatnonzero((at >= 2).all(1) & (at < self.end - 3).all(1))
         if not len(inside):
             return value, slope, bend
         at = at[inside]

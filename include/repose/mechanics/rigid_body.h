@@ -25,8 +25,9 @@ class RigidBody {
   RigidBody(Shape shape, int32_t bone, const Vec3& push)
       : shape_(std::make_shared<const Shape>(std::move(shape))), bone_(bone), push_(push) {}
 
-  /// The same body with distances read from a grid so many times coarser; a closed form is itself.
-  RigidBody smoothed(double times) const;
+  /// The body with rounded edges: a mesh's distances are read from a grid so many times coarser
+  /// (surface::DistanceField::rounded); a closed form is itself.
+  RigidBody rounded(double times) const;
 
   int32_t bone() const { return bone_; }  ///< −1 for one that is pushed
   const Vec3& push() const { return push_; }

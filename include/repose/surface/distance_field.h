@@ -16,12 +16,12 @@ struct Distance {
 
 /// The signed distance from a closed surface, negative inside, as a cubic B-spline on a grid of
 /// cubes, so that two derivatives are continuous. Its coefficients are the exact distances at the
-/// grid points, at most `reach`, which smooths the distance by a Gaussian of 0.58 spacings
-/// (variance h²/3): plane parts stay exact, a convex edge lies up to 0.3 spacings deeper than the
-/// surface's. Inside is where the surface's winding number is not 0. Grid values are computed when
-/// they are first needed and kept in memory. A value depends on its grid point alone, so that
-/// neither the order of questions nor the rank matters. One thread at a time may ask a field and
-/// its copies.
+/// grid points, at most `reach`, less a sixth of their second differences: a quasi-interpolant
+/// that reproduces cubics (de Boor 1978). Plane parts are exact; a convex edge of 90° lies 0.2
+/// spacings deeper than the surface's. Inside is where the surface's winding number is not 0. Grid
+/// values are computed when they are first needed and kept in memory. A value depends on its grid
+/// point alone, so that neither the order of questions nor the rank matters. One thread at a time
+/// may ask a field and its copies.
 class DistanceField {
  public:
   using Index = std::array<int64_t, 3>;  ///< of a grid point
@@ -31,8 +31,9 @@ class DistanceField {
   /// grid would be too large.
   DistanceField(Surface surface, double spacing, double reach);
 
-  /// The field of the same surface on a grid so many times coarser.
-  DistanceField coarser(double times) const;
+  /// The field of the same surface on a grid so many times coarser, with the distances themselves as
+  /// coefficients, which smooths by a Gaussian of 0.58 spacings (variance h²/3).
+  DistanceField rounded(double times) const;
 
   /// The value alone, mm; `reach` beyond.
   double value(const Vec3& point) const;
@@ -50,7 +51,7 @@ class DistanceField {
   template <class Archive>
   void pass(Archive& archive) {
     archive(surface_.points, surface_.triangles, grid_.origin, grid_.spacing, grid_.reach,
-            grid_.blocks);
+            grid_.blocks, grid_.rounded);
   }
 
  private:
@@ -58,6 +59,7 @@ class DistanceField {
     Vec3 origin = Vec3::Zero();     // mm, of grid point (0, 0, 0)
     double spacing = 1, reach = 0;  // mm
     Index blocks{};                 // along each axis
+    bool rounded = false;           // coefficients are the values
     Vec3 point(const Index& at) const;
   };
   class Values;
