@@ -133,6 +133,7 @@ struct ResultFile::State {
   std::vector<bool> moved;    // whether they hold bone surfaces
   bool savable = false;       // a result that is not committed
   bool is_whole = false;      // the part is closed, and nothing has failed
+  bool save_pending = false;  // to be saved as soon as it holds a step
   bool provisional = false;   // the last of these steps is to be replaced
   bool marked = false;        // the last step reads as that of a run that ended there, …
   std::string reason;         // … and this is what it says otherwise
@@ -168,6 +169,7 @@ struct ResultFile::State {
   void mark_last(bool as_end);
   void append(const model::StepNumbers& numbers, const model::StepRows& rows, bool under_way);
   void copy_steps(const std::filesystem::path& earlier, int64_t count);
+  bool save();
   std::vector<XdmfBlock> views_of_steps() const;
   std::vector<std::unique_ptr<UnfinishedFile>> describe() const;
   void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
@@ -427,6 +429,18 @@ void ResultFile::State::append(const model::StepNumbers& numbers, const model::S
   reason = same.reason;
   if (savable && same.converged && same.load < 1) mark_last(true);
   close_part();
+  if (save_pending) save();
+}
+
+/// On rank 0, under the lock.
+bool ResultFile::State::save() {
+  save_pending = savable && unfinished && loads.empty();
+  if (!savable || !is_whole || !unfinished || loads.empty()) return false;
+  const auto documents = describe();
+  std::filesystem::rename(part, unfinished->file());
+  unfinished.reset();
+  for (const auto& document : documents) document->commit();
+  return true;
 }
 
 /// On rank 0.
@@ -506,12 +520,7 @@ bool ResultFile::save() noexcept {
   State& s = *state_;
   try {
     const std::scoped_lock lock(s.mutex);
-    if (!s.savable || !s.is_whole || !s.unfinished || s.loads.empty()) return false;
-    const auto documents = s.describe();
-    std::filesystem::rename(s.part, s.unfinished->file());
-    s.unfinished.reset();
-    for (const auto& document : documents) document->commit();
-    return true;
+    return s.save();
   } catch (const std::exception&) {
     return false;
   }
