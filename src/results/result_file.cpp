@@ -12,6 +12,7 @@
 #include "repose/base/hdf5.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
+#include "repose/results/model_file.h"
 #include "unfinished_file.h"
 #include "views.h"
 #include "vtkhdf.h"
@@ -443,17 +444,21 @@ bool ResultFile::State::save() {
   return true;
 }
 
-/// On rank 0.
+/// On rank 0. Attributes are written anew: HDF5 crashes where it copies strings of variable length.
 void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t count) {
   const Reader in(earlier);
   unfinished->reserve(static_cast<int64_t>(std::filesystem::file_size(earlier)));
   say_where(unfinished->file(), [&] {
     const base::Hdf5File source = base::open_hdf5(earlier);
     base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
+    const base::Hdf5Properties without(H5Pcreate(H5P_OBJECT_COPY));
+    base::check_hdf5(H5Pset_copy_object(without, H5O_COPY_WITHOUT_ATTR_FLAG));
     for (int64_t k = 0; k < count; ++k) {
       const std::string step = group_of(k);
-      base::check_hdf5(
-          H5Ocopy(source, step.c_str(), whole, step.c_str(), H5P_DEFAULT, H5P_DEFAULT));
+      base::check_hdf5(H5Ocopy(source, step.c_str(), whole, step.c_str(), without, H5P_DEFAULT));
+      const base::Hdf5Group copy(H5Gopen2(whole, step.c_str(), H5P_DEFAULT));
+      const model::StepNumbers numbers = read_numbers(earlier, k);
+      model::for_each_number(numbers, WriteAttribute{copy});
       loads.push_back(in.number(step, "load"));
       moved.push_back(in.has(step + "/bone_surface/points"));
       for (const auto& [field, vector] : optional_fields(whole, step + "/point"))
