@@ -363,10 +363,12 @@ base::Exit run(const base::Options& options) {
   try {
     return run_input(options, input);
   } catch (const base::InputError& error) {
-    // A refusal on the way to the rest position of a model does not know its file.
+    // What refuses a model or a state of it does not know the file.
     const std::string text = error.what();
     const bool named = text.find(input.filename().string()) != std::string::npos;
-    if (input.extension() != ".h5" || named) throw;
+    const bool of_another = text.substr(0, text.find(' ')).ends_with(':');  // a file or an option
+    const bool of_options = text.starts_with('-') || text.starts_with("PETSc");
+    if (named || of_another || of_options) throw;
     throw base::InputError(fmt::format("{}: {}", input.string(), text));
   }
 }

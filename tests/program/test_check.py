@@ -206,7 +206,8 @@ def test_agrees_with_numpy(run, tmp_path, functional, volume):
 
 ATTRIBUTES = ["f_e", "potential", "f_f", "f_v", "penalty", "objective", "gradient_max",
               "volume_error_max"]
-ARRAYS = ["point/displacement", "point/advance", "point/residual_force", "prism/volume_ratio", "spring/elongation",
+ARRAYS = ["point/displacement", "point/advance", "point/residual_force", "prism/volume_ratio",
+          "spring/elongation",
           "spring/tension", "bone_surface/points", "bone_surface/displacement"]
 
 
