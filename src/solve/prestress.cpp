@@ -265,7 +265,8 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
       "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
       "{:.2f}) mm: the tissue there cannot hold it; {}",
       so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z(),
-      part.solid ? "change tissue.turgor or tissue.density" : "give tissue.springs a stiffness there");
+      part.solid ? "change tissue.turgor or tissue.density"
+                 : "give tissue.springs a stiffness there");
 }
 
 /// Brings values of this rank's first rows together in `whole` on rank 0. Collective.
