@@ -162,6 +162,16 @@ def test_restart_from_another_model_is_refused(run, face, tmp_path):
     assert names(tmp_path) == []
 
 
+def test_restart_from_springs_for_a_solid_is_refused(run, face, tmp_path):
+    text = SCENE.read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")
+    head, springs, end = text.partition("  springs:\n")
+    material = "  material: {preset: face}\n" + end.split("\n", 1)[1].partition("solve:")[0]
+    (tmp_path / "solid.yaml").write_text(head + material)
+    result = run("repose-solve", "solid.yaml", "-restart", face)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+    assert "the same model, but its springs differ" in result.stderr
+
+
 def test_checkpoints_are_results(run, face, tmp_path):
     result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-checkpoint_interval", 1e-9,
                  "-output", "jaw", ranks=2)
