@@ -26,6 +26,19 @@ void check_bones(const results::MergedBones& bones, const model::PrescribedMotio
   check("bone_surface/displacement", step.bone_displacement, results::displacements(bones, moved));
 }
 
+void check_advance(const model::Model& model, const std::vector<Vec3>& normals,
+                   const results::StoredStep& step, base::Comparison& comparison) {
+  if (step.advance.empty()) return;
+  double scale = 0;
+  std::vector<double> again;
+  for (size_t i = 0; i < normals.size(); ++i) {
+    const Vec3 &now = step.rows.position[i], &before = model.points.position[i];
+    again.push_back((now - before).dot(normals[i]));
+    scale = std::max({scale, now.lpNorm<Eigen::Infinity>(), before.lpNorm<Eigen::Infinity>()});
+  }
+  comparison.array("point/advance", step.advance, again, scale);
+}
+
 /// What the steps say of each other: the path leads from smaller to larger loads, to the end or to
 /// a step that did not converge. A checkpoint is no end.
 void check_path(const std::vector<model::StepNumbers>& steps, bool is_checkpoint,
@@ -46,6 +59,7 @@ base::Comparison check_file(const std::string& file) {
   if (count == 0) base::refuse("{}: /step holds no step; solve the model first", file);
   const model::PrescribedMotion motion(model);
   const results::MergedBones bones = results::merge_bones(model.bone_surfaces);
+  const std::vector<Vec3> normals = model::outward_normals(model);
   base::Comparison comparison(tolerance);
   comparison.begin("model");
   check::check_model(model, comparison);
@@ -54,6 +68,7 @@ base::Comparison check_file(const std::string& file) {
     const results::StoredStep step = results::read_step(file, s, model);
     comparison.begin(fmt::format("step {:04}", s));
     check::check_step(model, motion, step.numbers, step.rows, step.displacement, comparison);
+    check_advance(model, normals, step, comparison);
     check_bones(bones, motion, step, comparison);
     steps.push_back(step.numbers);
   }

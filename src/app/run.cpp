@@ -17,6 +17,7 @@
 #include "repose/adapt/given_skin.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
+#include "repose/discrete/gather.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
@@ -113,7 +114,8 @@ class Run {
   solve::Summary search(Writer& writer);
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
-  std::string write_given_skin(const Writer& writer) const;
+  std::vector<Vec3> positions(const Writer& writer) const;
+  std::string write_given_skin(const std::vector<Vec3>& position) const;
   std::string describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
                                     const Writer& writer) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
@@ -134,7 +136,7 @@ bool Run::is_done(const model::StepNumbers& end) const {
   const mechanics::Weights& weights = settings.weights;
   const bool penalty = end.volume == model::VolumeTerm::penalty;
   const auto equal = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); };
-  return end.displacement_error <= settings.path.accuracy &&
+  return end.displacement_error >= 0 && end.displacement_error <= settings.path.accuracy &&
          end.functional == settings.functional && end.volume == weights.volume &&
          equal(end.lambda, weights.elastic) &&
          (!penalty || equal(end.bulk_modulus, weights.volume_weight)) && !settings.stability &&
@@ -167,6 +169,7 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
   });
   for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (!done) return {};
+  say(write_given_skin(discrete::gather_points(comm, start_.position)));
   return folded ? base::Exit::not_converged : base::Exit::done;
 }
 
@@ -251,24 +254,27 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
   return check;
 }
 
+/// Where the last step has the points, or the skin of a model that is nowhere whole; on rank 0.
+/// Collective.
+std::vector<Vec3> Run::positions(const Writer& writer) const {
+  return job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+}
+
 /// Writes the displacement of the given skin, in the place of which another was solved, to
-/// NAME_given_skin.vtp. Collective.
-std::string Run::write_given_skin(const Writer& writer) const {
+/// NAME_given_skin.vtp. Collective; `position` as positions() returns it.
+std::string Run::write_given_skin(const std::vector<Vec3>& position) const {
   if (!job_.remeshed) return "";
   const std::string file = name_ + "_given_skin.vtp";
-  const auto write = [&](const auto& solved, const std::vector<Vec3>& initial,
-                         const std::vector<Vec3>& position) {
+  const auto write = [&](const auto& solved, const std::vector<Vec3>& initial) {
     std::vector<Vec3> displacement(position.size());
     for (size_t i = 0; i < position.size(); ++i) displacement[i] = position[i] - initial[i];
     const surface::Surface& given = *job_.anatomy->given_skin;
     surface::write_surface(file, given, adapt::displacement_of_given(given, solved, displacement));
   };
-  const std::vector<Vec3> position =
-      job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
   base::on_first_rank(comm, [&] {
-    if (job_.raised) return write(job_.anatomy->skin, job_.anatomy->skin.points, position);
+    if (job_.raised) return write(job_.anatomy->skin, job_.anatomy->skin.points);
     const model::Model model = results::read_model(name_ + ".h5");
-    write(model, model.points.position, position);
+    write(model, model.points.position);
   });
   return report_row("given skin", file + ": its vertices, with displacement");
 }
@@ -277,8 +283,7 @@ std::string Run::write_given_skin(const Writer& writer) const {
 std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
                                        const Writer& writer) const {
   if (!summary.path.complete()) return "";
-  const std::vector<Vec3> position =
-      job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+  const std::vector<Vec3> position = positions(writer);
   std::string text;
   base::on_first_rank(comm, [&] { text = skin.describe_self_contact(position); });
   return text;
@@ -305,7 +310,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
   say(folded ? describe_folds(summary.last, writer) : "");
-  const std::string given = write_given_skin(writer);
+  const std::string given = write_given_skin(positions(writer));
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
@@ -358,10 +363,12 @@ base::Exit run(const base::Options& options) {
   try {
     return run_input(options, input);
   } catch (const base::InputError& error) {
-    // A refusal on the way to the rest position of a model does not know its file.
+    // What refuses a model or a state of it does not know the file.
     const std::string text = error.what();
     const bool named = text.find(input.filename().string()) != std::string::npos;
-    if (input.extension() != ".h5" || named) throw;
+    const bool of_another = text.substr(0, text.find(' ')).ends_with(':');  // a file or an option
+    const bool of_options = text.starts_with('-') || text.starts_with("PETSc");
+    if (named || of_another || of_options) throw;
     throw base::InputError(fmt::format("{}: {}", input.string(), text));
   }
 }

@@ -36,7 +36,7 @@ std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, co
       {.given = !job.anatomy,
        .what = "the input is a model, which does not tell what it was made from"},
       {.given = s.settings.path.load_steps > 0, .what = "load_steps are asked for"},
-      {.given = !job.cuts.empty(), .what = "the scene has incisions"},
+      {.given = !job.cuts.empty(), .what = "the scene has incisions or parted lips"},
       {.given = s.tears, .what = "the tissue may tear", .to_path = true},
       {.given = s.verifies_path, .what = "the path is to be verified"},
   };

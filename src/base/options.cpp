@@ -259,7 +259,12 @@ void Options::read_database() {
     std::vector<std::string>& values = given_[option.name];
     if (!bare || option.kind == OptionKind::flag) values.push_back(bare ? "true" : value.data());
   }
-  for (const auto& [name, value] : petsc_options()) check_viewer(name, value);
+  for (const auto& [name, value] : petsc_options()) {
+    check_viewer(name, value);
+    if (find(name) || name.starts_with("log_") || read_at_the_end(name)) continue;
+    petsc_settings_ += fmt::format("{}-{}{}{}", petsc_settings_.empty() ? "" : " ", name,
+                                   value.empty() ? "" : " ", value);
+  }
   for (const std::string& name : left_in_database())
     if (!begins_as_petsc(name) && name != "help") unknown_.push_back(name);
 }

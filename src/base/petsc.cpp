@@ -31,7 +31,7 @@ void ignore_broken_pipes() {
 }  // namespace
 
 void check(PetscErrorCode code) {
-  if (code != 0) throw InternalError("PETSc: " + text_of(code));
+  if (code != 0) throw PetscError("PETSc: " + text_of(code));
 }
 
 void check_options(PetscErrorCode code) {

@@ -21,6 +21,26 @@ void say(std::FILE* where, const std::string& line) {
   std::fflush(where);
 }
 
+/// Prints one line and ends all ranks, of which some may not know that one has failed.
+int abandon(const std::string& line, Exit status) {
+  constexpr std::chrono::seconds while_the_first_prints{1};
+  int started = 0;
+  MPI_Initialized(&started);
+  const bool first = !started || rank(MPI_COMM_WORLD) == 0;
+  if (!first) std::this_thread::sleep_for(while_the_first_prints);
+  std::fprintf(stderr, "%s\n", line.c_str());
+  std::fflush(stderr);
+  if (started && size(MPI_COMM_WORLD) > 1) MPI_Abort(MPI_COMM_WORLD, static_cast<int>(status));
+  return static_cast<int>(status);
+}
+
+int internal_error(const std::exception& error) {
+  std::fprintf(stderr, "internal error on rank %d: %s\n", rank(MPI_COMM_WORLD), error.what());
+  std::fflush(stderr);
+  if (size(MPI_COMM_WORLD) > 1) MPI_Abort(MPI_COMM_WORLD, static_cast<int>(Exit::internal_error));
+  return static_cast<int>(Exit::internal_error);
+}
+
 int guarded(Options& options, const std::function<Exit()>& work) {
   try {
     options.check();
@@ -31,27 +51,24 @@ int guarded(Options& options, const std::function<Exit()>& work) {
   } catch (const InputError& e) {
     say(stderr, fmt::format("error: {}", e.what()));
     return static_cast<int>(Exit::bad_input);
+  } catch (const PetscError& e) {
+    if (options.petsc_settings().empty()) return internal_error(e);
+    return abandon(fmt::format("error: PETSc fails with the options {}: {}; leave out those that "
+                               "it does not take",
+                               options.petsc_settings(), e.what()),
+                   Exit::bad_input);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "internal error on rank %d: %s\n", rank(MPI_COMM_WORLD), e.what());
-    std::fflush(stderr);
-    if (size(MPI_COMM_WORLD) > 1) MPI_Abort(MPI_COMM_WORLD, static_cast<int>(Exit::internal_error));
-    return static_cast<int>(Exit::internal_error);
+    return internal_error(e);
   }
 }
 
 /// Ends a program that PETSc does not start in, which some ranks may not know.
 int leave(const InputError& error) {
-  constexpr std::chrono::seconds while_the_first_prints{1};
+  const int status = abandon(fmt::format("error: {}", error.what()), Exit::bad_input);
   int started = 0;
   MPI_Initialized(&started);
-  const bool first = !started || rank(MPI_COMM_WORLD) == 0;
-  if (!first) std::this_thread::sleep_for(while_the_first_prints);
-  std::fprintf(stderr, "error: %s\n", error.what());
-  std::fflush(stderr);
-  if (started && size(MPI_COMM_WORLD) > 1)
-    MPI_Abort(MPI_COMM_WORLD, static_cast<int>(Exit::bad_input));
   if (started) MPI_Finalize();
-  return static_cast<int>(Exit::bad_input);
+  return status;
 }
 
 }  // namespace

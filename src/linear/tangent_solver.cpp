@@ -228,7 +228,7 @@ void TangentSolver::give_up() {
   });
   MPI_Allreduce(MPI_IN_PLACE, &finite, 1, MPI_INT, MPI_MIN, positions_.comm());
   if (!finite) discrete::refuse_overflow("stiffnesses", positions_.load());
-  throw base::InternalError("the preconditioner of the stiffness matrix could not be made");
+  throw base::PetscError("the preconditioner of the stiffness matrix could not be made");
 }
 
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "array_check.h"
@@ -19,7 +20,8 @@ using base::refuse;
 
 // No energy of numbers up to these overflows.
 constexpr double farthest = 1e7, largest = 1e30;
-constexpr Limits place{-farthest, farthest, "mm"}, any{-largest, largest, ""};
+constexpr Limits place{-farthest, farthest, "mm"}, any{-largest, largest, ""},
+    weight{-1000, 1000, ""};
 
 constexpr Limits at_least_zero(const char* unit) { return {0, largest, unit}; }
 constexpr Limits positive(const char* unit, const char* remedy) {
@@ -137,7 +139,15 @@ void check_walls(const Walls& walls, size_t point_count, const ArrayCheck& check
     check.integer("contact/wall/begin", walls.begin.size() - 1, walls.begin.back(), shares, shares);
   }
   check.integers("contact/wall/point", walls.point, walls.point.size(), 0, points - 1);
-  check.numbers("contact/wall/weight", walls.weight, walls.point.size(), any);
+  check.numbers("contact/wall/weight", walls.weight, walls.point.size(), weight);
+  for (size_t c = 1; c < walls.begin.size(); ++c) {
+    const auto begin = walls.weight.begin() + walls.begin[c - 1];
+    const auto end = walls.weight.begin() + walls.begin[c];
+    const double sum = std::accumulate(begin, end, 0.0);
+    if (std::abs(sum - 1) > 1e-9)
+      check.refuse("contact/wall/weight", fmt::format("rows {} to {} have a sum of {}, expected 1",
+                                                      walls.begin[c - 1], walls.begin[c] - 1, sum));
+  }
   check.numbers("contact/wall/area", walls.area, static_cast<size_t>(places), at_least_zero("mm²"));
 }
 

@@ -261,18 +261,33 @@ struct ReadAttribute {
   void operator()(const char* name, bool& value) const { value = in.integer(group, name) != 0; }
 };
 
+std::string require_step(const Reader& in, int64_t step) {
+  const std::string group = fmt::format("/step/{:04}", step);
+  if (!in.has(group)) in.refuse(group, "is missing");
+  return group;
+}
+
 }  // namespace
+
+model::StepNumbers read_numbers(const std::filesystem::path& file, int64_t step) {
+  const Reader in(file);
+  const std::string group = require_step(in, step);
+  model::StepNumbers numbers;
+  model::for_each_number(numbers, ReadAttribute{in, group});
+  return numbers;
+}
 
 StoredStep read_step(const std::filesystem::path& file, int64_t step, const model::Model& model) {
   const Reader in(file);
-  const std::string group = fmt::format("/step/{:04}", step);
-  if (!in.has(group)) in.refuse(group, "is missing");
+  const std::string group = require_step(in, step);
   const model::Counts counts = model::count(model);
   StoredStep stored;
-  model::for_each_number(stored.numbers, ReadAttribute{in, group});
+  stored.numbers = read_numbers(file, step);
   stored.rows.position = in.vectors(group + "/point/position", counts.points);
   stored.displacement = in.vectors(group + "/point/displacement", counts.points);
   stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);
+  if (!model.skin.empty())
+    stored.advance = in.numbers(group + "/point/advance", {counts.points, {}});
   for (const std::string name : {"contact_gap", "contact_pressure"})
     if (const std::string path = group + "/point/" + name; in.has(path))
       stored.rows.point_fields.push_back({name, false, in.numbers(path, {counts.points, {}})});

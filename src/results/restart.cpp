@@ -42,11 +42,15 @@ Found find_step(const std::filesystem::path& file, const model::Model& model) {
 
 void refuse_another_model(const std::filesystem::path& file, const model::Model& stored,
                           const model::Model& model) {
-  if (stored.points.position != model.points.position)
+  const auto refuse = [&](const char* what) {
     base::refuse(
-        "{}: -restart needs a result of the same model, but its points differ from the "
-        "input's; give the scene or model it was made from",
-        file.string());
+        "{}: -restart needs a result of the same model, but its {} differ from the input's; give "
+        "the scene or model it was made from",
+        file.string(), what);
+  };
+  if (stored.points.position != model.points.position) refuse("points");
+  if (stored.springs.points.size() != model.springs.points.size()) refuse("springs");
+  if (stored.prisms.points.size() != model.prisms.points.size()) refuse("prisms");
 }
 
 /// The numbers of arrays, one list an array.

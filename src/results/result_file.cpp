@@ -12,6 +12,7 @@
 #include "repose/base/hdf5.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
+#include "repose/results/model_file.h"
 #include "unfinished_file.h"
 #include "views.h"
 #include "vtkhdf.h"
@@ -133,6 +134,7 @@ struct ResultFile::State {
   std::vector<bool> moved;    // whether they hold bone surfaces
   bool savable = false;       // a result that is not committed
   bool is_whole = false;      // the part is closed, and nothing has failed
+  bool save_pending = false;  // to be saved as soon as it holds a step
   bool provisional = false;   // the last of these steps is to be replaced
   bool marked = false;        // the last step reads as that of a run that ended there, …
   std::string reason;         // … and this is what it says otherwise
@@ -168,6 +170,7 @@ struct ResultFile::State {
   void mark_last(bool as_end);
   void append(const model::StepNumbers& numbers, const model::StepRows& rows, bool under_way);
   void copy_steps(const std::filesystem::path& earlier, int64_t count);
+  bool save();
   std::vector<XdmfBlock> views_of_steps() const;
   std::vector<std::unique_ptr<UnfinishedFile>> describe() const;
   void add_vtkhdf(const std::vector<XdmfBlock>& blocks) const;
@@ -427,19 +430,35 @@ void ResultFile::State::append(const model::StepNumbers& numbers, const model::S
   reason = same.reason;
   if (savable && same.converged && same.load < 1) mark_last(true);
   close_part();
+  if (save_pending) save();
 }
 
-/// On rank 0.
+/// On rank 0, under the lock.
+bool ResultFile::State::save() {
+  save_pending = savable && unfinished && loads.empty();
+  if (!savable || !is_whole || !unfinished || loads.empty()) return false;
+  const auto documents = describe();
+  std::filesystem::rename(part, unfinished->file());
+  unfinished.reset();
+  for (const auto& document : documents) document->commit();
+  return true;
+}
+
+/// On rank 0. Attributes are written anew: HDF5 crashes where it copies strings of variable length.
 void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t count) {
   const Reader in(earlier);
   unfinished->reserve(static_cast<int64_t>(std::filesystem::file_size(earlier)));
   say_where(unfinished->file(), [&] {
     const base::Hdf5File source = base::open_hdf5(earlier);
     base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
+    const base::Hdf5Properties without(H5Pcreate(H5P_OBJECT_COPY));
+    base::check_hdf5(H5Pset_copy_object(without, H5O_COPY_WITHOUT_ATTR_FLAG));
     for (int64_t k = 0; k < count; ++k) {
       const std::string step = group_of(k);
-      base::check_hdf5(
-          H5Ocopy(source, step.c_str(), whole, step.c_str(), H5P_DEFAULT, H5P_DEFAULT));
+      base::check_hdf5(H5Ocopy(source, step.c_str(), whole, step.c_str(), without, H5P_DEFAULT));
+      const base::Hdf5Group copy(H5Gopen2(whole, step.c_str(), H5P_DEFAULT));
+      const model::StepNumbers numbers = read_numbers(earlier, k);
+      model::for_each_number(numbers, WriteAttribute{copy});
       loads.push_back(in.number(step, "load"));
       moved.push_back(in.has(step + "/bone_surface/points"));
       for (const auto& [field, vector] : optional_fields(whole, step + "/point"))
@@ -506,12 +525,7 @@ bool ResultFile::save() noexcept {
   State& s = *state_;
   try {
     const std::scoped_lock lock(s.mutex);
-    if (!s.savable || !s.is_whole || !s.unfinished || s.loads.empty()) return false;
-    const auto documents = s.describe();
-    std::filesystem::rename(s.part, s.unfinished->file());
-    s.unfinished.reset();
-    for (const auto& document : documents) document->commit();
-    return true;
+    return s.save();
   } catch (const std::exception&) {
     return false;
   }

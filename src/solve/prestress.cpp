@@ -263,8 +263,10 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
   MPI_Allreduce(MPI_IN_PLACE, at.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
   base::refuse(
       "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
-      "{:.2f}) mm: its springs cannot hold it; give tissue.springs a stiffness there",
-      so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z());
+      "{:.2f}) mm: the tissue there cannot hold it; {}",
+      so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z(),
+      part.solid ? "change tissue.turgor or tissue.density"
+                 : "give tissue.springs a stiffness there");
 }
 
 /// Brings values of this rank's first rows together in `whole` on rank 0. Collective.

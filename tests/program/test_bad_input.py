@@ -181,6 +181,11 @@ CASES = {
     "half-space without a normal": (
         lambda i: i.scene("forces:", "instruments: [{push: [0, 1, 0], half_space: "
                           "{point: [0, -120, 0]}}]\nforces:"), ["normal"]),
+    "volume term of springs for a solid": (
+        lambda i: i.scene("  accuracy: 0.1", "  volume: {form: penalty}"),
+        ["scene.yaml: solve.volume", "tissue.springs"]),
+    "force functional of a solid": (
+        lambda i: i.scene("  accuracy: 0.1", "  functional: force"), ["scene.yaml", "force"]),
     "law that is not modeled": (
         lambda i: i.scene("  mass:", "  material: {law: ogden}\n  mass:"),
         ["scene.yaml:7:", "ogden", "neo_hookean"]),

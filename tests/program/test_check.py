@@ -52,6 +52,7 @@ def make_model():
                 for t in ([(i, j), (i, j + 1), (i + 1, j)], [(i + 1, j), (i, j + 1), (i + 1, j + 1)]):
                     prisms.append([row[k, m, a] for k, m in t] + [row[k, m, a + 1] for k, m in t])
     springs, prisms = np.array(near), np.array(prisms)
+    skin = [prism[:3] for prism in prisms if prism[0] % 3 == 0]  # of the outermost layer
     length = np.linalg.norm(x[springs[:, 1]] - x[springs[:, 0]], axis=1)
     count = len(springs)
     return {
@@ -66,6 +67,7 @@ def make_model():
         "spring/exponent": (np.arange(count) % 3).astype("i1"),
         "spring/reference": random.uniform(0.5, 5, count),
         "prism/points": prisms, "prism/rest_volume": volumes(x, prisms),
+        "skin/points": np.array(skin),
     }
 
 
@@ -79,6 +81,16 @@ def volumes(x, prisms):
 def length_of(vectors):
     """Euclidean length that complex numbers differentiate."""
     return np.sqrt((vectors * vectors).sum(-1))
+
+
+def outward(model):
+    """Unit vectors along the skin's normals above the points."""
+    x, skin, column = model["point/position"], model["skin/points"], model["point/column"]
+    areas = np.cross(x[skin[:, 1]] - x[skin[:, 0]], x[skin[:, 2]] - x[skin[:, 0]])
+    of_column = np.zeros((9, 3))
+    for corner in skin.T:
+        np.add.at(of_column, column[corner], areas)
+    return (of_column / np.linalg.norm(of_column, axis=1)[:, None])[column]
 
 
 def evaluate(model, x, functional, volume):
@@ -112,7 +124,9 @@ def evaluate(model, x, functional, volume):
     if functional == "force":
         f = (np.sqrt(length_of(force[soft])**2 + EPSILON**2) - EPSILON).sum()
     n["objective"] = LAMBDA * f + (1 - LAMBDA) * n["f_v"] if volume == "paper" else f + n["penalty"]
-    arrays = {"point/position": x, "point/displacement": x - model["point/position"],
+    displacement = x - model["point/position"]
+    arrays = {"point/position": x, "point/displacement": displacement,
+              "point/advance": (displacement * outward(model)).sum(1),
               "point/residual_force": force, "prism/volume_ratio": v / v0,
               "spring/elongation": s, "spring/tension": tension}
     return n, arrays, within
@@ -192,7 +206,8 @@ def test_agrees_with_numpy(run, tmp_path, functional, volume):
 
 ATTRIBUTES = ["f_e", "potential", "f_f", "f_v", "penalty", "objective", "gradient_max",
               "volume_error_max"]
-ARRAYS = ["point/displacement", "point/residual_force", "prism/volume_ratio", "spring/elongation",
+ARRAYS = ["point/displacement", "point/advance", "point/residual_force", "prism/volume_ratio",
+          "spring/elongation",
           "spring/tension", "bone_surface/points", "bone_surface/displacement"]
 
 

@@ -43,6 +43,10 @@ def springs(file):
     contact["body_row"] = np.arange(6, dtype=np.int32)
     contact["binding"] = np.zeros(6, np.int8)
     contact["area"] = np.ones(6)
+    contact["wall/net"] = np.array([[2, 2]])  # each control at one point
+    contact["wall/begin"] = np.arange(9)
+    contact["wall/point"] = np.array([0, 1, 3, 4, 0, 2, 3, 5])
+    contact["wall/weight"], contact["wall/area"] = np.ones(8), np.zeros(4)
 
 
 def solid(file):

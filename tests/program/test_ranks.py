@@ -72,6 +72,11 @@ def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
         assert (result.returncode, result.stderr) == (0, ""), result
         assert ("by 2 ranks, each its part" in result.stdout) == (ranks == 2)
         found.append(read_vtp(tmp_path / f"on{ranks}_given_skin.vtp")["displacement"])
+        again = run("repose-solve", "solid.yaml", "-restart", f"on{ranks}.h5", "-output", "copy",
+                    ranks=ranks)
+        assert again.returncode == 0 and "nothing is left to do" in again.stdout
+        copy = read_vtp(tmp_path / "copy_given_skin.vtp")["displacement"]
+        assert np.array_equal(copy, found[-1])
     assert np.abs(found[0]).max() > 1
     assert np.abs(found[0] - found[1]).max() < 0.1
 

@@ -130,6 +130,23 @@ def test_a_finished_result_of_another_name_is_copied(run, face, tmp_path):
     assert apart(last(tmp_path / "jaw.h5"), last(face)) == 0
 
 
+def test_a_finished_result_that_h5py_has_written_to_is_copied(run, face, tmp_path):
+    with h5py.File(shutil.copy(face, tmp_path / "noted.h5"), "r+") as file:
+        for step in file["step"].values():
+            step.attrs["reason"] = "noted"  # of variable length, at which HDF5's copy crashes
+    result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", "noted.h5", "-output", "jaw")
+    assert (result.returncode, result.stderr) == (0, "") and "nothing is left to do" in result.stdout
+    assert last(tmp_path / "jaw.h5")["reason"] == b"noted"
+    assert run("repose-check", "jaw.h5").returncode == 0
+
+
+def test_a_negative_distance_to_rest_is_no_end(run, face, tmp_path):
+    with h5py.File(shutil.copy(face, tmp_path / "odd.h5"), "r+") as file:
+        list(file["step"].values())[-1].attrs["displacement_error"] = -1.0
+    result = run("repose-solve", SCENE, "-accuracy", ACCURACY, "-restart", "odd.h5", "-output", "jaw")
+    assert result.returncode == 0 and "nothing is left to do" not in result.stdout
+
+
 def test_a_restart_with_other_settings_searches(run, face, tmp_path):
     text = SCENE.read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")
     (tmp_path / "other.yaml").write_text(text.replace("poisson: 0.4967", "poisson: 0.49"))
@@ -143,6 +160,16 @@ def test_restart_from_another_model_is_refused(run, face, tmp_path):
     assert result.returncode == 1
     assert len(result.stderr.splitlines()) == 1 and str(face) in result.stderr
     assert names(tmp_path) == []
+
+
+def test_restart_from_springs_for_a_solid_is_refused(run, face, tmp_path):
+    text = SCENE.read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")
+    head, springs, end = text.partition("  springs:\n")
+    material = "  material: {preset: face}\n" + end.split("\n", 1)[1].partition("solve:")[0]
+    (tmp_path / "solid.yaml").write_text(head + material)
+    result = run("repose-solve", "solid.yaml", "-restart", face)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+    assert "the same model, but its springs differ" in result.stderr
 
 
 def test_checkpoints_are_results(run, face, tmp_path):

@@ -105,6 +105,21 @@ def test_options_that_petsc_cannot_follow_are_refused(run, scenes, words, ranks)
     assert result.stderr.startswith("error: ") and "PETSC ERROR" not in result.stderr, result.stderr
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("words", [
+    ["-ksp_pc_side", "right"], ["-ksp_diagonal_scale"], ["-ksp_converged_reason", "paper"],
+    ["-tao_view", "ascii:log:paper"], ["-pc_type", "gamg", "-mg_levels_ksp_type", "fast"],
+    ["-pc_type", "gamg", "-pc_mg_cycle_type", "z"], ["-pc_type", "hypre", "-pc_hypre_type", "ams"],
+    ["-pc_type", "cholesky", "-pc_factor_mat_solver_type", "fast"],
+    ["-stability", "-eps_tol", "-1"], ["-stability", "-st_pc_type", "fast"]], ids=" ".join)
+def test_options_at_which_petsc_fails_during_the_solve_are_named(run, scenes, tmp_path, words, ranks):
+    result = run("repose-solve", scenes / "springs.yaml", *words, ranks=ranks)
+    assert result.returncode == 1, result
+    lines = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert len(lines) == 1 and " ".join(words[-2:]) in lines[0], result.stderr
+    assert not list(tmp_path.glob("springs*"))
+
+
 @pytest.mark.parametrize("words", [
     ["-log_view"], ["-log_view", ":log.txt"], ["-options_left"], ["-options_view"],
     ["-malloc_debug", "-malloc_dump", "-malloc_view"], ["-malloc_test"], ["-memory_view"],

@@ -83,6 +83,8 @@ class Options {
 
   /// The PETSc options of the command line that PETSc never asked for. PETSc must be initialised.
   std::vector<std::string> unused() const;
+  /// The options by which the user changes what PETSc computes, as typed, or empty. After check().
+  const std::string& petsc_settings() const { return petsc_settings_; }
 
  private:
   const Option* find(std::string_view name) const;
@@ -94,7 +96,7 @@ class Options {
   void check_arguments() const;
   [[noreturn]] void refuse_unknown(const std::string& name) const;
 
-  std::string program_, description_;
+  std::string program_, description_, petsc_settings_;
   std::vector<Argument> arguments_;
   std::vector<Option> table_;
   std::map<std::string, std::vector<std::string>, std::less<>> given_;

@@ -17,7 +17,13 @@
 /// PETSc objects as owners, and PETSc's error codes as exceptions.
 namespace repose::base {
 
-/// Throws InternalError with PETSc's own text when `code` is not zero. Not collective.
+/// A call of PETSc failed: an internal error, unless an option of the user's is the cause.
+class PetscError : public InternalError {
+ public:
+  using InternalError::InternalError;
+};
+
+/// Throws PetscError with PETSc's own text when `code` is not zero. Not collective.
 void check(PetscErrorCode code);
 
 /// The same for PETSc's …SetFromOptions, whose errors are the user's: throws InputError.

@@ -24,6 +24,7 @@ struct StoredStep {
   model::StepNumbers numbers;
   model::StepRows rows;            ///< all rows
   std::vector<Vec3> displacement;  ///< [N] mm
+  std::vector<double> advance;     ///< [N] mm, along the skin's outward normal; empty: no skin
   std::vector<Vec3> bone_points;   ///< mm, of all bone surfaces in turn; empty: none, or not moved
   std::vector<Vec3> bone_displacement;  ///< mm, of the same points; empty: none
 };
@@ -35,6 +36,8 @@ bool is_checkpoint(const std::filesystem::path& file);
 int64_t step_count(const std::filesystem::path& file);
 /// Bulk modulus κ of the penalty (N/mm²) in the last step of a file; nothing where it has none.
 std::optional<double> last_bulk_modulus(const std::filesystem::path& file);
+/// The attributes of a step; InputError as read_model.
+model::StepNumbers read_numbers(const std::filesystem::path& file, int64_t step);
 /// Step number `step` (from 0) of a file with `model`; InputError as read_model.
 StoredStep read_step(const std::filesystem::path& file, int64_t step, const model::Model& model);
 

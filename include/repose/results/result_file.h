@@ -50,7 +50,8 @@ class ResultFile {
   /// Makes the part, as it was between the latest two calls, NAME.h5, with its XDMF files: at once,
   /// on rank 0 only and from any thread. Its last step says that it has not converged, and of a
   /// rest position at a load below 1 `stopped_at_rest`. What is appended later goes to a copy.
-  /// Returns whether there was a step to save.
+  /// Returns whether there was a step to save; where there was none, the first one is saved as soon
+  /// as it is written.
   bool save() noexcept;
 
   /// fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
