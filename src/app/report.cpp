@@ -170,6 +170,16 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
   return text;
 }
 
+std::string describe_other_rest(const solve::Outcome& last) {
+  if (!last.other) return "";
+  const auto& [distance, place] = *last.other;
+  return report_row("other rest position",
+                    fmt::format("the skin is up to {:.2g} mm away there, most at ({:.1f}, {:.1f}, "
+                                "{:.1f}) mm: tissue rests on either side of an edge of bone, and "
+                                "this result is where rounded edges lead to",
+                                distance, place[0], place[1], place[2]));
+}
+
 }  // namespace
 
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s) {
@@ -189,7 +199,7 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
         fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N", on.points,
                     name, on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
   }
-  return text + describe_penetration(bodies, s);
+  return text + describe_penetration(bodies, s) + describe_other_rest(s.path.last);
 }
 
 std::string describe_tearing(const solve::Tearing& t) {

@@ -77,6 +77,18 @@ std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, do
   return gaps;
 }
 
+std::vector<Vec3> TouchLoop::own_normals(std::span<const Vec3> position, double reach) const {
+  std::vector<Vec3> normals(touches_.point.size(), Vec3::Zero());
+  for (size_t c = 0; c < normals.size(); ++c) {
+    const RigidBody& body = bodies_[touches_.body[c]];
+    const Vec3 beside = body.beside(position[touches_.point[c]]);
+    if (!slides(c) && least_gap(c, beside) > reach) continue;
+    const surface::Distance d = body.distance(beside);
+    if (d.value <= reach) normals[c] = body.own_direction(d.gradient);
+  }
+  return normals;
+}
+
 void TouchLoop::carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const {
   for (LinearGap& g : gaps) {
     const RigidBody& body = bodies_[touches_.body[g.constraint]];

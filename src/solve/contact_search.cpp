@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "repose/base/agreement.h"
+
 namespace repose::solve {
 
 using base::check;
@@ -14,6 +16,9 @@ namespace {
 constexpr double missed = 0.25;       // of the accuracy, by contact
 constexpr double contact_safety = 2;  // the estimate is so many times what is left
 constexpr double predicted_to = 0.1;  // mm
+// mm, of points whose sides of bodies are compared: before a step, and where they may press after
+// it.
+constexpr double normals_to = 6, pressing_to = 1;
 // Bodies with rounded edges have one rest position where sharper ones catch single points on either
 // side: it decides the side.
 constexpr ContactSearch::Approach to_rounded{true, 0.1, 0.05, 0.3}, to_exact{false, 0.1, 0.05, 0.1};
@@ -37,12 +42,18 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
       gradient_(objective.positions().make_vector()),
       slope_(objective.positions().make_vector()),
       step_(objective.positions().make_vector()),
-      trial_(objective.positions().make_vector()) {}
+      trial_(objective.positions().make_vector()),
+      start_(objective.positions().make_vector()) {}
 
-void ContactSearch::keep_multipliers() {
+ContactSearch::Multipliers ContactSearch::multipliers() const {
   const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
-  before_.assign(p.begin(), p.end());
-  walls_before_.assign(q.begin(), q.end());
+  return {{p.begin(), p.end()}, {q.begin(), q.end()}};
+}
+
+void ContactSearch::set_multipliers(const Multipliers& to) {
+  objective_.touches().set_multipliers(to.touches);
+  objective_.walls().set_multipliers(to.walls);
+  tangent_.forget_contact();
 }
 
 /// Takes so many times the model's stiffness from now on.
@@ -86,10 +97,12 @@ void ContactSearch::move_multipliers() {
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
-  keep_multipliers();
-  kept_ = true;
+  before_ = multipliers();
+  predicted_ = true;
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
+  objective_.place_bodies();
+  normals_ = objective_.touches().own_normals(positions.local(), normals_to);
   const discrete::Part& part = positions.part();
   std::vector<Vec3> way(positions.local().size(), Vec3::Zero());
   for (size_t i = 0; i < way.size(); ++i)
@@ -208,22 +221,76 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   return outcome;
 }
 
+/// Whether a point is on another side of a body than before the prediction. Collective.
+bool ContactSearch::gone_round(Vec displacement) {
+  discrete::Positions& positions = objective_.positions();
+  positions.update(displacement);
+  const std::vector<Vec3> now = objective_.touches().own_normals(positions.local(), pressing_to);
+  int found = 0;
+  for (size_t c = 0; c < now.size(); ++c)
+    if (now[c].dot(normals_[c]) < 0) found = 1;
+  MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, positions.comm());
+  return found;
+}
+
+/// How far apart two states of the skin are, and where most. Collective.
+std::optional<OtherRest> ContactSearch::compare_skins(Vec displacement, Vec other) {
+  discrete::Positions& positions = objective_.positions();
+  const model::Points& points = positions.part().model.points;
+  positions.update(displacement);
+  const std::vector<Vec3> skin(positions.local().begin(), positions.local().end());
+  positions.update(other);
+  struct {
+    double distance;
+    int rank;
+  } largest{0, base::rank(positions.comm())};
+  OtherRest found;
+  for (int64_t i = 0; i < positions.part().owned_points; ++i) {
+    const double apart = (positions.local()[i] - skin[i]).norm();
+    if (points.layer[i] != 0 || apart <= largest.distance) continue;
+    largest.distance = apart;
+    for (int a = 0; a < 3; ++a) found.place[a] = points.position[i][a];
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, positions.comm());
+  MPI_Bcast(found.place, 3, MPI_DOUBLE, largest.rank, positions.comm());
+  found.distance = largest.distance;
+  return found;
+}
+
+/// The rest position that the sharp bodies lead to from the prediction directly, where that is
+/// another one.
+std::optional<OtherRest> ContactSearch::find_other(Vec displacement, double accuracy) {
+  const Multipliers here = multipliers();
+  set_multipliers(at_prediction_);
+  std::optional<OtherRest> other;
+  int64_t iterations = 0;
+  const Outcome near =
+      approach(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
+  if (!near.stopped && newton(start_, accuracy, iterations) == End::reached)
+    other = compare_skins(displacement, start_);
+  set_multipliers(here);
+  objective_.evaluate(displacement, gradient_);
+  return other && other->distance > 2 * accuracy ? other : std::nullopt;
+}
+
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int most_rounds = 8, stiffest = 16;
   Outcome outcome;
-  if (!kept_) {
-    keep_multipliers();
+  if (!predicted_) {
+    before_ = multipliers();
     outcome = finish(displacement, accuracy);
     if (outcome.converged) return outcome;
   }
-  kept_ = false;
+  const bool may_have_other =
+      std::exchange(predicted_, false) && objective_.positions().load() == 1;
+  at_prediction_ = multipliers();
+  check(VecCopy(displacement, start_));
   stiffen(1);
   int64_t iterations = 0;
   double finer = accuracy;
   const Approach to_fine{false, accuracy, accuracy, to_exact.finer};
   for (int round = 0; round < most_rounds; ++round) {
-    const auto stages =
-        round == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
+    const auto stages = round == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
     for (const Approach& to : stages) {
       const Outcome near = approach(displacement, accuracy, to);
       iterations += near.iterations;
@@ -239,14 +306,14 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
+  if (outcome.converged && may_have_other && gone_round(displacement))
+    outcome.other = find_other(displacement, accuracy);
   return outcome;
 }
 
 void ContactSearch::go_back(Vec) {
   objective_.round_bodies(false);
-  objective_.touches().set_multipliers(before_);
-  objective_.walls().set_multipliers(walls_before_);
-  tangent_.forget_contact();
+  set_multipliers(before_);
 }
 
 double penetration(discrete::Objective& objective) {

@@ -8,8 +8,10 @@ namespace repose::solve {
 /// step to a load is predicted with its contact by a quadratic program; quasi-Newton searches on
 /// the augmented Lagrangian with a soft penalty come near, first to bodies with rounded edges;
 /// sequential quadratic programs (Nocedal & Wright 2006, chapter 18) end it, multipliers included.
-/// Where these fail, both are repeated with a finer search and a stiffer penalty. The multipliers of
-/// a load are where the next begins.
+/// Where these fail, both are repeated with a finer search and a stiffer penalty. The multipliers
+/// of a load are where the next begins. At load 1, where points have gone round an edge of a body,
+/// the sharp bodies are approached directly from the prediction, too: where this ends elsewhere,
+/// the outcome says so.
 class ContactSearch : public RestSearch {
  public:
   struct Approach {
@@ -27,7 +29,11 @@ class ContactSearch : public RestSearch {
   void go_back(Vec displacement) override;
 
  private:
-  void keep_multipliers();
+  struct Multipliers {
+    std::vector<double> touches, walls;  // N/mm²
+  };
+  Multipliers multipliers() const;
+  void set_multipliers(const Multipliers& to);
   void set_stiffness(double stiffness);
   void stiffen(int times);
   double violation();
@@ -39,17 +45,22 @@ class ContactSearch : public RestSearch {
   bool take_step(Vec displacement, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
+  bool gone_round(Vec displacement);
+  std::optional<OtherRest> find_other(Vec displacement, double accuracy);
+  std::optional<OtherRest> compare_skins(Vec displacement, Vec other);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   Minimiser& minimiser_;
   Minimiser::Watch watch_;
   ContactQp qp_;
-  double stiffness_;                           // N/mm³, of the penalty
-  int times_ = 1;                              // it is so many times the model's
-  bool kept_ = false;                          // before_ are those before a prediction
-  std::vector<double> before_, walls_before_;  // multipliers before the last search
-  base::VecHandle gradient_, slope_, step_, trial_;
+  double stiffness_;           // N/mm³, of the penalty
+  int times_ = 1;              // it is so many times the model's
+  bool predicted_ = false;     // the next search begins with a prediction
+  Multipliers before_;         // the last search, …
+  Multipliers at_prediction_;  // … and where it began
+  std::vector<Vec3> normals_;  // [touches] before the prediction, in bodies' axes
+  base::VecHandle gradient_, slope_, step_, trial_, start_;
 };
 
 /// mm, the deepest that a point is inside a body, beyond its offset, or has passed the other side

@@ -177,8 +177,8 @@ class DistanceField::Values {
 
   static constexpr int32_t unknown = -1, far = -2;
   Grid grid_;
-  std::vector<int32_t> place_;  // [blocks] which of the kept ones, or unknown or far
-  std::vector<float> value_;    // [kept blocks][8³] mm, not a number where it is not known
+  std::vector<int32_t> place_;      // [blocks] which of the kept ones, or unknown or far
+  std::vector<float> value_;        // [kept blocks][8³] mm, not a number where it is not known
   std::vector<float> coefficient_;  // the same
   TriangleTree tree_;
   std::unordered_map<int64_t, std::vector<LineCrossing>> lines_;  // by (j, k)

@@ -74,6 +74,9 @@ class TouchLoop {
   /// Takes gaps made by linear_gaps to where the bodies have moved since: each point stays beside
   /// the place of its body that it was beside.
   void carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const;
+  /// [C] The normals, in the bodies' own axes, of points that are nearer than `reach` mm; 0 for the
+  /// others.
+  std::vector<Vec3> own_normals(std::span<const Vec3> position, double reach) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
   template <class Visit>
   void for_each_curvature(std::span<const LinearGap> gaps, bool exact, Visit&& visit) const {

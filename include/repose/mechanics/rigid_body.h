@@ -42,6 +42,8 @@ class RigidBody {
   Vec3 in_space(const Vec3& beside) const { return rotation_ * beside + shift_; }
   /// Distance to a point given by beside(); the derivatives are those in space.
   surface::Distance distance(const Vec3& beside) const;
+  /// A direction in space in the body's own axes.
+  Vec3 own_direction(const Vec3& direction) const { return rotation_.transpose() * direction; }
   /// Up to this the distance is known, mm.
   double reach() const;
 

@@ -21,6 +21,12 @@ struct Iteration {
 inline constexpr const char* stopped_reason =
     "stopped before it was done, by a signal or the time limit";
 
+/// Another rest position of the same load.
+struct OtherRest {
+  double distance = 0;   ///< mm, the largest of the skin from the one that was chosen
+  double place[3] = {};  ///< mm, where on the initial skin
+};
+
 /// How a search for the rest position at one load ended.
 struct Outcome {
   bool converged = false;         ///< the estimated distance is below the accuracy asked for
@@ -31,6 +37,7 @@ struct Outcome {
   double gradient_max = 0;  ///< N
   int64_t iterations = 0;
   std::string reason;
+  std::optional<OtherRest> other;
 };
 
 /// Finds the rest position at a load.

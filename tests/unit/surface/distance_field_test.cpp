@@ -169,8 +169,8 @@ TEST(DistanceField, is_exact_beside_a_plane_part) {
 }
 
 TEST(DistanceField, rounds_a_convex_edge_by_a_fifth_of_a_spacing_and_nothing_else_much) {
-  const DistanceField field(box({-20, -20, -20}, {20, 20, 20}), 1.0, 6.0), rounded =
-                                                                             field.rounded(1);
+  const DistanceField field(box({-20, -20, -20}, {20, 20, 20}), 1.0, 6.0),
+      rounded = field.rounded(1);
   const double at_edge = field.value({20, 20, 0.3}), rounded_edge = rounded.value({20, 20, 0.3});
   EXPECT_GT(at_edge, 0.1);
   EXPECT_LT(at_edge, 0.23);
