@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "repose/surface/triangle_tree.h"
 
@@ -13,14 +12,15 @@ namespace {
 using Index = std::array<int64_t, 3>;
 using Vec3f = Eigen::Vector3f;
 
-/// Closest points of a surface, found at its triangles and handed on by sweeps over the grid.
+/// Closest points of a surface, found at its triangles and handed on between neighbours.
 class ClosestPoints {
  public:
-  explicit ClosestPoints(const Volume& grid)
+  ClosestPoints(const Volume& grid, double reach)
       : grid_(grid),
         voxel_(grid.spacing(0)),
         closest_(grid.size[0] * grid.size[1] * grid.size[2]),
-        squared_(closest_.size(), std::numeric_limits<float>::infinity()) {}
+        squared_(closest_.size(), static_cast<float>(reach * reach)),
+        waits_(closest_.size(), 0) {}
 
   void add(const Corners& triangle) {
     Index low, high;
@@ -35,68 +35,69 @@ class ClosestPoints {
       for (int64_t j = low[1]; j <= high[1]; ++j)
         for (int64_t i = low[0]; i <= high[0]; ++i) {
           Vec3 point;
-          squared_distance(grid_.origin + place(i, j, k).cast<double>(), triangle, &point);
-          offer(grid_.index(i, j, k), place(i, j, k), (point - grid_.origin).cast<float>());
+          squared_distance(grid_.origin + place({i, j, k}).cast<double>(), triangle, &point);
+          offer({i, j, k}, (point - grid_.origin).cast<float>());
         }
   }
 
-  /// Each of the eight sweeps carries closest points along one diagonal of the grid.
+  /// Each voxel offers its closest point to its neighbours until none is improved.
   std::vector<float> distances() {
-    for (int sweep = 0; sweep < 16; ++sweep) run(sweep % 8);
-    std::vector<float> distance(squared_.size());
-    for (size_t v = 0; v < distance.size(); ++v) distance[v] = std::sqrt(squared_[v]);
-    return distance;
+    std::vector<Index> front;
+    while (!changed_.empty()) {
+      front.clear();
+      front.swap(changed_);
+      for (const Index& at : front) hand_on(at);
+    }
+    for (float& value : squared_) value = std::sqrt(value);
+    return std::move(squared_);
   }
 
  private:
   /// mm beside the origin, small enough for floats.
-  Vec3f place(int64_t i, int64_t j, int64_t k) const {
+  Vec3f place(const Index& at) const {
     return static_cast<float>(voxel_) *
-           Vec3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
+           Vec3f(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
   }
 
-  void offer(int64_t voxel, const Vec3f& at, const Vec3f& point) {
-    const float squared = (point - at).squaredNorm();
+  void offer(const Index& at, const Vec3f& point) {
+    const int64_t voxel = grid_.index(at[0], at[1], at[2]);
+    const float squared = (point - place(at)).squaredNorm();
     if (!(squared < squared_[voxel])) return;
     squared_[voxel] = squared;
     closest_[voxel] = point;
+    if (!waits_[voxel]) changed_.push_back(at);
+    waits_[voxel] = 1;
   }
 
-  void run(int directions) {
-    const auto [columns, rows, slices] = grid_.size;
-    const std::array<bool, 3> back{(directions & 1) != 0, (directions & 2) != 0,
-                                   (directions & 4) != 0};
-    const Index behind{back[0] ? 1 : -1, (back[1] ? 1 : -1) * columns,
-                       (back[2] ? 1 : -1) * columns * rows};
-    for (int64_t c = 0; c < slices; ++c)
-      for (int64_t b = 0; b < rows; ++b)
-        for (int64_t a = 0; a < columns; ++a) {
-          const int64_t i = back[0] ? columns - 1 - a : a, j = back[1] ? rows - 1 - b : b,
-                        k = back[2] ? slices - 1 - c : c;
-          const int64_t voxel = grid_.index(i, j, k);
-          const std::array<bool, 3> has{a > 0, b > 0, c > 0};
-          const Vec3f at = place(i, j, k);
-          for (int n = 0; n < 3; ++n)
-            if (has[n] && std::isfinite(squared_[voxel + behind[n]]))
-              offer(voxel, at, closest_[voxel + behind[n]]);
-        }
+  void hand_on(const Index& at) {
+    const int64_t voxel = grid_.index(at[0], at[1], at[2]);
+    waits_[voxel] = 0;
+    const Vec3f point = closest_[voxel];
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int64_t side : {-1, 1}) {
+        Index next = at;
+        next[axis] += side;
+        if (next[axis] >= 0 && next[axis] < grid_.size[axis]) offer(next, point);
+      }
   }
 
   const Volume& grid_;
   double voxel_;
-  std::vector<Vec3f> closest_;  ///< mm beside the origin
+  std::vector<Vec3f> closest_;  ///< mm beside the origin, where the distance is below the reach
   std::vector<float> squared_;  ///< mm²
+  std::vector<char> waits_;     ///< whether a voxel is in changed_ or in the front
+  std::vector<Index> changed_;
 };
 
 }  // namespace
 
-Volume distance_volume(const Surface& surface, const Volume& grid) {
-  ClosestPoints points(grid);
+Volume distance_volume(const Surface& surface, const Volume& grid, double reach) {
+  ClosestPoints points(grid, reach);
   for (const Triangle& triangle : surface.triangles) points.add(corners(surface, triangle));
   return {surface.name, grid.size, grid.axes, grid.origin, points.distances(), {}};
 }
 
-Volume distance_volume(const Surface& surface, double voxel, double margin) {
+Volume distance_volume(const Surface& surface, double voxel, double margin, double reach) {
   Vec3 low = surface.points.front(), high = low;
   for (const Vec3& point : surface.points) {
     low = low.cwiseMin(point);
@@ -107,7 +108,7 @@ Volume distance_volume(const Surface& surface, double voxel, double margin) {
   grid.origin = low - Vec3::Constant(margin);
   for (int a = 0; a < 3; ++a)
     grid.size[a] = 2 + static_cast<int64_t>((high[a] - low[a] + 2 * margin) / voxel);
-  return distance_volume(surface, grid);
+  return distance_volume(surface, grid, reach);
 }
 
 }  // namespace repose::imaging

@@ -105,8 +105,8 @@ void keep_outside(double radius, Volume& distance) {
 }
 
 /// The distance to `border` over a grid, positive where the grid's own values are at least `level`.
-Volume signed_distance(const Surface& border, const Volume& grid, double level) {
-  Volume signed_values = distance_volume(border, grid);
+Volume signed_distance(const Surface& border, const Volume& grid, double level, double reach) {
+  Volume signed_values = distance_volume(border, grid, reach);
   for (size_t v = 0; v < grid.values.size(); ++v)
     if (grid.values[v] < level) signed_values.values[v] *= -1;
   return signed_values;
@@ -148,18 +148,20 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   const Cones cones = cones_of(solid, 6 * rolling.outside);
   append(cones.all, solid);
   const double margin = rolling.outside + 3 * rolling.voxel;
-  Volume field = distance_volume(solid, voxel_for(solid, rolling, margin), margin);
+  const double voxel = voxel_for(solid, rolling, margin);
+  const auto beyond = [voxel](double level) { return level + 2 * voxel; };
+  Volume field = distance_volume(solid, voxel, margin, beyond(rolling.outside));
   keep_outside(rolling.outside, field);
   const Surface outside = largest_component(isosurface(field, -rolling.outside));
-  field = signed_distance(outside, field, -rolling.outside);
   const double core = rolling.outside + rolling.inside;
+  field = signed_distance(outside, field, -rolling.outside, beyond(core));
   if (*std::max_element(field.values.begin(), field.values.end()) <= core)
     base::refuse(
         "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
         "at several ends) leave tissue.edge out",
         given.name, 2 * rolling.inside);
   const Surface inner = largest_component(isosurface(field, core));
-  field = signed_distance(inner, field, core);
+  field = signed_distance(inner, field, core, beyond(rolling.inside));
   return {largest_component(isosurface(field, -rolling.inside)),
           caps_of(outside, cones.ends, rolling.outside), rolling.outside};
 }
