@@ -18,9 +18,12 @@ class ClosestPoints {
   ClosestPoints(const Volume& grid, double reach)
       : grid_(grid),
         voxel_(grid.spacing(0)),
-        closest_(grid.size[0] * grid.size[1] * grid.size[2]),
-        squared_(closest_.size(), static_cast<float>(reach * reach)),
-        waits_(closest_.size(), 0) {}
+        closest_(grid.values.size()),
+        squared_(grid.values.size(), 0),
+        waits_(grid.values.size(), 0) {
+    for (size_t v = 0; v < squared_.size(); ++v)
+      if (grid.values[v] > 0) squared_[v] = static_cast<float>(reach * reach);
+  }
 
   void add(const Corners& triangle) {
     Index low, high;
@@ -91,10 +94,12 @@ class ClosestPoints {
 
 }  // namespace
 
-Volume distance_volume(const Surface& surface, const Volume& grid, double reach) {
+Volume distance_volume(const Surface& surface, Volume grid, double reach) {
   ClosestPoints points(grid, reach);
   for (const Triangle& triangle : surface.triangles) points.add(corners(surface, triangle));
-  return {surface.name, grid.size, grid.axes, grid.origin, points.distances(), {}};
+  grid.name = surface.name;
+  grid.values = points.distances();
+  return grid;
 }
 
 Volume distance_volume(const Surface& surface, double voxel, double margin, double reach) {
@@ -108,7 +113,8 @@ Volume distance_volume(const Surface& surface, double voxel, double margin, doub
   grid.origin = low - Vec3::Constant(margin);
   for (int a = 0; a < 3; ++a)
     grid.size[a] = 2 + static_cast<int64_t>((high[a] - low[a] + 2 * margin) / voxel);
-  return distance_volume(surface, grid, reach);
+  grid.values.assign(grid.size[0] * grid.size[1] * grid.size[2], 1);
+  return distance_volume(surface, std::move(grid), reach);
 }
 
 }  // namespace repose::imaging

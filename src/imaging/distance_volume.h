@@ -13,7 +13,7 @@ using surface::Surface;
 /// mapping", 1980), which is wrong by a small part of a voxel at most. O(voxels + T).
 Volume distance_volume(const Surface& surface, double voxel, double margin, double reach);
 
-/// The same over the grid of another volume, whose values are not read.
-Volume distance_volume(const Surface& surface, const Volume& grid, double reach);
+/// The same in the voxels of a grid whose values are positive, 0 in the others.
+Volume distance_volume(const Surface& surface, Volume grid, double reach);
 
 }  // namespace repose::imaging

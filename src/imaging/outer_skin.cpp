@@ -104,14 +104,6 @@ void keep_outside(double radius, Volume& distance) {
     distance.values[v] = reached[v] || distance.values[v] < radius ? -distance.values[v] : 0;
 }
 
-/// The distance to `border` over a grid, positive where the grid's own values are at least `level`.
-Volume signed_distance(const Surface& border, const Volume& grid, double level, double reach) {
-  Volume signed_values = distance_volume(border, grid, reach);
-  for (size_t v = 0; v < grid.values.size(); ++v)
-    if (grid.values[v] < level) signed_values.values[v] *= -1;
-  return signed_values;
-}
-
 double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
   Vec3 low = surface.points.front(), high = low;
   for (const Vec3& point : surface.points) {
@@ -153,15 +145,18 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   Volume field = distance_volume(solid, voxel, margin, beyond(rolling.outside));
   keep_outside(rolling.outside, field);
   const Surface outside = largest_component(isosurface(field, -rolling.outside));
+  for (float& value : field.values) value = value >= -rolling.outside ? 1 : 0;
   const double core = rolling.outside + rolling.inside;
-  field = signed_distance(outside, field, -rolling.outside, beyond(core));
+  field = distance_volume(outside, std::move(field), beyond(core));
   if (*std::max_element(field.values.begin(), field.values.end()) <= core)
     base::refuse(
         "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
         "at several ends) leave tissue.edge out",
         given.name, 2 * rolling.inside);
   const Surface inner = largest_component(isosurface(field, core));
-  field = signed_distance(inner, field, core, beyond(rolling.inside));
+  for (float& value : field.values) value = value < core ? 1 : 0;
+  field = distance_volume(inner, std::move(field), beyond(rolling.inside));
+  for (float& value : field.values) value = -value;
   return {largest_component(isosurface(field, -rolling.inside)),
           caps_of(outside, cones.ends, rolling.outside), rolling.outside};
 }
