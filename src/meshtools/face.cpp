@@ -152,20 +152,29 @@ std::vector<Vec3> normals_of(const Surface& surface) {
   return normals;
 }
 
-/// Points of the given triangles no farther apart than `spacing`, with their areas, in a ball
-/// around the face.
+/// The given triangles near the face: no point of the others is within the tolerance of it.
+Surface part_near(const Surface& given, const TriangleTree& face, double tolerance) {
+  Surface part{given.name, given.points, {}};
+  for (const Triangle& triangle : given.triangles) {
+    const auto [a, b, c] = corners(given, triangle);
+    const double reach = tolerance + std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    if (face.any_within((a + b + c) / 3, reach * reach) >= 0) part.triangles.push_back(triangle);
+  }
+  return part;
+}
+
+/// Points of triangles no farther apart than `spacing`, with their areas.
 struct Sampled {
   std::vector<Vec3> point;
   std::vector<double> area;
+  std::vector<int64_t> nearest;  ///< triangle of the face when last looked for, -1 at first
 };
 
-Sampled sample(const Surface& given, const TriangleTree& face, double spacing, double tolerance) {
+Sampled sample(const Surface& surface, double spacing) {
   Sampled samples;
-  for (const Triangle& triangle : given.triangles) {
-    const auto [a, b, c] = corners(given, triangle);
+  for (const Triangle& triangle : surface.triangles) {
+    const auto [a, b, c] = corners(surface, triangle);
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    const double reach = tolerance + longest;
-    if (face.any_within((a + b + c) / 3, reach * reach) < 0) continue;
     const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
     const double area = (b - a).cross(c - a).norm() / 2 / (n * n);
     for (int i = 0; i < n; ++i)
@@ -176,18 +185,21 @@ Sampled sample(const Surface& given, const TriangleTree& face, double spacing, d
           samples.area.push_back(area);
         }
   }
+  samples.nearest.assign(samples.point.size(), -1);
   return samples;
 }
 
 /// Draws the vertices along their normals to the samples within the tolerance.
-void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
+void fit(Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
          Surface& face) {
   const TriangleTree tree(face);
   const std::vector<Vec3> normals = normals_of(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
   for (size_t s = 0; s < samples.point.size(); ++s) {
-    const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance);
+    const auto nearest =
+        tree.nearest(samples.point[s], tolerance * tolerance, samples.nearest[s]);
     if (nearest.triangle < 0) continue;
+    samples.nearest[s] = nearest.triangle;
     const Triangle& triangle = face.triangles[nearest.triangle];
     const Vec3 share = barycentric(tree.corners_of(nearest.triangle), nearest.point);
     for (int k = 0; k < 3; ++k) {
@@ -223,8 +235,9 @@ void unfold(const VertexNeighbours& neighbours, Surface& face) {
   }
 }
 
-void measure(const Surface& given, Face& face) {
-  const TriangleTree tree(given);
+/// Distances are those to the given triangles near the face: upper bounds where others are nearer.
+void measure(const Surface& near, Face& face) {
+  const TriangleTree tree(near);
   std::vector<double> off;
   for (const Vec3& point : face.skin.points) off.push_back(std::sqrt(tree.nearest(point).squared));
   std::sort(off.begin(), off.end());
@@ -247,11 +260,11 @@ Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
   face.skin = remesh(region_of(outer_skin(given, request.rolling), request), request.edge);
   const VertexNeighbours neighbours = neighbours_of(face.skin);
-  const Sampled samples =
-      sample(given, TriangleTree(face.skin), request.edge / 2, request.tolerance);
+  const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
+  Sampled samples = sample(near, request.edge / 2);
   for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);
   unfold(neighbours, face.skin);
-  measure(given, face);
+  measure(near, face);
   face.skin.name = given.name;
   return face;
 }

@@ -57,22 +57,8 @@ double squared_distance(const Vec3& query, const Corners& triangle, Vec3* closes
   return (point - query).squaredNorm();
 }
 
-void TriangleTree::Box::extend(const Vec3& point) {
-  low = low.cwiseMin(point);
-  high = high.cwiseMax(point);
-}
-
-void TriangleTree::Box::extend(const Box& box) {
-  low = low.cwiseMin(box.low);
-  high = high.cwiseMax(box.high);
-}
-
 bool TriangleTree::Box::overlaps(const Box& box) const {
   return (low.array() <= box.high.array()).all() && (box.low.array() <= high.array()).all();
-}
-
-double TriangleTree::Box::squared_distance(const Vec3& point) const {
-  return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
 }
 
 TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
@@ -85,41 +71,53 @@ TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
 TriangleTree::TriangleTree(const Surface& surface)
     : order_(surface.triangles.size()), leaf_of_(surface.triangles.size()) {
   triangles_.reserve(surface.triangles.size());
-  for (const auto& triangle : surface.triangles) triangles_.push_back(corners(surface, triangle));
+  std::vector<Vec3> centres;
+  centres.reserve(surface.triangles.size());
+  for (const auto& triangle : surface.triangles) {
+    triangles_.push_back(corners(surface, triangle));
+    const auto& [a, b, c] = triangles_.back();
+    centres.push_back((a + b + c) / 3);
+  }
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
-  build(0, static_cast<int64_t>(order_.size()), -1);
+  build(0, static_cast<int64_t>(order_.size()), -1, centres);
 }
 
-int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent) {
+int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
+                            const std::vector<Vec3>& centres) {
   const auto number = static_cast<int64_t>(nodes_.size());
   nodes_.push_back({{}, first, end - first, -1, parent});
-  Box centres;
-  for (int64_t i = first; i < end; ++i) {
-    const Corners& t = triangles_[order_[i]];
-    nodes_[number].box.extend(box_of(t));
-    centres.extend((t[0] + t[1] + t[2]) / 3);
-    leaf_of_[order_[i]] = number;
+  if (end - first <= leaf_size) {
+    for (int64_t i = first; i < end; ++i) leaf_of_[order_[i]] = number;
+    nodes_[number].box = leaf_box(nodes_[number]);
+    return number;
   }
-  if (end - first <= leaf_size) return number;
+  Box box;
+  for (int64_t i = first; i < end; ++i) box.extend(centres[order_[i]]);
   Eigen::Index axis = 0;
-  (centres.high - centres.low).maxCoeff(&axis);
+  (box.high - box.low).maxCoeff(&axis);
   const auto middle = first + (end - first) / 2;
-  const auto centre = [&](int64_t t) {
-    return triangles_[t][0][axis] + triangles_[t][1][axis] + triangles_[t][2][axis];
-  };
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
-                   [&](int64_t s, int64_t t) { return centre(s) < centre(t); });
-  build(first, middle, number);
-  const int64_t right = build(middle, end, number);
-  nodes_[number].right = right;
-  nodes_[number].count = 0;
+                   [&](int64_t s, int64_t t) { return centres[s][axis] < centres[t][axis]; });
+  build(first, middle, number, centres);
+  const int64_t right = build(middle, end, number, centres);
+  Node& node = nodes_[number];
+  node.right = right;
+  node.count = 0;
+  node.box = nodes_[number + 1].box;
+  node.box.extend(nodes_[right].box);
   return number;
 }
 
-TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit) const {
+TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int64_t hint) const {
   Nearest best;
   best.squared = limit;
+  const auto offer = [&](int64_t t) {
+    Vec3 point;
+    const double squared = squared_distance(query, triangles_[t], &point);
+    if (squared < best.squared) best = {squared, t, point};
+  };
+  if (hint >= 0) offer(hint);
   std::array<std::pair<double, int64_t>, max_depth> stack;
   int depth = 0;
   stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
@@ -127,11 +125,7 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit) con
     const auto [bound, number] = stack[--depth];
     if (!(bound < best.squared)) continue;
     const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i) {
-      Vec3 point;
-      const double squared = squared_distance(query, triangles_[order_[i]], &point);
-      if (squared < best.squared) best = {squared, order_[i], point};
-    }
+    for (int64_t i = node.first; i < node.first + node.count; ++i) offer(order_[i]);
     if (node.count > 0) continue;
     std::pair left(nodes_[number + 1].box.squared_distance(query), number + 1);
     std::pair right(nodes_[node.right].box.squared_distance(query), node.right);

@@ -35,10 +35,19 @@ class TriangleTree {
   struct Box {
     Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
     Vec3 high = Vec3::Constant(-std::numeric_limits<double>::infinity());
-    void extend(const Vec3& point);
-    void extend(const Box& box);
+    void extend(const Vec3& point) {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    void extend(const Box& box) {
+      low = low.cwiseMin(box.low);
+      high = high.cwiseMax(box.high);
+    }
     bool overlaps(const Box& box) const;
-    double squared_distance(const Vec3& point) const;  ///< mm², 0 inside; ∞ to the empty box
+    /// mm², 0 inside; ∞ to the empty box.
+    double squared_distance(const Vec3& point) const {
+      return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
+    }
   };
   struct Nearest {
     double squared = std::numeric_limits<double>::infinity();  ///< mm²
@@ -48,8 +57,9 @@ class TriangleTree {
 
   explicit TriangleTree(const Surface& surface);
 
-  /// The closest point, if nearer than √limit.
-  Nearest nearest(const Vec3& query, double limit = std::numeric_limits<double>::infinity()) const;
+  /// The closest point, if nearer than √limit. The triangle `hint` is tried first.
+  Nearest nearest(const Vec3& query, double limit = std::numeric_limits<double>::infinity(),
+                  int64_t hint = -1) const;
 
   /// A triangle within √limit of the point, −1 for none. `hint` is tried first.
   int64_t any_within(const Vec3& query, double limit, int64_t hint = -1) const;
@@ -98,7 +108,7 @@ class TriangleTree {
     int64_t parent = -1;
   };
 
-  int64_t build(int64_t first, int64_t end, int64_t parent);
+  int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centres);
   Box leaf_box(const Node& node) const;
   void refit(int64_t node);
 
