@@ -20,7 +20,7 @@ class ClosestPoints {
         voxel_(grid.spacing(0)),
         closest_(grid.values.size()),
         squared_(grid.values.size(), 0),
-        waits_(grid.values.size(), 0) {
+        changed_(grid.values.size(), 0) {
     for (size_t v = 0; v < squared_.size(); ++v)
       if (grid.values[v] > 0) squared_[v] = static_cast<float>(reach * reach);
   }
@@ -37,19 +37,24 @@ class ClosestPoints {
     for (int64_t k = low[2]; k <= high[2]; ++k)
       for (int64_t j = low[1]; j <= high[1]; ++j)
         for (int64_t i = low[0]; i <= high[0]; ++i) {
+          const int64_t voxel = grid_.index(i, j, k);
+          if (squared_[voxel] == 0) continue;
           Vec3 point;
           squared_distance(grid_.origin + place({i, j, k}).cast<double>(), triangle, &point);
-          offer({i, j, k}, (point - grid_.origin).cast<float>());
+          if (offer(voxel, {i, j, k}, (point - grid_.origin).cast<float>())) changed_[voxel] = 1;
         }
   }
 
   /// Each voxel offers its closest point to its neighbours until none is improved.
   std::vector<float> distances() {
-    std::vector<Index> front;
-    while (!changed_.empty()) {
-      front.clear();
-      front.swap(changed_);
-      for (const Index& at : front) hand_on(at);
+    std::vector<Index> front, next;  // in the order of memory at first
+    for (Index at{0, 0, 0}; at[2] < grid_.size[2]; ++at[2])
+      for (at[1] = 0; at[1] < grid_.size[1]; ++at[1])
+        for (at[0] = 0; at[0] < grid_.size[0]; ++at[0])
+          if (changed_[grid_.index(at[0], at[1], at[2])]) front.push_back(at);
+    for (; !front.empty(); front.swap(next)) {
+      next.clear();
+      for (const Index& at : front) hand_on(at, next);
     }
     for (float& value : squared_) value = std::sqrt(value);
     return std::move(squared_);
@@ -62,25 +67,28 @@ class ClosestPoints {
            Vec3f(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
   }
 
-  void offer(const Index& at, const Vec3f& point) {
-    const int64_t voxel = grid_.index(at[0], at[1], at[2]);
+  /// Whether the point is the closest so far.
+  bool offer(int64_t voxel, const Index& at, const Vec3f& point) {
     const float squared = (point - place(at)).squaredNorm();
-    if (!(squared < squared_[voxel])) return;
+    if (!(squared < squared_[voxel])) return false;
     squared_[voxel] = squared;
     closest_[voxel] = point;
-    if (!waits_[voxel]) changed_.push_back(at);
-    waits_[voxel] = 1;
+    return true;
   }
 
-  void hand_on(const Index& at) {
+  void hand_on(const Index& at, std::vector<Index>& next) {
     const int64_t voxel = grid_.index(at[0], at[1], at[2]);
-    waits_[voxel] = 0;
+    changed_[voxel] = 0;
     const Vec3f point = closest_[voxel];
     for (int axis = 0; axis < 3; ++axis)
       for (const int64_t side : {-1, 1}) {
-        Index next = at;
-        next[axis] += side;
-        if (next[axis] >= 0 && next[axis] < grid_.size[axis]) offer(next, point);
+        Index beside = at;
+        beside[axis] += side;
+        if (beside[axis] < 0 || beside[axis] >= grid_.size[axis]) continue;
+        const int64_t other = grid_.index(beside[0], beside[1], beside[2]);
+        if (!offer(other, beside, point) || changed_[other]) continue;
+        changed_[other] = 1;
+        next.push_back(beside);
       }
   }
 
@@ -88,8 +96,7 @@ class ClosestPoints {
   double voxel_;
   std::vector<Vec3f> closest_;  ///< mm beside the origin, where the distance is below the reach
   std::vector<float> squared_;  ///< mm²
-  std::vector<char> waits_;     ///< whether a voxel is in changed_ or in the front
-  std::vector<Index> changed_;
+  std::vector<char> changed_;   ///< since a voxel last offered its point
 };
 
 }  // namespace

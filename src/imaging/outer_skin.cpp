@@ -104,6 +104,17 @@ void keep_outside(double radius, Volume& distance) {
     distance.values[v] = reached[v] || distance.values[v] < radius ? -distance.values[v] : 0;
 }
 
+/// Every `stride`-th sample along each axis.
+Volume thinned(const Volume& volume, int64_t stride) {
+  Volume thin{volume.name, {}, static_cast<double>(stride) * volume.axes, volume.origin, {}, {}};
+  for (int a = 0; a < 3; ++a) thin.size[a] = (volume.size[a] - 1) / stride + 1;
+  for (int64_t k = 0; k < volume.size[2]; k += stride)
+    for (int64_t j = 0; j < volume.size[1]; j += stride)
+      for (int64_t i = 0; i < volume.size[0]; i += stride)
+        thin.values.push_back(volume.at(i, j, k));
+  return thin;
+}
+
 double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
   Vec3 low = surface.points.front(), high = low;
   for (const Vec3& point : surface.points) {
@@ -141,7 +152,7 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   append(cones.all, solid);
   const double margin = rolling.outside + 3 * rolling.voxel;
   const double voxel = voxel_for(solid, rolling, margin);
-  const auto beyond = [voxel](double level) { return level + 2 * voxel; };
+  const auto beyond = [&](double level) { return level + 2 * std::max(voxel, rolling.sampling); };
   Volume field = distance_volume(solid, voxel, margin, beyond(rolling.outside));
   keep_outside(rolling.outside, field);
   const Surface outside = largest_component(isosurface(field, -rolling.outside));
@@ -157,6 +168,8 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   for (float& value : field.values) value = value < core ? 1 : 0;
   field = distance_volume(inner, std::move(field), beyond(rolling.inside));
   for (float& value : field.values) value = -value;
+  if (rolling.sampling >= 2 * voxel)
+    field = thinned(field, static_cast<int64_t>(rolling.sampling / voxel));
   return {largest_component(isosurface(field, -rolling.inside)),
           caps_of(outside, cones.ends, rolling.outside), rolling.outside};
 }
