@@ -152,13 +152,13 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   append(cones.all, solid);
   const double margin = rolling.outside + 3 * rolling.voxel;
   const double voxel = voxel_for(solid, rolling, margin);
-  const auto beyond = [&](double level) { return level + 2 * std::max(voxel, rolling.sampling); };
-  Volume field = distance_volume(solid, voxel, margin, beyond(rolling.outside));
+  constexpr double edges = 1.5;  // of a grid, beyond a level, on which distances are looked up
+  Volume field = distance_volume(solid, voxel, margin, rolling.outside + edges * voxel);
   keep_outside(rolling.outside, field);
   const Surface outside = largest_component(isosurface(field, -rolling.outside));
   for (float& value : field.values) value = value >= -rolling.outside ? 1 : 0;
   const double core = rolling.outside + rolling.inside;
-  field = distance_volume(outside, std::move(field), beyond(core));
+  field = distance_volume(outside, std::move(field), core + edges * voxel);
   if (*std::max_element(field.values.begin(), field.values.end()) <= core)
     base::refuse(
         "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
@@ -166,10 +166,11 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
         given.name, 2 * rolling.inside);
   const Surface inner = largest_component(isosurface(field, core));
   for (float& value : field.values) value = value < core ? 1 : 0;
-  field = distance_volume(inner, std::move(field), beyond(rolling.inside));
+  const int64_t stride = std::max(int64_t{1}, static_cast<int64_t>(rolling.sampling / voxel));
+  field = distance_volume(inner, std::move(field),
+                          rolling.inside + edges * static_cast<double>(stride) * voxel);
   for (float& value : field.values) value = -value;
-  if (rolling.sampling >= 2 * voxel)
-    field = thinned(field, static_cast<int64_t>(rolling.sampling / voxel));
+  if (stride > 1) field = thinned(field, stride);
   return {largest_component(isosurface(field, -rolling.inside)),
           caps_of(outside, cones.ends, rolling.outside), rolling.outside};
 }
