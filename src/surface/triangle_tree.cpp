@@ -69,18 +69,22 @@ TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
 }
 
 TriangleTree::TriangleTree(const Surface& surface)
-    : order_(surface.triangles.size()), leaf_of_(surface.triangles.size()) {
-  triangles_.reserve(surface.triangles.size());
+    : order_(surface.triangles.size()), row_(order_.size()), leaf_of_(order_.size()) {
   std::vector<Vec3> centres;
-  centres.reserve(surface.triangles.size());
+  centres.reserve(order_.size());
   for (const auto& triangle : surface.triangles) {
-    triangles_.push_back(corners(surface, triangle));
-    const auto& [a, b, c] = triangles_.back();
+    const auto [a, b, c] = corners(surface, triangle);
     centres.push_back((a + b + c) / 3);
   }
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
   build(0, static_cast<int64_t>(order_.size()), -1, centres);
+  sorted_.reserve(order_.size());
+  for (const int64_t t : order_) {
+    row_[t] = static_cast<int64_t>(sorted_.size());
+    sorted_.push_back(corners(surface, surface.triangles[t]));
+  }
+  for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) node->box = box_around(*node);
 }
 
 int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
@@ -89,7 +93,6 @@ int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
   nodes_.push_back({{}, first, end - first, -1, parent});
   if (end - first <= leaf_size) {
     for (int64_t i = first; i < end; ++i) leaf_of_[order_[i]] = number;
-    nodes_[number].box = leaf_box(nodes_[number]);
     return number;
   }
   Box box;
@@ -101,23 +104,20 @@ int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
                    [&](int64_t s, int64_t t) { return centres[s][axis] < centres[t][axis]; });
   build(first, middle, number, centres);
   const int64_t right = build(middle, end, number, centres);
-  Node& node = nodes_[number];
-  node.right = right;
-  node.count = 0;
-  node.box = nodes_[number + 1].box;
-  node.box.extend(nodes_[right].box);
+  nodes_[number].right = right;
+  nodes_[number].count = 0;
   return number;
 }
 
 TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int64_t hint) const {
   Nearest best;
   best.squared = limit;
-  const auto offer = [&](int64_t t) {
+  const auto offer = [&](int64_t row) {
     Vec3 point;
-    const double squared = squared_distance(query, triangles_[t], &point);
-    if (squared < best.squared) best = {squared, t, point};
+    const double squared = squared_distance(query, sorted_[row], &point);
+    if (squared < best.squared) best = {squared, order_[row], point};
   };
-  if (hint >= 0) offer(hint);
+  if (hint >= 0) offer(row_[hint]);
   std::array<std::pair<double, int64_t>, max_depth> stack;
   int depth = 0;
   stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
@@ -125,7 +125,7 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
     const auto [bound, number] = stack[--depth];
     if (!(bound < best.squared)) continue;
     const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i) offer(order_[i]);
+    for (int64_t i = node.first; i < node.first + node.count; ++i) offer(i);
     if (node.count > 0) continue;
     std::pair left(nodes_[number + 1].box.squared_distance(query), number + 1);
     std::pair right(nodes_[node.right].box.squared_distance(query), node.right);
@@ -137,14 +137,14 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
 }
 
 int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) const {
-  if (hint >= 0 && squared_distance(query, triangles_[hint]) <= limit) return hint;
+  if (hint >= 0 && squared_distance(query, corners_of(hint)) <= limit) return hint;
   int64_t stack[max_depth], depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
     const int64_t number = stack[--depth];
     const Node& node = nodes_[number];
     for (int64_t i = node.first; i < node.first + node.count; ++i)
-      if (squared_distance(query, triangles_[order_[i]]) <= limit) return order_[i];
+      if (squared_distance(query, sorted_[i]) <= limit) return order_[i];
     if (node.count > 0) continue;
     const double left = nodes_[number + 1].box.squared_distance(query);
     const double right = nodes_[node.right].box.squared_distance(query);
@@ -167,7 +167,7 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
   const auto to_triangle = [&](int64_t t) {
     double greatest = 0;
     for (size_t i = 0; i < points.size() && greatest < best; ++i)
-      greatest = std::max(greatest, squared_distance(points[i], triangles_[t]));
+      greatest = std::max(greatest, squared_distance(points[i], corners_of(t)));
     return greatest;
   };
   std::array<std::pair<double, int64_t>, max_depth> stack;
@@ -191,7 +191,7 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
 bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const {
   const auto covers = [&](int64_t t) {
     for (const Vec3& point : points)
-      if (squared_distance(point, triangles_[t]) > limit) return false;
+      if (squared_distance(point, corners_of(t)) > limit) return false;
     hint = t;
     return true;
   };
@@ -219,7 +219,7 @@ bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_
 }
 
 void TriangleTree::exchange(int64_t triangle, const Corners& corners) {
-  triangles_[triangle] = corners;
+  sorted_[row_[triangle]] = corners;
   refit(leaf_of_[triangle]);
 }
 
@@ -227,18 +227,19 @@ void TriangleTree::remove(int64_t triangle) {
   exchange(triangle, {Vec3::Constant(NAN), Vec3::Constant(NAN), Vec3::Constant(NAN)});
 }
 
-TriangleTree::Box TriangleTree::leaf_box(const Node& node) const {
+TriangleTree::Box TriangleTree::box_around(const Node& node) const {
   Box box;
-  for (int64_t i = node.first; i < node.first + node.count; ++i)
-    box.extend(box_of(triangles_[order_[i]]));
+  for (int64_t i = node.first; i < node.first + node.count; ++i) box.extend(box_of(sorted_[i]));
+  if (node.right < 0) return box;
+  box = (&node + 1)->box;
+  box.extend(nodes_[node.right].box);
   return box;
 }
 
 void TriangleTree::refit(int64_t number) {
-  nodes_[number].box = leaf_box(nodes_[number]);
+  nodes_[number].box = box_around(nodes_[number]);
   for (number = nodes_[number].parent; number >= 0; number = nodes_[number].parent) {
-    Box box = nodes_[number + 1].box;
-    box.extend(nodes_[nodes_[number].right].box);
+    const Box box = box_around(nodes_[number]);
     if (box.low == nodes_[number].box.low && box.high == nodes_[number].box.high) return;
     nodes_[number].box = box;
   }

@@ -86,7 +86,7 @@ class TriangleTree {
         stack[depth++] = &node - nodes_.data() + 1;
       }
       for (int64_t i = node.first; i < node.first + node.count; ++i)
-        if (box_of(triangles_[order_[i]]).overlaps(box) && visit(order_[i])) return true;
+        if (box_of(sorted_[i]).overlaps(box) && visit(order_[i])) return true;
     }
     return false;
   }
@@ -95,7 +95,7 @@ class TriangleTree {
   void exchange(int64_t triangle, const Corners& corners);
   void remove(int64_t triangle);
 
-  const Corners& corners_of(int64_t triangle) const { return triangles_[triangle]; }
+  const Corners& corners_of(int64_t triangle) const { return sorted_[row_[triangle]]; }
 
   static Box box_of(const Corners& corners);
 
@@ -109,11 +109,12 @@ class TriangleTree {
   };
 
   int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centres);
-  Box leaf_box(const Node& node) const;
+  Box box_around(const Node& node) const;
   void refit(int64_t node);
 
-  std::vector<Corners> triangles_;
   std::vector<int64_t> order_;    ///< triangles by leaf
+  std::vector<Corners> sorted_;   ///< in this order
+  std::vector<int64_t> row_;      ///< triangle → its row in this order
   std::vector<int64_t> leaf_of_;  ///< triangle → node
   std::vector<Node> nodes_;
 };
