@@ -9,6 +9,12 @@ namespace {
 
 constexpr int64_t leaf_size = 4;
 
+/// A node that is still to be visited, left without a value in arrays.
+struct Entry {
+  double bound;  ///< mm²
+  int64_t node;
+};
+
 /// Of a triangle's barycentric regions the one that holds the foot of `q`.
 Vec3 closest_point(const Vec3& q, const Corners& t) {
   const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = q - t[0], bp = q - t[1], cp = q - t[2];
@@ -118,7 +124,7 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
     if (squared < best.squared) best = {squared, order_[row], point};
   };
   if (hint >= 0) offer(row_[hint]);
-  std::array<std::pair<double, int64_t>, max_depth> stack;
+  std::array<Entry, max_depth> stack;
   int depth = 0;
   stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
   while (depth > 0) {
@@ -127,9 +133,9 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
     const Node& node = nodes_[number];
     for (int64_t i = node.first; i < node.first + node.count; ++i) offer(i);
     if (node.count > 0) continue;
-    std::pair left(nodes_[number + 1].box.squared_distance(query), number + 1);
-    std::pair right(nodes_[node.right].box.squared_distance(query), node.right);
-    if (left.first < right.first) std::swap(left, right);
+    Entry left{nodes_[number + 1].box.squared_distance(query), number + 1};
+    Entry right{nodes_[node.right].box.squared_distance(query), node.right};
+    if (left.bound < right.bound) std::swap(left, right);
     stack[depth++] = left;
     stack[depth++] = right;
   }
@@ -170,7 +176,7 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
       greatest = std::max(greatest, squared_distance(points[i], corners_of(t)));
     return greatest;
   };
-  std::array<std::pair<double, int64_t>, max_depth> stack;
+  std::array<Entry, max_depth> stack;
   int depth = 0;
   stack[depth++] = {to_box(0), 0};
   while (depth > 0 && best > enough) {
@@ -180,8 +186,8 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
     for (int64_t i = node.first; i < node.first + node.count; ++i)
       best = std::min(best, to_triangle(order_[i]));
     if (node.count > 0) continue;
-    std::pair left(to_box(number + 1), number + 1), right(to_box(node.right), node.right);
-    if (left.first < right.first) std::swap(left, right);
+    Entry left{to_box(number + 1), number + 1}, right{to_box(node.right), node.right};
+    if (left.bound < right.bound) std::swap(left, right);
     stack[depth++] = left;
     stack[depth++] = right;
   }
