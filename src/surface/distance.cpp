@@ -132,6 +132,19 @@ struct DistanceTree::Tree {
     return ids;
   }
 
+  /// The same for a segment along an axis, whose box is a line: without the tree for rays.
+  std::vector<Leaf::Id> meeting_along_axis(const Segment3& segment) const {
+    std::vector<Leaf::Id> ids;
+    TriangleTree::Box line;
+    line.extend(from_cgal(segment.source()));
+    line.extend(from_cgal(segment.target()));
+    nearest.overlapping(line, [&](int64_t t) {
+      if (CGAL::do_intersect(segment, triangles[t])) ids.push_back(&triangles[t]);
+      return false;
+    });
+    return ids;
+  }
+
   std::vector<int64_t> numbers;      ///< in the surface, of the triangles with an area
   TriangleTree nearest;              ///< of these
   std::vector<Triangle3> triangles;  ///< these
@@ -183,7 +196,8 @@ bool DistanceTree::contains(const Vec3& query) const {
   for (int i = 0; i < most_directions; ++i) {
     const Point3 end = to_cgal(query + tree_->reach(query) * look_along(i));
     bool odd = false, sure = true;
-    for (const auto id : tree_->meeting(Segment3(start, end))) {
+    const Segment3 ray(start, end);
+    for (const auto id : i == 0 ? tree_->meeting_along_axis(ray) : tree_->meeting(ray)) {
       const Crossing how = crossing(*id, start, end);
       if (how == Crossing::at_start) return true;
       sure = sure && how == Crossing::through;
