@@ -22,7 +22,7 @@ namespace {
 
 constexpr double beside_cap = 6;         // mm, from the skin to the end of a scan
 constexpr double border_smoothing = 21;  // mm², rounds times squared edges
-constexpr double coarsest_sampling = 3, of_an_edge = 0.75;  // mm, of the outer skin
+constexpr double coarsest_sampling = 3, sampling_per_edge = 0.75;  // mm, of the outer skin
 constexpr int fits = 4;
 constexpr int relaxations = 20;
 constexpr double thin = 0.93;   // cosine of an angle that is widened, 21.6°
@@ -232,7 +232,7 @@ double greatest_cosine(const Corners& p) {
 /// Moves the corners of thin triangles towards the middle of their neighbours where that widens the
 /// least angle around them (smart Laplacian smoothing; Freitag, "On combining Laplacian and
 /// optimization-based mesh smoothing techniques", 1997).
-void widen(const VertexNeighbours& neighbours, Surface& face) {
+void widen_angles(const VertexNeighbours& neighbours, Surface& face) {
   std::vector<std::vector<int64_t>> around(face.points.size());
   for (size_t t = 0; t < face.triangles.size(); ++t)
     for (const int64_t v : face.triangles[t]) around[v].push_back(static_cast<int64_t>(t));
@@ -297,10 +297,10 @@ void measure(const Surface& near, Face& face) {
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
   Rolling rolling = request.rolling;
-  rolling.sampling = std::min(coarsest_sampling, of_an_edge * request.edge);
+  rolling.sampling = std::min(coarsest_sampling, sampling_per_edge * request.edge);
   face.skin = remesh(region_of(outer_skin(given, rolling), request), request.edge);
   const VertexNeighbours neighbours = neighbours_of(face.skin);
-  widen(neighbours, face.skin);
+  widen_angles(neighbours, face.skin);
   const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
   Sampled samples = sample(near, request.edge / 2);
   for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);
