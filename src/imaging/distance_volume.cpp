@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "repose/surface/triangle_tree.h"
 
@@ -13,14 +12,18 @@ namespace {
 using Index = std::array<int64_t, 3>;
 using Vec3f = Eigen::Vector3f;
 
-/// Closest points of a surface, found at its triangles and handed on by sweeps over the grid.
+/// Closest points of a surface, found at its triangles and handed on between neighbours.
 class ClosestPoints {
  public:
-  explicit ClosestPoints(const Volume& grid)
+  ClosestPoints(const Volume& grid, double reach)
       : grid_(grid),
         voxel_(grid.spacing(0)),
-        closest_(grid.size[0] * grid.size[1] * grid.size[2]),
-        squared_(closest_.size(), std::numeric_limits<float>::infinity()) {}
+        closest_(grid.values.size()),
+        squared_(grid.values.size(), 0),
+        changed_(grid.values.size(), 0) {
+    for (size_t v = 0; v < squared_.size(); ++v)
+      if (grid.values[v] > 0) squared_[v] = static_cast<float>(reach * reach);
+  }
 
   void add(const Corners& triangle) {
     Index low, high;
@@ -34,69 +37,79 @@ class ClosestPoints {
     for (int64_t k = low[2]; k <= high[2]; ++k)
       for (int64_t j = low[1]; j <= high[1]; ++j)
         for (int64_t i = low[0]; i <= high[0]; ++i) {
+          const int64_t voxel = grid_.index(i, j, k);
+          if (squared_[voxel] == 0) continue;
           Vec3 point;
-          squared_distance(grid_.origin + place(i, j, k).cast<double>(), triangle, &point);
-          offer(grid_.index(i, j, k), place(i, j, k), (point - grid_.origin).cast<float>());
+          squared_distance(grid_.origin + place({i, j, k}).cast<double>(), triangle, &point);
+          if (offer(voxel, {i, j, k}, (point - grid_.origin).cast<float>())) changed_[voxel] = 1;
         }
   }
 
-  /// Each of the eight sweeps carries closest points along one diagonal of the grid.
+  /// Each voxel offers its closest point to its neighbours until none is improved.
   std::vector<float> distances() {
-    for (int sweep = 0; sweep < 16; ++sweep) run(sweep % 8);
-    std::vector<float> distance(squared_.size());
-    for (size_t v = 0; v < distance.size(); ++v) distance[v] = std::sqrt(squared_[v]);
-    return distance;
+    std::vector<Index> front, next;  // in the order of memory at first
+    for (Index at{0, 0, 0}; at[2] < grid_.size[2]; ++at[2])
+      for (at[1] = 0; at[1] < grid_.size[1]; ++at[1])
+        for (at[0] = 0; at[0] < grid_.size[0]; ++at[0])
+          if (changed_[grid_.index(at[0], at[1], at[2])]) front.push_back(at);
+    for (; !front.empty(); front.swap(next)) {
+      next.clear();
+      for (const Index& at : front) hand_on(at, next);
+    }
+    for (float& value : squared_) value = std::sqrt(value);
+    return std::move(squared_);
   }
 
  private:
   /// mm beside the origin, small enough for floats.
-  Vec3f place(int64_t i, int64_t j, int64_t k) const {
+  Vec3f place(const Index& at) const {
     return static_cast<float>(voxel_) *
-           Vec3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
+           Vec3f(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
   }
 
-  void offer(int64_t voxel, const Vec3f& at, const Vec3f& point) {
-    const float squared = (point - at).squaredNorm();
-    if (!(squared < squared_[voxel])) return;
+  /// Whether the point is the closest so far.
+  bool offer(int64_t voxel, const Index& at, const Vec3f& point) {
+    const float squared = (point - place(at)).squaredNorm();
+    if (!(squared < squared_[voxel])) return false;
     squared_[voxel] = squared;
     closest_[voxel] = point;
+    return true;
   }
 
-  void run(int directions) {
-    const auto [columns, rows, slices] = grid_.size;
-    const std::array<bool, 3> back{(directions & 1) != 0, (directions & 2) != 0,
-                                   (directions & 4) != 0};
-    const Index behind{back[0] ? 1 : -1, (back[1] ? 1 : -1) * columns,
-                       (back[2] ? 1 : -1) * columns * rows};
-    for (int64_t c = 0; c < slices; ++c)
-      for (int64_t b = 0; b < rows; ++b)
-        for (int64_t a = 0; a < columns; ++a) {
-          const int64_t i = back[0] ? columns - 1 - a : a, j = back[1] ? rows - 1 - b : b,
-                        k = back[2] ? slices - 1 - c : c;
-          const int64_t voxel = grid_.index(i, j, k);
-          const std::array<bool, 3> has{a > 0, b > 0, c > 0};
-          const Vec3f at = place(i, j, k);
-          for (int n = 0; n < 3; ++n)
-            if (has[n] && std::isfinite(squared_[voxel + behind[n]]))
-              offer(voxel, at, closest_[voxel + behind[n]]);
-        }
+  void hand_on(const Index& at, std::vector<Index>& next) {
+    const int64_t voxel = grid_.index(at[0], at[1], at[2]);
+    changed_[voxel] = 0;
+    const Vec3f point = closest_[voxel];
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int64_t side : {-1, 1}) {
+        Index beside = at;
+        beside[axis] += side;
+        if (beside[axis] < 0 || beside[axis] >= grid_.size[axis]) continue;
+        const int64_t other = grid_.index(beside[0], beside[1], beside[2]);
+        if (!offer(other, beside, point) || changed_[other]) continue;
+        changed_[other] = 1;
+        next.push_back(beside);
+      }
   }
 
   const Volume& grid_;
   double voxel_;
-  std::vector<Vec3f> closest_;  ///< mm beside the origin
+  std::vector<Vec3f> closest_;  ///< mm beside the origin, where the distance is below the reach
   std::vector<float> squared_;  ///< mm²
+  std::vector<char> changed_;   ///< since a voxel last offered its point
 };
 
 }  // namespace
 
-Volume distance_volume(const Surface& surface, const Volume& grid) {
-  ClosestPoints points(grid);
+Volume distance_volume(const Surface& surface, Volume grid, double reach) {
+  ClosestPoints points(grid, reach);
   for (const Triangle& triangle : surface.triangles) points.add(corners(surface, triangle));
-  return {surface.name, grid.size, grid.axes, grid.origin, points.distances(), {}};
+  grid.name = surface.name;
+  grid.values = points.distances();
+  return grid;
 }
 
-Volume distance_volume(const Surface& surface, double voxel, double margin) {
+Volume distance_volume(const Surface& surface, double voxel, double margin, double reach) {
   Vec3 low = surface.points.front(), high = low;
   for (const Vec3& point : surface.points) {
     low = low.cwiseMin(point);
@@ -107,7 +120,8 @@ Volume distance_volume(const Surface& surface, double voxel, double margin) {
   grid.origin = low - Vec3::Constant(margin);
   for (int a = 0; a < 3; ++a)
     grid.size[a] = 2 + static_cast<int64_t>((high[a] - low[a] + 2 * margin) / voxel);
-  return distance_volume(surface, grid);
+  grid.values.assign(grid.size[0] * grid.size[1] * grid.size[2], 1);
+  return distance_volume(surface, std::move(grid), reach);
 }
 
 }  // namespace repose::imaging

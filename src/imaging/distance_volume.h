@@ -7,13 +7,14 @@ namespace repose::imaging {
 using surface::Surface;
 
 /// A grid of cubes of `voxel` mm whose values are the distance, mm, from each centre to the nearest
-/// triangle, whatever the triangles' orientation and holes. It reaches at least `margin` mm beyond
-/// the surface on every side. Exact in the voxels that a triangle passes; elsewhere the closest
-/// points are handed on from voxel to voxel (Danielsson, "Euclidean distance mapping", 1980), which
-/// is wrong by a small part of a voxel at most. O(voxels + T).
-Volume distance_volume(const Surface& surface, double voxel, double margin);
+/// triangle, whatever the triangles' orientation and holes; `reach` mm where it is larger. It
+/// reaches at least `margin` mm beyond the surface on every side. Exact in the voxels that a
+/// triangle passes; elsewhere the closest points are handed on from voxel to voxel (Danielsson,
+/// "Euclidean distance mapping", 1980), which is wrong by a small part of a voxel at most. O(voxels
+/// + T).
+Volume distance_volume(const Surface& surface, double voxel, double margin, double reach);
 
-/// The same over the grid of another volume, whose values are not looked at.
-Volume distance_volume(const Surface& surface, const Volume& grid);
+/// The same in the voxels of a grid whose values are positive, 0 in the others.
+Volume distance_volume(const Surface& surface, Volume grid, double reach);
 
 }  // namespace repose::imaging

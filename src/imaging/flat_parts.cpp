@@ -75,16 +75,18 @@ class Parts {
 
 std::vector<char> flat_parts(const Surface& surface, double area) {
   Parts parts(surface);
-  std::vector<char> flat(surface.triangles.size(), 0);
+  std::vector<char> flat(surface.triangles.size(), 0), small(flat.size(), 0);
   for (int64_t seed = 0; seed < static_cast<int64_t>(flat.size()); seed += seed_every) {
-    if (flat[seed]) continue;
+    if (flat[seed] || small[seed]) continue;
     Plane plane = parts.at(seed);
     double grown = 0;
     std::vector<int64_t> part;
     for (int fit = 0; fit <= refits && (fit == 0 || grown > area / 20); ++fit)
       part = parts.grow(seed, plane, grown);
-    if (grown < area) continue;
-    for (const int64_t t : part) flat[t] = 1;
+    if (grown >= area)
+      for (const int64_t t : part) flat[t] = 1;
+    else if (grown < area / 2)
+      for (const int64_t t : part) small[t] = 1;
   }
   return flat;
 }

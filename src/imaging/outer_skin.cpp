@@ -104,12 +104,15 @@ void keep_outside(double radius, Volume& distance) {
     distance.values[v] = reached[v] || distance.values[v] < radius ? -distance.values[v] : 0;
 }
 
-/// The distance to `border` over a grid, positive where the grid's own values are at least `level`.
-Volume signed_distance(const Surface& border, const Volume& grid, double level) {
-  Volume signed_values = distance_volume(border, grid);
-  for (size_t v = 0; v < grid.values.size(); ++v)
-    if (grid.values[v] < level) signed_values.values[v] *= -1;
-  return signed_values;
+/// Every `stride`-th sample along each axis.
+Volume thinned(const Volume& volume, int64_t stride) {
+  Volume thin{volume.name, {}, static_cast<double>(stride) * volume.axes, volume.origin, {}, {}};
+  for (int a = 0; a < 3; ++a) thin.size[a] = (volume.size[a] - 1) / stride + 1;
+  for (int64_t k = 0; k < volume.size[2]; k += stride)
+    for (int64_t j = 0; j < volume.size[1]; j += stride)
+      for (int64_t i = 0; i < volume.size[0]; i += stride)
+        thin.values.push_back(volume.at(i, j, k));
+  return thin;
 }
 
 double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
@@ -148,18 +151,26 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   const Cones cones = cones_of(solid, 6 * rolling.outside);
   append(cones.all, solid);
   const double margin = rolling.outside + 3 * rolling.voxel;
-  Volume field = distance_volume(solid, voxel_for(solid, rolling, margin), margin);
+  const double voxel = voxel_for(solid, rolling, margin);
+  constexpr double edges = 1.5;  // of a grid, beyond a level, on which distances are looked up
+  Volume field = distance_volume(solid, voxel, margin, rolling.outside + edges * voxel);
   keep_outside(rolling.outside, field);
   const Surface outside = largest_component(isosurface(field, -rolling.outside));
-  field = signed_distance(outside, field, -rolling.outside);
+  for (float& value : field.values) value = value >= -rolling.outside ? 1 : 0;
   const double core = rolling.outside + rolling.inside;
+  field = distance_volume(outside, std::move(field), core + edges * voxel);
   if (*std::max_element(field.values.begin(), field.values.end()) <= core)
     base::refuse(
         "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
         "at several ends) leave tissue.edge out",
         given.name, 2 * rolling.inside);
   const Surface inner = largest_component(isosurface(field, core));
-  field = signed_distance(inner, field, core);
+  for (float& value : field.values) value = value < core ? 1 : 0;
+  const int64_t stride = std::max(int64_t{1}, static_cast<int64_t>(rolling.sampling / voxel));
+  field = distance_volume(inner, std::move(field),
+                          rolling.inside + edges * static_cast<double>(stride) * voxel);
+  for (float& value : field.values) value = -value;
+  if (stride > 1) field = thinned(field, stride);
   return {largest_component(isosurface(field, -rolling.inside)),
           caps_of(outside, cones.ends, rolling.outside), rolling.outside};
 }

@@ -20,10 +20,12 @@ using namespace surface;
 using namespace imaging;
 namespace {
 
-constexpr double beside_cap = 6;  // mm, from the skin to the end of a scan
-constexpr int border_smoothing = 12;
+constexpr double beside_cap = 6;         // mm, from the skin to the end of a scan
+constexpr double border_smoothing = 21;  // mm², rounds times squared edges
+constexpr double coarsest_sampling = 3, sampling_per_edge = 0.75;  // mm, of the outer skin
 constexpr int fits = 4;
-constexpr int unfoldings = 20;
+constexpr int relaxations = 20;
+constexpr double thin = 0.93;   // cosine of an angle that is widened, 21.6°
 constexpr double folded = 0.2;  // cosine between a vertex' normal and that of a triangle around it
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
@@ -128,7 +130,8 @@ Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
   }
   for (size_t v = 0; v < end.size(); ++v)
     if (end[v]) inside[v] = -request.margin;
-  smooth(neighbours, border_smoothing, inside);
+  const double edge = even_edge(outer.skin);
+  smooth(neighbours, static_cast<int>(std::lround(border_smoothing / (edge * edge))), inside);
   fill(neighbours, end, inside);
   const Surface part = cut_at_zero(outer.skin, inside);
   if (part.triangles.empty() && !request.regions.empty())
@@ -152,20 +155,29 @@ std::vector<Vec3> normals_of(const Surface& surface) {
   return normals;
 }
 
-/// Points of the given triangles no farther apart than `spacing`, with their areas, in a ball
-/// around the face.
+/// The given triangles near the face: no point of the others is within the tolerance of it.
+Surface part_near(const Surface& given, const TriangleTree& face, double tolerance) {
+  Surface part{given.name, given.points, {}};
+  for (const Triangle& triangle : given.triangles) {
+    const auto [a, b, c] = corners(given, triangle);
+    const double reach = tolerance + std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    if (face.any_within((a + b + c) / 3, reach * reach) >= 0) part.triangles.push_back(triangle);
+  }
+  return part;
+}
+
+/// Points of triangles no farther apart than `spacing`, with their areas.
 struct Sampled {
   std::vector<Vec3> point;
   std::vector<double> area;
+  std::vector<int64_t> nearest;  ///< triangle of the face when last looked for, -1 at first
 };
 
-Sampled sample(const Surface& given, const TriangleTree& face, double spacing, double tolerance) {
+Sampled sample(const Surface& surface, double spacing) {
   Sampled samples;
-  for (const Triangle& triangle : given.triangles) {
-    const auto [a, b, c] = corners(given, triangle);
+  for (const Triangle& triangle : surface.triangles) {
+    const auto [a, b, c] = corners(surface, triangle);
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    const double reach = tolerance + longest;
-    if (face.any_within((a + b + c) / 3, reach * reach) < 0) continue;
     const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
     const double area = (b - a).cross(c - a).norm() / 2 / (n * n);
     for (int i = 0; i < n; ++i)
@@ -176,18 +188,19 @@ Sampled sample(const Surface& given, const TriangleTree& face, double spacing, d
           samples.area.push_back(area);
         }
   }
+  samples.nearest.assign(samples.point.size(), -1);
   return samples;
 }
 
 /// Draws the vertices along their normals to the samples within the tolerance.
-void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
-         Surface& face) {
+void fit(Sampled& samples, double tolerance, const VertexNeighbours& neighbours, Surface& face) {
   const TriangleTree tree(face);
   const std::vector<Vec3> normals = normals_of(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
   for (size_t s = 0; s < samples.point.size(); ++s) {
-    const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance);
+    const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance, samples.nearest[s]);
     if (nearest.triangle < 0) continue;
+    samples.nearest[s] = nearest.triangle;
     const Triangle& triangle = face.triangles[nearest.triangle];
     const Vec3 share = barycentric(tree.corners_of(nearest.triangle), nearest.point);
     for (int k = 0; k < 3; ++k) {
@@ -201,9 +214,55 @@ void fit(const Sampled& samples, double tolerance, const VertexNeighbours& neigh
   for (size_t v = 0; v < offset.size(); ++v) face.points[v] += offset[v] * normals[v];
 }
 
+Vec3 middle_of(std::span<const int64_t> vertices, const std::vector<Vec3>& points) {
+  Vec3 sum = Vec3::Zero();
+  for (const int64_t v : vertices) sum += points[v];
+  return sum / static_cast<double>(vertices.size());
+}
+
+/// Cosine of the least angle of a triangle.
+double greatest_cosine(const Corners& p) {
+  double greatest = -1;
+  for (int k = 0; k < 3; ++k)
+    greatest = std::max(
+        greatest, (p[(k + 1) % 3] - p[k]).normalized().dot((p[(k + 2) % 3] - p[k]).normalized()));
+  return greatest;
+}
+
+/// Moves the corners of thin triangles towards the middle of their neighbours where that widens the
+/// least angle around them (smart Laplacian smoothing; Freitag, "On combining Laplacian and
+/// optimization-based mesh smoothing techniques", 1997).
+void widen_angles(const VertexNeighbours& neighbours, Surface& face) {
+  std::vector<std::vector<int64_t>> around(face.points.size());
+  for (size_t t = 0; t < face.triangles.size(); ++t)
+    for (const int64_t v : face.triangles[t]) around[v].push_back(static_cast<int64_t>(t));
+  const auto cosine_at = [&](size_t v) {
+    double greatest = -1;
+    for (const int64_t t : around[v])
+      greatest = std::max(greatest, greatest_cosine(corners(face, face.triangles[t])));
+    return greatest;
+  };
+  bool moved = true;
+  for (int round = 0; moved && round < relaxations; ++round) {
+    moved = false;
+    for (size_t v = 0; v < around.size(); ++v) {
+      const double before = cosine_at(v);
+      if (before <= thin) continue;
+      const Vec3 old = face.points[v];
+      const Vec3 step = middle_of(neighbours[static_cast<int64_t>(v)], face.points) - old;
+      for (double share = 1; share > 0.1; share /= 2) {
+        face.points[v] = old + share * step;
+        if (cosine_at(v) < before) break;
+        face.points[v] = old;
+      }
+      moved = moved || face.points[v] != old;
+    }
+  }
+}
+
 /// Moves vertices on folds to the middle of their neighbours until none is.
 void unfold(const VertexNeighbours& neighbours, Surface& face) {
-  for (int round = 0; round < unfoldings; ++round) {
+  for (int round = 0; round < relaxations; ++round) {
     const std::vector<Vec3> normals = normals_of(face), old = face.points;
     std::vector<char> moved(old.size(), 0);
     for (const Triangle& triangle : face.triangles) {
@@ -214,44 +273,39 @@ void unfold(const VertexNeighbours& neighbours, Surface& face) {
           for (const int64_t corner : triangle) moved[corner] = 1;
     }
     if (std::count(moved.begin(), moved.end(), 1) == 0) return;
-    for (size_t v = 0; v < moved.size(); ++v) {
-      if (!moved[v]) continue;
-      face.points[v] = Vec3::Zero();
-      for (const int64_t other : neighbours[v]) face.points[v] += old[other];
-      face.points[v] /= static_cast<double>(neighbours[v].size());
-    }
+    for (size_t v = 0; v < moved.size(); ++v)
+      if (moved[v]) face.points[v] = middle_of(neighbours[static_cast<int64_t>(v)], old);
   }
 }
 
-void measure(const Surface& given, Face& face) {
-  const TriangleTree tree(given);
+/// Distances are those to the given triangles near the face: upper bounds where others are nearer.
+void measure(const Surface& near, Face& face) {
+  const TriangleTree tree(near);
   std::vector<double> off;
   for (const Vec3& point : face.skin.points) off.push_back(std::sqrt(tree.nearest(point).squared));
   std::sort(off.begin(), off.end());
   face.off_95 = off[static_cast<size_t>(0.95 * static_cast<double>(off.size() - 1))];
   face.off_most = off.back();
-  double greatest_cosine = -1;
-  for (const Triangle& triangle : face.skin.triangles) {
-    const Corners p = corners(face.skin, triangle);
-    for (int k = 0; k < 3; ++k)
-      greatest_cosine =
-          std::max(greatest_cosine,
-                   (p[(k + 1) % 3] - p[k]).normalized().dot((p[(k + 2) % 3] - p[k]).normalized()));
-  }
-  face.least_angle = std::acos(std::min(greatest_cosine, 1.0)) * 180 / std::numbers::pi;
+  double greatest = -1;
+  for (const Triangle& triangle : face.skin.triangles)
+    greatest = std::max(greatest, greatest_cosine(corners(face.skin, triangle)));
+  face.least_angle = std::acos(std::min(greatest, 1.0)) * 180 / std::numbers::pi;
 }
 
 }  // namespace
 
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
-  face.skin = remesh(region_of(outer_skin(given, request.rolling), request), request.edge);
+  Rolling rolling = request.rolling;
+  rolling.sampling = std::min(coarsest_sampling, sampling_per_edge * request.edge);
+  face.skin = remesh(region_of(outer_skin(given, rolling), request), request.edge);
   const VertexNeighbours neighbours = neighbours_of(face.skin);
-  const Sampled samples =
-      sample(given, TriangleTree(face.skin), request.edge / 2, request.tolerance);
+  widen_angles(neighbours, face.skin);
+  const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
+  Sampled samples = sample(near, request.edge / 2);
   for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);
   unfold(neighbours, face.skin);
-  measure(given, face);
+  measure(near, face);
   face.skin.name = given.name;
   return face;
 }

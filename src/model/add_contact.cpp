@@ -6,10 +6,10 @@
 #include <map>
 #include <type_traits>
 
-#include "bone_field.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
 #include "repose/model/instruments.h"
+#include "repose/surface/triangle_tree.h"
 #include "travel.h"
 
 namespace repose::model {
@@ -44,7 +44,7 @@ void touch_bones(const scene::Scene& scene, const Attachment& attachment,
   for (size_t b = 0; b < model.bones.size(); ++b)
     model.contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
   const bool touching = scene.contact && scene.contact->bones;
-  const BoneField field(model.bone_surfaces);
+  std::vector<surface::TriangleTree> trees(model.bone_surfaces.begin(), model.bone_surfaces.end());
   std::vector<double> way;
   for (size_t b = 0; b < model.bones.size(); ++b)
     way.push_back(travel(model.bone_surfaces[b], scene.moves[b]));
@@ -54,12 +54,13 @@ void touch_bones(const scene::Scene& scene, const Attachment& attachment,
     if (model.points.set[p] != PointSet::soft_tissue) continue;
     const size_t column = p / layers;
     const int32_t slides_on = p % layers == layers - 1 ? attachment.slides_on[column] : -1;
-    for (int32_t b = 0; b < field.size(); ++b) {
+    for (int32_t b = 0; b < static_cast<int32_t>(trees.size()); ++b) {
       const auto row = static_cast<int64_t>(p);
+      const double reach = way[b] + farthest + margin;
       if (b == slides_on)
         add(row, b, Binding::slides, area[p], model.contact.touches);
       else if (touching && !attachment.free[column] &&
-               field.distance(b, model.points.position[p]) <= way[b] + farthest + margin)
+               trees[b].any_within(model.points.position[p], reach * reach) >= 0)
         add(row, b, Binding::touches, area[p], model.contact.touches);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 
 #include "directions.h"
 #include "fold.h"
@@ -12,12 +13,6 @@ namespace {
 
 constexpr double smoothing_per_depth = 0.5;
 constexpr int bends = 12;
-
-/// What is found along the directions, [V].
-struct Laid {
-  std::vector<double> thickness;
-  std::vector<char> holds;
-};
 
 /// Over what length (mm) to smooth the directions: in proportion to how deep the tissue is likely
 /// to be, because columns cross where their directions turn by much within their own length.
@@ -32,20 +27,21 @@ std::vector<double> smoothing_length(const std::vector<BoneField::Nearest>& near
 }
 
 /// Bends columns that cross towards their neighbours, as long as that helps; returns how many.
+/// `lay` finds the thickness again after those given were bent.
 int64_t bend_folded(const SkinMesh& mesh, const std::vector<Cone>& cones,
-                    const std::function<Laid(const std::vector<Vec3>&)>& lay,
-                    std::vector<Vec3>& directions, Laid& laid) {
+                    const std::function<void(const std::vector<int64_t>&)>& lay,
+                    const std::vector<double>& thickness, std::vector<Vec3>& directions) {
   std::vector<char> bent(directions.size(), 0);
   for (int round = 0; round < bends; ++round) {
     std::vector<int64_t> crossing;
-    for (const int64_t f : folded_triangles(mesh, directions, laid.thickness))
+    for (const int64_t f : folded_triangles(mesh, directions, thickness))
       for (const int64_t v : mesh.triangles[f]) crossing.push_back(v);
     if (crossing.empty()) break;
     std::sort(crossing.begin(), crossing.end());
     crossing.erase(std::unique(crossing.begin(), crossing.end()), crossing.end());
     bend(mesh, cones, crossing, directions);
     for (const int64_t v : crossing) bent[v] = 1;
-    laid = lay(directions);
+    lay(crossing);
   }
   return std::count(bent.begin(), bent.end(), 1);
 }
@@ -58,22 +54,29 @@ Columns lay_columns(const SkinMesh& mesh, const BoneField& bones,
   const std::vector<Cone> cones = inward_cones(mesh, skin_name);
   std::vector<Vec3> directions = column_directions(mesh, cones, nearest, tissue.attach_within,
                                                    smoothing_length(nearest, tissue));
-  const auto lay = [&](const std::vector<Vec3>& along) -> Laid {
-    const Reach reach = cast_columns(mesh, along, nearest, bones, tissue);
-    return {column_thickness(mesh, reach, tissue.free_thickness), reach.holds};
+  const surface::DistanceTree skin({"skin", mesh.points, mesh.triangles});
+  const size_t vertices = mesh.points.size();
+  Reach reach{std::vector<double>(vertices), std::vector<double>(vertices),
+              std::vector<char>(vertices)};
+  std::vector<double> laid;
+  const auto lay = [&](const std::vector<int64_t>& changed) {
+    cast_columns(mesh, skin, changed, directions, nearest, bones, tissue, reach);
+    laid = column_thickness(mesh, reach, tissue.free_thickness);
   };
-  Laid laid = lay(directions);
+  std::vector<int64_t> all(vertices);
+  std::iota(all.begin(), all.end(), 0);
+  lay(all);
 
   Columns columns;
-  if (tissue.edge) columns.bent = bend_folded(mesh, cones, lay, directions, laid);
-  columns.thickness = laid.thickness;
+  if (tissue.edge) columns.bent = bend_folded(mesh, cones, lay, laid, directions);
+  columns.thickness = laid;
   shorten_folded(mesh, directions, skin_name, columns.thickness);
 
-  columns.holds = laid.holds;
+  columns.holds = std::move(reach.holds);
   columns.deep.resize(mesh.points.size());
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     columns.deep[v] = mesh.points[v] + columns.thickness[v] * directions[v];
-    columns.shortened += columns.thickness[v] < laid.thickness[v];
+    columns.shortened += columns.thickness[v] < laid[v];
   }
   return columns;
 }

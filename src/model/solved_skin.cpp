@@ -34,9 +34,8 @@ int64_t lift_off(const std::vector<surface::Surface>& bones, surface::Surface& s
   const BoneField field(bones);
   int64_t lifted = 0;
   for (Vec3& point : skin.points) {
-    if (field.containing(point) < 0) continue;
     const BoneField::Nearest nearest = field.nearest(point);
-    if (nearest.distance > deepest_lifted) continue;
+    if (nearest.distance > deepest_lifted || field.containing(point) < 0) continue;
     const Vec3 out = nearest.point - point;
     if (out.norm() > 0) point = nearest.point + thinnest_tissue * out.normalized();
     ++lifted;

@@ -40,16 +40,13 @@ void cut_spikes(const SkinMesh& mesh, std::vector<double>& thickness) {
 
 }  // namespace
 
-Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
-                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                   const scene::Tissue& tissue) {
-  const size_t vertices = mesh.points.size();
-  const surface::DistanceTree skin({"skin", mesh.points, mesh.triangles});
+void cast_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
+                  const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
+                  const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
+                  const scene::Tissue& tissue, Reach& reach) {
   const double farthest =
       std::max(tissue.attach_within, tissue.free_thickness / std::min(bone_room, skin_room));
-  Reach reach{std::vector<double>(vertices), std::vector<double>(vertices),
-              std::vector<char>(vertices)};
-  for (size_t v = 0; v < vertices; ++v) {
+  for (const int64_t v : columns) {
     const auto hit = bones.first_hit(mesh.points[v], directions[v], farthest);
     reach.to_bone[v] = hit ? hit->distance : std::numeric_limits<double>::infinity();
     const double start = 1e-3 * std::sqrt(mesh.vertex_area[v]);
@@ -60,7 +57,6 @@ Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
     reach.holds[v] = reach.to_bone[v] <= deepest;
     reach.room[v] = std::min(bone_room * reach.to_bone[v], skin_room * skin_distance);
   }
-  return reach;
 }
 
 std::vector<double> column_thickness(const SkinMesh& mesh, const Reach& reach,

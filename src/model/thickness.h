@@ -14,13 +14,15 @@ struct Reach {
   std::vector<char> holds;      ///< 1 where the bone met is the one beneath, near enough to attach
 };
 
-/// Casts a ray down each column. A bone holds the column where it is met within `attach_within`,
+/// Casts a ray down each of the columns given by number, into their entries of `reach` [V]. `skin`
+/// is the tree of the mesh. A bone holds the column where it is met within `attach_within`,
 /// before the skin's own other side, and not much deeper than the nearest bone is away (1.6 times
 /// and 2 mm: a ray that slips between teeth or into an orbit finds no bone). A free column keeps to
 /// 0.95 of the way to bone and 0.45 of the way to the skin's other side.
-Reach cast_columns(const SkinMesh& mesh, const std::vector<Vec3>& directions,
-                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                   const scene::Tissue& tissue);
+void cast_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
+                  const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
+                  const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
+                  const scene::Tissue& tissue, Reach& reach);
 
 /// Thickness [V] in mm: down to the bone where it holds, elsewhere from the neighbouring bone's
 /// depth to `free_thickness` over about that distance, within the room there is. Then lowered,

@@ -10,16 +10,14 @@
 namespace repose::surface {
 namespace {
 
-bool is_open(const Surface& surface) {
-  const EdgeTable edges(surface.triangles);
+bool is_open(const EdgeTable& edges) {
   for (int64_t e = 0; e < edges.edges(); ++e)
     if (edges[e].size() == 1) return true;
   return false;
 }
 
 /// Which part each triangle belongs to, numbered in the order of their first triangle.
-std::vector<int64_t> parts_of(const Surface& surface, int64_t& count) {
-  const EdgeTable edges(surface.triangles);
+std::vector<int64_t> parts_of(const Surface& surface, const EdgeTable& edges, int64_t& count) {
   UnionFind sets(static_cast<int64_t>(surface.triangles.size()));
   for (int64_t e = 0; e < edges.edges(); ++e)
     for (const HalfEdge& half : edges[e]) sets.unite(edges[e].front().triangle, half.triangle);
@@ -31,9 +29,9 @@ std::vector<int64_t> parts_of(const Surface& surface, int64_t& count) {
 }
 
 /// Every part with its own points.
-std::vector<Surface> split(const Surface& surface) {
+std::vector<Surface> split(const Surface& surface, const EdgeTable& edges) {
   int64_t count = 0;
-  const auto part = parts_of(surface, count);
+  const auto part = parts_of(surface, edges, count);
   std::vector<Surface> parts(count);
   std::vector<int64_t> row(surface.points.size(), -1), owner(surface.points.size(), -1);
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
@@ -84,8 +82,9 @@ Surface compact(std::string name, const std::vector<Vec3>& points,
 }
 
 std::vector<Surface> components(const Surface& surface) {
-  std::vector<Surface> parts = split(surface);
-  const bool by_area = is_open(surface);
+  const EdgeTable edges(surface.triangles);
+  std::vector<Surface> parts = split(surface, edges);
+  const bool by_area = is_open(edges);
   std::vector<std::pair<double, size_t>> order;
   for (size_t p = 0; p < parts.size(); ++p)
     order.emplace_back(by_area ? -area_of(parts[p]) : -std::abs(volume_of(parts[p])), p);

@@ -15,6 +15,7 @@
 #include "cgal.h"
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 #if CGAL_VERSION_NR >= 1060000000
 #include <CGAL/AABB_traits_3.h>
@@ -91,21 +92,30 @@ void require_finite(const Vec3& query) {
 struct DistanceTree::Tree {
   using Aabb = CGAL::AABB_tree<TreeTraits<Leaf>>;
 
-  explicit Tree(const Surface& surface) {
+  explicit Tree(const Surface& surface) : Tree(surface, with_area(surface)) {}
+  Tree(const Surface& surface, std::vector<int64_t> kept)
+      : numbers(std::move(kept)), nearest({surface.name, surface.points, pick(surface, numbers)}) {
+    for (const int64_t t : numbers) triangles.push_back(to_cgal(surface, surface.triangles[t]));
+    aabb.insert(triangles.cbegin(), triangles.cend());  // built by the first query
+    for (const Triangle3& triangle : triangles) box += triangle.bbox();
+  }
+
+  static std::vector<int64_t> with_area(const Surface& surface) {
     require_sound(surface);
-    for (size_t t = 0; t < surface.triangles.size(); ++t) {
-      const Triangle3 triangle = to_cgal(surface, surface.triangles[t]);
-      if (triangle.is_degenerate()) continue;
-      triangles.push_back(triangle);
-      numbers.push_back(static_cast<int64_t>(t));
-    }
-    if (triangles.empty())
+    std::vector<int64_t> kept;
+    for (size_t t = 0; t < surface.triangles.size(); ++t)
+      if (!to_cgal(surface, surface.triangles[t]).is_degenerate())
+        kept.push_back(static_cast<int64_t>(t));
+    if (kept.empty())
       base::refuse("{}: no triangle with an area, so nothing to measure to; check the mesh",
                    surface.name);
-    aabb.insert(triangles.cbegin(), triangles.cend());
-    aabb.build();
-    aabb.accelerate_distance_queries();
-    box = aabb.bbox();
+    return kept;
+  }
+
+  static std::vector<Triangle> pick(const Surface& surface, const std::vector<int64_t>& rows) {
+    std::vector<Triangle> picked;
+    for (const int64_t row : rows) picked.push_back(surface.triangles[row]);
+    return picked;
   }
 
   int64_t number(Leaf::Id id) const { return numbers[id - triangles.data()]; }
@@ -122,8 +132,22 @@ struct DistanceTree::Tree {
     return ids;
   }
 
-  std::vector<Triangle3> triangles;  ///< those with an area
-  std::vector<int64_t> numbers;      ///< of each in the surface
+  /// The same for a segment along an axis, whose box is a line: without the tree for rays.
+  std::vector<Leaf::Id> meeting_along_axis(const Segment3& segment) const {
+    std::vector<Leaf::Id> ids;
+    TriangleTree::Box line;
+    line.extend(from_cgal(segment.source()));
+    line.extend(from_cgal(segment.target()));
+    nearest.overlapping(line, [&](int64_t t) {
+      if (CGAL::do_intersect(segment, triangles[t])) ids.push_back(&triangles[t]);
+      return false;
+    });
+    return ids;
+  }
+
+  std::vector<int64_t> numbers;      ///< in the surface, of the triangles with an area
+  TriangleTree nearest;              ///< of these
+  std::vector<Triangle3> triangles;  ///< these
   Aabb aabb;
   CGAL::Bbox_3 box;
 };
@@ -135,8 +159,8 @@ DistanceTree& DistanceTree::operator=(DistanceTree&&) noexcept = default;
 
 DistanceTree::Nearest DistanceTree::nearest(const Vec3& query) const {
   require_finite(query);
-  const auto [point, id] = tree_->aabb.closest_point_and_primitive(to_cgal(query));
-  return {from_cgal(point), tree_->number(id), (from_cgal(point) - query).norm()};
+  const TriangleTree::Nearest found = tree_->nearest.nearest(query);
+  return {found.point, tree_->numbers[found.triangle], std::sqrt(found.squared)};
 }
 
 std::optional<DistanceTree::Hit> DistanceTree::first_hit(const Vec3& origin, const Vec3& direction,
@@ -172,7 +196,8 @@ bool DistanceTree::contains(const Vec3& query) const {
   for (int i = 0; i < most_directions; ++i) {
     const Point3 end = to_cgal(query + tree_->reach(query) * look_along(i));
     bool odd = false, sure = true;
-    for (const auto id : tree_->meeting(Segment3(start, end))) {
+    const Segment3 ray(start, end);
+    for (const auto id : i == 0 ? tree_->meeting_along_axis(ray) : tree_->meeting(ray)) {
       const Crossing how = crossing(*id, start, end);
       if (how == Crossing::at_start) return true;
       sure = sure && how == Crossing::through;

@@ -73,17 +73,27 @@ class PointGrid {
 }  // namespace
 
 EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
-  half_edges_.reserve(3 * triangles.size());
-  for (size_t t = 0; t < triangles.size(); ++t) {
-    if (repeats_vertex(triangles[t])) continue;
-    for (int k = 0; k < 3; ++k) {
-      const int64_t a = triangles[t][k], b = triangles[t][(k + 1) % 3];
-      half_edges_.push_back({std::min(a, b), std::max(a, b), static_cast<int64_t>(t), k, a < b});
+  std::vector<int64_t> next;  // [vertices + 1] where the half-edges of each lower vertex go
+  const auto visit = [&](const auto& add) {
+    for (size_t t = 0; t < triangles.size(); ++t) {
+      if (repeats_vertex(triangles[t])) continue;
+      for (int k = 0; k < 3; ++k) {
+        const int64_t a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+        add(HalfEdge{std::min(a, b), std::max(a, b), static_cast<int64_t>(t), k, a < b});
+      }
     }
-  }
-  std::sort(half_edges_.begin(), half_edges_.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
+  };
+  for (const Triangle& t : triangles)
+    next.resize(std::max<size_t>(next.size(), *std::ranges::max_element(t) + 2), 0);
+  visit([&](const HalfEdge& half) { ++next[half.low + 1]; });
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  half_edges_.resize(next.empty() ? 0 : next.back());
+  visit([&](const HalfEdge& half) { half_edges_[next[half.low]++] = half; });
+  for (size_t v = 0, first = 0; v < next.size(); first = next[v++])
+    std::sort(half_edges_.begin() + first, half_edges_.begin() + next[v],
+              [](const HalfEdge& a, const HalfEdge& b) {
+                return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+              });
   for (size_t i = 0; i < half_edges_.size(); ++i)
     if (i == 0 || half_edges_[i].low != half_edges_[i - 1].low ||
         half_edges_[i].high != half_edges_[i - 1].high)

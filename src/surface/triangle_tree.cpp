@@ -9,6 +9,12 @@ namespace {
 
 constexpr int64_t leaf_size = 4;
 
+/// A node that is still to be visited, left without a value in arrays.
+struct Entry {
+  double bound;  ///< mm²
+  int64_t node;
+};
+
 /// Of a triangle's barycentric regions the one that holds the foot of `q`.
 Vec3 closest_point(const Vec3& q, const Corners& t) {
   const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = q - t[0], bp = q - t[1], cp = q - t[2];
@@ -57,22 +63,8 @@ double squared_distance(const Vec3& query, const Corners& triangle, Vec3* closes
   return (point - query).squaredNorm();
 }
 
-void TriangleTree::Box::extend(const Vec3& point) {
-  low = low.cwiseMin(point);
-  high = high.cwiseMax(point);
-}
-
-void TriangleTree::Box::extend(const Box& box) {
-  low = low.cwiseMin(box.low);
-  high = high.cwiseMax(box.high);
-}
-
 bool TriangleTree::Box::overlaps(const Box& box) const {
   return (low.array() <= box.high.array()).all() && (box.low.array() <= high.array()).all();
-}
-
-double TriangleTree::Box::squared_distance(const Vec3& point) const {
-  return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
 }
 
 TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
@@ -83,59 +75,67 @@ TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
 }
 
 TriangleTree::TriangleTree(const Surface& surface)
-    : order_(surface.triangles.size()), leaf_of_(surface.triangles.size()) {
-  triangles_.reserve(surface.triangles.size());
-  for (const auto& triangle : surface.triangles) triangles_.push_back(corners(surface, triangle));
+    : order_(surface.triangles.size()), row_(order_.size()), leaf_of_(order_.size()) {
+  std::vector<Vec3> centres;
+  centres.reserve(order_.size());
+  for (const auto& triangle : surface.triangles) {
+    const auto [a, b, c] = corners(surface, triangle);
+    centres.push_back((a + b + c) / 3);
+  }
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
-  build(0, static_cast<int64_t>(order_.size()), -1);
+  build(0, static_cast<int64_t>(order_.size()), -1, centres);
+  sorted_.reserve(order_.size());
+  for (const int64_t t : order_) {
+    row_[t] = static_cast<int64_t>(sorted_.size());
+    sorted_.push_back(corners(surface, surface.triangles[t]));
+  }
+  for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) node->box = box_around(*node);
 }
 
-int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent) {
+int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
+                            const std::vector<Vec3>& centres) {
   const auto number = static_cast<int64_t>(nodes_.size());
   nodes_.push_back({{}, first, end - first, -1, parent});
-  Box centres;
-  for (int64_t i = first; i < end; ++i) {
-    const Corners& t = triangles_[order_[i]];
-    nodes_[number].box.extend(box_of(t));
-    centres.extend((t[0] + t[1] + t[2]) / 3);
-    leaf_of_[order_[i]] = number;
+  if (end - first <= leaf_size) {
+    for (int64_t i = first; i < end; ++i) leaf_of_[order_[i]] = number;
+    return number;
   }
-  if (end - first <= leaf_size) return number;
+  Box box;
+  for (int64_t i = first; i < end; ++i) box.extend(centres[order_[i]]);
   Eigen::Index axis = 0;
-  (centres.high - centres.low).maxCoeff(&axis);
+  (box.high - box.low).maxCoeff(&axis);
   const auto middle = first + (end - first) / 2;
-  const auto centre = [&](int64_t t) {
-    return triangles_[t][0][axis] + triangles_[t][1][axis] + triangles_[t][2][axis];
-  };
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
-                   [&](int64_t s, int64_t t) { return centre(s) < centre(t); });
-  build(first, middle, number);
-  const int64_t right = build(middle, end, number);
+                   [&](int64_t s, int64_t t) { return centres[s][axis] < centres[t][axis]; });
+  build(first, middle, number, centres);
+  const int64_t right = build(middle, end, number, centres);
   nodes_[number].right = right;
   nodes_[number].count = 0;
   return number;
 }
 
-TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit) const {
+TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int64_t hint) const {
   Nearest best;
   best.squared = limit;
-  std::array<std::pair<double, int64_t>, max_depth> stack;
+  const auto offer = [&](int64_t row) {
+    Vec3 point;
+    const double squared = squared_distance(query, sorted_[row], &point);
+    if (squared < best.squared) best = {squared, order_[row], point};
+  };
+  if (hint >= 0) offer(row_[hint]);
+  std::array<Entry, max_depth> stack;
   int depth = 0;
   stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
   while (depth > 0) {
     const auto [bound, number] = stack[--depth];
     if (!(bound < best.squared)) continue;
     const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i) {
-      Vec3 point;
-      const double squared = squared_distance(query, triangles_[order_[i]], &point);
-      if (squared < best.squared) best = {squared, order_[i], point};
-    }
+    for (int64_t i = node.first; i < node.first + node.count; ++i) offer(i);
     if (node.count > 0) continue;
-    std::pair left(nodes_[number + 1].box.squared_distance(query), number + 1);
-    std::pair right(nodes_[node.right].box.squared_distance(query), node.right);
-    if (left.first < right.first) std::swap(left, right);
+    Entry left{nodes_[number + 1].box.squared_distance(query), number + 1};
+    Entry right{nodes_[node.right].box.squared_distance(query), node.right};
+    if (left.bound < right.bound) std::swap(left, right);
     stack[depth++] = left;
     stack[depth++] = right;
   }
@@ -143,14 +143,14 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit) con
 }
 
 int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) const {
-  if (hint >= 0 && squared_distance(query, triangles_[hint]) <= limit) return hint;
+  if (hint >= 0 && squared_distance(query, corners_of(hint)) <= limit) return hint;
   int64_t stack[max_depth], depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
     const int64_t number = stack[--depth];
     const Node& node = nodes_[number];
     for (int64_t i = node.first; i < node.first + node.count; ++i)
-      if (squared_distance(query, triangles_[order_[i]]) <= limit) return order_[i];
+      if (squared_distance(query, sorted_[i]) <= limit) return order_[i];
     if (node.count > 0) continue;
     const double left = nodes_[number + 1].box.squared_distance(query);
     const double right = nodes_[node.right].box.squared_distance(query);
@@ -173,10 +173,10 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
   const auto to_triangle = [&](int64_t t) {
     double greatest = 0;
     for (size_t i = 0; i < points.size() && greatest < best; ++i)
-      greatest = std::max(greatest, squared_distance(points[i], triangles_[t]));
+      greatest = std::max(greatest, squared_distance(points[i], corners_of(t)));
     return greatest;
   };
-  std::array<std::pair<double, int64_t>, max_depth> stack;
+  std::array<Entry, max_depth> stack;
   int depth = 0;
   stack[depth++] = {to_box(0), 0};
   while (depth > 0 && best > enough) {
@@ -186,8 +186,8 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
     for (int64_t i = node.first; i < node.first + node.count; ++i)
       best = std::min(best, to_triangle(order_[i]));
     if (node.count > 0) continue;
-    std::pair left(to_box(number + 1), number + 1), right(to_box(node.right), node.right);
-    if (left.first < right.first) std::swap(left, right);
+    Entry left{to_box(number + 1), number + 1}, right{to_box(node.right), node.right};
+    if (left.bound < right.bound) std::swap(left, right);
     stack[depth++] = left;
     stack[depth++] = right;
   }
@@ -197,7 +197,7 @@ double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
 bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const {
   const auto covers = [&](int64_t t) {
     for (const Vec3& point : points)
-      if (squared_distance(point, triangles_[t]) > limit) return false;
+      if (squared_distance(point, corners_of(t)) > limit) return false;
     hint = t;
     return true;
   };
@@ -225,7 +225,7 @@ bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_
 }
 
 void TriangleTree::exchange(int64_t triangle, const Corners& corners) {
-  triangles_[triangle] = corners;
+  sorted_[row_[triangle]] = corners;
   refit(leaf_of_[triangle]);
 }
 
@@ -233,18 +233,19 @@ void TriangleTree::remove(int64_t triangle) {
   exchange(triangle, {Vec3::Constant(NAN), Vec3::Constant(NAN), Vec3::Constant(NAN)});
 }
 
-TriangleTree::Box TriangleTree::leaf_box(const Node& node) const {
+TriangleTree::Box TriangleTree::box_around(const Node& node) const {
   Box box;
-  for (int64_t i = node.first; i < node.first + node.count; ++i)
-    box.extend(box_of(triangles_[order_[i]]));
+  for (int64_t i = node.first; i < node.first + node.count; ++i) box.extend(box_of(sorted_[i]));
+  if (node.right < 0) return box;
+  box = (&node + 1)->box;
+  box.extend(nodes_[node.right].box);
   return box;
 }
 
 void TriangleTree::refit(int64_t number) {
-  nodes_[number].box = leaf_box(nodes_[number]);
+  nodes_[number].box = box_around(nodes_[number]);
   for (number = nodes_[number].parent; number >= 0; number = nodes_[number].parent) {
-    Box box = nodes_[number + 1].box;
-    box.extend(nodes_[nodes_[number].right].box);
+    const Box box = box_around(nodes_[number]);
     if (box.low == nodes_[number].box.low && box.high == nodes_[number].box.high) return;
     nodes_[number].box = box;
   }

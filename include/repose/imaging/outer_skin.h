@@ -10,6 +10,7 @@ struct Rolling {
   double voxel = 1.5;    ///< mm of the grid on which it is done
   double outside = 3.0;  ///< mm, radius: closes holes, slits and nostrils up to twice as wide
   double inside = 8.0;   ///< mm, radius: takes off what is thinner than twice this, such as ears
+  double sampling = 0;   ///< mm between the samples that the skin is made of, if above a voxel
 };
 
 /// The outer skin of any triangles: open, flipped, doubled or with inner walls.

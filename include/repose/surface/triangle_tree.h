@@ -35,10 +35,19 @@ class TriangleTree {
   struct Box {
     Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
     Vec3 high = Vec3::Constant(-std::numeric_limits<double>::infinity());
-    void extend(const Vec3& point);
-    void extend(const Box& box);
+    void extend(const Vec3& point) {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    void extend(const Box& box) {
+      low = low.cwiseMin(box.low);
+      high = high.cwiseMax(box.high);
+    }
     bool overlaps(const Box& box) const;
-    double squared_distance(const Vec3& point) const;  ///< mm², 0 inside; ∞ to the empty box
+    /// mm², 0 inside; ∞ to the empty box.
+    double squared_distance(const Vec3& point) const {
+      return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
+    }
   };
   struct Nearest {
     double squared = std::numeric_limits<double>::infinity();  ///< mm²
@@ -48,8 +57,9 @@ class TriangleTree {
 
   explicit TriangleTree(const Surface& surface);
 
-  /// The closest point, if nearer than √limit.
-  Nearest nearest(const Vec3& query, double limit = std::numeric_limits<double>::infinity()) const;
+  /// The closest point, if nearer than √limit. The triangle `hint` is tried first.
+  Nearest nearest(const Vec3& query, double limit = std::numeric_limits<double>::infinity(),
+                  int64_t hint = -1) const;
 
   /// A triangle within √limit of the point, −1 for none. `hint` is tried first.
   int64_t any_within(const Vec3& query, double limit, int64_t hint = -1) const;
@@ -76,7 +86,7 @@ class TriangleTree {
         stack[depth++] = &node - nodes_.data() + 1;
       }
       for (int64_t i = node.first; i < node.first + node.count; ++i)
-        if (box_of(triangles_[order_[i]]).overlaps(box) && visit(order_[i])) return true;
+        if (box_of(sorted_[i]).overlaps(box) && visit(order_[i])) return true;
     }
     return false;
   }
@@ -85,7 +95,7 @@ class TriangleTree {
   void exchange(int64_t triangle, const Corners& corners);
   void remove(int64_t triangle);
 
-  const Corners& corners_of(int64_t triangle) const { return triangles_[triangle]; }
+  const Corners& corners_of(int64_t triangle) const { return sorted_[row_[triangle]]; }
 
   static Box box_of(const Corners& corners);
 
@@ -98,12 +108,13 @@ class TriangleTree {
     int64_t parent = -1;
   };
 
-  int64_t build(int64_t first, int64_t end, int64_t parent);
-  Box leaf_box(const Node& node) const;
+  int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centres);
+  Box box_around(const Node& node) const;
   void refit(int64_t node);
 
-  std::vector<Corners> triangles_;
   std::vector<int64_t> order_;    ///< triangles by leaf
+  std::vector<Corners> sorted_;   ///< in this order
+  std::vector<int64_t> row_;      ///< triangle → its row in this order
   std::vector<int64_t> leaf_of_;  ///< triangle → node
   std::vector<Node> nodes_;
 };
