@@ -63,6 +63,8 @@ std::vector<base::Option> run_options() {
        "Report the smallest eigenvalue of the energy's Hessian (SLEPc)."},
       {"verify_path", OptionKind::flag, "",
        "Solve again in twice the load steps; another rest position is exit status 2."},
+      {"skip_other_rest", OptionKind::flag, "",
+       "Do not search for another rest position where contact allows several."},
       {"sensitivity", OptionKind::flag, "",
        "Estimate how much the face depends on border, material and release, by a linear solve "
        "each."},

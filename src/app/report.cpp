@@ -41,11 +41,15 @@ std::string halved(const solve::Halvings& h) {
 }
 
 std::string work_rows(const solve::Summary& s) {
+  const std::string other =
+      s.evaluations_for_other > 0
+          ? fmt::format("; {} of value to find another rest position", s.evaluations_for_other)
+          : "";
   return report_row("load steps", fmt::format("{} ({})", s.path.steps, halved(s.path.halvings))) +
          hardship(s.path.halvings) +
          report_row("iterations", fmt::format("{}", s.path.iterations)) +
-         report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian",
-                                               s.evaluations, s.assemblies));
+         report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian{}",
+                                               s.evaluations, s.assemblies, other));
 }
 
 std::string stability(const solve::Spectrum& s) {

@@ -175,6 +175,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   Strategy s;
   s.settings = settings_of(wanted, job.solid);
   s.settings.stability = options.flag("stability");
+  s.settings.finds_other_rest = !options.flag("skip_other_rest");
   s.settings.monitor = options.flag("monitor_mm");
   s.settings.initial_equilibrium = job.initial_equilibrium;
   s.tears = job.tearing.has_value();

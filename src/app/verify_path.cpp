@@ -36,6 +36,7 @@ PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings 
   if (check.steps == 0) return check;
   settings.path.load_steps = static_cast<int>(2 * check.steps);
   settings.stability = false;
+  settings.finds_other_rest = false;
   settings.stages = nullptr;
   std::vector<Vec3> slab;
   check.again = solve::find_repose(

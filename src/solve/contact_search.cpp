@@ -259,8 +259,9 @@ std::optional<OtherRest> ContactSearch::compare_skins(Vec displacement, Vec othe
 
 /// The rest position that the sharp bodies lead to from the prediction directly, where that is
 /// another one.
-std::optional<OtherRest> ContactSearch::find_other(Vec displacement, double accuracy) {
+std::optional<OtherRest> ContactSearch::search_other(Vec displacement, double accuracy) {
   const Multipliers here = multipliers();
+  const int64_t evaluated = objective_.evaluations();
   set_multipliers(at_prediction_);
   std::optional<OtherRest> other;
   int64_t iterations = 0;
@@ -270,6 +271,7 @@ std::optional<OtherRest> ContactSearch::find_other(Vec displacement, double accu
     other = compare_skins(displacement, start_);
   set_multipliers(here);
   objective_.evaluate(displacement, gradient_);
+  evaluations_for_other_ += objective_.evaluations() - evaluated;
   return other && other->distance > 2 * accuracy ? other : std::nullopt;
 }
 
@@ -282,7 +284,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     if (outcome.converged) return outcome;
   }
   const bool may_have_other =
-      std::exchange(predicted_, false) && objective_.positions().load() == 1;
+      std::exchange(predicted_, false) && finds_other_ && objective_.positions().load() == 1;
   at_prediction_ = multipliers();
   check(VecCopy(displacement, start_));
   stiffen(1);
@@ -307,7 +309,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
   if (outcome.converged && may_have_other && gone_round(displacement))
-    outcome.other = find_other(displacement, accuracy);
+    outcome.other = search_other(displacement, accuracy);
   return outcome;
 }
 

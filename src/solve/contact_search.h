@@ -24,6 +24,10 @@ class ContactSearch : public RestSearch {
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                 linear::TangentSolver& solver, Minimiser& minimiser, Minimiser::Watch watch);
+  /// Whether another rest position is searched for at load 1 (the default), and the evaluations
+  /// that this took.
+  void find_other_rest(bool wanted) { finds_other_ = wanted; }
+  int64_t evaluations_for_other() const { return evaluations_for_other_; }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
@@ -46,7 +50,7 @@ class ContactSearch : public RestSearch {
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   bool gone_round(Vec displacement);
-  std::optional<OtherRest> find_other(Vec displacement, double accuracy);
+  std::optional<OtherRest> search_other(Vec displacement, double accuracy);
   std::optional<OtherRest> compare_skins(Vec displacement, Vec other);
 
   discrete::Objective& objective_;
@@ -54,8 +58,10 @@ class ContactSearch : public RestSearch {
   Minimiser& minimiser_;
   Minimiser::Watch watch_;
   ContactQp qp_;
-  double stiffness_;           // N/mm³, of the penalty
-  int times_ = 1;              // it is so many times the model's
+  double stiffness_;  // N/mm³, of the penalty
+  int times_ = 1;     // it is so many times the model's
+  bool finds_other_ = true;
+  int64_t evaluations_for_other_ = 0;
   bool predicted_ = false;     // the next search begins with a prediction
   Multipliers before_;         // the last search, …
   Multipliers at_prediction_;  // … and where it began

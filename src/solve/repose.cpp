@@ -142,6 +142,7 @@ class Searcher {
     if (positions.part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                        minimiser_, std::ref(watcher_));
+    if (contact_) contact_->find_other_rest(settings.finds_other_rest);
     if (is_exact(settings))
       exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                             minimiser_);
@@ -160,6 +161,7 @@ class Searcher {
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   /// Of the searches.
   int64_t evaluations() { return problem_.function().evaluations() - looks_; }
+  int64_t evaluations_for_other() const { return contact_ ? contact_->evaluations_for_other() : 0; }
   void count_look() { ++looks_; }
   int64_t assemblies() const { return problem_.assemblies(); }
 
@@ -352,6 +354,7 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
   summary.unknowns = 3 * part.total_unknowns;
   summary.evaluations = searcher.evaluations();
+  summary.evaluations_for_other = searcher.evaluations_for_other();
   summary.assemblies = searcher.assemblies();
   end_stage(settings, "solve");
   return summary;

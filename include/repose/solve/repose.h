@@ -25,6 +25,7 @@ struct Settings {
   base::Stages* stages = nullptr;        ///< of which "distribute" and "solve" are ended
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
   bool monitor = false;                  ///< print a line for every iteration
+  bool finds_other_rest = true;          ///< contact searches for another rest position at load 1
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene asks for one
   /// Called at each iteration, on all ranks.
@@ -64,6 +65,7 @@ struct Summary {
   model::StepNumbers last;
   int64_t unknowns = 0;                      ///< scalar
   int64_t evaluations = 0;                   ///< of objective and gradient
+  int64_t evaluations_for_other = 0;         ///< of these, in search of another rest position
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
