@@ -13,7 +13,7 @@ namespace repose::check {
 namespace {
 
 constexpr double considered = 6;       // mm, the stated gap where nothing is nearer
-constexpr double largest_slope = 1.1;  // of smoothed distances
+constexpr double largest_slope = 1.4;  // of interpolated distances, beside edges
 constexpr double exact_to = 1e-4;      // mm, of a penetration that two programs measure exactly
 
 const std::vector<double>* field(const model::StepRows& rows, const char* name) {

@@ -129,7 +129,7 @@ double grid_spacing(const scene::Scene& scene, const Foundation& on) {
   constexpr double finest = 0.5;  // mm
   if (scene.contact && scene.contact->grid) return *scene.contact->grid;
   if (!scene.osteotomies.empty()) return finest;  // edges that a saw leaves are sharp
-  constexpr double coarsest = 0.75;               // mm
+  constexpr double coarsest = 0.6;                // mm
   return std::clamp(thin_bone(on, 2 * coarsest) / 2, finest, coarsest);
 }
 

@@ -161,7 +161,7 @@ std::vector<Key> contact_keys() {
       {"contact.grid", number, "",
        "Spacing of the grids from which distances to meshes are read, which round edges of bones "
        "by a fifth of it; when not given half the thickness of thin bone near the tissue, 0.5 to "
-       "0.75 mm, and 0.5 mm where bone is cut.",
+       "0.6 mm, and 0.5 mm where bone is cut.",
        "mm", Range::between(0.1, 10)},
       {"contact.stiffness", number, "",
        "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",
@@ -229,10 +229,10 @@ std::vector<Key> material_keys() {
        Range::between(-0.9, 0.4999)},
       {.path = "tissue.material.dilatation",
        .kind = choice,
-       .standard = "prism",
+       .standard = "",
        .sentence =
            "Changes of volume are resisted prism by prism, or averaged over the prisms around each "
-           "point, for tissue that is nearly incompressible.",
+           "point; when not given nodal, or prism where a Poisson's ratio is not above 0.",
        .choices = {"prism", "nodal"}},
       {"tissue.material.skin", map, "", "The outermost stratum; the preset's when not given."},
       {"tissue.material.skin.thickness", number, "required", "Its thickness.", "mm",

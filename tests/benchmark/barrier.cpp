@@ -314,6 +314,7 @@ base::Exit run(const base::Options& options) {
     solve::Minimiser minimiser(problem.function(), problem.solver(), nullptr);
     solve::ContactSearch contact(problem.objective(), problem.tangent(), problem.elastic_solver(),
                                  minimiser, nullptr);
+    contact.find_other_rest(false);
     const base::VecHandle displacement = problem.objective().positions().make_vector();
     const auto found = solve::LoadPath(problem, contact, settings.path)
                            .run(displacement, nullptr, [](const auto&, double, double) {});

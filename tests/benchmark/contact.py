@@ -1,19 +1,24 @@
 #!/usr/bin/env python3
-"""What contact changes on a real head and what it costs: two tables and a picture.
+"""What contact changes on a real head, what it costs, and whether it gives one face: tables and a picture.
 
-    tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head]
-                               [-output docs/measurements/contact.md] [-accuracy 0.01]
-                               [-cases jaw_forward,…] [-picture contact.png]
+    tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
+                               [-output docs/measurements/contact.md] [-cases "jaw 8 mm back,…"]
+                               [-tables cost,runs,searches,ways] [-older BIN] [-picture contact.png]
 
-The first table: moves of the jaws, each with tissue near the moved bone let go (neither contact
-nor any hold there), tied to the bones, sliding on them, and touching them, the default. Lips are
+cost: each move with parted and with fused lips, with contact and without it. runs: the same on 1, 2, 3
+and 5 ranks and in 2, 5 and 10 load steps, against one rank and automatic steps. searches: the present
+search, a logarithmic barrier (benchmark_barrier), and with -older the repose-solve of another build, on
+the same scenes with lips parted and grids of 0.6 mm. ways: tissue near the moved bone let go (neither
+contact nor any hold there), tied to the bones, sliding on them, and touching them, the default; lips are
 parted. Points inside bone are free ones that are deeper in one of the moved surfaces than at the
-start, by more than 0.1 mm, against the triangles themselves (VTK), not the smoothed distances that
-the program uses. Regions are balls on the skin. The second table: the default on 1, 2 and 3 ranks
-and in 1, 2 and 5 load steps, against the first. Needs: pip install vtk h5py matplotlib
+start, by more than 0.1 mm, against the triangles themselves (VTK), not the smoothed distances
+that the program uses. Regions are balls on the skin. Seconds are CPU times of the search.
+Needs: pip install vtk h5py matplotlib
 """
 
+import concurrent.futures
 import pathlib
+import re
 import tempfile
 
 import h5py
@@ -26,11 +31,15 @@ from tissue import last, model_of
 
 SURFACES = ["skin.ply", "skull.ply", "mandible.ply"]
 JAW = "mouth"  # the scene whose moves the three of the jaw replace
-TURN = "{bone: mandible, rotate: {axis: [0.9995, 0.0038, -0.0327], center: [2.4, -208.2, 398.3], angle: 8}}"
+TURN = ("  - {{bone: mandible, rotate: {{axis: [0.9995, 0.0038, -0.0327], center: [2.4, -208.2, 398.3], "
+        "angle: {}}}}}\n")
+SHIFT = "  - {{bone: mandible, translate: [0, {}, 0]}}\n"
 CASES = {
-    "jaw 6 mm forward": (JAW, "  - {bone: mandible, translate: [0, -6, 0]}\n"),
-    "jaw 8 mm back": (JAW, "  - {bone: mandible, translate: [0, 8, 0]}\n"),
-    "jaw opened by 8°": (JAW, f"  - {TURN}\n"),
+    "jaw 6 mm forward": (JAW, SHIFT.format(-6)),
+    "jaw 8 mm back": (JAW, SHIFT.format(8)),
+    "jaw opened by 8°": (JAW, TURN.format(8)),
+    "jaw opened by 15°": (JAW, TURN.format(15)),
+    "8° and 6 mm forward": (JAW, TURN.format(8) + SHIFT.format(-6)),
     "Le Fort I": ("le_fort", None),
     "genioplasty": ("genioplasty", None),
     "sagittal split": ("split", None),
@@ -47,27 +56,40 @@ REGIONS = {"upper lip": ([2, -310, 376], 10), "lower lip": ([2, -309, 360], 9),
 HEAD = ("| move | tissue | evaluations | Hessians | search's time | inside bone: points, deepest mm "
         "| penetration said, mm | skin from contact's, mm: " + ", ".join(REGIONS)
         + " |\n|---|---" + "|--:" * 6 + "|")
-AGREE = ("| move | ranks | load steps | evaluations | Hessians | skin from the first, mm: largest, "
-         "99 % | estimate, mm |\n|---" + "|--:" * 6 + "|")
-RUNS = [(1, 0), (2, 0), (3, 0), (1, 2), (1, 5)]
+COST = ("| move | lips | evaluations, Hessians | without contact | search's time | … with another rest "
+        "position | inside bone: points, deepest mm | another rest position, mm |\n|---|---"
+        + "|--:" * 6 + "|")
+AGREE = ("| move | lips | evaluations, one step | ten steps | ranks 2, 3, 5: mm | load steps 2, 5, 10: mm "
+         "| not converged |\n|---|---" + "|--:" * 5 + "|")
+SEARCHES = ("| move | search | evaluations | Hessians or Newton systems | search's time | exact penetration, "
+            "mm | skin from the present search's, mm |\n|---|---" + "|--:" * 5 + "|")
+GRID = "contact: {grid: 0.6}\n"
+KINDS = {"ranks": [(2, 0), (3, 0), (5, 0)], "steps": [(1, 2), (1, 5), (1, 10)]}
+LIPS = ["parted", "fused"]
 
 
-def scene_of(case, way):
+def scene_of(case, way="contact", lips="parted", end=""):
     name, moves = CASES[case]
     text = (PROJECT / f"meshes/real_head_{name}.yaml").read_text()
     if moves:
         text = text.partition("moves:\n")[0] + "moves:\n" + moves
+    if lips == "fused":
+        text = re.sub(r"mouth:.*\n  path:.*\n", "", text)
     text = text.replace("  layers: 4", WAYS[way] + "  layers: 4")
-    return text + OFF * (way == "let go")
+    return text + OFF * (way == "let go") + end
 
 
-def solve(case, way, chosen, folder, ranks=1, steps=0):
-    scene = folder / "scene.yaml"
-    scene.write_text(scene_of(case, way))
-    options = ["-load_steps", steps] if steps else []
-    done = run([chosen.bin / "repose-solve", scene, "-output", "face", "-accuracy",
-                chosen.accuracy, *options], folder, ranks)
-    return done, folder / "face.h5"
+def solve(text, chosen, folder, ranks=1, steps=0, options=(), program=None):
+    """Solves a scene in a folder of its own."""
+    own = pathlib.Path(tempfile.mkdtemp(dir=folder))
+    for file in folder.iterdir():
+        if file.is_symlink():
+            (own / file.name).symlink_to(file.resolve())
+    (own / "scene.yaml").write_text(text)
+    steps = ["-load_steps", steps] if steps else []
+    done = run([(program or chosen.bin) / "repose-solve", "scene.yaml", "-output", "face",
+                "-accuracy", chosen.accuracy, *steps, *options], own, ranks)
+    return done, own / "face.h5"
 
 
 def skin(file):
@@ -119,11 +141,11 @@ def by_region(places, difference):
 
 
 def compare_ways(chosen, folder, faces):
-    """Rows of the first table; keeps all displacements of the skin in `faces`."""
+    """Rows of the table of ways; keeps all displacements of the skin in `faces`."""
     for case in chosen.cases.split(","):
         found = {}
         for way in WAYS:
-            done, file = solve(case, way, chosen, folder)
+            done, file = solve(scene_of(case, way), chosen, folder, options=["-skip_other_rest"])
             said = done.said.get("penetration", "–").split()[0]
             found[way] = (done.evaluations, done.stages["solve"][0], inside_bone(file), said,
                           *skin(file))
@@ -135,17 +157,68 @@ def compare_ways(chosen, folder, faces):
                    f"{by_region(places, moved - reference) if way != 'contact' else '–'} |")
 
 
-def compare_runs(chosen, folder):
+def compare_cost(chosen, folder):
     for case in chosen.cases.split(","):
-        first = None
-        for ranks, steps in RUNS:
-            done, file = solve(case, "contact", chosen, folder, ranks, steps)
-            _, moved = skin(file)
-            first = moved if first is None else first
-            far = np.linalg.norm(moved - first, axis=1)
-            yield (f"| {case} | {ranks} | {steps or 'automatic'} | {done.evaluations[0]} | "
-                   f"{done.evaluations[1]} | {far.max():.3f}, {np.quantile(far, 0.99):.3f} | "
-                   f"{last(file)['displacement_error']:.3f} |")
+        for lips in LIPS:
+            text = scene_of(case, lips=lips)
+            alone, file = solve(text, chosen, folder, options=["-skip_other_rest"])
+            full, _ = solve(text, chosen, folder)
+            off, _ = solve(text + OFF, chosen, folder)
+            count, deepest = inside_bone(file)
+            other = re.search(r"up to (\S+) mm", full.said.get("other rest position", ""))
+            least = off.stages["solve"][0]
+            yield (f"| {case} | {lips} | {alone.evaluations[0]}, {alone.evaluations[1]} | "
+                   f"{off.evaluations[0]}, {off.evaluations[1]} | "
+                   f"{alone.stages['solve'][0] / least:.1f} | {full.stages['solve'][0] / least:.1f} | "
+                   f"{count}, {deepest:.2f} | {other.group(1) if other else '–'} |")
+
+
+def compare_runs(chosen, folder):
+    def skin_of(text, ranks, steps):
+        done, file = solve(text, chosen, folder, ranks, steps, ["-skip_other_rest"])
+        return done, skin(file)[1]
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        for case in chosen.cases.split(","):
+            for lips in LIPS:
+                text = scene_of(case, lips=lips)
+                runs = {kind: [pool.submit(skin_of, text, *run) for run in KINDS[kind]]
+                        for kind in KINDS}
+                one, first = skin_of(text, 1, 0)
+                failed, worst = int(one.status != 0), {}
+                for kind, results in runs.items():
+                    good = [moved for done, moved in (r.result() for r in results)
+                            if done.status == 0]
+                    failed += len(results) - len(good)
+                    apart = [np.linalg.norm(moved - first, axis=1) for moved in good]
+                    far = max(apart, key=np.max, default=np.full(1, np.nan))
+                    worst[kind] = f"{far.max():.4f}, 99 % {np.quantile(far, 0.99):.4f}"
+                ten = runs["steps"][-1].result()[0]
+                yield (f"| {case} | {lips} | {one.evaluations[0]} | {ten.evaluations[0]} | "
+                       f"{worst['ranks']} | {worst['steps']} | {failed} |")
+
+
+def compare_searches(chosen, folder):
+    """The present search, the barrier, and that of another build."""
+    for case in chosen.cases.split(","):
+        text = scene_of(case, end=GRID)
+        done, file = solve(text, chosen, folder, options=["-skip_other_rest"])
+        seconds, first = done.stages["solve"][0], skin(file)[1]
+        yield (f"| {case} | present | {done.evaluations[0]} | {done.evaluations[1]} | 1.0 | "
+               f"{inside_bone(file)[1]:.2f} | – |")
+        barrier = run([chosen.bin / "benchmark_barrier", "scene.yaml", "-result", file], file.parent,
+                      ends=None)
+        row = re.search(r"\| barrier \| (\d+) \| (\d+) \| \d+ \| \d+ \| \S+ \((\S+)\) \| (\S+) \| (\S+)",
+                        barrier.text)
+        yield (f"| {case} | barrier | " + " | ".join(row.groups() if row else ["failed"] * 5) + " |")
+        if chosen.older:
+            rim = text.replace("moves:", "boundary: {rim: auto}\nmoves:")
+            old, file = solve(rim, chosen, folder, program=pathlib.Path(chosen.older))
+            moved = skin(file)[1]
+            apart = (f"{np.linalg.norm(moved - first, axis=1).max():.3f}"
+                     if len(moved) == len(first) else "another mesh")
+            yield (f"| {case} | rounds (older) | {old.evaluations[0]} | {old.evaluations[1]} | "
+                   f"{old.stages['solve'][0] / seconds:.1f} | {inside_bone(file)[1]:.2f} | {apart} |")
 
 
 def draw(faces, chosen):
@@ -169,16 +242,22 @@ def draw(faces, chosen):
 
 
 def main():
-    chosen = option_parser(__doc__, cases=",".join(CASES), accuracy=0.01,
-                           head=str(PROJECT.parent / "shared/data/head"), picture="").parse_args()
+    chosen = option_parser(__doc__, cases=",".join(CASES), tables="cost,runs,searches,ways",
+                           accuracy=0.01, head=str(PROJECT.parent / "shared/data/head"), older="",
+                           picture="").parse_args()
     faces = {}
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for file in [*(pathlib.Path(chosen.head) / f for f in SURFACES),
                      PROJECT / "meshes/real_head_split.obj"]:
             (folder / file.name).symlink_to(file.resolve())
-        print_table(HEAD, compare_ways(chosen, folder, faces), chosen.output, "ways")
-        print_table(AGREE, compare_runs(chosen, folder), chosen.output, "runs")
+        tables = {"cost": (COST, lambda: compare_cost(chosen, folder)),
+                  "runs": (AGREE, lambda: compare_runs(chosen, folder)),
+                  "searches": (SEARCHES, lambda: compare_searches(chosen, folder)),
+                  "ways": (HEAD, lambda: compare_ways(chosen, folder, faces))}
+        for table in chosen.tables.split(","):
+            head, rows = tables[table]
+            print_table(head, rows(), chosen.output, table)
     if chosen.picture:
         draw(faces, chosen)
 

@@ -249,8 +249,8 @@ BREAKS = [
     ),
     (
         "a penalty that is too soft stays so",
-        "left > slow * least &&",
-        "left > slow * least && false &&",
+        "stiffen(std::min(2 * times_, stiffest));",
+        "stiffen(1);",
         r"^solve\.contact",
     ),
     (
@@ -436,4 +436,16 @@ BREAKS = [
         f"{SOLVE}on_",
     ),
     ("a column's rows are all its first", "begin[k] + next++", "begin[k] + 0 * next++", f"{SOLVE}on_"),
+    (
+        "distances are smoothed as rounded bodies are",
+        "here - (sum - 6 * here) / 6",
+        "here",
+        r"^surface\.distance_field",
+    ),
+    (
+        "another rest position is compared with itself",
+        "positions.update(other);",
+        "positions.update(displacement);",
+        r"^program\.contact$",
+    ),
 ]

@@ -1,5 +1,7 @@
 """Contact as a whole: lips that part, operations with everything on, and what is refused in words."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from tissue import last, model_of
 DATA = PROJECT.parent / "shared/data/head"
 ACCURACY = 0.02  # mm
 real_head = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+OTHER = re.compile(r"other rest position +the skin is up to (\S+) mm away there, most at "
+                   r"\((\S+), (\S+), (\S+)\) mm")
 SOLID = (PROJECT / "meshes/head_solid.yaml").read_text()
 
 
@@ -56,6 +60,27 @@ def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operat
     for options, ranks in (((), 2), ((), 3), (("-load_steps", 2), 1)):
         other = skin(solve(scene, *options, ranks=ranks))[1]
         assert np.linalg.norm(other - first, axis=1).max() < 2 * ACCURACY
+
+
+@real_head
+def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, environment):
+    """The chin's skin rests on either side of the edge of the cut (a barrier method finds both)."""
+    run = runner(folder, environment)
+    scene = "real_head_genioplasty.yaml", "-accuracy", ACCURACY, "-output", "other"
+    rows = []
+    for ranks in (1, 2):
+        done = run("repose-solve", *scene, ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        row, = OTHER.findall(done.stdout)
+        rows.append([float(number) for number in row])
+        assert rows[-1][0] == pytest.approx(0.45, abs=0.15)
+        assert np.linalg.norm(np.array(rows[-1][1:]) - [34, -276, 329]) < 6
+        assert " to find another rest position" in done.stdout
+    assert rows[0] == pytest.approx(rows[1], abs=0.1)
+    alone = run("repose-solve", *scene, "-skip_other_rest")
+    assert alone.returncode == 0 and "other rest" not in alone.stdout
+    quiet = run("repose-solve", "real_head_le_fort.yaml", "-accuracy", ACCURACY, "-output", "quiet")
+    assert quiet.returncode == 0 and "other rest" not in quiet.stdout
 
 
 @real_head

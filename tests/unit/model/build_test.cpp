@@ -78,8 +78,8 @@ TEST(Build, grids_of_distances_resolve_thin_bone) {
     const auto bone = patches::box({-30, -30, -10 - thickness}, {130, 130, -10});
     return build_model(scene, patches::square(6, 60), {bone}).model.contact.spacing;
   };
-  EXPECT_EQ(spacing(15, std::nullopt), 1);
-  EXPECT_NEAR(spacing(1.4, std::nullopt), 0.7, 1e-9);
+  EXPECT_EQ(spacing(15, std::nullopt), 0.6);
+  EXPECT_NEAR(spacing(1.1, std::nullopt), 0.55, 1e-9);
   EXPECT_EQ(spacing(0.3, std::nullopt), 0.5);
   EXPECT_EQ(spacing(1.4, std::optional(2.5)), 2.5);
 }
