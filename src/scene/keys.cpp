@@ -229,10 +229,10 @@ std::vector<Key> material_keys() {
        Range::between(-0.9, 0.4999)},
       {.path = "tissue.material.dilatation",
        .kind = choice,
-       .standard = "",
+       .standard = "prism",
        .sentence =
            "Changes of volume are resisted prism by prism, or averaged over the prisms around each "
-           "point; when not given nodal, or prism where a Poisson's ratio is not above 0.",
+           "point, for tissue that is nearly incompressible.",
        .choices = {"prism", "nodal"}},
       {"tissue.material.skin", map, "", "The outermost stratum; the preset's when not given."},
       {"tissue.material.skin.thickness", number, "required", "Its thickness.", "mm",

@@ -24,27 +24,19 @@ MaterialRegion read_material_region(const Map& map, double poisson) {
   return {read_skin_region(map), read_elasticity(map, poisson)};
 }
 
-double least_poisson(const Material& material) {
+void read_dilatation(const Value& value, Material& material) {
+  material.dilatation = static_cast<Dilatation>(value.choice());
+  if (material.dilatation == Dilatation::prism) return;
   double least = material.deep.poisson;
   for (const Stratum& stratum : material.strata)
     least = std::min(least, stratum.elasticity.poisson);
   for (const MaterialRegion& region : material.regions)
     least = std::min(least, region.elasticity.poisson);
-  return least;
-}
-
-/// Volumes are averaged where this is possible, unless the scene says otherwise.
-Dilatation read_dilatation(const Map& map, const Material& material) {
-  const double least = least_poisson(material);
-  const auto given = map.find("dilatation");
-  if (!given) return least > 0 ? Dilatation::nodal : Dilatation::prism;
-  const auto dilatation = static_cast<Dilatation>(given->choice());
-  if (dilatation == Dilatation::nodal && !(least > 0))
-    given->refuse(
+  if (!(least > 0))
+    value.refuse(
         "nodal averages what resists changes of volume: every poisson must be above 0, one is {}; "
         "raise it or remove dilatation",
         least);
-  return dilatation;
 }
 
 }  // namespace
@@ -71,7 +63,7 @@ Material read_material(const Value& value) {
   if (const auto regions = map.find("regions"))
     for (const Value& item : regions->items())
       material.regions.push_back(read_material_region(Map(item), material.deep.poisson));
-  material.dilatation = read_dilatation(map, material);
+  if (const auto dilatation = map.find("dilatation")) read_dilatation(*dilatation, material);
   return material;
 }
 

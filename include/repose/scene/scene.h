@@ -137,7 +137,7 @@ struct Material {
   Elasticity deep;                      ///< below all strata
   std::vector<Stratum> strata;          ///< from the skin down
   std::vector<MaterialRegion> regions;  ///< beat the strata, and each the ones before it
-  Dilatation dilatation = Dilatation::nodal;
+  Dilatation dilatation = Dilatation::prism;
 };
 
 struct Tissue {
