@@ -62,6 +62,7 @@ def test_a_missing_file_is_one_line(script, name):
 
 
 def test_springs_are_named_where_a_result_has_none(script, solved):
+    pytest.importorskip("matplotlib")
     solid = solved("head_incision.yaml")
     says(script("plot_equilibrium.py", solid, "picture.png"), "plot_equilibrium.py",
          "tissue.springs")
