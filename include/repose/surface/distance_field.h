@@ -31,8 +31,8 @@ class DistanceField {
   /// grid would be too large.
   DistanceField(Surface surface, double spacing, double reach);
 
-  /// The field of the same surface on a grid so many times coarser, with the distances themselves as
-  /// coefficients, which smooths by a Gaussian of 0.58 spacings (variance h²/3).
+  /// The field of the same surface on a grid so many times coarser, with the distances themselves
+  /// as coefficients, which smooths by a Gaussian of 0.58 spacings (variance h²/3).
   DistanceField rounded(double times) const;
 
   /// The value alone, mm; `reach` beyond.
