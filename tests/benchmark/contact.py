@@ -3,16 +3,15 @@
 
     tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
                                [-output docs/measurements/contact.md] [-cases "jaw 8 mm back,…"]
-                               [-tables cost,runs,searches,ways] [-older BIN] [-picture contact.png]
+                               [-tables cost,runs,searches,ways] [-picture contact.png]
 
 cost: each move with parted and with fused lips, with contact and without it. runs: the same on 1, 2, 3
 and 5 ranks and in 2, 5 and 10 load steps, against one rank and automatic steps. searches: the present
-search, a logarithmic barrier (benchmark_barrier), and with -older the repose-solve of another build, on
-the same scenes with lips parted and grids of 0.6 mm. ways: tissue near the moved bone let go (neither
-contact nor any hold there), tied to the bones, sliding on them, and touching them, the default; lips are
-parted. Points inside bone are free ones that are deeper in one of the moved surfaces than at the
-start, by more than 0.1 mm, against the triangles themselves (VTK), not the smoothed distances
-that the program uses. Regions are balls on the skin. Seconds are CPU times of the search.
+search and a logarithmic barrier (benchmark_barrier), lips parted. ways: tissue near the moved bone let
+go (neither contact nor any hold there), tied to the bones, sliding on them, and touching them, the
+default; lips are parted. Points inside bone are free ones that are deeper in one of the moved surfaces
+than at the start, by more than 0.1 mm, against the triangles themselves (VTK), not the smoothed
+distances that the program uses. Regions are balls on the skin. Times are of the search alone.
 Needs: pip install vtk h5py matplotlib
 """
 
@@ -63,12 +62,11 @@ AGREE = ("| move | lips | evaluations, one step | ten steps | ranks 2, 3, 5: mm 
          "| not converged |\n|---|---" + "|--:" * 5 + "|")
 SEARCHES = ("| move | search | evaluations | Hessians or Newton systems | search's time | exact penetration, "
             "mm | skin from the present search's, mm |\n|---|---" + "|--:" * 5 + "|")
-GRID = "contact: {grid: 0.6}\n"
 KINDS = {"ranks": [(2, 0), (3, 0), (5, 0)], "steps": [(1, 2), (1, 5), (1, 10)]}
 LIPS = ["parted", "fused"]
 
 
-def scene_of(case, way="contact", lips="parted", end=""):
+def scene_of(case, way="contact", lips="parted"):
     name, moves = CASES[case]
     text = (PROJECT / f"meshes/real_head_{name}.yaml").read_text()
     if moves:
@@ -76,7 +74,7 @@ def scene_of(case, way="contact", lips="parted", end=""):
     if lips == "fused":
         text = re.sub(r"mouth:.*\n  path:.*\n", "", text)
     text = text.replace("  layers: 4", WAYS[way] + "  layers: 4")
-    return text + OFF * (way == "let go") + end
+    return text + OFF * (way == "let go")
 
 
 def solve(text, chosen, folder, ranks=1, steps=0, options=(), program=None):
@@ -199,11 +197,9 @@ def compare_runs(chosen, folder):
 
 
 def compare_searches(chosen, folder):
-    """The present search, the barrier, and that of another build."""
     for case in chosen.cases.split(","):
-        text = scene_of(case, end=GRID)
+        text = scene_of(case)
         done, file = solve(text, chosen, folder, options=["-skip_other_rest"])
-        seconds, first = done.stages["solve"][0], skin(file)[1]
         yield (f"| {case} | present | {done.evaluations[0]} | {done.evaluations[1]} | 1.0 | "
                f"{inside_bone(file)[1]:.2f} | – |")
         barrier = run([chosen.bin / "benchmark_barrier", "scene.yaml", "-result", file], file.parent,
@@ -211,14 +207,6 @@ def compare_searches(chosen, folder):
         row = re.search(r"\| barrier \| (\d+) \| (\d+) \| \d+ \| \d+ \| \S+ \((\S+)\) \| (\S+) \| (\S+)",
                         barrier.text)
         yield (f"| {case} | barrier | " + " | ".join(row.groups() if row else ["failed"] * 5) + " |")
-        if chosen.older:
-            rim = text.replace("moves:", "boundary: {rim: auto}\nmoves:")
-            old, file = solve(rim, chosen, folder, program=pathlib.Path(chosen.older))
-            moved = skin(file)[1]
-            apart = (f"{np.linalg.norm(moved - first, axis=1).max():.3f}"
-                     if len(moved) == len(first) else "another mesh")
-            yield (f"| {case} | rounds (older) | {old.evaluations[0]} | {old.evaluations[1]} | "
-                   f"{old.stages['solve'][0] / seconds:.1f} | {inside_bone(file)[1]:.2f} | {apart} |")
 
 
 def draw(faces, chosen):
@@ -243,7 +231,7 @@ def draw(faces, chosen):
 
 def main():
     chosen = option_parser(__doc__, cases=",".join(CASES), tables="cost,runs,searches,ways",
-                           accuracy=0.01, head=str(PROJECT.parent / "shared/data/head"), older="",
+                           accuracy=0.01, head=str(PROJECT.parent / "shared/data/head"),
                            picture="").parse_args()
     faces = {}
     with tempfile.TemporaryDirectory() as name:
