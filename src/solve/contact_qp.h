@@ -29,7 +29,7 @@ class ContactQp {
   /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a
   /// minimum was reached. Collective.
   bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
-  /// Whether the latest solve met negative curvature.
+  /// True if the latest solve met negative curvature.
   bool reduced() const { return reduced_; }
 
  private:

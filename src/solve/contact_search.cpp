@@ -221,7 +221,7 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   return outcome;
 }
 
-/// Whether a point is on another side of a body than before the prediction. Collective.
+/// True if a point is on another side of a body than before the prediction. Collective.
 bool ContactSearch::gone_round(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
@@ -233,8 +233,8 @@ bool ContactSearch::gone_round(Vec displacement) {
   return found;
 }
 
-/// How far apart two states of the skin are, and where most. Collective.
-std::optional<OtherRest> ContactSearch::compare_skins(Vec displacement, Vec other) {
+/// Finds the largest distance between two states of the skin, and its place. Collective.
+OtherRest ContactSearch::compare_skins(Vec displacement, Vec other) {
   discrete::Positions& positions = objective_.positions();
   const model::Points& points = positions.part().model.points;
   positions.update(displacement);

@@ -24,9 +24,9 @@ class ContactSearch : public RestSearch {
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                 linear::TangentSolver& solver, Minimiser& minimiser, Minimiser::Watch watch);
-  /// Whether another rest position is searched for at load 1 (the default), and the evaluations
-  /// that this took.
+  /// Sets if another rest position is searched for at load 1 (the default).
   void find_other_rest(bool wanted) { finds_other_ = wanted; }
+  /// Evaluations that this search took.
   int64_t evaluations_for_other() const { return evaluations_for_other_; }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
@@ -51,7 +51,7 @@ class ContactSearch : public RestSearch {
   Outcome finish(Vec displacement, double accuracy);
   bool gone_round(Vec displacement);
   std::optional<OtherRest> search_other(Vec displacement, double accuracy);
-  std::optional<OtherRest> compare_skins(Vec displacement, Vec other);
+  OtherRest compare_skins(Vec displacement, Vec other);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

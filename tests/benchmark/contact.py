@@ -201,7 +201,7 @@ def compare_searches(chosen, folder):
         text = scene_of(case)
         done, file = solve(text, chosen, folder, options=["-skip_other_rest"])
         yield (f"| {case} | present | {done.evaluations[0]} | {done.evaluations[1]} | 1.0 | "
-               f"{inside_bone(file)[1]:.2f} | – |")
+               f"{last(file)['penetration_exact']:.2f} | – |")
         barrier = run([chosen.bin / "benchmark_barrier", "scene.yaml", "-result", file], file.parent,
                       ends=None)
         row = re.search(r"\| barrier \| (\d+) \| (\d+) \| \d+ \| \d+ \| \S+ \((\S+)\) \| (\S+) \| (\S+)",
