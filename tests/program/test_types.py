@@ -78,7 +78,8 @@ def test_a_type_of_the_table_works(run, scenes, tmp_path, expected, option, valu
     if tissue not in expected:
         expected[tissue] = solve("default", 1)
     apart = solve("other", ranks, *options(option, value)) - expected[tissue]
-    assert np.linalg.norm(apart, axis=1).max() <= 2 * ACCURACY
+    rough = 2 if value == "preonly" else 1  # the estimate is the preconditioner's, nothing checks it
+    assert np.linalg.norm(apart, axis=1).max() <= 2 * rough * ACCURACY
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
