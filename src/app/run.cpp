@@ -254,8 +254,8 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
   return check;
 }
 
-/// Where the last step has the points, or the skin of a model that is nowhere whole; on rank 0.
-/// Collective.
+/// Positions of the points at the last step, or of the skin alone where no rank holds the whole
+/// model; on rank 0. Collective.
 std::vector<Vec3> Run::positions(const Writer& writer) const {
   return job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
 }

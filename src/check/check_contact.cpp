@@ -81,7 +81,7 @@ class Bodies {
   double distance(int32_t body, const Vec3& beside) const {
     return shapes_[body].distance(beside, reach);
   }
-  /// The same for a mesh by the solver's cubic B-spline, on a grid that has one of its points, or
+  /// Distance to a mesh by the solver's cubic B-spline, on a grid that has one of its points, or
   /// the middle of a cell, at the point.
   double smoothed_distance(int32_t body, const Vec3& beside, bool in_cell) const {
     if (!is_mesh(body)) return distance(body, beside);

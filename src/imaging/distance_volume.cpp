@@ -67,7 +67,7 @@ class ClosestPoints {
            Vec3f(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
   }
 
-  /// Whether the point is the closest so far.
+  /// True if the point is the closest so far.
   bool offer(int64_t voxel, const Index& at, const Vec3f& point) {
     const float squared = (point - place(at)).squaredNorm();
     if (!(squared < squared_[voxel])) return false;

@@ -14,7 +14,7 @@ using surface::Surface;
 /// + T).
 Volume distance_volume(const Surface& surface, double voxel, double margin, double reach);
 
-/// The same in the voxels of a grid whose values are positive, 0 in the others.
+/// Distances in the voxels of a grid whose values are positive, 0 in the others.
 Volume distance_volume(const Surface& surface, Volume grid, double reach);
 
 }  // namespace repose::imaging

@@ -132,7 +132,7 @@ struct DistanceTree::Tree {
     return ids;
   }
 
-  /// The same for a segment along an axis, whose box is a line: without the tree for rays.
+  /// Triangles that a segment along an axis meets; its box is a line, so no tree for rays is built.
   std::vector<Leaf::Id> meeting_along_axis(const Segment3& segment) const {
     std::vector<Leaf::Id> ids;
     TriangleTree::Box line;

@@ -30,7 +30,7 @@ struct Face {
 /// over the bones that move and a margin, without the scan's ends and with no hole in it, remeshed,
 /// its angles below 22° widened where that can be, and then drawn along its normals to the given
 /// triangles, whose offsets within the tolerance are averaged over an edge, so that noise is not
-/// followed. Throws InputError where the outer skin is nowhere in the regions or near the bones.
+/// followed. Throws InputError if no outer skin is in the regions or near the bones.
 Face solvable_face(const Surface& given, const FaceRequest& request);
 
 /// An edge for a head of this size, mm: a seventieth of the surface's bounding diagonal, 2 to 8.
