@@ -1,7 +1,7 @@
 # cmake --install, find_package(Repose) for programs of one's own, and Debian packages by cpack.
 include(CMakePackageConfigHelpers)
 
-set(rooms base scene volume surface imaging meshtools model mechanics discrete linear check solve results adapt app)
+set(rooms base scene volume surface imaging meshtools anatomy model mechanics discrete linear check solve results adapt app)
 list(TRANSFORM rooms PREPEND repose_ OUTPUT_VARIABLE libraries)
 foreach(room ${rooms})
   set_target_properties(repose_${room} PROPERTIES EXPORT_NAME ${room})

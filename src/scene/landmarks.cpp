@@ -262,4 +262,21 @@ std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file)
   return named;
 }
 
+std::string markups_text(const std::map<std::string, Vec3>& landmarks) {
+  std::string points;
+  int number = 0;
+  for (const auto& [name, at] : landmarks)
+    points += fmt::format(
+        "{}        {{\"id\": \"{}\", \"label\": \"{}\", \"position\": [{:.4f}, {:.4f}, {:.4f}], "
+        "\"positionStatus\": \"defined\"}}",
+        points.empty() ? "" : ",\n", ++number, name, at.x(), at.y(), at.z());
+  return "{\n"
+         "  \"@schema\": \"https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/"
+         "Markups/Resources/Schema/markups-schema-v1.0.3.json#\",\n"
+         "  \"markups\": [\n    {\n      \"type\": \"Fiducial\",\n"
+         "      \"coordinateSystem\": \"LPS\",\n      \"coordinateUnits\": \"mm\",\n"
+         "      \"controlPoints\": [\n" +
+         points + "\n      ]\n    }\n  ]\n}\n";
+}
+
 }  // namespace repose::scene

@@ -27,4 +27,8 @@ std::vector<Landmark> read_landmarks(const std::filesystem::path& file);
 /// The same by name; of a name that comes twice the last.
 std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file);
 
+/// The text of a .mrk.json file of these landmarks (LPS, mm), as 3D Slicer's Markups module reads
+/// it.
+std::string markups_text(const std::map<std::string, Vec3>& landmarks);
+
 }  // namespace repose::scene

@@ -1,0 +1,24 @@
+#pragma once
+#include "repose/base/geometry.h"
+#include "repose/surface/surface.h"
+
+namespace repose::anatomy {
+
+/// The frame of a head: its x axis points to the patient's left at right angles to the midsagittal
+/// plane, y back, z up, as LPS does for a head without tilt. The origin is in that plane.
+struct HeadFrame {
+  Mat3 axes = Mat3::Identity();  ///< rows: left, back and up in the coordinates of the scan
+  Vec3 origin = Vec3::Zero();    ///< mm
+
+  Vec3 to_frame(const Vec3& point) const { return axes * (point - origin); }
+  Vec3 to_scan(const Vec3& point) const { return axes.transpose() * point + origin; }
+  /// The frame turned about its x axis so that the segment from `low` to `high` (mm, in the scan)
+  /// is upright.
+  HeadFrame upright(const Vec3& low, const Vec3& high) const;
+};
+
+/// Fits the midsagittal plane of a skull: the plane in which its mirror image lies nearest to it,
+/// by iterated closest points over the nearest two thirds. Pitch stays that of the scan.
+HeadFrame fit_head_frame(const surface::Surface& skull);
+
+}  // namespace repose::anatomy

@@ -1,0 +1,32 @@
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+
+/// Standard names of the landmarks of a head.
+namespace repose::scene {
+
+using Landmarks = std::map<std::string, Vec3>;  ///< standard name → position, mm, LPS
+
+/// One landmark that has a standard name.
+struct LandmarkName {
+  std::string name;                  ///< as files of this project have it
+  std::string meaning;               ///< one phrase, for tables
+  std::vector<std::string> aliases;  ///< other spellings that are understood, lower case
+  bool on_skin;
+};
+
+/// All landmarks with a standard name, from above to below, bone first.
+const std::vector<LandmarkName>& landmark_names();
+
+/// The standard name that a spelling stands for ("ANS", "labrale superius", "Pog'"); empty where it
+/// stands for none. Upper and lower case, blanks, hyphens and underscores are alike.
+std::string standard_name(const std::string& spelling);
+
+/// Landmarks under their standard names; those without one keep theirs. InputError naming `file`
+/// where two spellings of one landmark have different positions.
+Landmarks with_standard_names(const Landmarks& landmarks, const std::string& file);
+
+}  // namespace repose::scene

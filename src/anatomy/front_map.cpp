@@ -1,0 +1,110 @@
+#include "front_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace repose::anatomy {
+namespace {
+
+constexpr double nothing = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame, double spacing)
+    : spacing_(spacing) {
+  std::vector<Vec3> points;
+  points.reserve(surface.points.size());
+  for (const Vec3& p : surface.points) points.push_back(frame.to_frame(p));
+  Vec3 low = Vec3::Constant(nothing), high = -low;
+  for (const Vec3& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  low_ = {low.x() - spacing, low.z() - spacing};
+  columns_ = static_cast<int64_t>((high.x() - low.x()) / spacing) + 3;
+  rows_ = static_cast<int64_t>((high.z() - low.z()) / spacing) + 3;
+  depth_.assign(columns_ * rows_, nothing);
+  for (const Triangle& t : surface.triangles) draw({points[t[0]], points[t[1]], points[t[2]]});
+}
+
+void FrontMap::draw(const std::array<Vec3, 3>& corner) {
+  const auto flat = [&](int k) {
+    return Eigen::Vector2d((corner[k].x() - low_.x()) / spacing_ - 0.5,
+                           (corner[k].z() - low_.y()) / spacing_ - 0.5);
+  };
+  const Eigen::Vector2d a = flat(0), b = flat(1), c = flat(2), u = b - a, v = c - a;
+  const Eigen::Vector2d low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+  const double area = u.x() * v.y() - u.y() * v.x();
+  if (std::abs(area) < 1e-12) return;
+  for (auto row = static_cast<int64_t>(std::ceil(low.y())); static_cast<double>(row) <= high.y();
+       ++row)
+    for (auto column = static_cast<int64_t>(std::ceil(low.x()));
+         static_cast<double>(column) <= high.x(); ++column) {
+      const Eigen::Vector2d w =
+          Eigen::Vector2d(static_cast<double>(column), static_cast<double>(row)) - a;
+      const double s = (w.x() * v.y() - w.y() * v.x()) / area,
+                   t = (u.x() * w.y() - u.y() * w.x()) / area;
+      if (s < -1e-9 || t < -1e-9 || s + t > 1 + 1e-9) continue;
+      const double y =
+          corner[0].y() + s * (corner[1].y() - corner[0].y()) + t * (corner[2].y() - corner[0].y());
+      cell(column, row) = std::min(cell(column, row), y);
+    }
+}
+
+std::optional<double> FrontMap::depth(double x, double z) const {
+  const auto column = static_cast<int64_t>(std::floor((x - low_.x()) / spacing_));
+  const auto row = static_cast<int64_t>(std::floor((z - low_.y()) / spacing_));
+  if (column < 0 || column >= columns_ || row < 0 || row >= rows_) return std::nullopt;
+  const double y = depth_[row * columns_ + column];
+  return y < nothing ? std::optional(y) : std::nullopt;
+}
+
+std::optional<double> FrontMap::foremost(double x, double z, double half_width) const {
+  std::optional<double> best;
+  for (double at = x - half_width; at <= x + half_width; at += spacing_)
+    if (const auto y = depth(at, z); y && (!best || *y < *best)) best = y;
+  return best;
+}
+
+std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double half_width) const {
+  std::vector<ProfilePoint> points;
+  for (double z = std::max(from_z, low_z()); z <= std::min(to_z, high_z()); z += spacing_)
+    if (const auto y = foremost(0, z, half_width)) points.emplace_back(*y, z);
+  return points;
+}
+
+std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
+                                                const ProfilePoint& a, const ProfilePoint& b,
+                                                double from_z, double to_z, int sign) {
+  const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
+  const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
+  std::optional<ProfilePoint> best;
+  double most = -nothing;
+  for (const ProfilePoint& p : profile) {
+    const double distance = sign * ahead.dot(p - a);
+    if (p.y() < from_z || p.y() > to_z || !(distance > most)) continue;
+    most = distance;
+    best = p;
+  }
+  return best;
+}
+
+std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile, double from_z,
+                                        double to_z) {
+  constexpr double flat = 0.25;  // mm
+  const auto best = farthest_from_chord(profile, {0, 0}, {0, 1}, from_z, to_z, 1);
+  if (!best) return best;
+  double low = best->y(), high = low;
+  for (const ProfilePoint& p : profile)
+    if (p.y() >= from_z && p.y() <= to_z && p.x() <= best->x() + flat) {
+      low = std::min(low, p.y());
+      high = std::max(high, p.y());
+    }
+  ProfilePoint middle = *best;
+  for (const ProfilePoint& p : profile)
+    if (std::abs(p.y() - (low + high) / 2) < std::abs(middle.y() - (low + high) / 2)) middle = p;
+  return middle;
+}
+
+}  // namespace repose::anatomy

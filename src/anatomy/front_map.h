@@ -1,0 +1,51 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "repose/anatomy/head_frame.h"
+#include "repose/surface/surface.h"
+
+namespace repose::anatomy {
+
+/// A point of a profile in the midsagittal plane of a head frame, mm: y backwards, z up.
+using ProfilePoint = Eigen::Vector2d;
+
+/// Depth of a surface as seen from in front: for each cell of a grid in the frontal plane of a head
+/// frame the foremost y, mm. Holes and inner walls of a raw surface do not matter.
+class FrontMap {
+ public:
+  /// Cells of `spacing` mm over all of the surface.
+  FrontMap(const surface::Surface& surface, const HeadFrame& frame, double spacing = 0.5);
+
+  /// The foremost y at a place of the frontal plane; nothing where no surface is behind it.
+  std::optional<double> depth(double x, double z) const;
+  /// The foremost y over the cells within `half_width` of x; nothing where there is none.
+  std::optional<double> foremost(double x, double z, double half_width) const;
+
+  double low_z() const { return low_.y(); }
+  double high_z() const { return low_.y() + spacing_ * static_cast<double>(rows_); }
+  double spacing() const { return spacing_; }
+
+  /// The foremost points within `half_width` of the midline between two heights, from below.
+  std::vector<ProfilePoint> profile(double from_z, double to_z, double half_width) const;
+
+ private:
+  void draw(const std::array<Vec3, 3>& corner);
+  double& cell(int64_t column, int64_t row) { return depth_[row * columns_ + column]; }
+
+  double spacing_;
+  Eigen::Vector2d low_;  // x, z of the lowest corner, mm
+  int64_t columns_ = 0, rows_ = 0;
+  std::vector<double> depth_;  // ∞ where there is nothing
+};
+
+/// The point of a profile between two heights that lies farthest in front of the line through `a`
+/// and `b` (behind it with sign −1); nothing where the profile has no point there.
+std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
+                                                const ProfilePoint& a, const ProfilePoint& b,
+                                                double from_z, double to_z, int sign);
+/// The foremost point of a profile between two heights; of a flat stretch its middle.
+std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile, double from_z,
+                                        double to_z);
+
+}  // namespace repose::anatomy

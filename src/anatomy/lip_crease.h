@@ -1,0 +1,30 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "front_map.h"
+
+namespace repose::anatomy {
+
+/// The line between the lips as seen from in front.
+struct LipCrease {
+  std::vector<Vec3> points;  ///< in the frame, from the right corner to the left, every spacing
+  bool open = false;         ///< the lips do not touch: the line runs through the middle of the gap
+  double gap = 0;            ///< mm, the widest
+};
+
+/// How far, mm, the skin at a place lies behind the mean of that 4 mm above and below it; nothing
+/// where one of the three has no skin.
+std::optional<double> crease_depth(const FrontMap& skin, double x, double z);
+
+/// The height of the middle of the gap between open lips, within 12 mm of z; nothing where there is
+/// none wider than 1.5 mm.
+std::optional<double> open_mouth(const FrontMap& skin, double z);
+
+/// Follows the crease from the midline to both sides, beginning at height `z`, until it is
+/// shallower than a quarter of its depth in the middle over 2.5 mm, or to x = `right` and `left`
+/// where these are given.
+LipCrease follow_crease(const FrontMap& skin, double z, std::optional<double> right,
+                        std::optional<double> left);
+
+}  // namespace repose::anatomy

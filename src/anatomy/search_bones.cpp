@@ -1,0 +1,171 @@
+#include <algorithm>
+#include <cmath>
+
+#include "search.h"
+
+namespace repose::anatomy {
+namespace {
+
+constexpr double midline = 2;         // mm, half width of a profile of bone
+constexpr double incisors = 7;        // mm, half width of the front teeth
+constexpr double condyle_depth = 9;   // mm below its top
+constexpr double condyle_reach = 12;  // mm before and behind its top
+constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
+constexpr double dentate = 32;        // mm, height of a symphysis with teeth at least
+
+/// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell within the
+/// incisors' width that is no farther than `reach` from depth `y`.
+std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, double from_z, double to_z, double y,
+                               double reach) {
+  std::optional<Vec3> edge;
+  for (double x = -incisors; x <= incisors; x += map.spacing()) {
+    std::optional<Vec3> end;
+    for (double z = from_z; sign * (to_z - z) >= 0; z += sign * map.spacing()) {
+      const auto depth = map.depth(x, z);
+      if (depth && std::abs(*depth - y) <= reach)
+        end = Vec3(x, *depth, z);
+      else if (end)
+        break;
+    }
+    if (end && (!edge || sign * (end->z() - edge->z()) > 0)) edge = end;
+  }
+  if (edge) edge->x() = 0;  // of whichever tooth, in the midsagittal plane
+  return edge;
+}
+
+void search_symphysis(const FrontMap& map, Search& search) {
+  const auto profile = map.profile(map.low_z(), map.high_z(), midline);
+  if (profile.empty()) {
+    for (const char* name : {"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"})
+      search.lack(name, "MANDIBLE has no bone at the midline");
+    return;
+  }
+  const double low = profile.front().y(), front = foremost_of(profile, low, map.high_z())->x();
+  search.put("menton_bone", Vec3(0, profile.front().x(), low));
+  const auto menton = *search.find("menton_bone");
+  if (const auto edge = tooth_edge(map, 1, menton.z() + 5, map.high_z(), front + 6, 12))
+    search.put("lower_incisor_edge", *edge);
+  const auto edge = search.profile_point("lower_incisor_edge");
+  if (!edge) return search.lack("lower_incisor_edge", "no bone above the chin at the midline");
+  const double height = edge->y() - menton.z();
+  if (height < dentate)
+    search.remark(fmt::format(
+        "MANDIBLE is {:.0f} mm high at the chin, {:.0f} mm or more with teeth: it may be "
+        "edentulous, and lower_incisor_edge the crest of the bone",
+        height, dentate));
+  const auto chin = foremost_of(profile, menton.z(), menton.z() + 0.45 * height);
+  search.put("pogonion_bone", chin, "no chin");
+  const auto pogonion = *search.profile_point("pogonion_bone");
+  search.put("b_point",
+             farthest_from_chord(profile, pogonion, *edge, pogonion.y() + 0.1 * height,
+                                 edge->y() - 0.2 * height, -1),
+             "no bone between pogonion and the lower incisors");
+}
+
+void search_condyle(const std::vector<Vec3>& points, int side, Search& search) {
+  const std::string name = side > 0 ? "left" : "right";
+  double front = INFINITY, back = -INFINITY;
+  for (const Vec3& p : points) {
+    front = std::min(front, p.y());
+    back = std::max(back, p.y());
+  }
+  const double from = back - rear * (back - front);
+  const auto aside = [&](const Vec3& p) { return side * p.x() > 15; };
+  const Vec3* top = nullptr;
+  const Vec3* angle = nullptr;
+  for (const Vec3& p : points) {
+    if (!aside(p)) continue;
+    if (p.y() >= from && (!top || p.z() > top->z())) top = &p;
+    if (!angle || p.y() - p.z() > angle->y() - angle->z()) angle = &p;
+  }
+  if (!top || !angle)
+    return search.lack(fmt::format("condyle_{}_center", name),
+                       fmt::format("MANDIBLE has no {} ramus", name));
+  Vec3 low = *top, high = *top;
+  for (const Vec3& p : points)
+    if (aside(p) && p.z() >= top->z() - condyle_depth &&
+        std::abs(p.y() - top->y()) <= condyle_reach) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  search.put(fmt::format("condyle_{}_center", name), (low + high) / 2);
+  search.put(fmt::format("gonion_{}", name), *angle);
+}
+
+/// The height of the nasal floor: the median over columns beside the septum of where the nasal
+/// opening begins, seen from in front, above the incisors' edge.
+std::optional<double> nasal_floor(const FrontMap& map, const ProfilePoint& edge) {
+  constexpr double inner = 3, outer = 8, drop = 6, over = 2;  // mm
+  constexpr double lowest = 12, highest = 50;                 // mm above the edge
+  std::vector<double> heights;
+  for (double aside = inner; aside <= outer; aside += map.spacing())
+    for (const int side : {-1, 1})
+      for (double z = edge.y() + lowest; z <= edge.y() + highest; z += map.spacing()) {
+        const auto below = map.depth(side * aside, z - over), here = map.depth(side * aside, z);
+        if (below && here && *here - *below < drop) continue;
+        if (below) heights.push_back(z - over / 2);
+        break;
+      }
+  if (heights.empty()) return std::nullopt;
+  std::nth_element(heights.begin(), heights.begin() + heights.size() / 2, heights.end());
+  return heights[heights.size() / 2];
+}
+
+/// Nasal spine, point A and nasion, by the skull's profile above the incisors.
+void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search& search) {
+  constexpr double near = 3;  // mm, of the spine to the nasal floor's height
+  const auto profile = map.profile(edge.y(), map.high_z(), midline);
+  const auto floor = nasal_floor(map, edge);
+  if (!floor) {
+    for (const char* name : {"nasal_spine", "a_point", "nasion_bone"})
+      search.lack(name, "SKULL has no nasal opening above the upper incisors");
+    return;
+  }
+  std::optional<ProfilePoint> deepest;
+  for (const ProfilePoint& p : profile)
+    if (p.y() > *floor && p.y() < *floor + 25 && (!deepest || p.x() > deepest->x())) deepest = p;
+  search.put(
+      "nasal_spine",
+      farthest_from_chord(profile, edge, deepest.value_or(ProfilePoint(edge.x(), *floor + 10)),
+                          *floor - near, *floor + near, 1),
+      "SKULL has no bone at the nasal floor");
+  const auto spine = search.profile_point("nasal_spine");
+  if (spine)
+    search.put("a_point",
+               farthest_from_chord(profile, edge, *spine, edge.y() + 9, spine->y() - 4, -1),
+               "SKULL has no bone between the nasal spine and the upper incisors");
+  const auto bridge = foremost_of(profile, *floor + 15, *floor + 45);
+  const auto brow =
+      bridge ? foremost_of(profile, bridge->y() + 20, bridge->y() + 38) : std::nullopt;
+  if (!brow) return search.lack("nasion_bone", "SKULL ends below the glabella");
+  search.put("nasion_bone",
+             farthest_from_chord(profile, *bridge, *brow, bridge->y() + 5, brow->y() - 3, -1),
+             "SKULL ends below the glabella");
+}
+
+void search_upper_jaw(const FrontMap& map, Search& search) {
+  constexpr double reach = 18, above = 14;  // mm, from the lower incisors
+  const auto lower = search.find("lower_incisor_edge");
+  if (!lower) return search.lack("upper_incisor_edge", "the lower incisors were not found");
+  const auto middle = map.foremost(0, lower->z() + above, midline);
+  if (middle && std::abs(*middle - lower->y()) <= reach)
+    if (const auto edge =
+            tooth_edge(map, -1, lower->z() + above, lower->z() - 2 * above, *middle, reach / 2))
+      search.put("upper_incisor_edge", *edge);
+  const auto edge = search.profile_point("upper_incisor_edge");
+  if (edge) return search_nasal_opening(map, *edge, search);
+  for (const char* name : {"upper_incisor_edge", "nasal_spine", "a_point", "nasion_bone"})
+    search.lack(name, "SKULL has no bone in front, 14 mm above the lower incisors");
+}
+
+}  // namespace
+
+void search_bones(const surface::Surface& skull, const surface::Surface& mandible, Search& search) {
+  search_symphysis(FrontMap(mandible, search.frame()), search);
+  std::vector<Vec3> points;
+  for (const Vec3& p : mandible.points) points.push_back(search.frame().to_frame(p));
+  for (const int side : {-1, 1}) search_condyle(points, side, search);
+  search_upper_jaw(FrontMap(skull, search.frame()), search);
+}
+
+}  // namespace repose::anatomy

@@ -1,0 +1,170 @@
+#include <algorithm>
+#include <cmath>
+
+#include "lip_crease.h"
+#include "search.h"
+
+namespace repose::anatomy {
+namespace {
+
+constexpr double skin_midline = 1;  // mm, half width of the skin's profile
+
+/// The height of the deepest crease of the skin near the edge of the upper incisors.
+std::optional<double> crease_height(const FrontMap& skin, double edge) {
+  constexpr double below = 10, above = 7;  // mm
+  if (const auto gap = open_mouth(skin, edge)) return gap;
+  std::optional<double> height;
+  double most = -INFINITY;
+  for (double z = edge - below; z <= edge + above; z += skin.spacing()) {
+    double sum = 0;
+    int count = 0;
+    for (const double x : {-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0})
+      if (const auto depth = crease_depth(skin, x, z)) {
+        sum += *depth;
+        ++count;
+      }
+    if (count < 4 || !(sum / count > most)) continue;
+    most = sum / count;
+    height = z;
+  }
+  return height;
+}
+
+void search_mouth(const FrontMap& skin, Search& search) {
+  const auto edge = search.find("upper_incisor_edge"), known = search.find("stomion");
+  std::optional<double> z;
+  if (known)
+    z = known->z();
+  else if (edge)
+    z = crease_height(skin, edge->z());
+  const auto x_of = [&](const char* name) {
+    const auto place = search.find(name);
+    return place ? std::optional(place->x()) : std::nullopt;
+  };
+  LipCrease crease;
+  if (z) crease = follow_crease(skin, *z, x_of("mouth_right"), x_of("mouth_left"));
+  if (!z && edge) crease = follow_crease(skin, edge->z(), {}, {});
+  if (crease.points.size() < 3) {
+    for (const char* name : {"stomion", "mouth_right", "mouth_left"})
+      search.lack(name, edge ? "SKIN has no crease between lips near the upper incisors"
+                             : "the upper incisors were not found");
+    return;
+  }
+  const auto middle = std::min_element(
+      crease.points.begin(), crease.points.end(),
+      [](const Vec3& a, const Vec3& b) { return std::abs(a.x()) < std::abs(b.x()); });
+  search.put("stomion", Vec3(0, middle->y(), middle->z()));
+  search.put("mouth_right", crease.points.front());
+  search.put("mouth_left", crease.points.back());
+  if (crease.open)
+    search.remark(fmt::format(
+        "the mouth is open in SKIN, by up to {:.1f} mm: stomion and corners are those of the gap",
+        crease.gap));
+}
+
+void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
+  const auto nasion = search.find("nasion_bone"), spine = search.find("nasal_spine");
+  if (!spine) {
+    for (const char* name : {"pronasale", "subnasale", "nasion_soft"})
+      search.lack(name, "the nasal spine was not found");
+    return;
+  }
+  const double top = nasion ? nasion->z() : spine->z() + 45;
+  search.put("pronasale", foremost_of(profile, spine->z() - 10, top), "SKIN has no nose");
+  const auto tip = search.profile_point("pronasale");
+  const auto brow = foremost_of(profile, top + 8, top + 30);
+  if (!tip || !brow) return search.lack("nasion_soft", "SKIN ends below the glabella");
+  search.put("nasion_soft", farthest_from_chord(profile, *tip, *brow, top - 12, top + 12, -1),
+             "SKIN ends below the glabella");
+}
+
+void search_lips(const std::vector<ProfilePoint>& profile, Search& search) {
+  const auto tip = search.profile_point("pronasale"), stomion = search.profile_point("stomion"),
+             spine = search.profile_point("nasal_spine");
+  const auto chin = search.profile_point("pogonion_soft");
+  if (!tip || !stomion || !spine) {
+    for (const char* name : {"subnasale", "upper_lip", "lower_lip", "b_soft"})
+      search.lack(name, "nose or mouth was not found");
+    return;
+  }
+  const double s = stomion->y();
+  const auto first = foremost_of(profile, s + 2, s + 0.6 * (tip->y() - s));
+  if (first)
+    search.put("subnasale",
+               farthest_from_chord(profile, *first, *tip, first->y() + 2, tip->y() - 3, -1), "");
+  const auto base = search.profile_point("subnasale");
+  if (base)
+    search.put("upper_lip", farthest_from_chord(profile, *stomion, *base, s + 2, base->y() - 3, 1),
+               "SKIN has no upper lip");
+  if (!base) search.lack("subnasale", "SKIN has no base of the nose");
+  if (!chin) return search.lack("lower_lip", "the chin was not found");
+  const auto lip = foremost_of(profile, s - 14, s - 2);
+  if (!lip) return search.lack("lower_lip", "SKIN has no lower lip");
+  search.put("b_soft", farthest_from_chord(profile, *chin, *lip, chin->y() + 3, lip->y() - 3, -1),
+             "SKIN has no sulcus between lower lip and chin");
+  const auto sulcus = search.profile_point("b_soft");
+  search.put("lower_lip",
+             farthest_from_chord(profile, sulcus.value_or(*chin), *stomion,
+                                 std::max(s - 16, sulcus ? sulcus->y() + 2 : 0), s - 2, 1),
+             "SKIN has no lower lip");
+}
+
+void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::Surface& skin,
+                      Search& search) {
+  constexpr double around = 3, above = 9;  // mm
+  const auto menton = search.find("menton_bone"), chin = search.find("pogonion_bone");
+  if (!menton || !chin) {
+    for (const char* name : {"pogonion_soft", "menton_soft"})
+      search.lack(name, "the chin of MANDIBLE was not found");
+    return;
+  }
+  search.put("pogonion_soft", foremost_of(profile, chin->z() - above, chin->z() + above),
+             "SKIN has no chin");
+  std::optional<Vec3> below;
+  for (const Vec3& point : skin.points) {
+    const Vec3 p = search.frame().to_frame(point);
+    if (std::abs(p.x() - menton->x()) > around || std::abs(p.y() - menton->y()) > around) continue;
+    if (p.z() < menton->z() && (!below || p.z() > below->z())) below = p;
+  }
+  if (below)
+    search.put("menton_soft", Vec3(0, menton->y(), below->z()));
+  else
+    search.lack("menton_soft", "SKIN has no point below menton");
+}
+
+}  // namespace
+
+void search_skin(const surface::Surface& skin, Search& search) {
+  const FrontMap map(skin, search.frame());
+  const auto profile = map.profile(map.low_z(), map.high_z(), skin_midline);
+  search_mouth(map, search);
+  search_nose_tip(profile, search);
+  search_soft_chin(profile, skin, search);
+  search_lips(profile, search);
+}
+
+std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame& frame,
+                                  const Landmarks& landmarks) {
+  constexpr double apart = 2;  // mm
+  Search search(frame, landmarks);
+  const FrontMap map(skin, frame);
+  const auto right = search.find("mouth_right"), left = search.find("mouth_left"),
+             stomion = search.find("stomion"), edge = search.find("upper_incisor_edge");
+  std::optional<double> z;
+  if (stomion)
+    z = stomion->z();
+  else if (right && left)
+    z = crease_height(map, (right->z() + left->z()) / 2 + 1);
+  else if (edge)
+    z = crease_height(map, edge->z());
+  if (!z) return {};
+  const LipCrease crease = follow_crease(map, *z, right ? std::optional(right->x()) : std::nullopt,
+                                         left ? std::optional(left->x()) : std::nullopt);
+  std::vector<Vec3> path;
+  for (const Vec3& p : crease.points)
+    if (path.empty() || p.x() - frame.to_frame(path.back()).x() >= apart)
+      path.push_back(frame.to_scan(p));
+  return path;
+}
+
+}  // namespace repose::anatomy

@@ -1,0 +1,116 @@
+#include "repose/scene/landmark_names.h"
+
+#include <algorithm>
+
+#include "repose/base/error.h"
+#include "repose/base/text.h"
+
+namespace repose::scene {
+
+const std::vector<LandmarkName>& landmark_names() {
+  static const std::vector<LandmarkName> names{
+      {"nasion_bone", "nasion", {"nasion", "n", "na"}, false},
+      {"nasal_spine", "anterior nasal spine", {"anterior nasal spine", "ans", "sp"}, false},
+      {"a_point", "point A", {"a", "point a", "subspinale", "ss"}, false},
+      {"upper_incisor_edge",
+       "edge of the upper incisors",
+       {"upper incisal edge", "upper incisor", "u1", "is"},
+       false},
+      {"lower_incisor_edge",
+       "edge of the lower incisors",
+       {"lower incisal edge", "lower incisor", "l1", "ii"},
+       false},
+      {"b_point", "point B", {"b", "point b", "supramentale", "sm"}, false},
+      {"pogonion_bone", "pogonion", {"pogonion", "pog", "pg"}, false},
+      {"menton_bone", "menton", {"menton", "me"}, false},
+      {"condyle_right_center",
+       "center of the right condyle",
+       {"condyle right", "right condyle", "condylion right", "co r"},
+       false},
+      {"condyle_left_center",
+       "center of the left condyle",
+       {"condyle left", "left condyle", "condylion left", "co l"},
+       false},
+      {"gonion_right", "right gonion", {"right gonion", "go r"}, false},
+      {"gonion_left", "left gonion", {"left gonion", "go l"}, false},
+      {"nasion_soft", "nasion of the skin", {"nasion'", "n'", "soft nasion"}, true},
+      {"pronasale", "tip of the nose", {"prn", "pn"}, true},
+      {"subnasale", "base of the nose", {"sn"}, true},
+      {"upper_lip", "labrale superius", {"labrale superius", "ls", "upper lip point"}, true},
+      {"stomion", "point where the lips meet", {"sto", "stm", "st"}, true},
+      {"lower_lip", "labrale inferius", {"labrale inferius", "li", "lower lip point"}, true},
+      {"mouth_right",
+       "right corner of the mouth",
+       {"mouth corner right", "right mouth corner", "cheilion right", "ch r"},
+       true},
+      {"mouth_left",
+       "left corner of the mouth",
+       {"mouth corner left", "left mouth corner", "cheilion left", "ch l"},
+       true},
+      {"b_soft",
+       "mentolabial sulcus",
+       {"b'", "si", "sublabiale", "sl", "mentolabial sulcus"},
+       true},
+      {"pogonion_soft",
+       "pogonion of the skin",
+       {"pogonion'", "pog'", "pg'", "soft pogonion", "soft tissue pogonion"},
+       true},
+      {"menton_soft",
+       "menton of the skin",
+       {"menton'", "me'", "soft menton", "soft tissue menton"},
+       true}};
+  return names;
+}
+
+namespace {
+
+/// Lower case, with single blanks between words and ' for a prime.
+std::string plain(const std::string& text) {
+  constexpr std::string_view prime = "\xE2\x80\xB2";
+  const std::string small = base::lower(text);
+  std::string result;
+  bool blank = false;
+  for (size_t i = 0; i < small.size(); ++i) {
+    const bool primed = std::string_view(small).substr(i).starts_with(prime);
+    const char c = primed ? '\'' : small[i];
+    if (primed) i += prime.size() - 1;
+    if (std::string_view(" _-.\t").find(c) != std::string_view::npos) {
+      blank = !result.empty();
+      continue;
+    }
+    if (blank) result.push_back(' ');
+    blank = false;
+    result.push_back(c);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string standard_name(const std::string& spelling) {
+  const std::string wanted = plain(spelling);
+  for (const LandmarkName& landmark : landmark_names()) {
+    if (plain(landmark.name) == wanted) return landmark.name;
+    const auto& aliases = landmark.aliases;
+    if (std::find(aliases.begin(), aliases.end(), wanted) != aliases.end()) return landmark.name;
+  }
+  return "";
+}
+
+Landmarks with_standard_names(const Landmarks& landmarks, const std::string& file) {
+  constexpr double same = 1e-3;  // mm
+  Landmarks renamed;
+  std::map<std::string, std::string> spelling;
+  for (const auto& [name, position] : landmarks) {
+    const std::string standard = standard_name(name), key = standard.empty() ? name : standard;
+    const auto [entry, added] = renamed.try_emplace(key, position);
+    if (!added && (entry->second - position).norm() > same)
+      base::refuse("{}: landmarks {} and {} are both {}, {:.1f} mm apart; remove one of them", file,
+                   base::shown(spelling[key]), base::shown(name), key,
+                   (entry->second - position).norm());
+    spelling[key] = name;
+  }
+  return renamed;
+}
+
+}  // namespace repose::scene

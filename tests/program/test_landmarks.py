@@ -1,0 +1,61 @@
+"""repose-landmarks from outside: what it writes, what it says of odd heads, and its measured error."""
+
+import json
+import re
+import sys
+
+import pytest
+
+from conftest import PROJECT, finish, programs
+
+MESHES = PROJECT / "meshes"
+SURFACES = [MESHES / "head_skin.ply", "-skull", MESHES / "head_skull.ply", "-mandible",
+            MESHES / "head_mandible.ply"]
+
+
+def points(file):
+    markup, = json.loads(file.read_text())["markups"]
+    assert markup["coordinateSystem"] == "LPS"
+    return {point["label"]: point["position"] for point in markup["controlPoints"]}
+
+
+def test_writes_landmarks_and_a_picture(run, tmp_path):
+    result = run("repose-landmarks", *SURFACES, "-output", "head.mrk.json")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    found = points(tmp_path / "head.mrk.json")
+    assert len(found) == 23
+    assert found["mouth_left"][0] > 10 > -10 > found["mouth_right"][0]
+    assert (tmp_path / "head.svg").read_text().startswith("<svg")
+    assert "remark: the mouth is open in SKIN" in result.stdout
+
+
+def test_known_landmarks_are_kept(run, tmp_path):
+    result = run("repose-landmarks", *SURFACES, "-landmarks", MESHES / "head_landmarks.json")
+    assert result.returncode == 0, result
+    known = json.loads((MESHES / "head_landmarks.json").read_text())
+    assert points(tmp_path / "landmarks.mrk.json")["pronasale"] == pytest.approx(known["pronasale"])
+    mean, most = re.search(r"of ([\d.]+) mm in the mean, ([\d.]+) mm at most", result.stdout).groups()
+    assert float(mean) < 3 and float(most) < 6
+
+
+@pytest.mark.parametrize("arguments, line", [
+    ([SURFACES[0]], "-skull FILE is required: the surface of the skull"),
+    ([SURFACES[0], "-skull", SURFACES[4], "-mandible", SURFACES[2]],
+     "give the skull and the mandible in this order"),
+])
+def test_refuses_in_one_line(run, tmp_path, arguments, line):
+    result = run("repose-landmarks", *arguments)
+    assert result.returncode == 1 and line in result.stderr and result.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_measures_its_error(environment, tmp_path):
+    pytest.importorskip("scipy")
+    page = tmp_path / "page.md"
+    page.write_text("<!-- phantoms -->\n<!-- end of phantoms -->\n<!-- real head -->\n"
+                    "<!-- end of real head -->\n")
+    result = finish([sys.executable, str(PROJECT / "tests/benchmark/landmarks.py"), "-bin",
+                     str(programs()), "-heads", "2", "-output", str(page)], tmp_path, environment, 60)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    mean, most = re.search(r"\*\*all\*\* \| \d+ \| ([\d.]+) \| ([\d.]+) \|", page.read_text()).groups()
+    assert float(mean) < 4 and float(most) < 15
