@@ -24,7 +24,8 @@ base::Option from_key(const char* name, const char* path) {
           .help = key.sentence,
           .range = key.range,
           .unit = key.unit,
-          .choices = key.choices};
+          .choices = key.choices,
+          .removed = key.removed};
 }
 
 /// What is computed, and how near.

@@ -28,11 +28,10 @@ solve::Settings spring_settings(const scene::Solve& wanted) {
   const VolumeTerm volume = wanted.volume.value_or(force ? VolumeTerm::none : VolumeTerm::penalty);
   if (force && volume != VolumeTerm::none && volume != VolumeTerm::paper)
     base::refuse(
-        "functional force takes volume none or paper, not {}: a penalty or a constraint belongs to "
-        "the energy; choose -functional energy or another -volume",
+        "functional force takes volume none or paper, not {}: a penalty belongs to the energy; "
+        "choose -functional energy or another -volume",
         word(volume));
-  if (volume == VolumeTerm::penalty || volume == VolumeTerm::exact)
-    settings.weights = {1, volume, wanted.bulk_modulus.value()};
+  if (volume == VolumeTerm::penalty) settings.weights = {1, volume, wanted.bulk_modulus.value()};
   if (volume == VolumeTerm::paper) settings.weights = {wanted.lambda, volume, 1 - wanted.lambda};
   return settings;
 }

@@ -26,10 +26,8 @@ struct Obstacle {
 };
 
 std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
-  const bool exact = s.settings.weights.volume == scene::VolumeTerm::exact;
   return {
       {.given = is_force(s), .what = "the functional is force"},
-      {.given = exact, .what = "the volume term is exact"},
       {.given = options.has("restart"),
        .what = "the run goes on from another result",
        .to_path = true},
@@ -101,10 +99,6 @@ void choose_coarse(const Wish& wish, const std::string& obstacle, const Job& job
 void require_contact_kept(const Strategy& s, const Job& job) {
   if (!job.touches) return;
   const char* remedy = "leave contact and sliding instruments out of the scene";
-  if (s.settings.weights.volume == scene::VolumeTerm::exact)
-    base::refuse(
-        "volume exact does not keep tissue out of what it touches; choose volume penalty, or {}",
-        remedy);
   if (is_force(s))
     base::refuse(
         "functional force does not keep tissue out of what it touches; choose functional energy, "

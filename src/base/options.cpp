@@ -282,6 +282,8 @@ void Options::check_values(const Option& option, const std::vector<std::string>&
            option.values == 1 ? "" : "s", wanted(option));
   for (const std::string& value : values) {
     if (is_valid(option, value)) continue;
+    if (const auto removed = option.removed.find(value); removed != option.removed.end())
+      refuse("{}: -{} no longer takes {}; {}", program_, option.name, value, removed->second);
     const bool words = option.kind == OptionKind::choice;
     refuse("{}: -{} {} must be {}{}", program_, option.name, shown(value), wanted(option),
            words ? fmt::format("; did you mean {}?", nearest(value, option.choices)) : "");

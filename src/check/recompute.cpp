@@ -48,11 +48,7 @@ class Recomputation {
  public:
   Recomputation(const model::Model& model, const model::StepNumbers& claimed,
                 const model::StepRows& rows)
-      : model_(model),
-        claimed_(claimed),
-        x_(rows.position),
-        pressure_(rows.pressure),
-        fields_(rows.point_fields) {}
+      : model_(model), claimed_(claimed), x_(rows.position), fields_(rows.point_fields) {}
 
   RecomputedStep run() {
     elastic_ = claimed_.volume == VolumeTerm::paper ? claimed_.lambda : 1.0;
@@ -96,7 +92,6 @@ class Recomputation {
   const model::Model& model_;
   const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
-  const std::vector<double>& pressure_;  // [M] or empty
   const std::vector<model::PointField>& fields_;
   double elastic_ = 1;                  // weight of f
   double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
@@ -350,9 +345,6 @@ void Recomputation::prism(int64_t j) {
   } else if (claimed_.volume == VolumeTerm::penalty) {
     slope = kappa * change / v0;
     curvature = kappa / v0;
-  } else if (!pressure_.empty()) {
-    slope = -pressure_[j];
-    curvature = kappa / v0;  // the pressure itself is κ (t − v)/v_0
   }
   const std::array<Vec3, 6> toward = volume_gradient(corners, extent);
   for (int c = 0; c < 6; ++c) {
@@ -411,7 +403,6 @@ void Recomputation::force_functional_gradient() {
 }
 
 void Recomputation::gradient() {
-  step_.gradient_known = claimed_.volume != VolumeTerm::exact || !pressure_.empty();
   if (claimed_.functional == model::Functional::energy)
     for (size_t i = 0; i < x_.size(); ++i) {
       gradient_[i] -= elastic_ * step_.rows.residual_force[i];

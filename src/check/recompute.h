@@ -24,13 +24,11 @@ struct RecomputedStep {
   double stretch_scale = 0;
   Recomputed f_e, potential, f_f, f_v, penalty, objective, gradient_max, volume_error_max;
   int64_t inverted_prisms = 0;  ///< v ≤ 0, of those with a soft-tissue point
-  bool gradient_known = true;   ///< false for volume "exact" without its pressures
 };
 
 /// Computes a step again by plain serial loops over the whole model, sharing with the solver only
 /// the formulas of spring_law.h and prism_geometry.h. Of `claimed` it takes what defines the
-/// objective: functional, volume, lambda, bulk_modulus, epsilon; of `rows`, all of them: position
-/// and, with volume "exact", pressure.
+/// objective: functional, volume, lambda, bulk_modulus, epsilon; of `rows`, the position.
 RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
                          const model::StepRows& rows);
 

@@ -20,15 +20,6 @@ double tension(const model::Springs& springs, int64_t e, double elongation) {
   });
 }
 
-/// [owned prisms] N/mm²; none where nothing is free to move.
-std::vector<double> owned_pressures(Objective& objective) {
-  std::vector<double> owned(objective.positions().part().owned_prisms, 0.0);
-  const std::vector<double> pressure = pressures(objective);
-  for (int64_t e = 0; e < objective.prisms().counted; ++e)
-    owned[objective.prisms().row[e]] = pressure[e];
-  return owned;
-}
-
 const double* numbers(std::span<const Vec3> points) {
   return points.empty() ? nullptr : points.data()->data();
 }
@@ -186,9 +177,7 @@ void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& r
   rows.tension = bring(springs_, values);
 }
 
-void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
-                             model::StepRows& rows) const {
-  const auto position = objective.positions().local();
+void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Prisms& prisms = part_.model.prisms;
   std::vector<double> ratio(part_.owned_prisms);
   for (int64_t e = 0; e < part_.owned_prisms; ++e) {
@@ -197,7 +186,6 @@ void NaturalRows::add_prisms(Objective& objective, bool with_pressure,
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
   rows.volume_ratio = bring(prisms_, ratio);
-  if (with_pressure) rows.pressure = bring(prisms_, owned_pressures(objective));
 }
 
 void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
@@ -232,12 +220,12 @@ void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const
   rows.point_fields.push_back(field("contact_force", state.force));
 }
 
-model::StepRows NaturalRows::rows(Objective& objective, bool with_pressure) const {
+model::StepRows NaturalRows::rows(Objective& objective) const {
   const auto position = objective.positions().local();
   model::StepRows rows;
   rows.position = natural(position);
   rows.residual_force = natural(objective.residual_force());
-  add_prisms(objective, with_pressure, rows);
+  add_prisms(position, rows);
   add_springs(position, rows);
   if (part_.solid) add_stress(position, rows);
   if (part_.contact) add_contact(objective, rows);

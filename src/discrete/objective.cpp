@@ -259,19 +259,6 @@ mechanics::Totals Objective::totals() const {
   return t;
 }
 
-std::vector<double> pressures(Objective& objective) {
-  const mechanics::PrismLoop& prisms = objective.prisms();
-  const auto position = objective.positions().local();
-  std::vector<double> pressure;
-  for (int64_t e = 0; e < prisms.size(); ++e) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
-    const double change = prisms.target_volume[e] - mechanics::prism_volume(corners.data());
-    pressure.push_back(objective.weights().volume_weight * change / prisms.rest_volume[e]);
-  }
-  return pressure;
-}
-
 ContactState contact_state(Objective& objective) {
   constexpr double looked_at = 6;  // mm
   const auto points = static_cast<size_t>(objective.positions().part().owned_points);

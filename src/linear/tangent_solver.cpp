@@ -149,11 +149,8 @@ void TangentSolver::renew(Vec displacement) {
   renew_preconditioner();
 }
 
-void TangentSolver::give_way() { given_way_ = is_columns(preconditioner()); }
-
 bool TangentSolver::hopeless() const {
-  const bool slow = given_way_ || (columns_ && lag_.hopeless());
-  return slow && !factors_ && unknowns_ <= factors_limit;
+  return columns_ && lag_.hopeless() && !factors_ && unknowns_ <= factors_limit;
 }
 
 void TangentSolver::renew_preconditioner() {

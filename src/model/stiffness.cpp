@@ -141,11 +141,9 @@ double missing_bulk_modulus(double shear, double poisson) {
 
 double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
                             const Model& model) {
-  constexpr double strict = 10;  // where an exact volume starts
   if (tissue.isotropic)
     return missing_bulk_modulus(tissue.isotropic->young / (2 * (1 + tissue.isotropic->poisson)),
                                 tissue.isotropic->poisson);
-  if (solve.volume == scene::VolumeTerm::exact) return strict * effective_modulus(model);
   constexpr double evenly = 15;  // 1/⟨u_x² u_y²⟩ over all directions u
   return missing_bulk_modulus(effective_modulus(model) / evenly, solve.poisson);
 }

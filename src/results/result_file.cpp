@@ -398,7 +398,7 @@ void ResultFile::State::settle_last() {
 void ResultFile::State::write_step(const model::StepNumbers& numbers, const model::StepRows& rows) {
   const base::Hdf5Group step = create_group(file, group_of(loads.size()));
   on_disk([&] { model::for_each_number(numbers, WriteAttribute{step}); });
-  counts.pressure = numbers.volume == model::VolumeTerm::exact || counts.stress;
+  counts.pressure = counts.stress;
   write_points(step, rows);
   write_elements(step, rows);
   moved.push_back(write_bones(step, numbers.load));

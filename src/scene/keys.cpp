@@ -357,11 +357,14 @@ std::vector<Key> solve_keys() {
        .sentence =
            "Form of the volume term; when not given penalty, and none with functional force, which "
            "takes none or paper only.",
-       .choices = {"none", "paper", "penalty", "exact"}},
+       .choices = {"none", "paper", "penalty"},
+       .removed =
+           {{"exact",
+             "for tissue that keeps its volume remove the volume term and solve a solid with "
+             "tissue.material {poisson: 0.499, dilatation: nodal}, or give penalty"}}},
       {"solve.volume.bulk_modulus", number, "",
-       "Bulk modulus κ of the penalty, and that exact starts with; when not given by poisson, or "
-       "for exact 10 × the tissue's effective modulus.",
-       "N/mm²", Range{.min = 0, .max = 1e9, .min_excluded = true}},
+       "Bulk modulus κ of the penalty; when not given by poisson.", "N/mm²",
+       Range{.min = 0, .max = 1e9, .min_excluded = true}},
       {"solve.volume.poisson", number, "0.45",
        "Poisson's ratio that springs, whose own is 1/4, are to have by the penalty; "
        "bulk_modulus overrides it.",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "repose/base/text.h"
 
@@ -75,8 +76,10 @@ std::vector<std::pair<std::string, Value>> Value::texts() const {
 }
 
 int Value::choice() const {
-  const std::vector<std::string>& choices = find_key(path_).choices;
+  const auto& [choices, removed] = std::tie(find_key(path_).choices, find_key(path_).removed);
   const std::string word = node_.IsScalar() ? node_.Scalar() : std::string{};
+  if (const auto old = removed.find(word); old != removed.end())
+    refuse("no longer takes {}; {}", word, old->second);
   const auto found = std::find(choices.begin(), choices.end(), word);
   if (found == choices.end())
     refuse("must be {}, it is {}; the nearest is {}", wanted(find_key(path_)), shown(),

@@ -11,7 +11,6 @@
 
 #include "contact_search.h"
 #include "exact_penetration.h"
-#include "exact_volume.h"
 #include "pierced_columns.h"
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
@@ -27,15 +26,12 @@ using model::VolumeTerm;
 
 namespace {
 
-bool is_exact(const Settings& settings) { return settings.weights.volume == VolumeTerm::exact; }
-
 /// What a state amounts to.
 void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
   const bool solid = objective.positions().part().solid;
-  const bool kappa = weights.volume == VolumeTerm::penalty || weights.volume == VolumeTerm::exact;
-  if (kappa && !solid) numbers.bulk_modulus = weights.volume_weight;
+  if (weights.volume == VolumeTerm::penalty) numbers.bulk_modulus = weights.volume_weight;
   numbers.f_e = totals.term_energy +
                 (solid ? totals.solid_energy + totals.fixed_energy : totals.spring_energy);
   numbers.potential = objective.potential();
@@ -61,7 +57,7 @@ model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& se
   n.lambda = settings.weights.elastic;
   measure(objective, n);
   // What is fixed stores energy, too, that no search knows of.
-  const bool whole = is_exact(settings) || objective.positions().part().solid;
+  const bool whole = objective.positions().part().solid;
   const double contact = std::isfinite(n.contact_energy) ? n.contact_energy : 0;
   n.objective = whole ? n.f_e + n.potential + contact : outcome.objective;
   n.gradient_max = outcome.gradient_max;
@@ -143,14 +139,10 @@ class Searcher {
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                        minimiser_, std::ref(watcher_));
     if (contact_) contact_->find_other_rest(settings.finds_other_rest);
-    if (is_exact(settings))
-      exact_volume_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
-                            minimiser_);
   }
 
   RestSearch& search() {
     if (force_search_) return *force_search_;
-    if (exact_volume_) return *exact_volume_;
     if (contact_) return *contact_;
     return minimiser_;
   }
@@ -170,7 +162,6 @@ class Searcher {
   Watcher watcher_;
   Minimiser minimiser_;
   std::optional<ForceSearch> force_search_;
-  std::optional<ExactVolume> exact_volume_;
   std::optional<ContactSearch> contact_;
   int64_t looks_ = 0;  // evaluations for those who look at a state
 };
@@ -191,7 +182,7 @@ void show_states(Searcher& searcher, const Settings& settings,
       outcome.reason = "the search is under way";
       model::StepNumbers numbers = numbers_of(objective, settings, outcome, i.load);
       numbers.epsilon = searcher.epsilon();
-      receive(numbers, natural.rows(objective, is_exact(settings)));
+      receive(numbers, natural.rows(objective));
     });
   });
 }
@@ -300,7 +291,7 @@ class Steps {
     last.seconds = seconds;
     last.evaluations = searcher_.evaluations() - evaluations_;
     evaluations_ = searcher_.evaluations();
-    model::StepRows rows = natural_.rows(objective, is_exact(settings_));
+    model::StepRows rows = natural_.rows(objective);
     if (stability && !std::isnan(stability->spectrum.smallest))
       rows.point_fields.push_back(natural_.field("stability_mode", stability->mode));
     receive_(last, rows);

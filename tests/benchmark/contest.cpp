@@ -124,7 +124,7 @@ Task read_task(const std::string& file) {
   results::StoredStep last = results::read_step(file, steps - 1, task.model);
   const model::StepNumbers& numbers = last.numbers;
   using model::VolumeTerm;
-  if (numbers.functional != model::Functional::energy || numbers.volume == VolumeTerm::exact)
+  if (numbers.functional != model::Functional::energy)
     base::refuse(
         "{}: functional {}, volume {}: the contest takes an energy with volume none, paper, "
         "penalty or material",

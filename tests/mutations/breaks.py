@@ -149,12 +149,6 @@ BREAKS = [
     ),
     # volume and stability
     (
-        "volume kept to a hundredth",
-        "pressure[e] / weight);",
-        "0.5 * pressure[e] / weight);",
-        f"{SOLVE}exact_volume",
-    ),
-    (
         "springs of the wrong volume",
         "constexpr int springs_of_prism = 15;",
         "constexpr int springs_of_prism = 9;",

@@ -1,21 +1,16 @@
-"""The force functional and exact volume: where they must meet the energy and the penalty, what the
-result says of them, and what is refused."""
+"""The force functional: where it must meet the energy, what the result holds, and what is refused."""
 
-import shutil
-
-import h5py
 import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from conftest import PROJECT
-from tissue import Tissue, apart, last, model_of, prism_volumes, steps, write_model
+from tissue import Tissue, apart, last, model_of, steps
 
 ADVANCE, OPENING = "paper_jaw_advance.yaml", "paper_jaw_opening.yaml"
 SMALL = {ADVANCE: ("[0, -6, 0]", "[0, -1, 0]"), OPENING: ("angle: 8", "angle: 1")}
 # tissue.release reaches as far as where bones move by 4 mm and more
 RELEASED = ("  layers: 4 ", "  release: 40\n  layers: 4 ")
-VOLUME_TOLERANCE = 1e-6  # of |v/v0 - 1| with volume exact
 
 
 @pytest.fixture(scope="module")
@@ -95,110 +90,22 @@ def test_first_order_force_that_runs_out_of_steps_says_so(run, tmp_path):
     assert last(tmp_path / "short.h5")["converged"] == 0
 
 
-@pytest.mark.parametrize("volume", ["penalty", "exact"])
-def test_force_takes_neither_penalty_nor_constraint(run, tmp_path, volume):
+def test_force_takes_no_penalty(run, tmp_path):
     result = run("repose-solve", PROJECT / "meshes" / ADVANCE, "-functional", "force",
-                 "-volume", volume)
+                 "-volume", "penalty")
     assert result.returncode == 1
-    assert len(result.stderr.splitlines()) == 1 and f"not {volume}" in result.stderr
+    assert len(result.stderr.splitlines()) == 1 and "not penalty" in result.stderr
     assert not list(tmp_path.glob("*.h5*"))
 
 
-@pytest.fixture(scope="module")
-def exact(solved):
-    """The jaw advance with exact volume."""
-    return solved(ADVANCE, "-volume", "exact")
-
-
-def test_exact_volume_keeps_every_prism(exact):
-    step, model = last(exact), model_of(exact)
-    prisms = model["prism/points"]
-    within = (model["point/set"] == 0)[prisms].any(1)
-    ratio = prism_volumes(step["point/position"], prisms)[0] / model["prism/rest_volume"]
-    assert np.abs(ratio[within] - 1).max() <= VOLUME_TOLERANCE
-    assert step["volume_error_max"] <= VOLUME_TOLERANCE and step["volume"] == b"exact"
-
-
-def test_exact_volume_ends_where_a_path_of_smaller_steps_does(solved, exact):
-    """A step that was refused leaves nothing behind that leads the next ones astray."""
-    slowly = last(solved(ADVANCE, "-volume", "exact", "-load_steps", 12))
-    assert apart(last(exact), slowly) <= last(exact)["displacement_error"] + 0.01
-
-
-def test_pressures_balance_the_springs(exact):
-    step, model = last(exact), model_of(exact)
-    force = step["point/residual_force"].copy()
-    slopes = prism_volumes(step["point/position"], model["prism/points"])[1]
-    np.add.at(force, model["prism/points"], step["prism/pressure"][:, None, None] * slopes)
-    soft = model["point/set"] == 0
-    left = np.linalg.norm(force[soft], axis=1).max()
-    largest = np.linalg.norm(step["point/residual_force"], axis=1).max()
-    assert largest > 100
-    assert left < 1e-8 * largest and step["gradient_max"] < 1e-8 * largest
-
-
-def test_check_knows_pressures(run, exact, tmp_path):
-    assert run("repose-check", exact).returncode == 0
-    with h5py.File(shutil.copy(exact, tmp_path / "tampered.h5"), "r+") as h5:
-        pressure = h5["step"][max(h5["step"])]["prism/pressure"]
-        values = pressure[()]
-        row = np.abs(values).argmax()
-        values[row] *= 1 + 1e-6
-        pressure[...] = values
-    result = run("repose-check", tmp_path / "tampered.h5")
-    assert result.returncode == 1
-    assert len(result.stderr.splitlines()) == 1 and "gradient_max" in result.stderr
-
-
-def test_stiffer_penalties_tend_to_exact_volume(solved, small):
-    """Positions and volumes do as 1/κ, the pressures of a nearly locked mesh more slowly."""
-    scene = small(ADVANCE, False)
-    exact = last(solved(scene, "-volume", "exact", "-accuracy", 1e-5))
-    errors = []
-    for kappa in (1e4, 1e5, 1e6):
-        step = last(solved(scene, "-bulk_modulus", kappa, "-accuracy", 1e-6))
-        pressure = kappa * (1 - step["prism/volume_ratio"])
-        off = np.linalg.norm(pressure - exact["prism/pressure"])
-        errors.append((apart(step, exact), step["volume_error_max"],
-                       off / np.linalg.norm(exact["prism/pressure"])))
-    for before, after in zip(errors, errors[1:]):
-        assert after[0] < 0.3 * before[0] and after[1] < 0.3 * before[1], errors
-        assert after[2] < 0.7 * before[2], errors
-
-
-def closed_box(file):
-    """One free point within held ones, whose lid comes down: the volume has nowhere to go."""
-    grid = [(i, j, a) for i in range(3) for j in range(3) for a in range(3)]
-    row = {place: n for n, place in enumerate(grid)}
-    x = np.array([(5.0 * i, 5.0 * j, -4.0 * a) for i, j, a in grid])
-    centre = row[1, 1, 1]
-    springs = np.array([(centre, p) for p in range(27) if p != centre])
-    prisms = np.array([[row[k, m, a] for k, m in t] + [row[k, m, a + 1] for k, m in t]
-                       for i in range(2) for j in range(2) for a in range(2)
-                       for t in ([(i, j), (i, j + 1), (i + 1, j)],
-                                 [(i + 1, j), (i, j + 1), (i + 1, j + 1)])])
-    sets = np.full(27, 3, dtype="i1")
-    sets[centre] = 0
-    return write_model(file, {
-        "gravity": np.zeros(3), "point/position": x, "point/set": sets,
-        "point/target": np.where((sets == 3)[:, None], x * (1, 1, 0.9), x),
-        "point/layer": np.array([a for _, _, a in grid], dtype="i4"),
-        "point/column": np.array([3 * i + j for i, j, _ in grid]),
-        "point/bone": np.full(27, -1, dtype="i4"),
-        "spring/points": springs, "spring/set": np.zeros(26, dtype="i4"),
-        "spring/rest_length": np.linalg.norm(x[springs[:, 1]] - x[centre], axis=1),
-        "spring/stiffness": np.ones(26), "spring/exponent": np.full(26, 2, dtype="i1"),
-        "spring/reference": np.ones(26), "spring_set": np.array([b"all"]),
-        "prism/points": prisms, "prism/rest_volume": prism_volumes(x, prisms)[0]})
-
-
-def test_a_squeeze_without_room_ends_in_words(run, tmp_path):
-    result = run("repose-solve", closed_box(tmp_path / "box.h5"), "-volume", "exact",
-                 "-output", "squeezed")
-    assert result.returncode == 2, result
-    assert "NOT CONVERGED" in result.stdout and "volume cannot be kept" in result.stdout
-    step = last(tmp_path / "squeezed.h5")
-    assert step["converged"] == 0 and b"volume cannot be kept" in step["reason"]
+def test_the_removed_volume_term_names_its_replacement(run, tmp_path):
+    scene = tmp_path / "old.yaml"
+    text = (PROJECT / "meshes" / ADVANCE).read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")
+    scene.write_text(text.replace("form: penalty", "form: exact"))
+    for place, *options in ((PROJECT / "meshes" / ADVANCE, "-volume", "exact"), (scene,)):
+        result = run("repose-solve", place, *options)
+        assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+        assert "no longer takes exact" in result.stderr and "poisson: 0.499" in result.stderr
 
 
 def test_stability_is_reported_when_asked_for(run, small, tmp_path):

@@ -62,7 +62,7 @@ REFUSED = {
     "first depth": ("  depths_mm: [1, 2]", "", "must begin with 0"),
     "isotropic": ("  springs: {isotropic: {young: 1, poisson: 0.45}, default: {modulus: 1}}", "",
                   "exclude each other"),
-    "volume": ("", "solve: {volume: {form: exact}}", "the tissue is a solid"),
+    "volume": ("", "solve: {volume: {form: penalty}}", "the tissue is a solid"),
     "functional": ("", "solve: {functional: force}", "the tissue is a solid"),
     "tearing": ("", "forces: [{at: [47, -80, 8], radius: 6, force: [0, -3, 0]}]\n"
                     "tearing: {limit: 0.5}", "the tissue is a solid"),

@@ -66,32 +66,6 @@ def test_the_stiffness_is_renewed_where_the_search_has_slowed(solved):
     assert apart(last(solved(*far)), last(once)) <= 2 * ACCURACY
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """The jaw advance, so small that the volume can be kept by any method."""
-    text = (PROJECT / "meshes" / ADVANCE).read_text().replace("[0, -6, 0]", "[0, -0.3, 0]")
-    scene = tmp_path_factory.mktemp("small") / "small.yaml"
-    scene.write_text(text.replace(": paper_", f": {PROJECT}/meshes/paper_"))
-    return scene
-
-
-EXACT = "-volume", "exact", "-accuracy", 1e-3
-
-
-def test_lmvm_from_the_stiffness_keeps_volumes(solved, small):
-    default, other = (last(solved(small, *EXACT, *more)) for more in ((), STIFFNESS))
-    assert apart(default, other) <= 2e-3 and other["volume_error_max"] < 1e-6
-
-
-def test_exact_volume_keeps_a_chosen_preconditioner_until_it_is_worn_out(run, small, tmp_path):
-    """Only the multigrid on columns gives way, to factors, where tissue keeps its volume."""
-    result = run("repose-solve", small, *EXACT, *FACTORS, "-log_view", ":log")
-    assert (result.returncode, result.stderr) == (0, ""), result
-    hessians = int(re.search(r"(\d+) of the Hessian", result.stdout)[1])
-    made = int(re.search(r"^PCRenew +(\d+)", (tmp_path / "log").read_text(), re.M)[1])
-    assert 0 < made < hessians / 2
-
-
 @pytest.mark.parametrize("method, prefix", [("ntr", "tao_ntr_"), ("bntr", "tao_bnk_")])
 def test_a_method_that_overwrites_memory_is_refused(run, method, prefix):
     scene = PROJECT / "meshes" / ADVANCE

@@ -29,6 +29,8 @@ struct Option {
   std::string unit{};        ///< number
   /// choice: the words allowed; number, integer: words that may stand in place of the number.
   std::vector<std::string> choices{};
+  std::map<std::string, std::string>
+      removed{};   ///< words of earlier versions: what to give instead
   int values = 1;  ///< how many values follow the name
 };
 

@@ -9,8 +9,8 @@ namespace repose::check {
 
 /// Compares every number of a stored step with what the model and the stored positions make of it:
 /// positions of the points that are not unknown with `motion`, all else with recompute(). What only
-/// the run itself knows (iterations, evaluations, seconds, displacement_error, and gradient_max
-/// with volume "exact") is checked for its range.
+/// the run itself knows (iterations, evaluations, seconds, displacement_error) is checked for
+/// its range.
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
                 const model::StepNumbers& numbers, const model::StepRows& rows,
                 const std::vector<Vec3>& displacement, base::Comparison& comparison);

@@ -14,7 +14,7 @@ class NaturalRows {
   NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
 
   /// The arrays of a step at the objective's last update.
-  model::StepRows rows(Objective& objective, bool with_pressure = false) const;
+  model::StepRows rows(Objective& objective) const;
 
   /// The arrays of a raised part's model, as it is now.
   static model::ModelRows of_model(MPI_Comm comm, const RaisedPart& raised);
@@ -46,7 +46,7 @@ class NaturalRows {
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_contact(Objective& objective, model::StepRows& rows) const;
-  void add_prisms(Objective& objective, bool with_pressure, model::StepRows& rows) const;
+  void add_prisms(std::span<const Vec3> position, model::StepRows& rows) const;
 
   MPI_Comm comm_;
   const Part& part_;

@@ -75,10 +75,6 @@ class Objective : public Function {
   std::vector<Vec3> work_;        // [local points]
 };
 
-/// The pressure κ (t − v)/v_0 in each prism of the objective's loop, N/mm², compression positive,
-/// at the last update. Not collective.
-std::vector<double> pressures(Objective& objective);
-
 /// What points touch at the objective's last update, [owned points].
 struct ContactState {
   std::vector<double> gap;       ///< mm, the smallest; what is looked at at most where none is

@@ -82,9 +82,7 @@ class TangentSolver {
   /// Takes the Hessian's present contact into the preconditioner, where that is multigrid.
   void update_contact();
   bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
-  /// Multigrid gives way to factors at the next renewal: tissue will be nearly incompressible.
-  void give_way();
-  int64_t renewals() const { return renewals_; }  ///< of the preconditioner
+  int64_t renewals() const { return renewals_; }           ///< of the preconditioner
 
  private:
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
@@ -109,7 +107,6 @@ class TangentSolver {
   int64_t unknowns_;  // scalar, of all ranks
   std::unique_ptr<ColumnMultigrid> columns_;
   PcHandle factors_;  // in the place of columns_
-  bool given_way_ = false;
   KspHandle krylov_;
   base::VecHandle next_;             // the Newton step at a trial
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of

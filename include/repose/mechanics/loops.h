@@ -71,7 +71,6 @@ using model::VolumeTerm;
 /// prism's v − t with t its target volume:
 ///     paper     weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)
 ///     penalty   weight ½ (v − t)² / v_0     (weight = κ)
-///     exact     likewise; multipliers move t from v_0
 ///     material  likewise of a solid         (weight = 1: its prisms have moduli of their own)
 struct Weights {
   double elastic = 1;  ///< λ of `paper`, else 1

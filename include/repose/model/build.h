@@ -123,7 +123,7 @@ double effective_modulus(const Model& model);
 /// κ (N/mm²) of the volume term where a scene of springs names none: what springs lack in bulk
 /// modulus for Poisson's ratio `solve.poisson`, or that of the isotropic solid. Springs of modulus
 /// Y in all directions have the shear modulus Y/15, so that ν = 0.45 makes 8/15 Y of the effective
-/// modulus Y. An exact volume starts with 10 Y.
+/// modulus Y.
 double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
                             const Model& model);
 

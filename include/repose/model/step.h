@@ -96,7 +96,7 @@ struct StepRows {
   std::vector<Vec3> position;        ///< mm
   std::vector<Vec3> residual_force;  ///< N
   std::vector<double> volume_ratio;
-  /// N/mm², compression positive; with volume "exact" and of a solid, else empty.
+  /// N/mm², compression positive; of a solid, else empty.
   std::vector<double> pressure;
   std::vector<Vec3> stretch;      ///< principal stretches of a solid, largest first; else empty
   std::vector<double> von_mises;  ///< N/mm², of a solid; else empty

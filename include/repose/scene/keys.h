@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,8 @@ struct Key {
   std::string unit{};
   base::Range range{};                 ///< of a number, or of each of several
   std::vector<std::string> choices{};  ///< words; for a number those that may stand in its place
+  std::map<std::string, std::string>
+      removed{};  ///< words of earlier versions: what to give instead
 
   bool required() const { return standard == "required"; }
 };

@@ -168,11 +168,11 @@ enum class Rim { fixed, free, automatic };
 enum class Functional { energy, force };
 /// Of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no scene's:
 /// its moduli say how it keeps its volume.
-enum class VolumeTerm { none, paper, penalty, exact, material };
+enum class VolumeTerm { none, paper, penalty, material };
 /// As scenes, options and results spell them.
 inline constexpr std::array<std::string_view, 2> words(Functional) { return {"energy", "force"}; }
-inline constexpr std::array<std::string_view, 5> words(VolumeTerm) {
-  return {"none", "paper", "penalty", "exact", "material"};
+inline constexpr std::array<std::string_view, 4> words(VolumeTerm) {
+  return {"none", "paper", "penalty", "material"};
 }
 template <class Choice>
 constexpr std::string_view word(Choice choice) {

@@ -20,7 +20,7 @@ using Look = std::function<void(const Receiver&)>;
 
 /// What is asked of a run.
 struct Settings {
-  mechanics::Weights weights;  ///< the objective; for exact volume the penalty it starts with
+  mechanics::Weights weights;                                ///< the objective
   model::Functional functional = model::Functional::energy;  ///< what is minimised
   base::Stages* stages = nullptr;        ///< of which "distribute" and "solve" are ended
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it

@@ -107,7 +107,7 @@ forces:
   - {at: [1, 2, 3], radius: 5, force: [0, 0, -2]}
 solve:
   functional: force
-  volume: {form: exact, bulk_modulus: 0.1}
+  volume: {form: paper, bulk_modulus: 0.1}
   lambda: 1
   accuracy: 1e-3
   load_steps: 8
@@ -175,7 +175,7 @@ TEST(Scene, FullRest) {
   EXPECT_EQ(scene.forces[0].radius, 5);
   EXPECT_EQ(scene.forces[0].force, Vec3(0, 0, -2));
   EXPECT_EQ(scene.solve.functional, Functional::force);
-  EXPECT_EQ(scene.solve.volume, VolumeTerm::exact);
+  EXPECT_EQ(scene.solve.volume, VolumeTerm::paper);
   EXPECT_EQ(scene.solve.bulk_modulus, 0.1);
   EXPECT_EQ(scene.solve.lambda, 1);
   EXPECT_EQ(scene.solve.accuracy, 1e-3);
@@ -425,7 +425,7 @@ TEST(SceneRefuses, Words) {
       {"solve: {functional: forces}\n",
        "solve.functional must be one of energy, force, it is 'forces'; the nearest is force"},
       {"solve: {volume: {form: penatly}}\n",
-       "solve.volume.form must be one of none, paper, penalty, exact, it is 'penatly'; the nearest "
+       "solve.volume.form must be one of none, paper, penalty, it is 'penatly'; the nearest "
        "is penalty"},
       {"solve: {functional: [energy]}\n", "it is a list"},
   });
