@@ -13,7 +13,7 @@ install(DIRECTORY include/repose DESTINATION include)
 # Scripts find each other, and the Slicer panel the programs, by where they lie.
 install(DIRECTORY meshes examples DESTINATION share/repose)
 install(DIRECTORY drivers/ DESTINATION share/repose USE_SOURCE_PERMISSIONS
-  FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
+  FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN *.css PATTERN norms.json PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
 
 # Manual pages and bash completion, printed by the programs' own tables of options.
 foreach(program ${programs})
@@ -41,5 +41,5 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3-numpy, python3-h5py, python3-matplotlib")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3-numpy, python3-h5py")
 include(CPack)

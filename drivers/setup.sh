@@ -7,7 +7,7 @@ build_packages=(
   libeigen3-dev libcgal-dev libyaml-cpp-dev libfmt-dev
   libinsighttoolkit5-dev zlib1g-dev # volumes: DICOM, NIfTI, NRRD, MetaImage
 )
-report_packages=(python3 python3-numpy python3-h5py python3-matplotlib) # drivers/report.py
+report_packages=(python3 python3-numpy python3-h5py) # drivers/report.py
 test_packages=(
   libgtest-dev libbenchmark-dev clang-format
   python3 python3-pytest python3-numpy python3-scipy python3-h5py python3-meshio

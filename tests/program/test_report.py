@@ -1,19 +1,22 @@
-"""The page about a result: it stands alone, and its numbers are those of the result."""
+"""The planning sheet of a result: it stands alone, its numbers are those of the result, and its view
+works in a browser."""
 
 import base64
 import html.parser
-import importlib.util
 import json
 import math
 import pathlib
+import re
 import shutil
 import sys
 import xml.etree.ElementTree
+import zlib
 
 import h5py
 import numpy as np
 import pytest
 
+from browser import browse, evaluate, needs_browser
 from conftest import PROJECT, TIME_LIMIT, finish
 from tissue import last, model_of
 
@@ -88,12 +91,22 @@ def test_numbers_are_those_of_the_result(report, opened, tmp_path):
     tension = abs(step["spring/tension"]).max()
     assert page.rows["largest tension of a spring, N"] == [f"{tension:.3g}"]
     assert page.rows["springs"] == [str(len(model["spring/points"]))]
-    assert page.rows["mandible"][1].startswith("8.00° about (1, 0, 0)")
-    assert page.rows["skull"] == ["stays", "none", "0.00"]
-    assert f"{step['displacement_error']:.2g} mm" in page.text["p"]
+    place = json.loads((PROJECT / "meshes/paper_landmarks.json").read_text())["lower_incisor_edge"]
+    shift = opened_jaw(place) - place
+    assert page.rows["mandible"] == ["at the lower incisor's edge", *(
+        f"{value:.1f}".replace("-", "−") for value in (-shift[1], shift[2])), "0.0", "8.0", "0.0", "0.0"]
+    assert "Does not move: skull." in page.text["p"]
+    assert f"within {step['displacement_error']:.2g} mm of the answer" in page.text["b"]
     assert page.rows["1.00"][0] == "yes"
     assert page.rows["ranks"] == ["1"] and page.rows["program"][0].startswith("Repose ")
     assert page.rows["command"][0].endswith(f"{SCENE} -allow_folded -output {opened.with_suffix('')}")
+
+
+def opened_jaw(place):
+    """Where the scene takes a place of the jaw: 8° about the x axis."""
+    turn = np.radians(8)
+    return np.array([place[0], math.cos(turn) * place[1] - math.sin(turn) * place[2],
+                     math.sin(turn) * place[1] + math.cos(turn) * place[2]])
 
 
 def test_contact_is_told_where_there_is_any(report, opened, tmp_path):
@@ -128,33 +141,109 @@ def test_lips_that_part_are_measured(report, opened, tmp_path):
 
 def test_the_page_stands_alone(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened)
-    assert all(link.startswith("data:image/png;base64,") for link in page.links)
-    for word in ("http:", "https:", "import(", "fetch("):
-        assert word not in page.text["script"]
-    has_pictures = importlib.util.find_spec("matplotlib") is not None
-    assert len(page.links) == has_pictures
-    for link in page.links:
-        assert base64.b64decode(link.split(",")[1]).startswith(b"\x89PNG")
-    viewer = (PROJECT / "drivers/report_viewer.js").read_text()
-    assert page.text["script"].endswith(viewer) and viewer.count("\n") < 150
+    assert page.links == []
+    for word in ("import(", "fetch("):
+        assert word not in "".join((PROJECT / "drivers/web" / name).read_text()
+                                   for name in ("viewer.js", "sheet.js"))
+    text = (tmp_path / "page.html").read_text()
+    for name in ("three.js", "viewer.js", "sheet.js", "viewer.css", "sheet.css"):
+        assert (PROJECT / "drivers/web" / name).read_text() in text
+    assert "Permission is hereby granted" in text, "the licence of three.js"
+
+
+class View:
+    """What a page draws, as sheet.js unpacks it."""
+
+    def __init__(self, file):
+        text = file.read_text(encoding="utf-8")
+        self.told = json.loads(re.search(r'id="described">(.*?)</script>', text, re.S)[1])
+        packed = re.search(r'id="packed">(.*?)</script>', text, re.S)[1]
+        self.bytes = np.frombuffer(zlib.decompress(base64.b64decode(packed)), "u1")
+
+    def array(self, stored):
+        rows, columns, size = stored["rows"], stored["columns"], stored["bits"] // 8
+        part = self.bytes[stored["at"]:stored["at"] + rows * columns * size].reshape(size, -1)
+        steps = sum(part[b].astype(np.int64) << 8 * b for b in range(size)).reshape(columns, rows)
+        whole = steps.cumsum(axis=1).T % (1 << stored["bits"])
+        return stored.get("low", 0) + stored.get("step", 1) * whole
+
+    def surface(self, name):
+        (one,) = (s for s in self.told["surfaces"] if s["name"] == name)
+        states = [self.array(state) for state in one["states"]]
+        return self.array(one["triangles"]), states[0], *(states[0] + s for s in states[1:])
 
 
 def test_the_view_holds_the_head(report, opened, tmp_path):
-    stored = json.JSONDecoder().raw_decode(page_of(report, tmp_path, opened).text["script"])[0]
-    step, model = last(opened), model_of(opened)
+    page_of(report, tmp_path, opened)
+    view, step, model = View(tmp_path / "page.html"), last(opened), model_of(opened)
     skin, corners = np.unique(model["skin/points"], return_inverse=True)
+    triangles, before, after = view.surface("skin")
+    assert np.abs(before - model["point/position"][skin]).max() < 0.005
+    assert np.abs(after - step["point/position"][skin]).max() < 0.01
+    assert np.array_equal(triangles.ravel(), corners.ravel())
+    moved = np.concatenate([view.surface(name)[2] for name in ("skull", "mandible")])
+    assert np.abs(moved - step["bone_surface/points"]).max() < 0.01
 
-    def numbers(text, kind):
-        return np.frombuffer(base64.b64decode(text), kind)
 
-    def places(mesh, name):
-        return mesh["low"] + mesh["step"] * numbers(mesh[name], "<u2").reshape(-1, 3)
+def test_the_view_works_in_a_browser(report, opened, tmp_path):
+    """Faces are drawn, the two sides of the split differ, the pointer reads movements, two clicks
+    measure, and nothing is loaded."""
+    needs_browser()
+    page_of(report, tmp_path, opened, "-landmarks", MARKS)
+    found = evaluate(tmp_path / "page.html", """
+      const {viewer} = sheet, gl = viewer.three.renderer.getContext(), box =
+        viewer.element.getBoundingClientRect();
+      const columns = states => {
+        viewer.show({mode: "split", states, split: 0.5});
+        const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+        gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA,
+                      gl.UNSIGNED_BYTE, pixels);
+        return pixels;
+      };
+      viewer.look("front");
+      const same = columns([0, 0]), split = columns([0, 1]), wide = gl.drawingBufferWidth;
+      const changed = [0, 0];
+      let drawn = 0;
+      for (let i = 0; i < same.length; i += 4) {
+        drawn += same[i + 3] > 0;
+        changed[(i / 4) % wide < wide / 2 ? 0 : 1] += same[i] !== split[i];
+      }
+      const chin = viewer.surfaces[0].positions[0].length;
+      const at = (x, y) => ({clientX: box.left + x * box.width, clientY: box.top + y * box.height});
+      viewer.show({mode: "single", states: [1]});
+      const hit = viewer.pick(at(0.5, 0.75));
+      const after = viewer.surfaces[0].positions[1], before = viewer.surfaces[0].positions[0];
+      const moved = hit.at(after, 3).map((v, k) => v - hit.at(before, 3)[k]);
+      document.getElementById("measure").click();
+      sheet.measure(viewer.pick(at(0.45, 0.5)));
+      sheet.measure(viewer.pick(at(0.55, 0.5)));
+      const ends = sheet.measured.map(one => one.point);
+      sheet.color("movement");
+      return {drawn: drawn / (same.length / 4), changed, sentence: sheet.sentence(hit), moved,
+        point: hit.point, on: hit.surface.name, inside: hit.at(after, 3),
+        distance: document.getElementById("distance").textContent,
+        apart: Math.hypot(...ends[0].map((v, k) => v - ends[1][k])),
+        bar: document.getElementById("bar").textContent,
+        loaded: performance.getEntriesByType("resource").map(one => one.name)
+          .filter(name => !name.startsWith("data:") && !name.startsWith("blob:"))};
+    """)
+    assert "error" not in found, found
+    assert found["loaded"] == [] and found["drawn"] > 0.15
+    assert found["changed"][0] == 0 < found["changed"][1]
+    far = math.hypot(*found["moved"])
+    assert far > 1 and f"moves {far:.1f} mm" in found["sentence"] and "down" in found["sentence"]
+    assert np.allclose(found["point"], found["inside"], atol=1e-3)
+    assert f"after {found['apart']:.1f} mm" in found["distance"]
+    assert found["bar"].startswith("0movement, mm")
 
-    for name, points in (("before", model["point/position"]), ("after", step["point/position"])):
-        assert np.abs(places(stored["skin"], name) - points[skin]).max() < 0.005
-    assert np.array_equal(numbers(stored["skin"]["triangles"], "<u4"), corners.ravel())
-    moved = np.concatenate([places(bone, "after") for bone in stored["bones"]])
-    assert np.abs(moved - step["bone_surface/points"]).max() < 0.005
+
+def test_it_prints_on_two_pages(report, opened, tmp_path):
+    needs_browser()
+    page_of(report, tmp_path, opened, "-landmarks", MARKS)
+    browse(tmp_path / "page.html", "--virtual-time-budget=20000",
+           f"--print-to-pdf={tmp_path / 'page.pdf'}")
+    pages = re.findall(rb"/Type\s*/Page\b(?!s)", (tmp_path / "page.pdf").read_bytes())
+    assert len(pages) == 2
 
 
 def sphere(radius, middle, count):
@@ -181,12 +270,9 @@ def test_a_fine_bone_is_drawn_coarser_and_the_page_stays_small(report, opened, t
             h5[f"model/bone_surface/0/{name}"] = values
         del step["bone_surface/points"]
         step["bone_surface/points"] = np.concatenate([points, moved[other:]])
-    page = page_of(report, tmp_path, tmp_path / "fine.h5")
+    page_of(report, tmp_path, tmp_path / "fine.h5")
     assert (tmp_path / "page.html").stat().st_size < 5e6
-    bone = json.JSONDecoder().raw_decode(page.text["script"])[0]["bones"][0]
-    corners = np.frombuffer(base64.b64decode(bone["triangles"]), "<u4").reshape(-1, 3)
-    whole = np.frombuffer(base64.b64decode(bone["before"]), "<u2").reshape(-1, 3)
-    places = bone["low"] + bone["step"] * whole
+    corners, places, _ = View(tmp_path / "page.html").surface("skull")
     assert 20_000 < len(corners) <= 80_000 and corners.max() < len(places)
     assert np.abs(np.linalg.norm(places - (0, 20, 10), axis=1) - 60).max() < 0.1
 
@@ -230,6 +316,10 @@ def bent(file, copy):
     return marks
 
 
+def tenths(*values):
+    return [f"{value:.1f}".replace("-", "−") for value in values]
+
+
 def corner(one, middle, other):
     a, b = one - middle, other - middle
     return math.degrees(math.acos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
@@ -245,28 +335,28 @@ def test_landmarks_and_angles_are_right(report, opened, tmp_path):
         x, y, z = sides[1][name] - here[name]
         wanted = ["skin", *(f"{v:.2f}" for v in (-y, x, z, math.hypot(x, y, z)))]
         assert page.rows[name.replace("_", " ")] == wanted
-    convexity = [corner(p["glabella_soft"], p["subnasale"], p["pogonion_soft"]) for p in sides]
-    assert page.rows["facial convexity (glabella–subnasale–pogonion)"] == [
-        "°", *(f"{v:.2f}" for v in (*convexity, convexity[1] - convexity[0]))]
+    convexity = [180 - corner(p["glabella_soft"], p["subnasale"], p["pogonion_soft"]) for p in sides]
+    assert page.rows["facial convexity"] == [
+        "180° − angle glabella–subnasale–pogonion", "°",
+        *tenths(*convexity, convexity[1] - convexity[0]), "13.6 ± 4.2 [1]; 14.7 ± 5.1 [2]"]
     lips = [np.linalg.norm(p["upper_lip"] - p["lower_lip"]) for p in sides]
-    assert page.rows["upper lip to lower lip"][1:3] == [f"{v:.2f}" for v in lips]
+    assert page.rows["upper lip to lower lip"][2:4] == tenths(*lips)
     for lip in ("upper", "lower"):
         off = []
         for p in sides:
             line = p["pogonion_soft"] - p["pronasale"]
             away = np.cross(p[f"{lip}_lip"] - p["pronasale"], line / np.linalg.norm(line))
             off.append(-np.linalg.norm(away))  # both lips are behind the line
-        assert page.rows[f"{lip} lip in front of the E-line"][1:3] == [f"{v:.2f}" for v in off]
-    assert "nasolabial angle (pronasale–subnasale–upper lip)" in page.rows
-    assert "mentolabial angle (lower lip–sublabiale–pogonion)" in page.rows
+        assert page.rows[f"{lip} lip in front of the E-line"][2:4] == tenths(*off)
+    assert page.rows["nasolabial angle by the tip"][0] == "pronasale–subnasale–upper lip"
+    assert page.rows["mentolabial angle"][0] == "lower lip–sublabiale–pogonion"
 
 
 def test_bones_landmarks_go_with_the_bone(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened, "-landmarks", MARKS)
     marks = json.loads((PROJECT / "meshes/paper_landmarks.json").read_text())
-    at, turn = np.array(marks["pogonion_bone"]), np.radians(8)
-    to = np.array([at[0], math.cos(turn) * at[1] - math.sin(turn) * at[2],
-                   math.sin(turn) * at[1] + math.cos(turn) * at[2]])
+    at = np.array(marks["pogonion_bone"])
+    to = opened_jaw(at)
     assert page.rows["pogonion bone"] == ["mandible", f"{at[1] - to[1]:.2f}", "0.00",
                                           f"{to[2] - at[2]:.2f}", f"{np.linalg.norm(to - at):.2f}"]
     assert page.rows["nasion bone"][0] == "skull"
@@ -283,7 +373,7 @@ def test_the_scene_is_shown_and_names_the_landmarks(report, opened, tmp_path):
 def test_a_bad_end_is_warned_of(report, run, tmp_path):
     assert run("repose-solve", SCENE, "-time_limit", 0, "-output", "cut").returncode == 2
     page = page_of(report, tmp_path, tmp_path / "cut.h5")
-    assert "NOT CONVERGED" in page.text["p"] and "did not reach its accuracy" in page.text["p"]
+    assert "NOT FINISHED" in page.text["b"] and "did not reach its accuracy" in page.text["p"]
 
 
 def test_mistakes_are_one_line(report, opened, tmp_path):

@@ -1,0 +1,117 @@
+"""Colors or a photograph of a mesh of the skin, for the face that is shown: PLY with colors, OBJ with
+colors or a texture."""
+
+import base64
+import pathlib
+import re
+
+import numpy as np
+
+from sheet.result import Unusable
+from sheet.shown_skin import Skin, nearest
+
+LARGEST_IMAGE = 2_000_000  # bytes: the page must stay below 5 MB
+TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+         "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+         "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
+
+
+class Appearance:
+    """A skin to show with colors [n, 3] of its vertices, or texture coordinates and an image."""
+
+    def __init__(self, skin, colors=None, uv=None, image=None):
+        self.skin, self.colors, self.uv, self.image = skin, colors, uv, image
+
+    def arrays(self):
+        named = {"colors": self.colors, "uv": self.uv}
+        return {name: np.asarray(values, float) for name, values in named.items()
+                if values is not None}
+
+
+def read_appearance(file, skin):
+    """The appearance that a mesh file gives the shown skin; None where it has none."""
+    ending = pathlib.Path(file).suffix.lower()
+    if ending == ".ply":
+        points, colors = read_ply(file)
+        return None if colors is None else Appearance(skin, colors[nearest(points, skin.before)])
+    return read_obj(file, skin) if ending == ".obj" else None
+
+
+def read_ply(file):
+    """Points and colors of the vertices, None where it has no colors."""
+    head, _, body = pathlib.Path(file).read_bytes().partition(b"end_header\n")
+    lines = head.decode("ascii", "replace").replace("\r", "").splitlines()
+    at = [i for i, line in enumerate(lines) if line.startswith("element")]
+    if not at or not lines[at[0]].startswith("element vertex"):
+        return None, None
+    count = int(lines[at[0]].split()[2])
+    columns = [line.split()[1:] for line in lines[at[0] + 1:(at + [len(lines)])[1]]
+               if line.startswith("property")]
+    names = [column[-1] for column in columns]
+    if not {"red", "green", "blue"} <= set(names):
+        return None, None
+    if "format ascii 1.0" in lines:
+        rows = np.array([line.split() for line in body.split(b"\n", count)[:count]], float)
+        vertices = {name: rows[:, k] for k, name in enumerate(names)}
+    else:
+        order = "<" if "format binary_little_endian 1.0" in lines else ">"
+        vertices = np.frombuffer(body, np.dtype([(name, order + TYPES[kind])
+                                                 for kind, name in columns]), count)
+    points, colors = (np.stack([vertices[name] for name in three], 1).astype(float)
+                      for three in (("x", "y", "z"), ("red", "green", "blue")))
+    whole = any(kind.startswith(("u", "i")) for kind, name in columns if name == "red")
+    return points, colors if whole else 255 * colors
+
+
+def read_obj(file, skin):
+    """The mesh of an OBJ file, moved with the skin, if it has colors or a texture."""
+    points, uv, faces, library = [], [], [], None
+    for line in pathlib.Path(file).read_text(errors="replace").splitlines():
+        words = line.split()
+        if not words:
+            continue
+        if words[0] == "v":
+            points.append([float(word) for word in words[1:7]])
+        elif words[0] == "vt":
+            uv.append([float(word) for word in words[1:3]])
+        elif words[0] == "f":
+            corners = [[int(n or 0) for n in word.split("/")] for word in words[1:]]
+            faces += [(corners[0], *corners[k:k + 2]) for k in range(1, len(corners) - 1)]
+        elif words[0] == "mtllib":
+            library = line.split(maxsplit=1)[1].strip()
+    image = texture(pathlib.Path(file), library) if uv and library else None
+    if image and all(len(corner) > 1 and corner[1] for face in faces for corner in face):
+        return textured(points, uv, faces, image, skin)
+    if points and len(points[0]) >= 6:
+        rows = np.array([point[:6] for point in points])
+        return Appearance(skin, 255 * rows[nearest(rows[:, :3], skin.before), 3:])
+    return None
+
+
+def texture(file, library):
+    """The image of the first map_Kd of a material library, as a data URL."""
+    described = file.parent / library
+    found = re.search(r"^\s*map_Kd\s+(.+)$", described.read_text(errors="replace"), re.M) \
+        if described.is_file() else None
+    if not found:
+        return None
+    image = file.parent / found[1].strip()
+    kind = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg"}.get(image.suffix.lower())
+    if not image.is_file() or not kind:
+        return None
+    if image.stat().st_size > LARGEST_IMAGE:
+        raise Unusable(f"{image}: {image.stat().st_size / 1e6:.1f} MB, at most "
+                       f"{LARGEST_IMAGE / 1e6:g} MB fit the page; save it smaller, as JPEG")
+    return f"data:image/{kind};base64," + base64.b64encode(image.read_bytes()).decode()
+
+
+def textured(points, uv, faces, image, skin):
+    """A vertex for each pair of place and texture coordinate."""
+    flat = np.array([[corner[:2] for corner in face] for face in faces]).reshape(-1, 2)
+    flat = np.where(flat < 0, flat + [len(points), len(uv)], flat - 1)
+    pairs, corners = np.unique(flat, axis=0, return_inverse=True)
+    before = np.array([point[:3] for point in points])[pairs[:, 0]]
+    near = nearest(skin.before, before)
+    after = before + (skin.after - skin.before)[near]
+    shown = Skin(before, after, corners.reshape(-1, 3), skin.solved[near])
+    return Appearance(shown, uv=np.array(uv)[pairs[:, 1]], image=image)

@@ -1,0 +1,206 @@
+"""Landmarks: read, placed on skin and bones, found by the shape of the profile, and the parts of the
+face that they bound. In mm and LPS: +x patient left, +y posterior, +z up, the head upright."""
+
+import json
+import pathlib
+
+import numpy as np
+
+from sheet.result import Unusable
+
+NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
+BEYOND = "skin beyond the solved part"
+NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_soft", "n'"),
+         "pronasale": ("pronasale", "prn"), "columella": ("columella", "cm"),
+         "subnasale": ("subnasale", "sn"), "upper lip": ("upper_lip", "labrale_superius", "ls"),
+         "upper stomion": ("stomion_superius", "stms"), "lower stomion": ("stomion_inferius", "stmi"),
+         "lower lip": ("lower_lip", "labrale_inferius", "li"),
+         "sublabiale": ("sublabiale", "mentolabial_sulcus", "b'"),
+         "pogonion": ("pogonion_soft", "soft_pogonion", "pog'"),
+         "gnathion": ("gnathion_soft", "soft_gnathion", "gn'"),
+         "menton": ("menton_soft", "soft_menton", "me'"), "throat": ("throat", "cervical_point", "c'")}
+BONES = {"upper incisor": ("upper_incisor_edge", "u1"), "lower incisor": ("lower_incisor_edge", "l1"),
+         "nasal spine": ("anterior_nasal_spine", "ans"), "chin bone": ("pogonion_bone", "pog")}
+MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip",
+           "sublabiale", "pogonion", "menton")
+
+
+def read_landmarks(file):
+    """{name: position} in LPS, of Slicer's markups or of named points."""
+    try:
+        stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as reason:
+        raise Unusable(f"{file}: not landmarks as JSON: {reason}") from None
+    found = {name: value for name, value in stored.items()
+             if isinstance(value, list) and len(value) == 3 and
+             all(isinstance(number, (int, float)) for number in value)}
+    for markup in stored.get("markups", []):
+        sign = (-1, -1, 1) if markup.get("coordinateSystem", "LPS") == "RAS" else (1, 1, 1)
+        for point in markup.get("controlPoints", []):
+            if point.get("positionStatus", "defined") == "defined":
+                found[point["label"]] = np.array(point["position"]) * sign
+    return {name: np.array(value, float) for name, value in found.items()}
+
+
+def on_surface(before, after, corners, point):
+    """The nearest place of a surface before, where it is after, and the distance."""
+    near = np.argsort(((before - point)**2).sum(1))[:8]
+    faces = corners[np.isin(corners, near).any(1)]
+    a, b, c = (before[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.maximum((normal**2).sum(1), 1e-300)
+    weights = np.stack([(np.cross(c - b, point - b) * normal).sum(1) / area,
+                        (np.cross(a - c, point - c) * normal).sum(1) / area,
+                        (np.cross(b - a, point - a) * normal).sum(1) / area], axis=1)
+    weights = np.maximum(weights, 0)
+    weights /= weights.sum(1, keepdims=True)
+    places = np.einsum("fk,fkx->fx", weights, before[faces])
+    best = np.argmin(((places - point)**2).sum(1))
+    there = weights[best] @ after[faces[best]]
+    return places[best], there, np.linalg.norm(places[best] - point)
+
+
+def place_landmarks(result, landmarks):
+    """[{name, on, before, after}] of those on the skin, on a bone (with which they go) or on the
+    given skin beyond the one that was solved; and the names of the others."""
+    placed, lost = [], []
+    for name, point in landmarks.items():
+        skin = result.solved
+        before, after, distance = on_surface(skin.before, skin.after, skin.corners, point)
+        best = {"name": name, "on": "skin", "before": before, "after": after}
+        for bone in result.bones:
+            away = np.sqrt(((bone["before"] - point)**2).sum(1).min())
+            if away < distance:
+                turn, shift = bone["motion"]
+                distance = away
+                best = {"name": name, "on": bone["name"], "before": point,
+                        "after": turn @ point + shift}
+        if distance > NEAR and result.given:
+            given = result.given
+            before, after, distance = on_surface(given.before, given.after, given.corners, point)
+            best = {"name": name, "on": BEYOND, "before": before, "after": after}
+        if distance <= NEAR:
+            placed.append(best)
+        else:
+            lost.append(name)
+    return placed, lost
+
+
+def known_places(placed, names=None):
+    """{name: (before, after)} of the landmarks on the skin by NAMES, or of BONES on bones."""
+    on_skin = names is None
+    by_name = {mark["name"].lower(): mark for mark in placed
+               if (mark["on"] in ("skin", BEYOND)) == on_skin}
+    found = {}
+    for name, others in (names or NAMES).items():
+        for other in others:
+            if other in by_name:
+                found.setdefault(name, (by_name[other]["before"], by_name[other]["after"]))
+    return found
+
+
+# ----- by the shape of the profile
+
+
+def turning_points(forward):
+    """Rows at which a profile that begins at the tip of the nose turns: [(row, is a bulge)]. Turns of
+    less than 0.4 mm do not count."""
+    found, best, bulge = [], 0, False
+    for i in range(1, len(forward)):
+        passed = forward[i] - forward[best] if bulge else forward[best] - forward[i]
+        if passed > 0:
+            best = i
+        elif passed < -0.4:
+            found.append((best, bulge))
+            best, bulge = i, not bulge
+    return found
+
+
+def front_line(segments):
+    """The foremost line [n, 3] of the cut through the face, from above, a place a millimeter."""
+    ends = segments.reshape(-1, 3)
+    if len(ends) == 0:
+        return ends
+    ends = np.concatenate([ends, segments.mean(1)])
+    rows = np.floor(ends[:, 2]).astype(int)
+    order = np.lexsort((ends[:, 1], rows))
+    _, first = np.unique(rows[order], return_index=True)
+    return ends[order][first][::-1]
+
+
+def by_shape(segments):
+    """{name of NAMES: place} of nose, lips and chin, by the shape of an upright profile that looks to
+    −y: bulges and hollows beside the line from the tip of the nose to the chin. Empty where it does
+    not show them all."""
+    line = front_line(segments)
+    if len(line) < 40:
+        return {}
+    tip = int(np.argmin(line[:, 1]))
+    drop = line[tip, 2] - line[:, 2]
+    chins = np.flatnonzero((drop > 50) & (drop < 110))
+    if len(chins) == 0:
+        return {}
+    chin = chins[np.argmin((line[chins, 1] - line[tip, 1]) / drop[chins])]
+    chord = (line[chin] - line[tip]) / np.linalg.norm(line[chin] - line[tip])
+    between = line[tip:chin + 1] - line[tip]
+    turned = turning_points(between[:, 2] * chord[1] - between[:, 1] * chord[2]
+                            if chord[2] > 0 else between[:, 1] * chord[2] - between[:, 2] * chord[1])
+    names = ["subnasale", "upper lip", None, "lower lip", "sublabiale"]
+    if len(turned) != len(names):
+        return {}
+    found = {"pronasale": line[tip], "pogonion": line[chin]}
+    return found | {name: line[tip + row] for (row, _), name in zip(turned, names) if name}
+
+
+# ----- parts of the face
+
+
+class Parts:
+    """The parts of an upright face as repose-compare draws them, by pronasale, subnasale, upper lip,
+    lower lip and pogonion."""
+
+    NEEDED = ("pronasale", "subnasale", "upper lip", "lower lip", "pogonion")
+    NAMES = ("nose", "upper lip", "lower lip", "chin", "right cheek", "left cheek")
+
+    def __init__(self, known):
+        at = {name: place[0] for name, place in known.items()}
+        self.middle = np.mean([at[name][0] for name in self.NEEDED])
+        self.tip, self.depth = at["pronasale"][2], at["pronasale"][1]
+        self.subnasale, self.pogonion = at["subnasale"][2], at["pogonion"][2]
+        self.between_lips = (at["upper lip"][2] + at["lower lip"][2]) / 2
+        self.under_lip = (at["lower lip"][2] + at["pogonion"][2]) / 2
+        self.nasion = at["nasion"][2] if "nasion" in at else self.tip + 50
+        self.menton = (at["menton"][2] if "menton" in at else self.pogonion - 15) - 5
+
+    @classmethod
+    def of(cls, known):
+        return cls(known) if known.keys() >= set(cls.NEEDED) else None
+
+    def at(self, points):
+        """The row of NAMES of each point, −1 for none."""
+        side, z = points[:, 0] - self.middle, points[:, 2]
+        aside, front = abs(side), points[:, 1] <= self.depth + 70
+        below, wide = z <= self.subnasale, np.where(z > self.subnasale, 20, 30)
+        cheek = (aside > wide) & (aside <= 70) & (z > self.pogonion) & (z <= self.tip + 15)
+        lips = below & (aside <= 30)
+        tests = (~below & (z <= self.nasion) & (aside <= 20), lips & (z > self.between_lips),
+                 lips & (z <= self.between_lips) & (z > self.under_lip),
+                 lips & (z <= self.under_lip) & (z > self.menton), cheek & (side <= 0),
+                 cheek & (side > 0))
+        part = np.full(len(points), -1)
+        for row, test in enumerate(tests):
+            part[test & front] = row
+        return part
+
+
+def place_in_words(point, known, parts):
+    """Where a point is, as one says it: at a part of the face, else beside the nearest landmark."""
+    row = parts.at(np.array([point]))[0] if parts else -1
+    if row >= 0:
+        return "at the " + Parts.NAMES[row]
+    if parts and point[2] <= parts.menton:
+        return "under the chin"
+    if known:
+        name, (at, *_) = min(known.items(), key=lambda item: np.linalg.norm(item[1][0] - point))
+        return f"{np.linalg.norm(at - point):.0f} mm from the {name}"
+    return f"at ({point[0]:.0f}, {point[1]:.0f}, {point[2]:.0f}) mm"

@@ -1,0 +1,463 @@
+"""The planning sheet: one HTML page of one result or of two plans of one patient."""
+
+import html
+import json
+import math
+import os
+import pathlib
+
+import numpy as np
+
+from sheet import RAMP
+from sheet.landmarks import (BEYOND, BONES, NEAR, Parts, by_shape, known_places, on_surface,
+                             place_landmarks)
+from sheet.meshes import Pack, coarser
+from sheet.measures import (FOLLOWS_SOURCE, following, measured, occlusion, reference,
+                            shift_in_words, turns, turns_in_words)
+from sheet.profile import COLORS, cut, drawing, middle_plane, outlines
+from sheet.shown_skin import nearest
+from sheet.result import Figure, Unusable
+from sheet.tables import folded, table, tenths
+from sheet.words import PUBLISHED, by_part, paragraphs
+
+WEB = pathlib.Path(__file__).resolve().parents[1] / "web"
+MOST_TRIANGLES = 80_000  # of the skin, and of all bones, in the view to turn
+UNCERTAIN = ("e8f0ea", "f3d9a4", "d9822b", "8c2d04")
+REGION = ("a8acb2", "2a9d8f")
+
+
+class Plan:
+    """A result with its name, landmarks and what follows from them."""
+
+    def __init__(self, name, result, marks, norms):
+        self.name, self.result = name, result
+        placed, self.lost = place_landmarks(result, marks)
+        self.placed = placed
+        self.known, self.bones = known_places(placed), known_places(placed, BONES)
+        self.guessed = self.guess()
+        self.plane = middle_plane(result.solved, self.known)
+        self.find_sublabiale()
+        self.parts = Parts.of(self.known)
+        self.measures = measured(self.known | self.bones, norms)
+
+    def guess(self):
+        """Adds landmarks by the shape of the profile where they are not given; their names."""
+        if "subnasale" in self.known and "pogonion" in self.known:
+            return []
+        skin = self.result.solved
+        tip = self.known["pronasale"][0] if "pronasale" in self.known else \
+            skin.before[np.argmin(skin.before[:, 1])]
+        for aside in (0, 1.5, -1.5, 3, -3):
+            plane = np.array([tip[0] + aside, 0, 0]), np.array([1.0, 0, 0])
+            found = by_shape(cut(skin.before, skin.corners, plane)[0])
+            if found:
+                break
+        missing = [name for name in found if name not in self.known]
+        self.known |= {name: on_surface(skin.before, skin.after, skin.corners, found[name])[:2]
+                       for name in missing}
+        return missing
+
+    def find_sublabiale(self):
+        """The deepest place of the profile between lower lip and chin, where no landmark says it."""
+        skin, known = self.result.solved, self.known
+        points = cut(skin.before, skin.corners, self.plane)[0].reshape(-1, 3)
+        if "sublabiale" in known or not {"lower lip", "pogonion"} <= known.keys() or \
+                len(points) == 0:
+            return
+        lip, chin = known["lower lip"][0], known["pogonion"][0]
+        line = (chin - lip) / np.linalg.norm(chin - lip)
+        along = (points - lip) @ line
+        behind = points - lip - along[:, None] * line
+        depth = np.where((along > 0) & (along < np.linalg.norm(chin - lip)) &
+                         (np.linalg.norm(behind, axis=1) < 20), behind[:, 1], -np.inf)
+        if depth.max() > 0:
+            known["sublabiale"] = on_surface(skin.before, skin.after, skin.corners,
+                                             points[np.argmax(depth)])[:2]
+
+
+# ----- the view
+
+
+def matched(first, second):
+    """After the second plan, the vertices of the first one's skin."""
+    one, other = first.result.skin, second.result.skin
+    if one.before.shape == other.before.shape and np.allclose(one.before, other.before, atol=1e-6):
+        return other.after
+    near = nearest(other.before, one.before)
+    if np.median(np.linalg.norm(other.before[near] - one.before, axis=1)) > 5:
+        raise Unusable(f"{second.result.file}: not the skin of {first.result.file}; two plans of one "
+                       "patient can be compared")
+    return one.before + (other.after - other.before)[near]
+
+
+def packed_skin(plans, appearance, pack):
+    """The surface of the skin for the page, and its fields."""
+    result = plans[0].result
+    skin = appearance.skin if appearance else result.skin
+    states = [skin.after] if len(plans) == 1 else [skin.after, matched(*plans)]
+    near = None if skin is result.skin else nearest(result.skin.before, skin.before)
+    unsure = result.uncertainty
+    fields = {"solved": skin.solved}
+    if unsure is not None:
+        fields["uncertainty"] = unsure if near is None else unsure[near]
+    if len(states) == 2 and near is not None:
+        states[1] = skin.before + (states[1] - result.skin.before)[near]
+    extra = appearance.arrays() if appearance else {}
+    names, arrays = [*fields, *extra], [*states, *fields.values(), *extra.values()]
+    before, corners, arrays = coarser(skin.before, skin.corners, arrays, MOST_TRIANGLES,
+                                      skin.solved == 0)
+    after, values = arrays[:len(states)], dict(zip(names, arrays[len(states):]))
+    surface = {"name": "skin", "kind": "skin", "triangles": pack.add(corners, 32),
+               "states": [pack.numbers(before), *(pack.numbers(a - before) for a in after)]}
+    if "colors" in values:
+        surface["colors"] = pack.add(np.clip(np.rint(values["colors"]), 0, 255), 8)
+    if "uv" in values:
+        surface |= {"uv": pack.numbers(values["uv"]), "image": appearance.image}
+    return surface, packed_fields(values, len(states), pack)
+
+
+def packed_fields(values, count, pack):
+    """Fields of the skin; the same in all states after the first."""
+    fields = []
+    if "uncertainty" in values:
+        most = max(float(np.percentile(values["uncertainty"], 99)), 0.1)
+        stored = pack.numbers(values["uncertainty"])
+        fields.append({"name": "uncertainty", "label": "sure to, mm", "high": most,
+                       "ramp": UNCERTAIN, "states": [stored] + [stored] * count})
+    if np.ptp(values["solved"]) > 0:
+        stored = pack.numbers(values["solved"])
+        fields.append({"name": "solved", "label": "part of the skin", "high": 1.0, "ramp": REGION,
+                       "ends": ("as scanned", "computed"), "states": [stored] * (count + 1)})
+    return fields
+
+
+def packed_bones(plans, pack):
+    """Bones of all plans; one that all share stands once."""
+    found, first = [], plans[0].result.bones
+    total = sum(len(bone["corners"]) for plan in plans for bone in plan.result.bones)
+    for number, plan in enumerate(plans):
+        for bone in plan.result.bones:
+            twin = next((k for k, other in enumerate(first) if number == 1 and
+                         same(bone, other)), None)
+            if twin is not None:
+                continue
+            after = [bone["after"]]
+            before, corners, (after,) = coarser(
+                bone["before"], bone["corners"], after,
+                max(MOST_TRIANGLES * len(bone["corners"]) // max(total, 1), 200))
+            states = [pack.numbers(before)] + [None] * len(plans)
+            states[number + 1] = pack.numbers(after - before)
+            if number == 0 and len(plans) == 2 and any(same(bone, b)
+                                                       for b in plans[1].result.bones):
+                states[2] = states[1]
+            found.append({"name": bone["name"].replace("_", " "), "kind": "bone",
+                          "triangles": pack.add(corners, 32), "states": states})
+    return found
+
+
+def same(bone, other):
+    return bone["after"].shape == other["after"].shape and \
+        np.allclose(bone["before"], other["before"]) and np.allclose(bone["after"], other["after"])
+
+
+def described(plans, appearance):
+    """What sheet.js needs, and the packed arrays."""
+    pack, solved = Pack(), plans[0].result.solved
+    skin, fields = packed_skin(plans, appearance, pack)
+    largest = max(float(plan.result.solved.movement.max()) for plan in plans)
+    low, high = frame(plans)
+    shown = {"surfaces": [skin, *packed_bones(plans, pack)], "fields": fields, "ramp": RAMP,
+             "states": state_names(plans), "largest": rounded_up(largest),
+             "frame": [float(v) for v in (*low, *high)]}
+    if len(plans) == 2:
+        apart = np.linalg.norm(matched(*plans) - plans[0].result.skin.after, axis=1)
+        shown["apart"] = rounded_up(float(apart.max()))
+    return json.dumps(shown), pack.text()
+
+
+def frame(plans):
+    """Corners of the box that the view fills: the head, but of a tall scan not what lies far above
+    or below the computed part."""
+    solved = [plan.result.solved for plan in plans]
+    states = np.concatenate([solved[0].before, *(skin.after for skin in solved)])
+    low, high = states.min(0), states.max(0)
+    points = np.concatenate([states, plans[0].result.skin.before])
+    points = points[(points[:, 2] > low[2] - 5) & (points[:, 2] < high[2] + 80)]
+    return points.min(0) - (0, 0, 2), points.max(0) + (0, 0, 2)
+
+
+def rounded_up(number):
+    """To two digits."""
+    digit = 10.0 ** (math.floor(math.log10(number)) - 1) if number > 0 else 1.0
+    return float(math.ceil(number / digit * (1 - 1e-12)) * digit)
+
+
+def state_names(plans):
+    return ["before", "after"] if len(plans) == 1 else ["before", *(plan.name for plan in plans)]
+
+
+# ----- sections
+
+
+def figure_of(known, name):
+    """The motion of a landmark for a card: its largest part as a number, the rest in small words."""
+    shift = known[name][1] - known[name][0]
+    axis = int(np.argmax(abs(shift)))
+    if abs(shift[axis]) < 0.05:
+        return "0.0<small> mm</small>", "does not move"
+    alone, rest = np.zeros(3), shift.copy()
+    alone[axis], rest[axis] = shift[axis], 0
+    number, words = shift_in_words(alone).split(" ", 1)
+    return f"{number}<small> {words}</small>", shift_in_words(rest).replace("stays", "")
+
+
+def numbers(plans):
+    """The three numbers that matter, of each plan."""
+    cards = []
+    for title, landmarks in (("Chin", ("pogonion",)), ("Lips", ("upper lip", "lower lip")),
+                             ("Nose", ("pronasale",))):
+        parts = [f'<div class="number-card"><h3>{title}</h3>']
+        for plan in plans:
+            for name in landmarks:
+                label = ", ".join(filter(None, (plan.name if len(plans) > 1 else "",
+                                                name if len(landmarks) > 1 else "")))
+                if name in plan.known:
+                    big, rest = figure_of(plan.known, name)
+                    said = ": ".join(filter(None, (label, rest)))
+                    parts.append(f"<b>{big}</b><p>{html.escape(said)}</p>")
+                else:
+                    parts.append(f"<b>–</b><p>{html.escape(label)} no landmark</p>")
+        cards.append("".join([*parts, "</div>"]))
+    return f'<div class="numbers">{"".join(cards)}</div>'
+
+
+def moved_bones(plan):
+    """[(name, place, shift there, rotation)] of the bones that move."""
+    marks = {name: mark for name, others in BONES.items() for mark in plan.placed
+             if mark["name"].lower() in others}
+    found = []
+    for bone in plan.result.bones:
+        turn, shift = bone["motion"]
+        place, point = reference(bone, marks)
+        step = turn @ point + shift - point
+        if np.linalg.norm(bone["after"] - bone["before"], axis=1).max() > 0.005:
+            found.append((bone["name"].replace("_", " "), place, step, turn))
+    return found
+
+
+def plan_lines(plan):
+    """The plan in a sentence a piece."""
+    lines = []
+    for name, _, step, turn in moved_bones(plan):
+        turned = turns_in_words(turn)
+        said = shift_in_words(step) + (f"; {turned}" if turned else "")
+        lines.append(f'<p class="plan-line"><b>{html.escape(name)}</b> {html.escape(said)}</p>')
+    return "".join(lines) or "<p>No bone moves.</p>"
+
+
+def plan_table(plans):
+    rows = []
+    for plan in plans:
+        for name, place, step, turn in moved_bones(plan):
+            parts = map(tenths, (-step[1], step[2], step[0], *turns(turn)))
+            rows.append((*([plan.name] if len(plans) > 1 else []), name, place, *parts))
+    head = ("piece", "measured", "advance, mm", "up, mm", "to the left, mm", "pitch, °", "roll, °",
+            "yaw, °")
+    page = table(("plan", *head) if len(plans) > 1 else head, rows) if rows else \
+        "<p>No bone moves.</p>"
+    still = sorted({bone["name"] for plan in plans for bone in plan.result.bones} -
+                   {row[0] for plan in plans for row in moved_bones(plan)})
+    if still:
+        page += f'<p class="note">Does not move: {html.escape(", ".join(still))}. '
+    else:
+        page += '<p class="note">'
+    page += ("A negative advance is a setback; up is impaction of an upper jaw. Pitch: front down; "
+             "roll: left side down; yaw: front to the patient's left, each positive.</p>")
+    for plan in plans:
+        for name, before, after in occlusion(plan.bones):
+            title = f"{plan.name}: {name}" if len(plans) > 1 else name
+            page += (f'<p class="plan-line"><b>{html.escape(title)}</b> {before:.1f} mm before, '
+                     f"{after:.1f} mm after</p>")
+    return page
+
+
+def profile_section(plans):
+    first, states = plans[0], COLORS[:len(plans) + 1]
+    skin = first.result.skin
+    skins = [outlines(skin.before, skin.corners, first.plane)]
+    bones = []
+    for state, plan in zip(states[1:], plans):
+        shown = plan.result.skin
+        skins.append(outlines(shown.after, shown.corners, plan.plane))
+        for bone in plan.result.bones:
+            moves = np.abs(bone["after"] - bone["before"]).max() > 0.005
+            for which, name in (("before", "before"), ("after", state)) if moves else \
+                    (("before", "fixed"),):
+                bones.append((name, outlines(bone[which], bone["corners"], plan.plane)))
+    known = {name: (*places, *((plans[1].known[name][1],) if len(plans) > 1 and
+                               name in plans[1].known else ()))
+             for name, places in first.known.items()}
+    legend = "".join(f'<b class="{state}">{html.escape(name)}</b>'
+                     for state, name in zip(states, state_names(plans)))
+    return drawing(skins, bones, known, states) + \
+        f'<p class="legend">{legend}<b class="fixed">bone that stays</b></p>'
+
+
+def ratio_table(plans):
+    rows = []
+    for plan in plans:
+        for skin, bone, direction, soft, hard, share, low, high in following(
+                plan.known, plan.bones, plan.result):
+            label = f"{skin} to {bone}, {direction}"
+            rows.append((label if len(plans) == 1 else f"{plan.name}: {label}", tenths(soft),
+                         tenths(hard), Figure(f"{share:.0f} %"), Figure(f"{low}–{high} %")))
+    if not rows:
+        return '<p class="note">No soft-to-hard ratio: none of the bones under subnasale, lips and ' \
+            "chin moves by a millimeter, or their landmarks are not given.</p>"
+    return table(("skin to bone", "skin, mm", "bone, mm", "ratio", "published"), rows) + \
+        f'<p class="note">Published ranges: {FOLLOWS_SOURCE}, after surgery, a year and more; a ' \
+        "ratio outside them is a reason to look again, not an error.</p>"
+
+
+def region_table(plans):
+    first = plans[0]
+    if first.parts is None:
+        return '<p class="note">No parts of the face: they need the landmarks pronasale, subnasale, ' \
+            "upper_lip, lower_lip and pogonion_soft.</p>"
+    columns, heads = [], []
+    for plan in plans:
+        skin = plan.result.solved
+        columns.append(by_part(skin, plan.parts or first.parts, skin.movement))
+        heads.append("moves" if len(plans) == 1 else plan.name)
+    if len(plans) == 2:
+        skin = first.result.skin
+        apart = np.linalg.norm(matched(*plans) - skin.after, axis=1)
+        columns.append(by_part(skin, first.parts, apart))
+        heads.append("difference")
+    elif first.result.uncertainty is not None:
+        columns.append(by_part(first.result.skin, first.parts, first.result.uncertainty))
+        heads.append("sure to")
+    rows = [(name.capitalize(), *(tenths(number) for column in columns
+                     for number in column.get(name, (math.nan,) * 3)))
+            for name in Parts.NAMES if name in columns[0]]
+    head = ("part", *(f"{title}, {what}" for title in heads
+                      for what in ("mean, mm", "90 % within", "95 % within")))
+    published = "; ".join(f"{where} {error} ({who})" for where, error, who in PUBLISHED)
+    return table(head, rows) + '<p class="note">By area. How far published planners were from the ' \
+        f"operated face: {published}.</p>"
+
+
+def measure_rows(plans):
+    others = {m["name"]: m for m in plans[1].measures} if len(plans) > 1 else {}
+    for one in plans[0].measures:
+        values = list(one["values"])
+        if len(plans) > 1:
+            values.append(others.get(one["name"], {"values": (0, math.nan)})["values"][1])
+        else:
+            values.append(values[1] - values[0])
+        values = [tenths(value) if one["unit"] else Figure(f"{value:.2f}") for value in values]
+        norm = "; ".join(f"{mean:g} ± {deviation:g} [{number + 1}]".replace("-", "−")
+                         for mean, deviation, number in one["norms"])
+        yield one["name"], one["definition"], one["unit"], *values, norm
+
+
+def measure_table(plans, norms):
+    rows = list(measure_rows(plans))
+    if not rows:
+        return "<p>No angles: not all landmarks that one needs are on the skin.</p>"
+    states = ("before", "after", "change") if len(plans) == 1 else \
+        ("before", plans[0].name, plans[1].name)
+    sources = "; ".join(f"[{number}] {group['population']} ({group['source']})"
+                        for number, group in enumerate(norms, 1))
+    return table(("measure", "definition", "", *states, "norm (mean ± standard deviation)"), rows) + \
+        f'<p class="note">Norms: {html.escape(sources)}. Norms are of relaxed lips in natural head ' \
+        "position, which a CT rarely has.</p>"
+
+
+def landmark_table(plan):
+    if not plan.placed:
+        return "<p>None are given.</p>"
+    rows, rest = [], ", ".join(name.replace("_", " ") for name in plan.lost)
+    for mark in plan.placed:
+        move = mark["after"] - mark["before"]
+        parts = map(float, (-move[1], move[0], move[2], np.linalg.norm(move)))
+        rows.append((mark["name"].replace("_", " "), mark["on"], *parts))
+    head = ("landmark", "on", "forward, mm", "to the left, mm", "up, mm", "in all, mm")
+    lost_ones = f"<p>Farther than {NEAR:g} mm from skin and bones: {html.escape(rest)}.</p>"
+    return table(head, rows) + (lost_ones if rest else "")
+
+
+# ----- the page
+
+
+def view(plans):
+    """Stage and controls."""
+    names = state_names(plans)
+    pair = "" if len(plans) == 1 else (
+        '<select id="pair" aria-label="what is compared">' + "".join(
+            f'<option value="{a} {b}">{html.escape(names[a])} | {html.escape(names[b])}</option>'
+            for a, b in ((1, 2), (0, 1), (0, 2))) + "</select>")
+    return f"""<div class="stage"><div id="view"></div>
+<span class="tag" id="tag-left"></span><span class="tag" id="tag-right"></span>
+<div id="bar" hidden></div><div id="tip" hidden></div></div>
+<p id="no-view" class="warning" hidden></p>
+<div class="controls"><span class="group" role="group" aria-label="direction of view">
+<button data-view="front">front</button><button data-view="three-quarter">three-quarter</button>
+<button data-view="right">profile</button></span>
+<span class="group" role="group" aria-label="arrangement">
+<button data-mode="split">split</button><button data-mode="side">side by side</button>
+<button data-mode="single">one</button></span>{pair}
+<select id="coloring" aria-label="coloring of the skin"><option value="">skin</option></select>
+<label id="share-label" hidden>{html.escape(names[0])} <input type="range" id="share" min="0" max="1"
+step="0.02" value="1"> {html.escape(names[-1])}</label>
+<label>skin <input type="range" id="skin" min="0" max="1" step="0.05" value="1"></label>
+<label><input type="checkbox" id="bones" checked> bones</label>
+<label><input type="checkbox" id="measure"> measure</label><output id="distance"></output></div>
+<p class="note screen">Drag to turn, two fingers or right button to shift, wheel or pinch to zoom.
+Point at the skin, or tap it, to read how far it moves.</p>"""
+
+
+def style():
+    return "".join((WEB / name).read_text(encoding="utf-8") for name in ("viewer.css", "sheet.css"))
+
+
+def scripts():
+    return "".join(f"<script>{(WEB / name).read_text(encoding='utf-8')}</script>"
+                   for name in ("three.js", "viewer.js", "sheet.js"))
+
+
+def write(plans, norms, scene, appearance):
+    """The page as text."""
+    first = plans[0]
+    title = html.escape(" and ".join(plan.name for plan in plans))
+    words, packed = described(plans, appearance)
+    said = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
+                   paragraphs(plan.result, plan.known, plan.parts, plan.guessed) +
+                   plan_lines(plan) for plan in plans)
+    landmarks = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
+                        landmark_table(plan) for plan in plans)
+    return f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width,initial-scale=1"><title>{title}</title>
+<style>{style()}</style></head><body><main>
+<header><h1>{title}</h1><span class="soft">predicted face after the planned surgery</span></header>
+<section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{said}</div></section>
+<div class="stills" id="stills"></div>
+<section><h2>The plan</h2>{plan_table(plans)}</section>
+<section class="two"><div><h2 class="page-two">Profile</h2>{profile_section(plans)}</div>
+<div><h2 class="page-two">How far the skin follows the bone</h2>{ratio_table(plans)}
+<h2>Parts of the face</h2>{region_table(plans)}</div></section>
+<section><h2>Measures of the soft tissue</h2>{measure_table(plans, norms)}</section>
+<section class="screen"><h2>Landmarks</h2>{landmarks}</section>
+{"".join(folded([(plan.name, plan.result) for plan in plans], scene))}
+</main><script type="application/json" id="described">{words}</script>
+<script type="text/plain" id="packed">{packed}</script>
+{scripts()}</body></html>
+"""
+
+
+def title_of(name):
+    return os.path.basename(name).replace("_", " ")
+
+
+__all__ = ["BEYOND", "Plan", "title_of", "write"]

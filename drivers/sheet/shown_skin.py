@@ -1,0 +1,105 @@
+"""The skin that is shown of a result: the one that was given, displaced, where another was solved in
+its place, with lips and cuts open; otherwise the one that was solved. Arrays in mm."""
+
+import base64
+import pathlib
+import xml.etree.ElementTree
+
+import numpy as np
+
+AROUND_CUTS = 4.0  # mm: so near to a cut the solved skin is shown, which is cut open
+
+
+class Skin:
+    """A skin before and after, with its triangles; `solved`: 1 where the model computed a vertex, 0
+    where it does not move, between in the strip where the motion fades."""
+
+    def __init__(self, before, after, corners, solved):
+        self.before, self.after, self.corners, self.solved = before, after, corners, solved
+        self.movement = np.linalg.norm(after - before, axis=1)
+
+
+def read_given(file):
+    """The given skin of a NAME_given_skin.vtp, or None where there is no such file."""
+    file = pathlib.Path(file)
+    if not file.is_file():
+        return None
+    found = {item.get("Name"): np.frombuffer(
+        base64.b64decode(item.text)[8:], "<f8" if item.get("type") == "Float64" else "<i8")
+        for item in xml.etree.ElementTree.parse(file).iter("DataArray")}
+    before = found["Points"].reshape(-1, 3)
+    return Skin(before, before + found["displacement"].reshape(-1, 3),
+                found["connectivity"].reshape(-1, 3), found["solved"])
+
+
+def solved_skin(h5, step=None):
+    """The solved skin of a result at a step (the last), and the rows of its points in the model."""
+    step = step or h5["step"][sorted(h5["step"])[-1]]
+    used, corners = np.unique(h5["model/skin/points"][:], return_inverse=True)
+    before = h5["model/point/position"][:][used]
+    return Skin(before, step["point/position"][:][used], corners.reshape(-1, 3),
+                np.ones(len(used))), used
+
+
+def sides_of_cuts(solved):
+    """Places [n, 3] at which vertices of the solved skin lie twice, and are apart in the end."""
+    _, place, count = np.unique(solved.before, axis=0, return_inverse=True, return_counts=True)
+    twice = np.flatnonzero(count[place.ravel()] > 1)
+    return solved.before[twice]
+
+
+def near(points, places, reach):
+    """Which points lie within `reach` of one of a few places."""
+    found = np.zeros(len(points), bool)
+    if len(places) == 0:
+        return found
+    inside = np.flatnonzero(((points > places.min(0) - reach) &
+                             (points < places.max(0) + reach)).all(1))
+    for some in np.array_split(inside, max(1, len(inside) * len(places) // 4_000_000)):
+        apart = ((points[some, None] - places[None])**2).sum(2).min(1)
+        found[some[apart < reach * reach]] = True
+    return found
+
+
+def opened(given, solved):
+    """The given skin with the solved one in place of it beside cuts and between lips, so that these
+    open. Both lie within a fraction of a millimeter of each other."""
+    places = sides_of_cuts(solved)
+    if len(places) == 0:
+        return given
+    spaced = denser(places)
+    kept = ~near(given.before, spaced, AROUND_CUTS)[given.corners].any(1)
+    edge = np.linalg.norm(np.ptp(solved.before[solved.corners], axis=1), axis=1).mean()
+    patch = near(solved.before, spaced, AROUND_CUTS + edge)[solved.corners].any(1)
+    faces = solved.corners[patch]
+    rows, faces = np.unique(faces, return_inverse=True)
+    return Skin(np.concatenate([given.before, solved.before[rows]]),
+                np.concatenate([given.after, solved.after[rows]]),
+                np.concatenate([given.corners[kept], faces.reshape(-1, 3) + len(given.before)]),
+                np.concatenate([given.solved, np.ones(len(rows))]))
+
+
+def denser(places):
+    """Places with those between neighbors, at most 8 mm apart, so that they cover a curve."""
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    one, other = np.nonzero((apart > 0) & (apart < 8))
+    return np.concatenate([places, (places[one] + places[other]) / 2])
+
+
+def shown_skin(h5, name):
+    """The skin to show of the open result NAME.h5."""
+    solved, _ = solved_skin(h5)
+    given = read_given(name + "_given_skin.vtp")
+    return opened(given, solved) if given else solved
+
+
+def nearest(points, places):
+    """For each place the row of the nearest point."""
+    middle = points.mean(0)
+    points, places = points - middle, places - middle
+    squares, found = (points**2).sum(1), np.empty(len(places), int)
+    size = max(1, 20_000_000 // max(len(points), 1))
+    for first in range(0, len(places), size):
+        apart = squares - 2 * places[first:first + size] @ points.T
+        found[first:first + size] = apart.argmin(1)
+    return found

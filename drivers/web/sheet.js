@@ -1,0 +1,266 @@
+// The planning sheet of report.py: unpacks the surfaces of the page, shows them by viewer.js, and
+// connects the controls. All that is drawn lies in the page; nothing is loaded.
+"use strict";
+
+const bySheetId = id => document.getElementById(id);
+
+// Inverse of Pack in drivers/sheet/meshes.py: columns of whole numbers from differences.
+function unpack(bytes, {at, rows, columns, bits, low = 0, step = 1}) {
+  const size = bits / 8, total = rows * columns, mask = bits === 32 ? 0xffffffff : (1 << bits) - 1;
+  const values = low === 0 && step === 1 ? new Uint32Array(total) : new Float32Array(total);
+  for (let k = 0; k < columns; ++k) {
+    let sum = 0;
+    for (let i = 0; i < rows; ++i) {
+      let difference = 0;
+      for (let b = size - 1; b >= 0; --b)
+        difference = difference * 256 + bytes[at + b * total + k * rows + i];
+      sum = ((sum + difference) & mask) >>> 0;
+      values[i * columns + k] = low + step * sum;
+    }
+  }
+  return values;
+}
+
+async function inflate(text) {
+  const packed = Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+function inWords(shift, digits = 1) {
+  const words = [[1, "back", "forward"], [2, "up", "down"], [0, "to the left", "to the right"]];
+  const said = words.filter(([axis]) => Math.abs(shift[axis]) >= 0.5 * 10 ** -digits)
+    .map(([axis, plus, minus]) =>
+      `${Math.abs(shift[axis]).toFixed(digits)} ${shift[axis] > 0 ? plus : minus}`);
+  return said.join(", ") || "stays";
+}
+
+class Sheet {
+  constructor(described, bytes) {
+    this.described = described;
+    this.viewer = new FaceViewer(bySheetId("view"));
+    for (const one of described.surfaces) this.addSurface(one, bytes);
+    this.skin = this.viewer.surfaces[0];
+    this.fields = new Map(described.fields.map(field => [field.name, {
+      ...field, states: field.states.map(one => one && unpack(bytes, one))}]));
+    this.addMovement();
+    this.viewer.fit(described.frame);
+    this.measured = [];
+    this.connect();
+    const choice = bySheetId("coloring");
+    for (const name of this.fields.keys()) choice.add(new Option(this.fields.get(name).label, name));
+    this.viewer.look("three-quarter");
+    this.setMode("split");
+    this.color("");
+  }
+
+  addSurface({name, kind, triangles, states, colors, uv, image}, bytes) {
+    const base = unpack(bytes, states[0] ?? states.find(Boolean));
+    const positions = states.map((one, state) => {
+      if (!one) return null;
+      if (state === 0) return base;
+      const moved = unpack(bytes, one);
+      return moved.map((shift, i) => base[i] + shift);
+    });
+    const surface = this.viewer.add({
+      name, kind, triangles: unpack(bytes, triangles), states: positions,
+      colors: colors ? Uint8Array.from(unpack(bytes, colors)) : null,
+      uv: uv ? unpack(bytes, uv) : null});
+    if (!image) return;
+    const photograph = new Image();
+    photograph.onload = () => { surface.setStyle({image: photograph}); this.viewer.draw(); };
+    photograph.src = image;
+  }
+
+  // Movement in mm of each vertex in each state after the first, and the difference of two plans.
+  addMovement() {
+    const {positions} = this.skin, between = (one, other) => {
+      const distance = new Float32Array(one.length / 3);
+      for (let i = 0; i < distance.length; ++i) distance[i] = Math.hypot(
+        other[3 * i] - one[3 * i], other[3 * i + 1] - one[3 * i + 1],
+        other[3 * i + 2] - one[3 * i + 2]);
+      return distance;
+    };
+    const own = [null, ...positions.slice(1).map(after => between(positions[0], after))];
+    const fields = [["movement", {label: "movement, mm", states: own, unit: "mm",
+                                  high: this.described.largest}]];
+    if (positions.length > 2) {
+      const apart = between(positions[1], positions[2]);
+      fields.push(["difference", {label: "difference of the plans, mm", unit: "mm",
+                                  states: [null, apart, apart], high: this.described.apart}]);
+    }
+    this.fields = new Map([...fields, ...this.fields]);
+  }
+
+  // Colors the skin by a field; by none: ("").
+  color(name) {
+    const field = this.fields.get(name), {ramp} = this.described;
+    this.colored = name;
+    bySheetId("coloring").value = name;
+    bySheetId("bar").hidden = !field;
+    if (field) {
+      const colors = field.ramp ?? ramp;
+      this.viewer.setScale({ramp: colors, low: 0, high: field.high || 1});
+      bySheetId("bar").innerHTML =
+        `<i style="background:linear-gradient(90deg,${colors.map(c => `#${c}`).join(",")})"></i>` +
+        `<span><b>${field.ends ? field.ends[0] : "0"}</b><b>${field.label}</b>` +
+        `<b>${field.ends ? field.ends[1] : field.high.toFixed(1)}</b></span>`;
+    }
+    this.skin.positions.forEach((_, state) => this.skin.setField(state, field?.states[state] ?? null));
+    this.blend();
+    this.viewer.draw();
+  }
+
+  setMode(mode) {
+    this.mode = mode;
+    for (const button of document.querySelectorAll("[data-mode]"))
+      button.setAttribute("aria-pressed", button.dataset.mode === mode);
+    bySheetId("share-label").hidden = mode !== "single";
+    this.blend();
+    this.showStates();
+  }
+
+  pair() { return (bySheetId("pair")?.value ?? "0 1").split(" ").map(Number); }
+
+  showStates() {
+    const [one, other] = this.pair(), names = this.described.states;
+    const share = Number(bySheetId("share").value);
+    const single = share === 0 ? one : share === 1 ? other : FaceViewer.MIXED;
+    this.viewer.show({mode: this.mode, states: this.mode === "single" ? [single] : [one, other]});
+    bySheetId("tag-left").textContent = this.mode !== "single" ? names[one]
+      : single === FaceViewer.MIXED ? `${Math.round(100 * share)} % of the way` : names[single];
+    bySheetId("tag-right").hidden = this.mode === "single";
+    bySheetId("tag-right").textContent = names[other];
+  }
+
+  blend() {
+    const share = Number(bySheetId("share").value);
+    if (this.mode === "single" && share > 0 && share < 1) this.viewer.mix(...this.pair(), share);
+  }
+
+  tell(hit, event) {
+    const tip = bySheetId("tip");
+    tip.hidden = !hit;
+    if (!hit) return;
+    const box = bySheetId("view").getBoundingClientRect();
+    tip.style.left = `${Math.min(event.clientX - box.left, box.width - 190)}px`;
+    tip.style.top = `${Math.min(event.clientY - box.top, box.height - 70)}px`;
+    tip.textContent = this.sentence(hit);
+  }
+
+  sentence({surface, state, at}) {
+    const names = this.described.states, after = state === 0 || state === FaceViewer.MIXED ? 1 : state;
+    if (!surface.positions[0] || !surface.positions[after]) return surface.name;
+    const [from, to] = [0, after].map(k => at(surface.positions[k], 3));
+    const shift = to.map((value, axis) => value - from[axis]);
+    const plan = names.length > 2 ? `${names[after]}: ` : "";
+    const place = surface === this.skin ? "" : `${surface.name}: `;
+    const moves = Math.hypot(...shift) < 0.05 ? "does not move"
+      : `moves ${Math.hypot(...shift).toFixed(1)} mm: ${inWords(shift)}`;
+    const unsure = this.fields.get("uncertainty")?.states[after];
+    return plan + place + moves +
+      (surface === this.skin && unsure ? `; sure to ${at(unsure)[0].toFixed(1)} mm` : "");
+  }
+
+  // Two clicks measure a distance; a third begins again.
+  measure(hit) {
+    if (!bySheetId("measure").checked || !hit) return;
+    if (this.measured.length === 2) this.measured = [];
+    this.measured.push(hit);
+    this.viewer.mark("distance", this.measured.map(one => one.point), "#1f6fb4");
+    const told = bySheetId("distance");
+    if (this.measured.length < 2) {
+      told.textContent = "Choose the second point.";
+      return;
+    }
+    const names = this.described.states, apart = state => {
+      const ends = this.measured.map(({surface, at}) =>
+        surface.positions[state] && at(surface.positions[state], 3));
+      return ends[0] && ends[1] && Math.hypot(...ends[0].map((value, k) => value - ends[1][k]));
+    };
+    told.textContent = names.map((name, state) => [name, apart(state)])
+      .filter(([, distance]) => distance).map(([name, distance]) =>
+        `${name} ${distance.toFixed(1)} mm`).join(", ");
+  }
+
+  connect() {
+    const on = (id, event, act) => bySheetId(id)?.addEventListener(event, act);
+    for (const button of document.querySelectorAll("[data-view]"))
+      button.addEventListener("click", () => this.viewer.look(button.dataset.view));
+    for (const button of document.querySelectorAll("[data-mode]"))
+      button.addEventListener("click", () => this.setMode(button.dataset.mode));
+    on("coloring", "change", event => this.color(event.target.value));
+    on("pair", "change", () => { this.blend(); this.showStates(); });
+    on("share", "input", () => { this.blend(); this.showStates(); });
+    on("skin", "input", event => {
+      this.skin.setStyle({opacity: Number(event.target.value)});
+      this.viewer.draw();
+    });
+    on("bones", "change", event => {
+      for (const bone of this.viewer.surfaces.slice(1))
+        bone.setStyle({visible: event.target.checked});
+      this.viewer.draw();
+    });
+    on("measure", "change", event => {
+      this.measured = [];
+      this.viewer.mark("distance", null);
+      bySheetId("distance").textContent = event.target.checked ? "Choose two points of the face." : "";
+    });
+    this.viewer.onHover = (hit, event) => this.tell(hit, event);
+    this.viewer.onClick = (hit, event) => {
+      this.measure(hit);
+      if (event.pointerType === "touch") this.tell(hit, event);
+    };
+  }
+
+  // Pictures for the print, where a view to turn is of no use: [[title, view, state, colored]].
+  planStills() {
+    const {states, largest} = this.described, many = states.length > 2;
+    const views = many ? ["front", "right"] : ["front", "three-quarter", "right"];
+    return [...[...states.entries()].flatMap(([state, name]) =>
+              views.map(view => [name, view, state, false])),
+            ...[...states.entries()].slice(1).flatMap(([state, name]) =>
+              (many ? ["front"] : views).map(view =>
+                [`${name}: movement, dark is ${largest.toFixed(1)} mm`, view, state, true]))];
+  }
+
+  makeStill([title, view, state, fields]) {
+    const {low, high, ramp} = this.viewer.scale, kept = this.skin.fields[state] ?? null;
+    this.viewer.setScale({low: 0, high: this.described.largest, ramp: this.described.ramp});
+    this.skin.setField(state, fields ? this.fields.get("movement").states[state] : null);
+    const figure = document.createElement("figure"), image = new Image();
+    image.src = this.viewer.snapshot(480, 480, {view, state, fields: true});
+    image.alt = `${title}, ${view}`;
+    figure.append(image, Object.assign(document.createElement("figcaption"), {textContent: title}));
+    bySheetId("stills").append(figure);
+    this.viewer.setScale({low, high, ramp});
+    this.skin.setField(state, kept);
+    this.viewer.draw();
+  }
+
+  // One after another while nothing else happens; what is missing when the page is printed, then.
+  makeStills() {
+    const left = this.planStills(), next = () => {
+      if (left.length) this.makeStill(left.shift());
+      if (left.length) setTimeout(next, 30);
+      else document.documentElement.dataset.stills = "yes";
+    };
+    window.addEventListener("beforeprint", () => { while (left.length) this.makeStill(left.shift()); });
+    setTimeout(next, 300);
+  }
+}
+
+(async () => {
+  const described = JSON.parse(bySheetId("described").textContent);
+  try {
+    const sheet = new Sheet(described, await inflate(bySheetId("packed").textContent));
+    window.sheet = sheet;
+    document.documentElement.dataset.ready = "yes";
+    sheet.makeStills();
+  } catch (reason) {
+    bySheetId("no-view").hidden = false;
+    bySheetId("no-view").textContent =
+      `The view to turn needs a browser with WebGL 2 (${reason.message}).`;
+    document.documentElement.dataset.ready = "failed";
+  }
+})();

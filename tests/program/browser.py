@@ -1,0 +1,48 @@
+"""Pages in headless Chromium: what a script finds in them, and pictures of them. No network."""
+
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+
+import pytest
+
+CHROMIUM = shutil.which("chromium")
+OPTIONS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
+           "--enable-unsafe-swiftshader", "--disable-background-networking", "--hide-scrollbars",
+           "--host-resolver-rules=MAP * ~NOTFOUND"]
+FOUND = re.compile(r'<pre id="found">(.*?)</pre>', re.S)
+
+
+def needs_browser():
+    if not CHROMIUM:
+        pytest.skip("Chromium is not installed (apt-get install --no-install-recommends chromium)")
+
+
+def browse(page, *options, size=(700, 700), seconds=100):
+    """Runs Chromium on a page; what it prints."""
+    needs_browser()
+    with tempfile.TemporaryDirectory() as profile:
+        command = [CHROMIUM, *OPTIONS, f"--user-data-dir={profile}",
+                   f"--window-size={size[0]},{size[1]}", *options, page.as_uri()]
+        return subprocess.run(command, capture_output=True, text=True, timeout=seconds).stdout
+
+
+def evaluate(page, script, **options):
+    """What an asynchronous JavaScript function, given as its body, returns on the page, as JSON.
+    It runs when the page says data-ready."""
+    copy = page.with_name(page.stem + "_run.html")
+    copy.write_text(page.read_text(encoding="utf-8").replace("</body>", f"""<script>(async () => {{
+  const sleep = time => new Promise(end => setTimeout(end, time));
+  while (!document.documentElement.dataset.ready) await sleep(20);
+  const told = document.createElement("pre");
+  told.id = "found";
+  try {{ told.textContent = JSON.stringify(await (async () => {{ {script} }})() ?? null); }}
+  catch (reason) {{ told.textContent = JSON.stringify({{error: String(reason.stack)}}); }}
+  document.body.append(told);
+}})();</script></body>"""), encoding="utf-8")
+    printed = browse(copy, "--virtual-time-budget=60000", "--dump-dom", **options)
+    found = FOUND.search(printed)
+    assert found, printed[-2000:]
+    return json.loads(found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
