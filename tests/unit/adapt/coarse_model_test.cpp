@@ -6,7 +6,7 @@
 #include "repose/meshtools/remesh.h"
 
 namespace repose::adapt {
-namespace {
+namespace coarse_model_test {
 
 /// The shipped head whose jaw advances: 2000 skin vertices, 4 layers.
 model::Anatomy head() {
@@ -65,5 +65,5 @@ TEST(Remesh, by_the_even_edge_keeps_the_number_of_triangles) {
   EXPECT_NEAR(static_cast<double>(same.triangles.size()) / skin.triangles.size(), 1, 0.2);
 }
 
-}  // namespace
+}  // namespace coarse_model_test
 }  // namespace repose::adapt

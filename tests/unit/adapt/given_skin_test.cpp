@@ -7,7 +7,7 @@
 #include "../../layered_patch.h"
 
 namespace repose::adapt {
-namespace {
+namespace given_skin_test {
 
 TEST(GivenSkin, follows_an_affine_motion_and_fades_beyond_the_rim) {
   const test::PatchSize size{
@@ -86,5 +86,5 @@ TEST(GivenSkin, parts_where_the_solved_skin_does) {
   }
 }
 
-}  // namespace
+}  // namespace given_skin_test
 }  // namespace repose::adapt

@@ -7,7 +7,7 @@
 #include "../../layered_patch.h"
 
 namespace repose::adapt {
-namespace {
+namespace transfer_test {
 
 /// A patch of 12 mm × 8 mm and 4 mm depth whose fixed points are taken by `displacement`.
 template <class Field>
@@ -55,5 +55,5 @@ TEST(Transfer, takes_fixed_points_where_they_go_and_what_is_above_in_proportion)
     EXPECT_NEAR(carried[i].z(), to.points.layer[i] / 2.0, 1e-12) << i;
 }
 
-}  // namespace
+}  // namespace transfer_test
 }  // namespace repose::adapt

@@ -6,7 +6,7 @@
 #include <sstream>
 
 namespace repose::base {
-namespace {
+namespace comparison_test {
 
 std::vector<std::string> lines_with(const std::string& text, const std::string& word) {
   std::vector<std::string> found;
@@ -53,5 +53,5 @@ TEST(Comparison, TheTableHasEveryNumber) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 4 * 20);
 }
 
-}  // namespace
+}  // namespace comparison_test
 }  // namespace repose::base

@@ -10,7 +10,7 @@
 #include "repose/base/petsc.h"
 
 namespace repose::base {
-namespace {
+namespace mpi_environment_test {
 
 std::map<std::string, std::string> variables(const std::map<std::string, const char*>& set,
                                              bool filtered = false) {
@@ -104,5 +104,5 @@ TEST(MpiEnvironmentDeathTest, ASessionAloneOpensNoSocketAndStartsNoDaemon) {
   EXPECT_EXIT(std::_Exit(traces_of_a_session()), ::testing::ExitedWithCode(0), "");
 }
 
-}  // namespace
+}  // namespace mpi_environment_test
 }  // namespace repose::base

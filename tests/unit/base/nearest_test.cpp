@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace repose::base {
-namespace {
+namespace nearest_test {
 
 TEST(Nearest, DistanceCountsEdits) {
   EXPECT_EQ(edit_distance("", ""), 0u);
@@ -30,5 +30,5 @@ TEST(Nearest, EndsOnLongGarbage) {
   EXPECT_EQ(nearest(std::string(1 << 20, 'q'), {"quadratic", "x"}), "quadratic");
 }
 
-}  // namespace
+}  // namespace nearest_test
 }  // namespace repose::base

@@ -11,7 +11,7 @@
 #include "repose/base/petsc.h"
 
 namespace repose::base {
-namespace {
+namespace options_test {
 
 std::vector<Option> table() {
   return {{.name = "accuracy",
@@ -216,5 +216,5 @@ TEST(Options, ReadsPetscsDatabase) {
   ASSERT_EQ(PetscOptionsClear(nullptr), 0);
 }
 
-}  // namespace
+}  // namespace options_test
 }  // namespace repose::base

@@ -5,7 +5,7 @@
 #include <limits>
 
 namespace repose::base {
-namespace {
+namespace text_test {
 
 TEST(Text, NumbersAreReadAsAWhole) {
   EXPECT_EQ(parse_number("8"), 8.0);
@@ -45,5 +45,5 @@ TEST(Range, SaysItself) {
   EXPECT_EQ((Range{.min = 0, .max = 5, .min_excluded = true}.text()), "> 0 and ≤ 5");
 }
 
-}  // namespace
+}  // namespace text_test
 }  // namespace repose::base

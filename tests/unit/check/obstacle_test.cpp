@@ -6,7 +6,7 @@
 #include <random>
 
 namespace repose::check {
-namespace {
+namespace obstacle_test {
 
 /// An axis-parallel box of n × n squares a side, outward.
 surface::Surface box(const Vec3& size, int n) {
@@ -110,5 +110,5 @@ TEST(Obstacle, ANormalIsGivenOnlyAwayFromEdges) {
   EXPECT_TRUE(grid.uniform_normal({19, 10, 20.5}, 3).isZero(0));
 }
 
-}  // namespace
+}  // namespace obstacle_test
 }  // namespace repose::check

@@ -12,7 +12,7 @@
 
 namespace repose::imaging {
 using namespace surface;
-namespace {
+namespace isosurface_test {
 
 constexpr double pi = M_PI;
 
@@ -177,5 +177,5 @@ TEST(Extract, says_what_it_did) {
   EXPECT_NE(refusal([&] { extract(volume, wanted); }).find("in one way"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace isosurface_test
 }  // namespace repose::imaging

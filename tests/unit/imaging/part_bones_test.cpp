@@ -9,7 +9,7 @@
 #include "volumes.h"
 
 namespace repose::imaging {
-namespace {
+namespace part_bones_test {
 
 constexpr double level = 200;
 
@@ -78,5 +78,5 @@ TEST(PartBones, what_is_apart_stays_and_points_beside_bone_are_refused) {
   EXPECT_NE(refused({0, 0, 90}, {0, 0, 5}).find("of the first bone"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace part_bones_test
 }  // namespace repose::imaging

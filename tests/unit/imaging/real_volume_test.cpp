@@ -12,7 +12,7 @@
 namespace repose::imaging {
 using namespace surface;
 using namespace meshtools;
-namespace {
+namespace real_volume_test {
 
 constexpr double voxel = 0.9765625;  // mm, the shorter one
 
@@ -82,5 +82,5 @@ TEST_F(RealVolume, labels_give_skull_and_mandible_apart) {
   EXPECT_LT(percentile_95(outside_of(skull, skin), bone), voxel);
 }
 
-}  // namespace
+}  // namespace real_volume_test
 }  // namespace repose::imaging

@@ -10,7 +10,7 @@
 
 namespace repose::imaging {
 using namespace surface;
-namespace {
+namespace volume_filter_test {
 
 TEST(VolumeFilter, otsu_parts_two_heaps) {
   const Volume volume = sampled(20, Mat3::Identity(), [](const Vec3& p) {
@@ -105,5 +105,5 @@ TEST(VolumeFilter, what_is_no_label_map_is_refused) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace volume_filter_test
 }  // namespace repose::imaging

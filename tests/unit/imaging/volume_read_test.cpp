@@ -6,7 +6,7 @@
 
 /// Headers of volumes read from files written by hand.
 namespace repose::imaging {
-namespace {
+namespace volume_read_test {
 
 std::string meta(const std::string& dimensions) {
   return fmt::format(
@@ -80,5 +80,5 @@ TEST(VolumeRead, RefusesASliceWithAnElementLongerThanTheFile) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace volume_read_test
 }  // namespace repose::imaging

@@ -8,7 +8,7 @@
 /// Contact's derivatives by Taylor expansions, before, at and after touch; what is left out of
 /// looking.
 namespace repose::mechanics {
-namespace {
+namespace contact_test {
 
 std::vector<Vec3> random_points(int count, double size, int seed) {
   std::mt19937 random(seed);
@@ -238,5 +238,5 @@ TEST(TouchLoop, LooksAgainAsSoonAsAPointMayHaveComeNear) {
                    fresh.loop.add_gradient(made.position, 1, gradient));
 }
 
-}  // namespace
+}  // namespace contact_test
 }  // namespace repose::mechanics

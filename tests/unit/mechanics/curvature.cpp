@@ -8,7 +8,7 @@
 
 /// Which Hessians are positive semidefinite, and what happens where springs have no length.
 namespace repose::mechanics {
-namespace {
+namespace curvature_test {
 
 using test::State;
 
@@ -116,5 +116,5 @@ TEST(SpringsWithoutLength, PushNowhere) {
   EXPECT_EQ(block, Mat3(spring_tangent<2>(-1.0, 2.0, 1.0) * Mat3::Identity()));
 }
 
-}  // namespace
+}  // namespace curvature_test
 }  // namespace repose::mechanics

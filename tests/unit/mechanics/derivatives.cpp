@@ -11,7 +11,7 @@
 /// with gradient and Hessian, and automatic differentiation of the formulas of
 /// docs/theory/model.md.
 namespace repose::mechanics {
-namespace {
+namespace derivatives_test {
 
 using test::State;
 using test::StateInfo;
@@ -58,7 +58,7 @@ using Terms = testing::Types<Solid, AveragedSolid, Term<none, 0>, Term<none, 1>,
                              Term<paper>, Term<penalty>, Term<paper, 2>, Term<penalty, 0, 1, 2>>;
 
 template <class T>
-class Derivatives : public testing::Test {
+class Derivatives : public ::testing::Test {
  protected:
   template <class Check>
   void in_every_state(Check&& check) {
@@ -260,5 +260,5 @@ TYPED_TEST(Derivatives, AgreeWithAutomaticDifferentiation) {
   });
 }
 
-}  // namespace
+}  // namespace derivatives_test
 }  // namespace repose::mechanics

@@ -7,7 +7,7 @@
 #include "states.h"
 
 namespace repose::mechanics {
-namespace {
+namespace loops_test {
 
 using model::PointSet;
 
@@ -114,5 +114,5 @@ TEST(Loops, AnEmptyPartIsAllowed) {
   EXPECT_EQ(loops.prisms.size(), 0);
 }
 
-}  // namespace
+}  // namespace loops_test
 }  // namespace repose::mechanics

@@ -9,7 +9,7 @@
 #include "states.h"
 
 namespace repose::mechanics {
-namespace {
+namespace prism_volume_test {
 
 using Prism = std::array<Vec3, 6>;
 
@@ -145,5 +145,5 @@ TEST(PrismVolume, DerivativesAgreeWithAutomaticDifferentiation) {
   }
 }
 
-}  // namespace
+}  // namespace prism_volume_test
 }  // namespace repose::mechanics

@@ -11,7 +11,7 @@
 
 /// Closed forms of the neo-Hookean solid (docs/theory/continuum.md).
 namespace repose::mechanics {
-namespace {
+namespace solid_test {
 
 constexpr scene::Elasticity soft{0.015, 0.45};
 constexpr int64_t across = 5, layers = 4;
@@ -44,7 +44,7 @@ model::Model block() {
   return model;
 }
 
-class SolidBlock : public testing::Test {
+class SolidBlock : public ::testing::Test {
  protected:
   /// The forces that hold the block at x = F X, N.
   std::vector<Vec3> forces(const Mat3& f) const {
@@ -229,5 +229,5 @@ TEST_F(SolidBlock, LimitedSlopesMakeTheHessianSemidefinite) {
   }
 }
 
-}  // namespace
+}  // namespace solid_test
 }  // namespace repose::mechanics

@@ -9,7 +9,7 @@
 #include <unsupported/Eigen/AutoDiff>
 
 namespace repose::mechanics {
-namespace {
+namespace spring_law_test {
 
 constexpr std::array<double, 11> elongations = {-30.0, -3.0, -0.7, -0.1, -1e-9, 0.0,
                                                 1e-12, 0.02, 0.5,  2.0,  40.0};
@@ -38,7 +38,7 @@ double integrated_tension(double s, double inverse_reference) {
 }
 
 template <class T>
-class SpringLaw : public testing::Test {};
+class SpringLaw : public ::testing::Test {};
 template <int exponent>
 struct Exponent {
   static constexpr int p = exponent;
@@ -116,5 +116,5 @@ TEST(SpringLaw, ExponentIsChosenOnceForALoop) {
   }
 }
 
-}  // namespace
+}  // namespace spring_law_test
 }  // namespace repose::mechanics

@@ -8,7 +8,7 @@
 /// Every energy term that is listed here: Taylor expansions with gradient and Hessian, and what its
 /// loop makes of it.
 namespace repose::mechanics {
-namespace {
+namespace term_test {
 
 /// A spring of no length to a place that stays.
 struct Bed {
@@ -41,7 +41,7 @@ struct Chain {
 using Energies = testing::Types<Bed, Pressure, Chain>;
 
 template <class Energy>
-class Terms : public testing::Test {
+class Terms : public ::testing::Test {
  protected:
   void SetUp() override {
     test::Random random(3);
@@ -123,5 +123,5 @@ TEST(UnknownTerms, AreRefusedByName) {
   EXPECT_THROW(TermLoop({"bed", 2, 4, {0, 1}, {0, 0, 0, 1}}, m.points, 0), base::InputError);
 }
 
-}  // namespace
+}  // namespace term_test
 }  // namespace repose::mechanics

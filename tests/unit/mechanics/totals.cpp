@@ -7,7 +7,7 @@
 #include "states.h"
 
 namespace repose::mechanics {
-namespace {
+namespace totals_test {
 
 using test::State;
 
@@ -42,7 +42,7 @@ Totals plain_totals(const model::Model& model, const std::vector<Vec3>& x, int64
   return sum;
 }
 
-class TotalsOfAState : public testing::TestWithParam<test::StateInfo> {};
+class TotalsOfAState : public ::testing::TestWithParam<test::StateInfo> {};
 
 TEST_P(TotalsOfAState, AreThePlainSumsOverWhatIsCounted) {
   const model::Model model = test::uneven_patch();
@@ -115,5 +115,5 @@ TEST(Gradients, NoVolumeTermMeansNoPrisms) {
   for (const Vec3& g : gradient) EXPECT_EQ(g, Vec3::Zero());
 }
 
-}  // namespace
+}  // namespace totals_test
 }  // namespace repose::mechanics

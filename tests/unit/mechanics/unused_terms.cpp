@@ -20,7 +20,7 @@ namespace repose::mechanics {
   return value;
 }
 
-namespace {
+namespace unused_terms_test {
 
 /// What evaluate_often() returns for a patch with or without prisms.
 std::pair<double, std::vector<Vec3>> evaluated(bool prisms, const Weights& weights) {
@@ -51,5 +51,5 @@ TEST(UnusedTermsAre, NoPartOfTheSums) {
   EXPECT_NE(evaluated(true, {1, VolumeTerm::penalty, 5}), springs_alone());
 }
 
-}  // namespace
+}  // namespace unused_terms_test
 }  // namespace repose::mechanics

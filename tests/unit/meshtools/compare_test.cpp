@@ -10,7 +10,7 @@
 namespace repose::meshtools {
 using namespace surface;
 using namespace imaging;
-namespace {
+namespace compare_test {
 
 Surface ball(double radius) {
   return isosurface(sampled(40, Mat3::Identity(), [](const Vec3& p) { return -p.norm(); }),
@@ -93,5 +93,5 @@ TEST(Compare, colours_go_from_blue_over_white_to_red) {
   EXPECT_GT(distance_colour(2, 2)[0], distance_colour(2, 2)[2]);
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace repose::meshtools

@@ -11,7 +11,7 @@
 
 namespace repose::meshtools {
 using namespace surface;
-namespace {
+namespace decimate_test {
 
 /// A closed ball with bumps of the given height, radius 50; longitude × latitude.
 Surface bumpy_ball(int n, double bump, unsigned seed) {
@@ -234,5 +234,5 @@ TEST(Hausdorff, an_empty_surface_is_an_internal_error) {
   EXPECT_THROW(one_sided_distance(cube(), {"none", {}, {}}, 1e-3), base::InternalError);
 }
 
-}  // namespace
+}  // namespace decimate_test
 }  // namespace repose::meshtools

@@ -17,7 +17,7 @@
 namespace repose::meshtools {
 using namespace surface;
 using namespace imaging;
-namespace {
+namespace face_test {
 
 constexpr double radius = 45;  // mm
 
@@ -157,5 +157,5 @@ TEST(SolvableFace, refuses_bones_that_are_elsewhere) {
   EXPECT_NE(refusal([&] { solvable_face(solid(ball), request); }).find("frame"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace face_test
 }  // namespace repose::meshtools

@@ -9,7 +9,7 @@
 
 namespace repose::meshtools {
 using namespace surface;
-namespace {
+namespace osteotomy_test {
 
 Osteotomy by_plane(const Vec3& point, const Vec3& normal, double kerf = 0) {
   return {"part", {{point, normal}}, {}, kerf, {}};
@@ -263,5 +263,5 @@ TEST_P(RealBones, random_cuts_of_real_bones) {
 
 INSTANTIATE_TEST_SUITE_P(Osteotomy, RealBones, ::testing::Values("mandible.ply", "skull.ply"));
 
-}  // namespace
+}  // namespace osteotomy_test
 }  // namespace repose::meshtools

@@ -17,7 +17,7 @@
 
 namespace repose::meshtools {
 using namespace surface;
-namespace {
+namespace phantom_test {
 
 int64_t edge_count(const Surface& surface) {
   std::vector<std::pair<int64_t, int64_t>> edges;
@@ -267,5 +267,5 @@ TEST(Solid, head_is_nowhere_much_steeper_than_a_distance) {
         }
 }
 
-}  // namespace
+}  // namespace phantom_test
 }  // namespace repose::meshtools

@@ -8,7 +8,7 @@
 
 namespace repose::meshtools {
 using namespace surface;
-namespace {
+namespace register_test {
 
 class Random {
  public:
@@ -210,5 +210,5 @@ TEST(Register, transforms_compose_as_matrices) {
   EXPECT_LT((a.after(b).matrix() - a.matrix() * b.matrix()).cwiseAbs().maxCoeff(), 1e-11);
 }
 
-}  // namespace
+}  // namespace register_test
 }  // namespace repose::meshtools

@@ -11,7 +11,7 @@
 #include "repose/model/skin_mesh.h"
 
 namespace repose::model {
-namespace {
+namespace build_test {
 
 using scene::RigidMotion;
 
@@ -426,5 +426,5 @@ TEST(BuildRefuses, a_skin_that_is_not_a_manifold) {
   EXPECT_TRUE(says(refusal(scene, skin, {kFlatBone}), "vertex 99"));
 }
 
-}  // namespace
+}  // namespace build_test
 }  // namespace repose::model

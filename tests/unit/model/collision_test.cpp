@@ -8,7 +8,7 @@
 #include "repose/meshtools/osteotomy.h"
 
 namespace repose::model {
-namespace {
+namespace collision_test {
 
 using scene::RigidMotion;
 
@@ -145,5 +145,5 @@ TEST(Collisions, stop_refuses_the_scene) {
   heed_collisions(jaws, scene, remarks);
 }
 
-}  // namespace
+}  // namespace collision_test
 }  // namespace repose::model

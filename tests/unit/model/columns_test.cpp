@@ -12,7 +12,7 @@
 #include "repose/model/skin_mesh.h"
 
 namespace repose::model {
-namespace {
+namespace columns_test {
 
 Columns lay(const SkinMesh& mesh, const std::vector<surface::Surface>& bones,
             const scene::Tissue& tissue = {}) {
@@ -239,5 +239,5 @@ TEST(Smoothing, a_slope_limit_lowers_as_little_as_it_can) {
   EXPECT_DOUBLE_EQ(values[50], 3 + 0.5 * 10);                // against the diagonals: two edges
 }
 
-}  // namespace
+}  // namespace columns_test
 }  // namespace repose::model

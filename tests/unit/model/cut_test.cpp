@@ -16,7 +16,7 @@
 #include "repose/model/skin_mesh.h"
 
 namespace repose::model {
-namespace {
+namespace cut_test {
 
 const surface::Surface kBone = patches::box({-30, -30, -25}, {130, 130, -10});
 
@@ -98,7 +98,7 @@ TEST(CutPath, refuses_what_cannot_be_cut) {
   says({{{{15, 15, 0}, {45, 45, 0}}, 1}, {{{15, 44, 0}, {45, 16, 0}}, 1}}, "incisions[1]");
 }
 
-class CutAlong : public testing::Test {
+class CutAlong : public ::testing::Test {
  protected:
   void make(int layers, int depth) {
     built_ =
@@ -273,5 +273,5 @@ TEST(CutTouches, both_sides_share_the_area_that_touches) {
   EXPECT_EQ(touches.area, (std::vector<double>{4, 3, 3}));
 }
 
-}  // namespace
+}  // namespace cut_test
 }  // namespace repose::model

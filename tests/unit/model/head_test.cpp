@@ -10,7 +10,7 @@
 #include "repose/surface/read.h"
 
 namespace repose::model {
-namespace {
+namespace head_test {
 
 surface::Surface head_surface(const char* name) {
   return surface::weld_and_orient(
@@ -18,7 +18,7 @@ surface::Surface head_surface(const char* name) {
 }
 
 /// A real head whose jaw opens by 8°, with n layers.
-class Head : public testing::TestWithParam<int> {
+class Head : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(REPOSE_HEAD_DATA)) GTEST_SKIP() << "no head data";
@@ -59,7 +59,7 @@ TEST_P(Head, is_a_valid_model_with_positive_prisms) {
 INSTANTIATE_TEST_SUITE_P(Layers, Head, testing::Values(2, 4, 8, 64));
 
 /// Table 1 on the shipped paper-sized head: layers, points, springs, prisms.
-class PaperHead : public testing::TestWithParam<std::array<int64_t, 4>> {};
+class PaperHead : public ::testing::TestWithParam<std::array<int64_t, 4>> {};
 
 TEST_P(PaperHead, has_the_counts_of_table_1_and_positive_prisms) {
   const std::filesystem::path folder = REPOSE_MESHES;
@@ -84,5 +84,5 @@ INSTANTIATE_TEST_SUITE_P(Table1, PaperHead,
                          testing::Values(Row{2, 954, 5881, 874}, Row{4, 1908, 14941, 2622},
                                          Row{6, 2862, 24001, 4370}));
 
-}  // namespace
+}  // namespace head_test
 }  // namespace repose::model

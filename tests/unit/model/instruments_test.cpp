@@ -11,7 +11,7 @@
 #include "repose/surface/read.h"
 
 namespace repose::model {
-namespace {
+namespace instruments_test {
 
 using scene::Instrument;
 
@@ -133,5 +133,5 @@ TEST(Instruments, refusals_name_the_instrument) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace instruments_test
 }  // namespace repose::model

@@ -11,7 +11,7 @@
 #include "repose/model/stiffness.h"
 
 namespace repose::model {
-namespace {
+namespace layers_test {
 
 Model flat_model(const SkinMesh& mesh, int layers, double thickness) {
   std::vector<Vec3> deep = mesh.points;
@@ -144,5 +144,5 @@ TEST(Layers, spring_volumes_are_the_shares_of_the_prisms_around) {
   }
 }
 
-}  // namespace
+}  // namespace layers_test
 }  // namespace repose::model

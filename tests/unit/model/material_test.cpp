@@ -6,7 +6,7 @@
 #include "repose/model/build.h"
 
 namespace repose::model {
-namespace {
+namespace material_test {
 
 /// A square of tissue 60 mm wide and 10 mm deep, of such strata, whose skin is stretched so.
 Model square_of(const std::vector<scene::Stratum>& strata, double turgor) {
@@ -42,5 +42,5 @@ TEST(Material, PrismsTakeTheMeanOfTheStrataBelowOneAnother) {
     EXPECT_NEAR(m.prisms.shear_modulus[k], means[m.points.layer[m.prisms.points[k][0]]], 1e-12);
 }
 
-}  // namespace
+}  // namespace material_test
 }  // namespace repose::model

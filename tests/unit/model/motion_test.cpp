@@ -8,7 +8,7 @@
 #include "repose/base/error.h"
 
 namespace repose::model {
-namespace {
+namespace motion_test {
 
 const scene::RigidMotion screw =
     scene::RigidMotion::translation({1, 6, -2})
@@ -140,5 +140,5 @@ TEST(PrescribedMotion, RefusesATransformThatIsNotRigid) {
   }
 }
 
-}  // namespace
+}  // namespace motion_test
 }  // namespace repose::model

@@ -5,7 +5,7 @@
 #include <Eigen/IterativeLinearSolvers>
 
 namespace repose::model {
-namespace {
+namespace multilevel_test {
 
 using Sparse = Multilevel::Sparse;
 
@@ -59,5 +59,5 @@ TEST(Multilevel, solves_a_small_or_unconnected_matrix_at_once) {
   EXPECT_LE(iterations(grid(40, 2, 0)), 1);
 }
 
-}  // namespace
+}  // namespace multilevel_test
 }  // namespace repose::model

@@ -7,7 +7,7 @@
 #include "repose/surface/read.h"
 
 namespace repose::model {
-namespace {
+namespace region_test {
 
 /// A region with 10 mm from the origin to its border along x.
 class Regions : public ::testing::Test {
@@ -32,5 +32,5 @@ TEST_F(Regions, reach_to_their_border_and_as_far_beyond_as_asked) {
   }
 }
 
-}  // namespace
+}  // namespace region_test
 }  // namespace repose::model

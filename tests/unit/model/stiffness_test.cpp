@@ -8,7 +8,7 @@
 #include "repose/model/build.h"
 
 namespace repose::model {
-namespace {
+namespace stiffness_test {
 
 struct Built {
   SkinMesh mesh;
@@ -104,5 +104,5 @@ TEST(Stiffness, a_rule_for_a_set_that_is_not_there_is_refused) {
   }
 }
 
-}  // namespace
+}  // namespace stiffness_test
 }  // namespace repose::model

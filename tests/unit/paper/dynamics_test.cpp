@@ -7,7 +7,7 @@
 #include "quadratic.h"
 
 namespace repose::paper {
-namespace {
+namespace dynamics_test {
 
 /// x(t) of x'' = −k (x − 1) − c x' from rest at 0, c² < 4 k.
 double oscillation(double k, double c, double t) {
@@ -60,5 +60,5 @@ TEST_F(Oscillator, EulerSaysThatItDiverged) {
   EXPECT_FALSE(move_by_euler(function, x, {0}, 10, 1000));
 }
 
-}  // namespace
+}  // namespace dynamics_test
 }  // namespace repose::paper

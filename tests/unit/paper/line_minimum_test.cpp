@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace repose::paper {
-namespace {
+namespace line_minimum_test {
 
 struct Case {
   const char* name;
@@ -52,5 +52,5 @@ TEST(Brent, TakesFewValuesOfASmoothFunction) {
   EXPECT_LE(values, 15);
 }
 
-}  // namespace
+}  // namespace line_minimum_test
 }  // namespace repose::paper

@@ -7,7 +7,7 @@
 #include "repose/solve/minimiser.h"
 
 namespace repose::paper {
-namespace {
+namespace polak_ribiere_test {
 
 /// With exact line minima a quadratic of four curvatures is minimised in four iterations.
 TEST(PolakRibiere, MinimisesAQuadraticInItsNumberOfCurvatures) {
@@ -52,5 +52,5 @@ TEST(PolakRibiere, FindsTheRestPositionOfTissue) {
   EXPECT_LT(discrete::largest_block(x), 1e-4);
 }
 
-}  // namespace
+}  // namespace polak_ribiere_test
 }  // namespace repose::paper

@@ -5,7 +5,7 @@
 #include "files.h"
 
 namespace repose::results {
-namespace {
+namespace name_lock_test {
 
 void make(const std::filesystem::path& file) { std::ofstream(file) << "x"; }
 
@@ -54,5 +54,5 @@ TEST(NameLock, AMissingFolderIsRefused) {
   EXPECT_NE(text.find("none/a.h5: cannot be written: there is no folder"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace name_lock_test
 }  // namespace repose::results

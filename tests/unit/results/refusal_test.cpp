@@ -10,7 +10,7 @@
 
 // A valid file with one thing spoiled must be refused by the name of that thing.
 namespace repose::results {
-namespace {
+namespace refusal_test {
 
 using base::check_hdf5;
 
@@ -527,5 +527,5 @@ TEST(BadFile, TruncatedAnywhereIsRefused) {
   }
 }
 
-}  // namespace
+}  // namespace refusal_test
 }  // namespace repose::results

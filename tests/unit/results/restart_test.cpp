@@ -6,7 +6,7 @@
 #include "repose/results/model_file.h"
 
 namespace repose::results {
-namespace {
+namespace restart_test {
 
 struct Told {
   double load;
@@ -138,5 +138,5 @@ TEST(Restart, AResultIsNoCheckpoint) {
   EXPECT_FALSE(is_checkpoint(folder.path("a.h5")));
 }
 
-}  // namespace
+}  // namespace restart_test
 }  // namespace repose::results

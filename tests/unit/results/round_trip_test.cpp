@@ -6,7 +6,7 @@
 #include "repose/results/model_file.h"
 
 namespace repose::results {
-namespace {
+namespace round_trip_test {
 
 void expect_same_points(const model::Points& a, const model::Points& b) {
   EXPECT_EQ(a.position, b.position);
@@ -128,5 +128,5 @@ TEST(RoundTrip, IsHdf5BySignature) {
   EXPECT_FALSE(is_hdf5(folder.path("none.h5")));
 }
 
-}  // namespace
+}  // namespace round_trip_test
 }  // namespace repose::results

@@ -6,7 +6,7 @@
 #include "results/unfinished_file.h"
 
 namespace repose::results {
-namespace {
+namespace whole_or_absent_test {
 
 std::string text_of(const std::filesystem::path& file) {
   std::ostringstream text;
@@ -176,5 +176,5 @@ TEST(WholeOrAbsent, RowsThatAreNotTheSlabAreAnInternalError) {
   EXPECT_THROW(file.append(small_numbers(0), rows), base::InternalError);
 }
 
-}  // namespace
+}  // namespace whole_or_absent_test
 }  // namespace repose::results

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace repose::scene {
-namespace {
+namespace landmark_fit_test {
 
 TEST(LandmarkFit, FitsByTheirNumber) {
   const std::vector<Vec3> from{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}},
@@ -21,5 +21,5 @@ TEST(LandmarkFit, FitsByTheirNumber) {
     EXPECT_LT(fit_landmarks({from[0], from[1]}, {from[0], to}).residual, 1e-9) << to.transpose();
 }
 
-}  // namespace
+}  // namespace landmark_fit_test
 }  // namespace repose::scene

@@ -8,7 +8,7 @@
 #include "repose/scene/transform_file.h"
 
 namespace repose::scene {
-namespace {
+namespace landmarks_test {
 
 std::string markups(const std::string& frame, const std::string& points) {
   return "{\"markups\": [{\"type\": \"Fiducial\"," + frame + " \"controlPoints\": [" + points +
@@ -131,5 +131,5 @@ TEST(Landmarks, TheShippedFilesAgree) {
     EXPECT_LT((plain.at(name) - position).norm(), 1e-3) << name;
 }
 
-}  // namespace
+}  // namespace landmarks_test
 }  // namespace repose::scene

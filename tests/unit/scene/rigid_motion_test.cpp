@@ -10,7 +10,7 @@
 #include "folder.h"
 
 namespace repose::scene {
-namespace {
+namespace rigid_motion_test {
 
 constexpr double degree = std::numbers::pi / 180;
 
@@ -217,5 +217,5 @@ TEST(RigidFit, RefusesTooFewAndCollinear) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace rigid_motion_test
 }  // namespace repose::scene

@@ -9,7 +9,7 @@
 #include "repose/scene/keys.h"
 
 namespace repose::scene {
-namespace {
+namespace scene_test {
 
 const std::string minimal =
     "skin: face.ply\n"
@@ -705,5 +705,5 @@ TEST(Keys, DocumentationHoldsTheTable) {
       << describe_keys();
 }
 
-}  // namespace
+}  // namespace scene_test
 }  // namespace repose::scene

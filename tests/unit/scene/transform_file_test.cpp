@@ -9,7 +9,7 @@
 #include "repose/base/hdf5.h"
 
 namespace repose::scene {
-namespace {
+namespace transform_file_test {
 
 const std::string head = "#Insight Transform File V1.0\n#Transform 0\n";
 
@@ -191,5 +191,5 @@ TEST(TransformFile, RefusesInOneLine) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace transform_file_test
 }  // namespace repose::scene

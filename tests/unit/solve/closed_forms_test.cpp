@@ -9,7 +9,7 @@
 #include "rest.h"
 
 namespace repose {
-namespace {
+namespace closed_forms_test {
 
 using model::PointSet;
 using testing::Rest;
@@ -164,5 +164,5 @@ TEST(FindRepose, RefusesAModelWithNothingFree) {
   EXPECT_THROW(find_rest(m, 0.1), base::InputError);
 }
 
-}  // namespace
+}  // namespace closed_forms_test
 }  // namespace repose

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace repose {
-namespace {
+namespace column_level_test {
 
 using linear::Lanes;
 
@@ -74,7 +74,7 @@ Vector vector(const std::vector<Lanes>& lanes) {
   return all;
 }
 
-class SweepsOfALevel : public testing::Test {
+class SweepsOfALevel : public ::testing::Test {
  protected:
   Level s_;
   const Vector some_ = Vector::LinSpaced(3 * Level::points, -1, 2).array().sin();
@@ -125,5 +125,5 @@ TEST(ColumnLevel, WhatIsNoNumberCouplesNothing) {
   }
 }
 
-}  // namespace
+}  // namespace column_level_test
 }  // namespace repose

@@ -8,7 +8,7 @@
 #include "repose/linear/tangent_solver.h"
 
 namespace repose {
-namespace {
+namespace column_multigrid_test {
 
 using base::check;
 
@@ -175,5 +175,5 @@ TEST(ColumnMultigrid, LivesWithPointsThatNothingHolds) {
   EXPECT_LT(Preconditioned(loose).iterations(), 60);
 }
 
-}  // namespace
+}  // namespace column_multigrid_test
 }  // namespace repose

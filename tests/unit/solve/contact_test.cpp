@@ -10,7 +10,7 @@
 
 /// Contact solved: closed forms.
 namespace repose {
-namespace {
+namespace contact_test {
 
 using model::Binding;
 using model::PointSet;
@@ -237,5 +237,5 @@ TEST(Contact, TheSidesOfACutThatIsPulledApartLetGo) {
   for (const double p : field(rest, "contact_pressure")) EXPECT_EQ(p, 0);
 }
 
-}  // namespace
+}  // namespace contact_test
 }  // namespace repose

@@ -7,7 +7,7 @@
 #include "rest.h"
 
 namespace repose {
-namespace {
+namespace force_functional_test {
 
 using base::check;
 using mechanics::VolumeTerm;
@@ -253,5 +253,5 @@ TEST_P(ForceLaws, ChainHangsWhereTheEnergyIsLeast) {
 
 INSTANTIATE_TEST_SUITE_P(Exponents, ForceLaws, ::testing::Values(0, 1, 2));
 
-}  // namespace
+}  // namespace force_functional_test
 }  // namespace repose

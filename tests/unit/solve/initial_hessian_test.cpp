@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace repose {
-namespace {
+namespace initial_hessian_test {
 
 /// Iterations until the lag tells to renew, where each leaves `left` of the force of the one
 /// before and takes `length` of the full step; 100 where it never does.
@@ -39,5 +39,5 @@ TEST(StepLag, ANewOneHasSpentNothing) {
   EXPECT_EQ(lifetime(lag, 0.5, 0.25), first);
 }
 
-}  // namespace
+}  // namespace initial_hessian_test
 }  // namespace repose

@@ -7,7 +7,7 @@
 #include "moved_block.h"
 
 namespace repose {
-namespace {
+namespace load_path_test {
 
 using base::check;
 
@@ -158,5 +158,5 @@ TEST(LoadPath, LeavesAGuessThatIsFolded) {
   EXPECT_EQ(path.loads.size(), 5u);
 }
 
-}  // namespace
+}  // namespace load_path_test
 }  // namespace repose

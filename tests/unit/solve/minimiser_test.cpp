@@ -11,7 +11,7 @@
 #include "repose/base/options.h"
 
 namespace repose {
-namespace {
+namespace minimiser_test {
 
 using base::check;
 
@@ -131,5 +131,5 @@ TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
   EXPECT_GE(s.outcome.displacement_error + std::sqrt(3) * height, discrete::largest_block(s.x));
 }
 
-}  // namespace
+}  // namespace minimiser_test
 }  // namespace repose

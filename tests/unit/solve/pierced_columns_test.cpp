@@ -6,7 +6,7 @@
 
 /// Columns that bone enters between their points.
 namespace repose {
-namespace {
+namespace pierced_columns_test {
 
 using model::PointSet;
 
@@ -48,5 +48,5 @@ TEST(PiercedColumns, APlateBesideTheBlockOrThereFromTheStartIsNot) {
   EXPECT_EQ(push_plate(0, 0.5).columns, 0);
 }
 
-}  // namespace
+}  // namespace pierced_columns_test
 }  // namespace repose

@@ -8,7 +8,7 @@
 #include "repose/mechanics/spring_law.h"
 
 namespace repose {
-namespace {
+namespace prestress_test {
 
 using model::PointSet;
 
@@ -142,5 +142,5 @@ TEST(Prestress, RefusesAPointThatNothingHolds) {
   }
 }
 
-}  // namespace
+}  // namespace prestress_test
 }  // namespace repose

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace repose::solve {
-namespace {
+namespace progress_test {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -55,5 +55,5 @@ TEST(ProgressTest, CountsTheEvaluationsOfItsOwnSearch) {
   EXPECT_FALSE(test.stalls({5000, 2, 2, 2}));
 }
 
-}  // namespace
+}  // namespace progress_test
 }  // namespace repose::solve

@@ -10,7 +10,7 @@
 #include "rest.h"
 
 namespace repose {
-namespace {
+namespace raise_test {
 
 namespace patches = model::patches;
 using discrete::Part;
@@ -247,5 +247,5 @@ TEST(Raise, what_needs_more_than_columns_is_said) {
   EXPECT_EQ(model::beyond_columns(scene), "its layers have masses");
 }
 
-}  // namespace
+}  // namespace raise_test
 }  // namespace repose

@@ -6,7 +6,7 @@
 
 /// First-order changes against the changed model solved.
 namespace repose {
-namespace {
+namespace sensitivity_test {
 
 using model::PointSet;
 using testing::Rest;
@@ -99,5 +99,5 @@ TEST(Sensitivity, KeepsWhatPressesPressing) {
   EXPECT_LE(error_of_change(pressed(1), pressed(1.01)), 0.1);
 }
 
-}  // namespace
+}  // namespace sensitivity_test
 }  // namespace repose

@@ -12,7 +12,7 @@
 #include "rest.h"
 
 namespace repose {
-namespace {
+namespace sharing_test {
 
 using test::layered_patch;
 
@@ -116,5 +116,5 @@ TEST(Sharing, GathersSlabsOfDifferentLengthsInOrder) {
   EXPECT_EQ(all, expected);
 }
 
-}  // namespace
+}  // namespace sharing_test
 }  // namespace repose

@@ -5,7 +5,7 @@
 
 /// The neo-Hookean solid solved: closed forms, and the same answer on any way to it.
 namespace repose {
-namespace {
+namespace solid_test {
 
 using model::PointSet;
 using testing::Rest;
@@ -136,5 +136,5 @@ TEST(Solid, ReportsWhatItsForcesAre) {
               1e-9 * rest.summary.last.f_e);
 }
 
-}  // namespace
+}  // namespace solid_test
 }  // namespace repose

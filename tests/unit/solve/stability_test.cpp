@@ -7,7 +7,7 @@
 #include "repose/discrete/tangent.h"
 
 namespace repose {
-namespace {
+namespace stability_test {
 
 using base::check;
 using model::PointSet;
@@ -135,5 +135,5 @@ TEST_P(Solver, DoesNotDependOnTheRanks) {
 INSTANTIATE_TEST_SUITE_P(DirectAndPreconditioned, Solver,
                          ::testing::Values(always_direct, never_direct));
 
-}  // namespace
+}  // namespace stability_test
 }  // namespace repose

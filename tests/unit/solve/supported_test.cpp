@@ -15,7 +15,7 @@ extern PetscFunctionList TaoList, TaoLineSearchList, KSPList, PCList;
 }
 
 namespace repose::solve {
-namespace {
+namespace supported_test {
 
 const SupportedTypes& row(const std::string& option) {
   const auto& table = supported_types();
@@ -90,5 +90,5 @@ TEST(SupportedTypes, DocumentationHoldsTheTable) {
       << describe_supported_types();
 }
 
-}  // namespace
+}  // namespace supported_test
 }  // namespace repose::solve

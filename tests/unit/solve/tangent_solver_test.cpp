@@ -9,7 +9,7 @@
 #include "repose/solve/load_path.h"
 
 namespace repose {
-namespace {
+namespace tangent_solver_test {
 
 using base::check;
 
@@ -136,5 +136,5 @@ TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
 
 INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));
 
-}  // namespace
+}  // namespace tangent_solver_test
 }  // namespace repose

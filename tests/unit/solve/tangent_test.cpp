@@ -6,7 +6,7 @@
 #include "repose/base/agreement.h"
 
 namespace repose {
-namespace {
+namespace tangent_test {
 
 using base::check;
 
@@ -113,5 +113,5 @@ TEST(Part, EveryRowHasOneOwner) {
   }
 }
 
-}  // namespace
+}  // namespace tangent_test
 }  // namespace repose

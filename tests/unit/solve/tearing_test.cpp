@@ -10,7 +10,7 @@
 #include "repose/model/cut.h"
 
 namespace repose {
-namespace {
+namespace tearing_test {
 
 using model::PointSet;
 
@@ -142,5 +142,5 @@ TEST(TornSpring, TakesThePrismsAndTrianglesThatHaveItForAnEdge) {
   EXPECT_EQ(m.prisms.points.size(), 2 * layers_prisms);
 }
 
-}  // namespace
+}  // namespace tearing_test
 }  // namespace repose

@@ -8,7 +8,7 @@
 
 /// Models with elements of a further term, solved on the ranks of the test.
 namespace repose {
-namespace {
+namespace term_test {
 
 using model::PointSet;
 using testing::find_rest;
@@ -101,5 +101,5 @@ TEST(FurtherTerms, TheForceFunctionalRefusesThem) {
   EXPECT_THROW(find_rest(m, force), base::InputError);
 }
 
-}  // namespace
+}  // namespace term_test
 }  // namespace repose

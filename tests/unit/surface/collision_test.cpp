@@ -8,7 +8,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace collision_test {
 
 using Corners = std::array<Vec3, 3>;
 
@@ -356,5 +356,5 @@ TEST(Collision, no_contact_of_real_bones_is_missed) {
   EXPECT_LT(touching, 4 * poses / 5);
 }
 
-}  // namespace
+}  // namespace collision_test
 }  // namespace repose::surface

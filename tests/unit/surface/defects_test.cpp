@@ -5,7 +5,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace defects_test {
 
 TEST(Defects, closed_surfaces_have_none) {
   for (const Surface& s : {tetrahedron(), cube()}) {
@@ -165,5 +165,5 @@ TEST(NewIntersections, a_fold_is_found_and_what_met_before_is_not) {
   EXPECT_TRUE(new_intersections(folded, folded).empty());
 }
 
-}  // namespace
+}  // namespace defects_test
 }  // namespace repose::surface

@@ -12,7 +12,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace distance_field_test {
 
 /// A box of 12 triangles from `low` to `high`.
 Surface box(const Vec3& low, const Vec3& high) {
@@ -234,5 +234,5 @@ TEST(DistanceField, follows_the_jaw_of_a_head_inside_and_out) {
   EXPECT_LT(sum / count, 0.03);
 }
 
-}  // namespace
+}  // namespace distance_field_test
 }  // namespace repose::surface

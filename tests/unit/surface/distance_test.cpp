@@ -6,7 +6,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace distance_test {
 
 /// A closed bumpy ball of radius about 50 around `centre`; longitude × latitude.
 Surface ball(const Vec3& centre, int n = 24) {
@@ -213,5 +213,5 @@ TEST(Distance, a_moved_tree_answers) {
   EXPECT_EQ(DistanceTree(std::move(second)).nearest({50, 50, 130}).distance, 30);
 }
 
-}  // namespace
+}  // namespace distance_test
 }  // namespace repose::surface

@@ -6,7 +6,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace head_test {
 
 class Head : public ::testing::Test {
  protected:
@@ -41,5 +41,5 @@ TEST_F(Head, the_chin_lies_where_its_landmarks_are) {
   EXPECT_TRUE(mandible.first_hit(on_skin, (on_bone - on_skin).normalized(), 15));
 }
 
-}  // namespace
+}  // namespace head_test
 }  // namespace repose::surface

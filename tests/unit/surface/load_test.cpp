@@ -3,7 +3,7 @@
 #include "repose/surface/read.h"
 
 namespace repose::surface {
-namespace {
+namespace load_test {
 
 class Load : public SurfaceFiles {
  protected:
@@ -107,5 +107,5 @@ TEST_F(Load, nothing_but_flat_triangles) {
   EXPECT_TRUE(says(refused(line, Role::skin), "none of its 1 triangles has an area"));
 }
 
-}  // namespace
+}  // namespace load_test
 }  // namespace repose::surface

@@ -6,7 +6,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace range_scan_test {
 
 /// A text range grid of a relief z(x, y), 1 mm apart; nothing where `hole` says so.
 struct Relief {
@@ -175,5 +175,5 @@ TEST_F(RangeScan, what_is_no_range_grid_is_refused) {
   says(refused(empty.text()), "no two neighbouring cells hold points");
 }
 
-}  // namespace
+}  // namespace range_scan_test
 }  // namespace repose::surface

@@ -4,7 +4,7 @@
 #include "repose/surface/defects.h"
 
 namespace repose::surface {
-namespace {
+namespace read_test {
 
 using Corners = std::vector<std::array<Vec3, 3>>;
 
@@ -246,5 +246,5 @@ TEST_F(Read, writing_into_a_missing_folder_is_refused) {
   EXPECT_NE(message.find("out.ply: cannot be written"), std::string::npos) << message;
 }
 
-}  // namespace
+}  // namespace read_test
 }  // namespace repose::surface

@@ -3,7 +3,7 @@
 #include "repose/surface/read.h"
 
 namespace repose::surface {
-namespace {
+namespace weld_test {
 
 class Weld : public SurfaceFiles {};
 
@@ -119,5 +119,5 @@ TEST_F(Weld, crowded_and_coinciding_points) {
   EXPECT_TRUE(weld_and_orient(spot).triangles.empty());
 }
 
-}  // namespace
+}  // namespace weld_test
 }  // namespace repose::surface

@@ -4,7 +4,7 @@
 #include "shapes.h"
 
 namespace repose::surface {
-namespace {
+namespace write_test {
 
 class Write : public SurfaceFiles {
  protected:
@@ -64,5 +64,5 @@ TEST_F(Write, another_ending_is_refused_before_anything_is_written) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
 
-}  // namespace
+}  // namespace write_test
 }  // namespace repose::surface
