@@ -55,7 +55,7 @@ def arguments():
     for option in ("-output", "-scene", "-landmarks", "-skin"):
         parser.add_argument(option)
     parser.add_argument("-norms", default=str(measures.NORMS))
-    chosen = parser.parse_args()
+    chosen = parser.parse_intermixed_args()
     chosen.names = [name.removesuffix(".h5") for name in (chosen.name, chosen.other) if name]
     chosen.output = chosen.output or "_and_".join(
         [chosen.names[0], *map(os.path.basename, chosen.names[1:])]) + ".html"

@@ -109,11 +109,20 @@ def packed_skin(plans, appearance, pack):
     after, values = arrays[:len(states)], dict(zip(names, arrays[len(states):]))
     surface = {"name": "skin", "kind": "skin", "triangles": pack.add(corners, 32),
                "states": [pack.numbers(before), *(pack.numbers(a - before) for a in after)]}
+    surface["oriented"] = is_oriented(before, corners)
     if "colors" in values:
         surface["colors"] = pack.add(np.clip(np.rint(values["colors"]), 0, 255), 8)
     if "uv" in values:
         surface |= {"uv": pack.numbers(values["uv"]), "image": appearance.image}
     return surface, packed_fields(values, len(states), pack)
+
+
+def is_oriented(points, corners):
+    """Whether nearly all triangles are counter-clockwise seen from outside."""
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    _, count = np.unique(ends, axis=0, return_counts=True)
+    a, b, c = (points[corners[:, k]] - points.mean(0) for k in range(3))
+    return bool((count > 1).sum() < 0.01 * len(count) and (a * np.cross(b, c)).sum() > 0)
 
 
 def packed_fields(values, count, pack):
@@ -273,11 +282,12 @@ def plan_table(plans):
         page += '<p class="note">'
     page += ("A negative advance is a setback; up is impaction of an upper jaw. Pitch: front down; "
              "roll: left side down; yaw: front to the patient's left, each positive.</p>")
-    for plan in plans:
-        for name, before, after in occlusion(plan.bones):
-            title = f"{plan.name}: {name}" if len(plans) > 1 else name
-            page += (f'<p class="plan-line"><b>{html.escape(title)}</b> {before:.1f} mm before, '
-                     f"{after:.1f} mm after</p>")
+    teeth = [occlusion(plan.bones) for plan in plans]
+    for k, (name, before, _) in enumerate(teeth[0] if all(teeth) else ()):
+        after = ", ".join(f"{tenths(one[k][2])} mm {title}" for one, title in
+                          zip(teeth, state_names(plans)[1:]))
+        page += (f'<p class="plan-line"><b>{name}</b> {tenths(before)} mm before, '
+                 f"{html.escape(after)}</p>")
     return page
 
 
@@ -319,29 +329,32 @@ def ratio_table(plans):
         "ratio outside them is a reason to look again, not an error.</p>"
 
 
+def region_columns(plans):
+    """[(title, numbers by part, how many of mean, 90 % and 95 % are shown)]"""
+    first, many = plans[0], len(plans) > 1
+    columns = [(plan.name if many else "moves",
+                by_part(plan.result.solved, plan.parts or first.parts, plan.result.solved.movement),
+                1 if many else 3) for plan in plans]
+    skin = first.result.skin
+    if many:
+        apart = np.linalg.norm(matched(*plans) - skin.after, axis=1)
+        columns.append(("difference", by_part(skin, first.parts, apart), 3))
+    elif first.result.uncertainty is not None:
+        columns.append(("sure to", by_part(skin, first.parts, first.result.uncertainty), 3))
+    return columns
+
+
 def region_table(plans):
     first = plans[0]
     if first.parts is None:
         return '<p class="note">No parts of the face: they need the landmarks pronasale, subnasale, ' \
             "upper_lip, lower_lip and pogonion_soft.</p>"
-    columns, heads = [], []
-    for plan in plans:
-        skin = plan.result.solved
-        columns.append(by_part(skin, plan.parts or first.parts, skin.movement))
-        heads.append("moves" if len(plans) == 1 else plan.name)
-    if len(plans) == 2:
-        skin = first.result.skin
-        apart = np.linalg.norm(matched(*plans) - skin.after, axis=1)
-        columns.append(by_part(skin, first.parts, apart))
-        heads.append("difference")
-    elif first.result.uncertainty is not None:
-        columns.append(by_part(first.result.skin, first.parts, first.result.uncertainty))
-        heads.append("sure to")
-    rows = [(name.capitalize(), *(tenths(number) for column in columns
-                     for number in column.get(name, (math.nan,) * 3)))
-            for name in Parts.NAMES if name in columns[0]]
-    head = ("part", *(f"{title}, {what}" for title in heads
-                      for what in ("mean, mm", "90 % within", "95 % within")))
+    columns = region_columns(plans)
+    rows = [(name.capitalize(), *(tenths(number) for _, column, shown in columns
+                                  for number in column.get(name, (math.nan,) * 3)[:shown]))
+            for name in Parts.NAMES if name in columns[0][1]]
+    head = ("part", *(f"{title}, {what}" for title, _, shown in columns
+                      for what in ("mean, mm", "90 % within", "95 % within")[:shown]))
     published = "; ".join(f"{where} {error} ({who})" for where, error, who in PUBLISHED)
     return table(head, rows) + '<p class="note">By area. How far published planners were from the ' \
         f"operated face: {published}.</p>"
@@ -432,8 +445,8 @@ def write(plans, norms, scene, appearance):
     title = html.escape(" and ".join(plan.name for plan in plans))
     words, packed = described(plans, appearance)
     said = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
-                   paragraphs(plan.result, plan.known, plan.parts, plan.guessed) +
-                   plan_lines(plan) for plan in plans)
+                   paragraphs(plan.result, plan.known, plan.parts, plan.guessed,
+                              plan is plans[-1]) + plan_lines(plan) for plan in plans)
     landmarks = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
                         landmark_table(plan) for plan in plans)
     return f"""<!DOCTYPE html>

@@ -117,7 +117,7 @@ class Frame:
 
 
 def scale_bar(frame):
-    x, y, length = frame.width + MARGIN + 8, MARGIN + HEIGHT, 20 * frame.scale
+    x, y, length = frame.width + MARGIN + 8, MARGIN + HEIGHT + 34, 20 * frame.scale
     return (f'<path class="scale" d="M{x:.1f} {y - 5}v5h{length:.1f}v-5"/>'
             f'<text class="small" x="{x:.1f}" y="{y - 12}">20 mm</text>')
 
@@ -141,7 +141,7 @@ def drawing(skins, bones, known, states):
     if not skins[0]:
         return "<p>The plane of symmetry does not meet the skin.</p>"
     frame = Frame(skins, known)
-    wide, high = frame.width + 2 * MARGIN + 84, HEIGHT + 2 * MARGIN
+    wide, high = frame.width + 2 * MARGIN + 84, HEIGHT + 2 * MARGIN + 34
     parts = [f'<svg class="profile" viewBox="0 0 {wide:.0f} {high}" role="img" '
              'aria-label="profile before and after, looking to the right">'
              f'<defs><clipPath id="face"><rect x="0" y="{MARGIN}" width="{wide - 84:.0f}" '

@@ -108,8 +108,9 @@ def trust(result):
             "not a medical device.")
 
 
-def paragraphs(result, known, parts, guessed):
+def paragraphs(result, known, parts, guessed, trusted=True):
+    """The verdict with its cautions; `trusted`: with what every sheet says once."""
     said = "".join(f'<p class="warning">{html.escape(line)}</p>'
                    for line in cautions(result, known, parts, guessed))
-    return (f'<p class="verdict"><b>{html.escape(verdict(result))}</b> {html.escape(trust(result))}'
-            f"</p>{said}")
+    rest = html.escape(trust(result)) if trusted else ""
+    return f'<p class="verdict"><b>{html.escape(verdict(result))}</b> {rest}</p>{said}'

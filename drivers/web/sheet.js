@@ -54,7 +54,7 @@ class Sheet {
     this.color("");
   }
 
-  addSurface({name, kind, triangles, states, colors, uv, image}, bytes) {
+  addSurface({name, kind, triangles, states, colors, uv, image, oriented}, bytes) {
     const base = unpack(bytes, states[0] ?? states.find(Boolean));
     const positions = states.map((one, state) => {
       if (!one) return null;
@@ -63,7 +63,7 @@ class Sheet {
       return moved.map((shift, i) => base[i] + shift);
     });
     const surface = this.viewer.add({
-      name, kind, triangles: unpack(bytes, triangles), states: positions,
+      name, kind, oriented, triangles: unpack(bytes, triangles), states: positions,
       colors: colors ? Uint8Array.from(unpack(bytes, colors)) : null,
       uv: uv ? unpack(bytes, uv) : null});
     if (!image) return;
@@ -101,11 +101,13 @@ class Sheet {
     if (field) {
       const colors = field.ramp ?? ramp;
       this.viewer.setScale({ramp: colors, low: 0, high: field.high || 1});
-      bySheetId("bar").innerHTML =
+      bySheetId("bar").innerHTML = `<b>${field.label}</b>` +
         `<i style="background:linear-gradient(90deg,${colors.map(c => `#${c}`).join(",")})"></i>` +
-        `<span><b>${field.ends ? field.ends[0] : "0"}</b><b>${field.label}</b>` +
-        `<b>${field.ends ? field.ends[1] : field.high.toFixed(1)}</b></span>`;
+        `<span><span>${field.ends ? field.ends[0] : "0"}</span>` +
+        `<span>${field.ends ? field.ends[1] : field.high.toFixed(1)}</span></span>`;
     }
+    for (const bone of this.viewer.surfaces.slice(1))
+      bone.setStyle({color: field ? "#b9c0ca" : "#f2e8cf"});
     this.skin.positions.forEach((_, state) => this.skin.setField(state, field?.states[state] ?? null));
     this.blend();
     this.viewer.draw();
@@ -246,7 +248,7 @@ class Sheet {
       else document.documentElement.dataset.stills = "yes";
     };
     window.addEventListener("beforeprint", () => { while (left.length) this.makeStill(left.shift()); });
-    setTimeout(next, 300);
+    setTimeout(next, 5000);
   }
 }
 

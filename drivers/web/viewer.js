@@ -4,6 +4,8 @@
 //   const viewer = new FaceViewer(element);       // throws where the browser has no WebGL 2
 //   const skin = viewer.add({name: "skin", triangles, states: [before, after]});
 //   viewer.add({name: "mandible", kind: "bone", triangles, states: [before, after]});
+//   // further keys: colors (Uint8Array, 3 a vertex), uv (2 a vertex), oriented (triangles are
+//   // counter-clockwise from outside: the inside is then drawn dark)
 //   viewer.show({mode: "split", states: [0, 1]});
 //   viewer.look("three-quarter");
 //
@@ -42,9 +44,18 @@ function rampColor(ramp, share) {
     (place - below) * (part(ramp[below + 1], k) - part(ramp[below], k)));
 }
 
+// Draws the back of a surface, as seen through an open mouth, dark.
+function darkenInside(material) {
+  material.onBeforeCompile = shader => {
+    shader.fragmentShader = shader.fragmentShader.replace("#include <color_fragment>",
+      "#include <color_fragment>\nif (!gl_FrontFacing) diffuseColor.rgb = vec3(0.13, 0.05, 0.045);");
+  };
+}
+
 // One surface in all its states; made by FaceViewer.add.
 class FaceSurface {
-  constructor(viewer, {name, kind = "skin", triangles, states, colors = null, uv = null}) {
+  constructor(viewer, {name, kind = "skin", triangles, states, colors = null, uv = null,
+                       oriented = false}) {
     Object.assign(this, {viewer, name, kind, triangles, positions: [], meshes: [], fields: []});
     this.index = new THREE.BufferAttribute(triangles, 1);
     this.shared = {};
@@ -56,6 +67,7 @@ class FaceSurface {
       roughness: bone ? 0.85 : 0.62, metalness: 0, side: THREE.DoubleSide});
     this.colored = new THREE.MeshStandardMaterial({
       map: viewer.rampTexture, roughness: 0.8, metalness: 0, side: THREE.DoubleSide});
+    if (oriented) for (const material of [this.plain, this.colored]) darkenInside(material);
     this.style = {visible: true, opacity: 1, plain: false};
     states.forEach((positions, state) => positions && this.setPositions(state, positions));
   }

@@ -20,7 +20,7 @@ def needs_browser():
         pytest.skip("Chromium is not installed (apt-get install --no-install-recommends chromium)")
 
 
-def browse(page, *options, size=(700, 700), seconds=100):
+def browse(page, *options, size=(500, 500), seconds=100):
     """Runs Chromium on a page; what it prints."""
     needs_browser()
     with tempfile.TemporaryDirectory() as profile:
@@ -42,7 +42,7 @@ def evaluate(page, script, **options):
   catch (reason) {{ told.textContent = JSON.stringify({{error: String(reason.stack)}}); }}
   document.body.append(told);
 }})();</script></body>"""), encoding="utf-8")
-    printed = browse(copy, "--virtual-time-budget=60000", "--dump-dom", **options)
+    printed = browse(copy, "--virtual-time-budget=4000", "--dump-dom", **options)
     found = FOUND.search(printed)
     assert found, printed[-2000:]
     return json.loads(found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))

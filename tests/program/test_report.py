@@ -234,7 +234,7 @@ def test_the_view_works_in_a_browser(report, opened, tmp_path):
     assert far > 1 and f"moves {far:.1f} mm" in found["sentence"] and "down" in found["sentence"]
     assert np.allclose(found["point"], found["inside"], atol=1e-3)
     assert f"after {found['apart']:.1f} mm" in found["distance"]
-    assert found["bar"].startswith("0movement, mm")
+    assert found["bar"].startswith("movement, mm0")
 
 
 def test_it_prints_on_two_pages(report, opened, tmp_path):
@@ -388,3 +388,91 @@ def test_mistakes_are_one_line(report, opened, tmp_path):
         assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result.stderr
         assert result.stderr.startswith("report.py: ") and part in result.stderr
     assert not [f for f in pathlib.Path(tmp_path).iterdir() if f.suffix in (".html", ".part")]
+
+
+@pytest.fixture
+def other_plan(opened, tmp_path):
+    """The same face, moved half as far: what a second plan could give."""
+    shutil.copy(opened, tmp_path / "half.h5")
+    with h5py.File(tmp_path / "half.h5", "r+") as h5:
+        step = h5["step"][sorted(h5["step"])[-1]]
+        before = h5["model/point/position"][:]
+        step["point/position"][...] = before + 0.5 * (step["point/position"][:] - before)
+        bones = h5["model/bone_surfaces/points"][:]
+        step["bone_surface/points"][...] = bones + 0.5 * (step["bone_surface/points"][:] - bones)
+    return tmp_path / "half.h5"
+
+
+def test_two_plans_are_compared(report, opened, other_plan, tmp_path):
+    page = page_of(report, tmp_path, opened, other_plan, "-landmarks", MARKS)
+    view, step, model = View(tmp_path / "page.html"), last(opened), model_of(opened)
+    skin = np.unique(model["skin/points"])
+    _, before, after, half = view.surface("skin")
+    assert np.abs(after - step["point/position"][skin]).max() < 0.01
+    assert np.abs(half - before - 0.5 * (after - before)).max() < 0.01
+    assert view.told["states"] == ["before", "0", "half"]
+    mean, mean_of_half, *apart = (float(cell) for cell in page.rows["Chin"])
+    assert mean > 2 and mean_of_half == pytest.approx(mean / 2, abs=0.06)
+    assert apart[0] == pytest.approx(mean / 2, abs=0.06) and apart[0] <= apart[1] <= apart[2]
+    assert len(page.rows["lower face"]) == 6
+
+
+def test_another_patient_is_refused(report, opened, other_plan):
+    with h5py.File(other_plan, "r+") as h5:
+        h5["model/point/position"][...] += 20
+    result = report(opened, other_plan, "-output", "page.html")
+    assert result.returncode == 1 and "two plans of one patient" in result.stderr
+
+
+def write_ply(file, points, colors):
+    rows = [f"{x} {y} {z} {r} {g} {b}" for (x, y, z), (r, g, b) in zip(points, colors)]
+    properties = [f"property {kind} {name}" for kind, names in (
+        ("float", ("x", "y", "z")), ("uchar", ("red", "green", "blue"))) for name in names]
+    file.write_text("\n".join(["ply", "format ascii 1.0", f"element vertex {len(rows)}", *properties,
+                               "end_header", *rows, ""]))
+
+
+def test_colors_and_photographs_of_a_skin_are_kept(report, opened, tmp_path):
+    model = model_of(opened)
+    rows, corners = np.unique(model["skin/points"], return_inverse=True)
+    points, corners = model["point/position"][rows], corners.reshape(-1, 3)
+    colors = np.stack([np.arange(len(points)) % 256] * 3, 1) // (1, 2, 3)
+    write_ply(tmp_path / "face.ply", points, colors)
+    page_of(report, tmp_path, opened, "-skin", tmp_path / "face.ply")
+    view = View(tmp_path / "page.html")
+    assert np.array_equal(view.array(view.told["surfaces"][0]["colors"]), colors)
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG a photograph")
+    (tmp_path / "face.mtl").write_text("newmtl face\nmap_Kd photo.png\n")
+    (tmp_path / "face.obj").write_text("mtllib face.mtl\n" + "".join(
+        [f"v {x} {y} {z}\n" for x, y, z in points] +
+        [f"vt {x / 200 + 0.5} {z / 300 + 0.5}\n" for x, _, z in points] +
+        ["f " + " ".join(f"{c}/{c}" for c in face) + "\n" for face in corners + 1]))
+    page_of(report, tmp_path, opened, "-skin", tmp_path / "face.obj")
+    view = View(tmp_path / "page.html")
+    shown = view.told["surfaces"][0]
+    assert base64.b64decode(shown["image"].split(",")[1]) == b"\x89PNG a photograph"
+    _, before, after = view.surface("skin")
+    assert np.abs(view.array(shown["uv"]) - before[:, [0, 2]] / (200, 300) - 0.5).max() < 1e-3
+    assert np.abs(after - last(opened)["point/position"][rows]).max() < 0.02
+
+
+def test_norms_of_ones_own(report, opened, tmp_path):
+    norms = [{"source": "of ours 2020", "population": "12 adults", "norms": {"facial convexity": [9, 2]}}]
+    (tmp_path / "norms.json").write_text(json.dumps(norms))
+    page = page_of(report, tmp_path, opened, "-landmarks", MARKS, "-norms", tmp_path / "norms.json")
+    assert page.rows["facial convexity"][-1] == "9 ± 2 [1]" and "12 adults" in page.text["p"]
+    (tmp_path / "norms.json").write_text('[{"norms": {"beauty": [1, 1]}}]')
+    refused = report(opened, "-norms", "norms.json")
+    assert refused.returncode == 1 and "norms.json" in refused.stderr and "beauty" in refused.stderr
+
+
+def test_landmarks_are_found_by_shape_and_said_to_be(report, solved, tmp_path):
+    face = solved("head_solid.yaml")
+    page = page_of(report, tmp_path, face)
+    assert "found by the shape of the profile" in page.text["p"]
+    given = page_of(report, tmp_path, face, "-landmarks", PROJECT / "meshes/head.mrk.json")
+    assert "found by the shape" not in given.text["p"]
+    for name in ("upper lip in front of the E-line", "lower lip in front of the E-line"):
+        ours, right = (float(p.rows[name][2].replace("−", "-")) for p in (page, given))
+        assert abs(ours - right) < 1
+    assert page.rows["Chin"] and page.rows["Lower lip"]
