@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
 """Pictures of a result, drawn without a screen, and a film of its way.
 
-    drivers/render.py NAME [-output picture.png] [-views front,three-quarter,profile]
+    drivers/render.py NAME [OTHER] [-output picture.png] [-views front,three-quarter,profile]
         [-columns before,after,movement,bones] [-step last] [-film film.gif] [-frames 24]
-        [-scene scene.yaml]
+        [-scene scene.yaml] [-solved_skin]
 
-NAME is the result (NAME.h5, the ending may be left out). One row a view, one column a way to see it:
+NAME is the result (NAME.h5, the ending may be left out); OTHER is another plan of the same patient,
+whose columns stand beside, on one scale, with the difference of the faces. One row a view, one column
+a way to see it:
 
-    before, after   the skin
+    before, after   the skin that the scene names, displaced
     movement        how far each place of the skin has gone, mm
     advance         how far outwards (red) or inwards (blue), mm
     stress          von Mises stress of the skin's prisms; tension of its springs
+    region          which part of the skin was computed
     bones           the skin as a veil over the bones
 
+-solved_skin shows the skin that was solved, where that is a remeshed part of the scene's.
 -film draws the columns along the load steps, between which it moves evenly, into an animated GIF.
 -scene shows the instruments of the scene, which the result does not hold; it needs PyYAML.
 Needs VTK and h5py, and no display: pip install vtk h5py, with apt-get install libegl1
@@ -32,15 +36,16 @@ import sys
 if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_screen
     sys.argv[1:] = json.loads(os.environ["REPOSE_RENDER"])
 
-# Where the camera stands as seen from the head: +x patient left, +y posterior, +z up.
-VIEWS = {"front": (0, -1, 0), "three-quarter": (0.65, -0.75, 0.1), "profile": (1, 0, 0)}
-COLOURED = ("movement", "advance", "stress")
+# Where the camera stands as seen from the head: +x patient left, +y posterior, +z up. A profile
+# looks to the right.
+VIEWS = {"front": (0, -1, 0), "three-quarter": (-0.65, -0.75, 0.1), "profile": (-1, 0, 0)}
+COLOURED = ("movement", "advance", "stress", "region")
 COLUMNS = ("before", "after", *COLOURED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
 FLESH, GREY, STEEL = (0.70, 0.36, 0.33), (0.72, 0.74, 0.78), (0.45, 0.55, 0.65)
-MAGMA = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")  # light to dark
+REGION = ("a8acb2", "2a9d8f")  # as given, computed
 BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
 
 
@@ -67,6 +72,7 @@ def arguments():
                        formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-help", action="help")
     parser.add_argument("name")
+    parser.add_argument("other", nargs="?")
     parser.add_argument("-output")
     parser.add_argument("-views", default=",".join(VIEWS))
     parser.add_argument("-columns", default="before,after,movement,bones")
@@ -74,15 +80,21 @@ def arguments():
     parser.add_argument("-film")
     parser.add_argument("-frames", type=int, default=24)
     parser.add_argument("-scene")
-    chosen = parser.parse_args()
-    chosen.name = os.path.abspath(chosen.name.removesuffix(".h5"))
-    chosen.output = os.path.abspath(chosen.film or chosen.output or chosen.name + ".png")
+    parser.add_argument("-solved_skin", action="store_true")
+    chosen = parser.parse_intermixed_args()
+    chosen.names = [os.path.abspath(name.removesuffix(".h5"))
+                    for name in (chosen.name, chosen.other) if name]
+    made = "_and_".join([chosen.names[0], *map(os.path.basename, chosen.names[1:])])
+    chosen.output = os.path.abspath(chosen.film or chosen.output or made + ".png")
     chosen.views = words("-views", chosen.views, tuple(VIEWS))
     chosen.columns = words("-columns", chosen.columns, COLUMNS)
     if chosen.scene and not os.path.isfile(chosen.scene):
         refuse(f"-scene {chosen.scene}: no such file")
-    if not os.path.isfile(chosen.name + ".h5"):
-        refuse(f"{chosen.name}.h5 is missing: NAME is the result's path")
+    for name in chosen.names:
+        if not os.path.isfile(name + ".h5"):
+            refuse(f"{name}.h5 is missing: NAME is the result's path")
+    if chosen.film and len(chosen.names) > 1:
+        refuse("-film shows one result, not two")
     if not os.path.isdir(os.path.dirname(chosen.output)):
         refuse(f"{chosen.output}: make its folder first")
     if chosen.film and not (chosen.film.endswith(".gif") and 2 <= chosen.frames <= 1000):
@@ -127,13 +139,15 @@ def find_screen():
 
 def load_modules():
     """After find_screen."""
-    global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy, RAMP, shown_skin
     try:
         import h5py
         import numpy as np
         import vtkmodules.all as vtk
         from vtkmodules.util.numpy_support import (numpy_to_vtk, numpy_to_vtkIdTypeArray,
                                                    vtk_to_numpy)
+        sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+        from sheet import RAMP, shown_skin
     except ImportError as missing:
         refuse(f"{missing.name} is missing: pip install vtk h5py, or apt-get install "
                "--no-install-recommends python3-numpy python3-h5py")
@@ -145,7 +159,9 @@ def load_modules():
 class Result:
     """The steps of a result: skin and bones before and on their way, and numbers at the skin."""
 
-    def __init__(self, file):
+    def __init__(self, file, solved_skin=False):
+        file = str(file)
+        self.name = os.path.basename(file).removesuffix(".h5")
         try:
             self.h5 = h5py.File(file)
         except OSError as reason:
@@ -155,9 +171,11 @@ class Result:
         self.model = self.h5["model"]
         self.steps = [self.h5["step"][name] for name in sorted(self.h5["step"])]
         self.loads = [step.attrs["load"] for step in self.steps]
-        self.used, corners = np.unique(self.model["skin/points"][:], return_inverse=True)
-        self.corners = corners.reshape(-1, 3)
-        self.before = self.model["point/position"][:][self.used]
+        solved, self.used = shown_skin.solved_skin(self.h5)
+        shown = solved if solved_skin else shown_skin.shown_skin(self.h5, file.removesuffix(".h5"))
+        self.corners, self.before, self.solved = shown.corners, shown.before, shown.solved
+        self.given = None if len(shown.before) == len(solved.before) else shown
+        self.near = None if self.given is None else shown_skin.nearest(solved.before, shown.before)
         self.walls = self.find_walls()
         self.instruments = []
         bones = self.model.get("bone_surfaces")
@@ -186,7 +204,15 @@ class Result:
         return self.steps[step]["point/position"][:]
 
     def skin(self, step):
-        return self.points(step)[self.used]
+        """The shown skin at a step; a given one goes evenly to where it is at the last."""
+        if self.given is None:
+            return self.points(step)[self.used]
+        share = self.loads[step] / self.loads[-1] if self.loads[-1] > 0 else 1.0
+        return self.before + share * (self.given.after - self.before)
+
+    def of_skin(self, numbers):
+        """Numbers of the solved skin's vertices at those of the shown skin."""
+        return numbers if self.near is None else np.where(self.solved > 0, numbers[self.near], 0.0)
 
     def bones(self, step):
         moved = self.steps[step].get("bone_surface/points")
@@ -213,11 +239,11 @@ class Result:
     def state(self, step):
         """Skin, bones and the numbers of each coloured column, at a step."""
         skin = self.skin(step)
-        numbers = {"movement": np.linalg.norm(skin - self.before, axis=1)}
+        numbers = {"movement": np.linalg.norm(skin - self.before, axis=1), "region": self.solved}
         if "point/advance" in self.steps[step]:
-            numbers["advance"] = self.steps[step]["point/advance"][:][self.used]
+            numbers["advance"] = self.of_skin(self.steps[step]["point/advance"][:][self.used])
         if "prism/von_mises" in self.steps[step] or "spring/tension" in self.steps[step]:
-            numbers["stress"] = self.stress(step)
+            numbers["stress"] = self.of_skin(self.stress(step))
         return {"skin": skin, "bones": self.bones(step), "walls": self.wall(step),
                 "load": self.loads[step], **numbers}
 
@@ -240,7 +266,8 @@ def head(column, result):
     """What stands above a column."""
     unit = "N/mm²" if "prism/von_mises" in result.steps[-1] else "N"
     return {"movement": "movement, mm", "advance": "outwards, mm",
-            "stress": ("stress, " if unit != "N" else "tension, ") + unit}.get(column, column)
+            "stress": ("stress, " if unit != "N" else "tension, ") + unit,
+            "difference": "difference, mm", "region": "computed part"}.get(column, column)
 
 
 # ----- VTK
@@ -337,8 +364,8 @@ def round_up(number):
 
 def colours(column, numbers):
     """The colour table of a column: from 0, or as far inwards as outwards."""
-    largest = round_up(float(np.abs(numbers).max())) or 1.0
-    ramp, low = (BOTH, -largest) if column == "advance" else (MAGMA, 0.0)
+    largest = 1.0 if column == "region" else round_up(float(np.abs(numbers).max())) or 1.0
+    ramp, low = {"advance": (BOTH, -largest), "region": (REGION, 0.0)}.get(column, (RAMP, 0.0))
     table = vtk.vtkColorTransferFunction()
     for i, text in enumerate(ramp):
         red, green, blue = (int(text[k:k + 2], 16) / 255 for k in (0, 2, 4))
@@ -486,27 +513,69 @@ class Sheet:
         return flat.reshape(high, wide, 3)[::-1]
 
 
-def picture(result, state, chosen, tables, title=""):
-    """A sheet of one row a view, cropped to the skin, and one column a way to see it."""
-    margin, wide = 1.05, COLUMN
-    frames = [extent(np.concatenate([result.before, result.skin(-1)]), view)
-              for view in chosen.views]
+class Panel:
+    """A column of the picture: a way to see one result at one state."""
+
+    def __init__(self, column, result, state, title):
+        self.column, self.result, self.state, self.title = column, result, state, title
+
+
+def panels(results, states, columns):
+    """The panels of one result, or of two beside each other with their difference."""
+    if len(results) == 1:
+        return [Panel(column, results[0], states[0], head(column, results[0])) for column in columns]
+    made = []
+    for column in columns:
+        once = column in ("before", "region")
+        made += [Panel(column, result, state, head(column, result) if once else
+                       f"{result.name}: {head(column, result)}")
+                 for result, state in list(zip(results, states))[:1 if once else 2]]
+    apart = difference(results, states)
+    made.append(Panel("difference", results[1], {**states[1], "difference": apart},
+                      head("difference", results[1])))
+    return made
+
+
+def difference(results, states):
+    """How far the faces of two results are from each other, mm, at the vertices of the second."""
+    first, second = (state["skin"] - result.before for result, state in zip(results, states))
+    near = shown_skin.nearest(results[0].before, results[1].before)
+    off = np.linalg.norm(results[0].before[near] - results[1].before, axis=1)
+    if np.median(off) > 5:
+        refuse(f"{results[1].name}.h5: not the skin of {results[0].name}.h5; two plans of one patient "
+               "can be compared")
+    return np.linalg.norm(second - first[near], axis=1)
+
+
+def scales(drawn):
+    """The color table of each colored column, one for all panels of it."""
+    numbers = {}
+    for panel in drawn:
+        if panel.column in (*COLOURED, "difference"):
+            numbers.setdefault(panel.column, []).append(panel.state[panel.column])
+    return {column: colours(column, np.concatenate(values)) for column, values in numbers.items()}
+
+
+def picture(drawn, views, tables, title=""):
+    """A sheet of one row a view, cropped to the skin, and one column a panel."""
+    margin, wide, result = 1.05, COLUMN, drawn[0].result
+    frames = [extent(np.concatenate([result.before, result.skin(-1)]), view) for view in views]
     scale = wide / (2 * margin * max(across for _, across, _ in frames))  # pixels per mm
     rows = [2 * margin * up * scale for _, _, up in frames]
     bars = BAR if tables else 0
-    sheet = Sheet(wide * len(chosen.columns), TITLE * (1 + bool(title)) + sum(rows) + bars)
+    sheet = Sheet(wide * len(drawn), TITLE * (1 + bool(title)) + sum(rows) + bars)
     if title:
         sheet.put(label(title), 0, 0, sheet.width, TITLE)
-    for i, column in enumerate(chosen.columns):
+    for i, panel in enumerate(drawn):
         top = TITLE * (1 + bool(title))
-        sheet.put(label(head(column, result)), i * wide, top - TITLE, wide, TITLE)
-        for view, (middle, _, up), high in zip(chosen.views, frames, rows):
-            scene = renderer(actors(column, state, result, tables))
+        sheet.put(label(panel.title), i * wide, top - TITLE, wide, TITLE)
+        for view, (middle, _, up), high in zip(views, frames, rows):
+            scene = renderer(actors(panel.column, panel.state, panel.result, tables))
             sheet.put(scene, i * wide, top, wide, high)
             look(scene, view, middle, margin * up)
             top += high
-        bar = colour_bar(tables[column]) if column in tables else renderer([])
-        sheet.put(bar, i * wide, top, wide, bars)
+        table = tables.get(panel.column)
+        sheet.put(colour_bar(table) if table else renderer([]), i * wide, top, wide, bars)
     return sheet.pixels()
 
 
@@ -535,26 +604,33 @@ def write_film(frames, output):
     os.replace(output + ".part", output)
 
 
-def main():
-    chosen = arguments()
-    result = Result(chosen.name + ".h5")
-    if chosen.scene:
-        result.instruments = read_instruments(chosen.scene)
+def state_of(result, chosen):
+    """The state that is drawn of a result; refuses steps and columns that it has not."""
     last = len(result.steps) - 1
     if chosen.step != "last" and not (chosen.step.isdecimal() and int(chosen.step) <= last):
-        refuse(f"-step {chosen.step}: {chosen.name}.h5 has the steps 0 to {last}, or last")
+        refuse(f"-step {chosen.step}: {result.name}.h5 has the steps 0 to {last}, or last")
     state = result.state(last if chosen.step == "last" else int(chosen.step))
     for column in chosen.columns:
         if column in COLOURED and column not in state:
-            refuse(f"-columns {column}: {chosen.name}.h5 does not have it; solve it again")
-    tables = {column: colours(column, state[column]) for column in chosen.columns
-              if column in COLOURED}
+            refuse(f"-columns {column}: {result.name}.h5 does not have it; solve it again")
+    return state
+
+
+def main():
+    chosen = arguments()
+    results = [Result(name + ".h5", chosen.solved_skin) for name in chosen.names]
+    if chosen.scene:
+        for result in results:
+            result.instruments = read_instruments(chosen.scene)
+    states = [state_of(result, chosen) for result in results]
+    drawn = panels(results, states, chosen.columns)
+    tables = scales(drawn)
     if chosen.film:
-        loads = np.linspace(0, state["load"], chosen.frames)
-        write_film([picture(result, result.between(load), chosen, tables, f"load {load:.2f}")
-                    for load in loads], chosen.output)
+        loads = np.linspace(0, states[0]["load"], chosen.frames)
+        write_film([picture(panels(results, [results[0].between(load)], chosen.columns), chosen.views,
+                            tables, f"load {load:.2f}") for load in loads], chosen.output)
     else:
-        write_picture(picture(result, state, chosen, tables), chosen.output)
+        write_picture(picture(drawn, chosen.views, tables), chosen.output)
     print(chosen.output)
 
 

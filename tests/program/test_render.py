@@ -120,3 +120,59 @@ def test_a_film_shows_the_load_steps(render, solved, tmp_path):
         first = frames.convert("RGB").tobytes()
         frames.seek(2)
         assert frames.convert("RGB").tobytes() != first
+
+
+def drawing_module(monkeypatch):
+    pytest.importorskip("vtkmodules")
+    monkeypatch.syspath_prepend(SCRIPT.parent)
+    drawing = importlib.import_module("render")
+    drawing.load_modules()
+    return drawing
+
+
+def test_two_results_stand_beside_each_other_with_their_difference(render, solved, tmp_path):
+    needs_vtk()
+    one = other = solved("paper_jaw_opening.yaml")
+    result = render(one, other, "-output", "two.png", "-views", "profile", "-columns", "before,after")
+    assert (result.returncode, result.stderr) == (0, "")
+    single = render(one, "-output", "one.png", "-views", "profile", "-columns", "before")
+    assert single.returncode == 0
+    assert size_of(tmp_path / "two.png")[0] == 4 * size_of(tmp_path / "one.png")[0]
+    assert "shows one result" in render(one, other, "-film", "way.gif").stderr
+
+
+def test_the_difference_is_that_of_the_faces(solved, monkeypatch):
+    drawing = drawing_module(monkeypatch)
+    results = [drawing.Result(solved(name)) for name in ("head_solid.yaml", "head_incision.yaml")]
+    apart = drawing.difference(results, [result.state(-1) for result in results])
+    near = drawing.shown_skin.nearest(results[0].before, results[1].before)
+    moves = [result.skin(-1) - result.before for result in results]
+    assert apart.max() > 5
+    assert abs(apart - ((moves[1] - moves[0][near])**2).sum(1)**0.5).max() < 1e-9
+
+
+def test_profiles_look_to_the_right(solved, monkeypatch):
+    """The tip of the nose is right of the ear in the camera's coordinates."""
+    drawing = drawing_module(monkeypatch)
+    for view in ("profile", "three-quarter"):
+        forward = -drawing.np.array(drawing.VIEWS[view])
+        right = drawing.np.cross(forward, (0, 0, 1))
+        assert right @ (0, -1, 0) > 0.5, view
+
+
+def test_the_given_skin_is_drawn_and_opens_at_the_lips(run, tmp_path, monkeypatch):
+    drawing = drawing_module(monkeypatch)
+    text = (PROJECT / "meshes/head_incision.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    (tmp_path / "cut.yaml").write_text(text.replace("  layers: 4", "  layers: 2\n  edge: 8", 1))
+    assert run("repose-solve", "cut.yaml", "-accuracy", 1, "-allow_folded").returncode == 0
+    given, solved = (drawing.Result(str(tmp_path / "cut.h5"), only) for only in (False, True))
+    assert len(given.before) > 1.5 * len(solved.before)
+    places = drawing.shown_skin.sides_of_cuts(drawing.shown_skin.solved_skin(given.h5)[0])
+    assert len(places) > 4
+    edges = drawing.np.sort(given.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    across = drawing.np.linalg.norm(given.skin(-1)[edges[:, 0]] - given.skin(-1)[edges[:, 1]], axis=1)
+    before = drawing.np.linalg.norm(given.before[edges[:, 0]] - given.before[edges[:, 1]], axis=1)
+    beside = drawing.shown_skin.near(given.before, places, 4.0)[edges].any(1)
+    assert (across[beside] < 1.5 * before[beside] + 0.2).all(), "no triangle spans the cut"
+    assert set(given.solved) >= {0.0, 1.0} or given.solved.min() == 1
