@@ -7,7 +7,9 @@ and press the macro's button. Without ParaView's window:
 
 Without a display: xvfb-run -a pvpython …
 NAME is the result without ending. It reads NAME_skin.xdmf and NAME_bones.xdmf, which ParaView reads
-from version 5.6 on; the time slider shows the load steps.
+from version 5.6 on; the time slider shows the load steps. Where the scene's skin was remeshed, that of
+the scene is shown, displaced as at the end (NAME_given_skin.vtp); "computed skin" in the pipeline
+browser is the one with load steps.
 """
 
 import ctypes
@@ -20,14 +22,17 @@ try:
                                  CreateLayout, CreateRenderView, GetActiveSource, GetAnimationScene,
                                  GetColorTransferFunction, GetParaViewVersion, GetScalarBar,
                                  RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show,
-                                 Slice, Text, XDMFReader)
+                                 Slice, Text, Threshold, WarpByVector, XDMFReader, XMLPolyDataReader)
 except ImportError as missing:
     raise SystemExit(f"paraview_repose.py: {missing.name} is missing: run pvpython of ParaView; "
                      "apt-get install --no-install-recommends python3-paraview xvfb xauth") from None
 
 BLUE, RED, INK = (0.12, 0.44, 0.71), (0.75, 0.22, 0.17), (0.15, 0.15, 0.15)
 SKIN, IVORY = (0.87, 0.68, 0.58), (0.96, 0.92, 0.8)
-PARTS = ("_skin.xdmf", "_bones.xdmf", "_tissue.xdmf", "_springs.xdmf", ".h5", ".vtkhdf")
+# As in drivers/sheet/__init__.py, which a macro cannot import.
+RAMP = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")
+FRONT_RIGHT, PROFILE = (-0.65, -0.75, 0.1), (-1, 0, 0)  # looking to the right
+PARTS = ("_skin.xdmf", "_given_skin.vtp", "_bones.xdmf", "_tissue.xdmf", "_springs.xdmf", ".h5", ".vtkhdf")
 
 
 def result_name():
@@ -64,7 +69,7 @@ def has_display():
 
 
 def view(layout, hint, title):
-    """A white view of the head from the front left, with a title."""
+    """A white view, with a title."""
     made = CreateRenderView()
     AssignViewToLayout(view=made, layout=layout, hint=hint)
     made.UseColorPaletteForBackground = 0
@@ -113,8 +118,11 @@ def coloured_by_movement(source, made):
     ColorBy(drawn, ("POINTS", "displacement", "Magnitude"))
     drawn.RescaleTransferFunctionToDataRange(False)
     table = GetColorTransferFunction("displacement")
-    table.ApplyPreset("Magma (matplotlib)", True)
-    table.InvertTransferFunction()
+    low, high = table.RGBPoints[0], table.RGBPoints[-4]
+    table.ColorSpace = "RGB"
+    table.RGBPoints = [value for i, color in enumerate(RAMP) for value in (
+        low + (high - low) * i / (len(RAMP) - 1),
+        *(int(color[k:k + 2], 16) / 255 for k in (0, 2, 4)))]
     bar = GetScalarBar(table, made)
     bar.Title, bar.ComponentTitle = "movement, mm", ""
     bar.TitleColor = bar.LabelColor = list(INK)
@@ -124,6 +132,33 @@ def coloured_by_movement(source, made):
         bar.AutomaticLabelFormat = 0
         bar.LabelFormat = bar.RangeLabelFormat = "%.3g"
     drawn.SetScalarBarVisibility(made, True)
+
+
+def bone_names(name, bones):
+    """The names of the bones, from the result where this Python has h5py; else their numbers."""
+    try:
+        import h5py
+        with h5py.File(name + ".h5") as h5:
+            return [word.decode() for word in h5["model/bone"][:]]
+    except (ImportError, OSError):
+        return [f"bone {k}" for k in range(int(bones.CellData["bone"].GetRange()[1]) + 1)]
+
+
+def each_bone(name, bones):
+    """Entries of the pipeline browser, one a bone and named by it, to be shown, hidden and colored."""
+    for number, word in enumerate(bone_names(name, bones)):
+        one = Threshold(registrationName=word, Input=bones, Scalars=["CELLS", "bone"])
+        one.LowerThreshold = one.UpperThreshold = number
+
+
+def given_skin(name):
+    """Before and after of the skin that the scene names, where another was solved in its place."""
+    file = name + "_given_skin.vtp"
+    if not os.path.isfile(file):
+        return None
+    before = XMLPolyDataReader(registrationName="skin before", FileName=[file])
+    return before, WarpByVector(registrationName="skin", Input=before,
+                                Vectors=["POINTS", "displacement"], ScaleFactor=1.0)
 
 
 def profile(source, name, made, colour):
@@ -140,13 +175,15 @@ def main():
         require_display()
     if not os.path.isfile(name + "_skin.xdmf"):
         raise SystemExit(f"paraview_repose.py: {name}_skin.xdmf is missing: NAME is the result's path")
-    skin = XDMFReader(registrationName="skin", FileNames=[name + "_skin.xdmf"])
+    solved = "computed skin" if os.path.isfile(name + "_given_skin.vtp") else "skin"
+    skin = XDMFReader(registrationName=solved, FileNames=[name + "_skin.xdmf"])
     scene = GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     scene.GoToLast()
     bones = XDMFReader(registrationName="bones", FileNames=[name + "_bones.xdmf"]) \
         if os.path.isfile(name + "_bones.xdmf") else None
-    before = initial(skin, "skin before")
+    given = given_skin(name)
+    before, skin = given or (initial(skin, "skin before"), skin)
     layout = CreateLayout("Repose")
     second = layout.SplitHorizontal(0, 1 / 3) + 1
     third = layout.SplitHorizontal(second, 1 / 2) + 1
@@ -156,11 +193,13 @@ def main():
         if bones:
             shown(initial(bones, "bones before") if drawn is before else bones, made, IVORY)
         shown(drawn, made, SKIN, 0.5)
-        look_from(made, (0.65, -0.75, 0.1), skin)
+        look_from(made, FRONT_RIGHT, skin)
     coloured_by_movement(skin, middle)
+    if bones:
+        each_bone(name, bones)
     profile(before, "profile before", right, BLUE)
     profile(skin, "profile after", right, RED)
-    look_from(right, (1, 0, 0), skin)
+    look_from(right, PROFILE, skin)
     AddCameraLink(left, middle, "before and after")
     SetActiveView(middle)
     RenderAllViews()

@@ -1,6 +1,8 @@
 """Pictures of a result: what they are of, and what is refused. Needs VTK ≥ 9.4 (pip install vtk)."""
 
+import importlib
 import importlib.util
+import re
 import shutil
 import struct
 import sys
@@ -104,7 +106,22 @@ def test_paraview_draws_the_same_result(solved, tmp_path, environment):
                      "look.pvsm"], tmp_path, environment, TIME_LIMIT)
     assert result.returncode == 0, result.stderr
     wide, high = size_of(tmp_path / "look.png")
-    assert wide == 2.5 * high and "XdmfReader" in (tmp_path / "look.pvsm").read_text()
+    state = (tmp_path / "look.pvsm").read_text()
+    assert wide == 2.5 * high and "XdmfReader" in state
+    assert 'name="skull"' in state and 'name="mandible"' in state, "each bone by its name"
+
+
+def test_one_color_scale_and_one_direction_everywhere(monkeypatch):
+    """ParaView's macro and the viewer cannot import those of drivers/sheet."""
+    monkeypatch.syspath_prepend(SCRIPT.parent)
+    ramp = importlib.import_module("sheet").RAMP
+    macro = (SCRIPT.parent / "paraview_repose.py").read_text()
+    viewer = (SCRIPT.parent / "web/viewer.js").read_text()
+    for text, start in ((macro, "RAMP = ("), (viewer, "REPOSE_RAMP = [")):
+        written = text.split(start)[1].split(")")[0].split("]")[0]
+        assert tuple(re.findall('"([0-9a-f]{6})"', written)) == ramp
+    assert "PROFILE = (-0.65, -0.75, 0.1), (-1, 0, 0)" in macro
+    assert 'right: [-1, 0, 0]' in viewer and '"three-quarter": [-0.65, -0.75, 0.1]' in viewer
 
 
 def test_a_film_shows_the_load_steps(render, solved, tmp_path):

@@ -477,3 +477,19 @@ def test_several_processors(panel, head, tmp_path):
     result = panel(*arguments, "--predictedSkin", tmp_path / "skin.vtp")
     assert (result.returncode, result.stderr) == (0, "")
     assert "on 2 ranks" in result.stdout
+
+
+def test_the_given_model_comes_back_displaced(program, run, tmp_path):
+    """Where a remeshed part of the skin was solved, all of the chosen model is returned."""
+    text = (MESHES / "head_jaw_opening.yaml").read_text().replace(": head_", f": {MESHES}/head_")
+    (tmp_path / "part.yaml").write_text(text.replace("  layers: 4", "  layers: 2\n  edge: 8", 1))
+    assert run("repose-solve", "part.yaml", "-accuracy", 1).returncode == 0
+    with h5py.File(tmp_path / "part.h5") as h5:
+        points, triangles, arrays = program["skin_to_hand_back"](h5, tmp_path / "part.h5")
+        reached = h5["step"][sorted(h5["step"])[-1]].attrs["displacement_error"]
+    given = read_vtp(tmp_path / "part_given_skin.vtp")
+    assert np.array_equal(points, given["Points"] + given["displacement"])
+    assert np.array_equal(triangles, given["connectivity"].reshape(-1, 3))
+    assert np.array_equal(arrays["computed"], given["solved"].ravel())
+    assert np.array_equal(arrays["uncertainty"], reached * (arrays["computed"] > 0))
+    assert arrays["displacement_magnitude"].max() > 5

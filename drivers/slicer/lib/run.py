@@ -310,6 +310,28 @@ def write_vtp(file, points, triangles, arrays):
     part.replace(file)
 
 
+def skin_to_hand_back(h5, result):
+    """Points, triangles and arrays of the predicted skin: of the model that was given, displaced, where
+    a remeshed part of it was solved."""
+    import numpy as np
+    sys.path.insert(0, str(FOLDER.parent))
+    from sheet.shown_skin import nearest, shown_skin, solved_skin
+    step = h5["step"][sorted(h5["step"])[-1]]
+    solved, used = solved_skin(h5)
+    skin = shown_skin(h5, str(result).removesuffix(".h5"))
+    arrays = {"displacement": skin.after - skin.before, "displacement_magnitude": skin.movement}
+    error, of_mesh = step.attrs["displacement_error"], step.attrs.get("discretisation_error")
+    unsure = np.full(len(used), of_mesh or 0.0)
+    if "point/discretisation_error" in step:
+        unsure = step["point/discretisation_error"][:][used]
+    if len(skin.before) != len(solved.before):
+        arrays["computed"] = skin.solved
+        unsure = np.where(skin.solved > 0, unsure[nearest(solved.before, skin.before)], 0.0)
+    if math.isfinite(error):
+        arrays["uncertainty"] = error * (skin.solved > 0) + unsure
+    return skin.after, skin.corners, arrays
+
+
 def hand_back(chosen, result, numbers):
     """Writes the models that are asked for; the numbers for the panel."""
     import h5py
@@ -317,20 +339,11 @@ def hand_back(chosen, result, numbers):
     with h5py.File(result) as h5:
         step = h5["step"][sorted(h5["step"])[-1]]
         told = dict(step.attrs)
-        triangles = h5["model/skin/points"][:]
-        used, triangles = np.unique(triangles, return_inverse=True)
-        displacement = step["point/displacement"][:][used]
-        points, ratio = step["point/position"][:][used], step["prism/volume_ratio"][:]
-        movement = np.linalg.norm(displacement, axis=1)
-        arrays = {"displacement": displacement, "displacement_magnitude": movement}
+        points, triangles, arrays = skin_to_hand_back(h5, result)
+        movement, ratio = arrays["displacement_magnitude"], step["prism/volume_ratio"][:]
         error, mesh_error = told["displacement_error"], told.get("discretisation_error")
-        of_mesh = np.full(len(used), mesh_error or 0.0)
-        if "point/discretisation_error" in step:
-            of_mesh = step["point/discretisation_error"][:][used]
-        if math.isfinite(error):
-            arrays["uncertainty"] = error + of_mesh
         if chosen["predictedSkin"]:
-            write_vtp(chosen["predictedSkin"], points, triangles.reshape(-1, 3), arrays)
+            write_vtp(chosen["predictedSkin"], points, triangles, arrays)
         moved, first = step["bone_surface/points"][:] if "bone_surface/points" in step else None, 0
         for b, number in enumerate(numbers):
             surface = h5[f"model/bone_surface/{b}"]
