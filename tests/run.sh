@@ -1,8 +1,13 @@
 #!/usr/bin/env bash
-# Installs what is missing (apt), builds with warnings as errors, checks the formatting, runs every
-# test. Ends with ctest's own summary.
+# run.sh [--all]: installs missing packages (apt), builds with warnings as errors, checks the formatting and
+# runs the tests; with --all also the long ones, half an hour more. Ends with ctest's summary and what was left out.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+case "${1-}" in
+  "") selection=(-LE long) ;;
+  --all) selection=() && export REPOSE_ALL=1 ;;
+  *) echo "run.sh: $1: the only argument is --all" >&2 && exit 1 ;;
+esac
 . drivers/setup.sh
 
 install_packages "${build_packages[@]}" "${test_packages[@]}"
@@ -17,4 +22,10 @@ else
 fi
 
 mpi_environment
-exec ctest --preset ci
+status=0
+ctest --preset ci "${selection[@]}" || status=$?
+if [ ${#selection[@]} -gt 0 ]; then
+  echo "left out: $(ctest --preset ci -N -L long | sed -n 's/^ *Test *#[0-9]*: //p' | paste -sd' ')" \
+    "and tests marked long in $(grep -l 'pytest.mark.long' tests/program/*.py | wc -l) files: tests/run.sh --all"
+fi
+exit $status

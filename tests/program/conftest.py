@@ -60,6 +60,25 @@ def can_draw():
     return vtk_version() >= (9, 4) or bool(older and shutil.which("xvfb-run"))
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "long: runs only where REPOSE_ALL is set (tests/run.sh --all)")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Deselects the long tests unless REPOSE_ALL is set."""
+    if os.environ.get("REPOSE_ALL"):
+        return
+    long_tests = [item for item in items if item.get_closest_marker("long")]
+    items[:] = [item for item in items if item not in long_tests]
+    config.hook.pytest_deselected(items=long_tests)
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """A file whose tests are all long is no failure."""
+    if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not os.environ.get("REPOSE_ALL"):
+        session.exitstatus = pytest.ExitCode.OK
+
+
 @pytest.fixture(scope="session")
 def environment():
     return mpi_environment()
