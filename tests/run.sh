@@ -24,6 +24,8 @@ fi
 mpi_environment
 status=0
 ctest --preset ci "${selection[@]}" || status=$?
+echo "skipped:"
+grep -hE '^(\[  SKIPPED \] [^ ]+$|SKIPPED \[)' build-ci/Testing/Temporary/LastTest.log | sort | uniq || echo "  nothing"
 if [ ${#selection[@]} -gt 0 ]; then
   echo "left out: $(ctest --preset ci -N -L long | sed -n 's/^ *Test *#[0-9]*: //p' | paste -sd' ')" \
     "and tests marked long in $(grep -l 'pytest.mark.long' tests/program/*.py | wc -l) files: tests/run.sh --all"
