@@ -6,11 +6,11 @@
 #include <map>
 #include <type_traits>
 
+#include "motion_range.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
 #include "repose/model/instruments.h"
 #include "repose/surface/triangle_tree.h"
-#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -46,8 +46,9 @@ void touch_bones(const scene::Scene& scene, const Attachment& attachment,
   const bool touching = scene.contact && scene.contact->bones;
   std::vector<surface::TriangleTree> trees(model.bone_surfaces.begin(), model.bone_surfaces.end());
   std::vector<double> way;
+  const MotionRange range(scene, model.bone_surfaces);
   for (size_t b = 0; b < model.bones.size(); ++b)
-    way.push_back(travel(model.bone_surfaces[b], scene.moves[b]));
+    way.push_back(range.travel(model.bone_surfaces[b], static_cast<int32_t>(b)));
   const double farthest = way.empty() ? 0 : *std::max_element(way.begin(), way.end());
   const size_t layers = area.size() / std::max<size_t>(attachment.bone.size(), 1);
   for (size_t p = 0; p < area.size(); ++p) {

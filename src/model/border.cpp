@@ -4,8 +4,6 @@
 
 #include <limits>
 
-#include "travel.h"
-
 namespace repose::model {
 namespace {
 
@@ -18,14 +16,13 @@ struct BorderPlace {
   Vec3 at = Vec3::Zero();
 };
 
-BorderPlace nearest_place(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
+BorderPlace nearest_place(const MotionRange& range, const std::vector<surface::Surface>& bones,
                           const SkinMesh& mesh, const BoneField& field) {
   BorderPlace nearest;
   if (mesh.border_loops.empty()) return nearest;
   for (int32_t b = 0; b < field.size(); ++b) {
-    const scene::RigidMotion& move = scene.moves[b];
-    if (travel(bones[b], move) <= negligible_travel) continue;
-    const scene::RigidMotion back = move.inverse();
+    if (range.travel(bones[b], b) <= negligible_travel) continue;
+    const scene::RigidMotion back = range.only_move(b).value_or(scene::RigidMotion()).inverse();
     for (const int64_t v : mesh.border_loops.front()) {
       const Vec3& x = mesh.points[v];
       const double distance = std::min(field.distance(b, x), field.distance(b, back.apply(x)));
@@ -50,10 +47,10 @@ std::string remedy_of(const scene::Scene& scene) {
 
 }  // namespace
 
-std::string describe_near_border(const scene::Scene& scene,
+std::string describe_near_border(const scene::Scene& scene, const MotionRange& range,
                                  const std::vector<surface::Surface>& bones, const SkinMesh& mesh,
                                  const BoneField& field) {
-  const BorderPlace place = nearest_place(scene, bones, mesh, field);
+  const BorderPlace place = nearest_place(range, bones, mesh, field);
   if (!(place.distance <= near_border)) return "";
   return fmt::format(
       "the skin ends {:.1f} mm from bone '{}', which moves, at ({:.1f}, {:.1f}, {:.1f}): {} (as "

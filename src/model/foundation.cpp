@@ -7,7 +7,6 @@
 #include "point_sets.h"
 #include "release.h"
 #include "repose/base/error.h"
-#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -39,8 +38,8 @@ SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin
 }
 
 /// Which columns are held as the rim; those let go of bone, as do those near other pieces.
-std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
-                             const Columns& columns, const BoneField& field,
+std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range,
+                             const SkinMesh& mesh, const Columns& columns, const BoneField& field,
                              Attachment& attachment) {
   std::vector<char> rim = rim_columns(mesh, scene.rim != scene::Rim::free);
   const auto let_go = [&] {
@@ -49,13 +48,13 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
   };
   if (scene.rim == scene::Rim::fixed) let_go();
   const std::vector<int32_t> sliding = attachment.slides_on;
-  release_near_other_pieces(columns.deep, field, scene.moves,
+  release_near_other_pieces(columns.deep, field, range,
                             {scene.tissue.release, scene.tissue.released}, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
   const std::vector<char> border = rim;
   for (size_t c = 0; c < rim.size(); ++c) {
     const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
-    rim[c] = rim[c] && bone >= 0 && travel(columns.deep[c], scene.moves[bone]) <= negligible_travel;
+    rim[c] = rim[c] && bone >= 0 && range.travel(columns.deep[c], bone) <= negligible_travel;
   }
   const bool held = std::ranges::any_of(rim, [](char on) { return on != 0; }) ||
                     std::ranges::any_of(attachment.bone, [](int32_t bone) { return bone >= 0; });
@@ -69,6 +68,7 @@ std::vector<char> settle_rim(const scene::Scene& scene, const SkinMesh& mesh,
 Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& skin,
                           const std::vector<surface::Surface>& bones) {
   require_one_of_each(scene, bones);
+  const MotionRange range(scene, bones);
   std::vector<Cut> cuts;
   SkinMesh mesh = mesh_with_paths(scene, skin, cuts);
   BoneField field(bones);
@@ -80,10 +80,11 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
   Attachment attachment = attach_columns(columns, field, scene);
-  std::vector<char> rim = settle_rim(scene, mesh, columns, field, attachment);
-  if (const std::string border = describe_near_border(scene, bones, mesh, field); !border.empty())
+  std::vector<char> rim = settle_rim(scene, range, mesh, columns, field, attachment);
+  if (const std::string border = describe_near_border(scene, range, bones, mesh, field);
+      !border.empty())
     report.remarks.push_back(border);
-  release_near_rim(columns.deep, rim, scene.moves, {scene.tissue.release, scene.tissue.released},
+  release_near_rim(columns.deep, rim, range, {scene.tissue.release, scene.tissue.released},
                    attachment);
   return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),
           std::move(attachment), std::move(rim),  std::move(report)};

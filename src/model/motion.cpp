@@ -82,6 +82,11 @@ Vec3 PrescribedMotion::at(const Model& model, int64_t row, double load) const {
   return (1 - load) * from + load * model.points.target[row];
 }
 
+void PrescribedMotion::set(int32_t bone, const scene::RigidMotion& motion) {
+  motion_[bone] = motion;
+  straight_[bone] = false;
+}
+
 bool PrescribedMotion::follows_screw(const Model& model, int64_t row) const {
   const int32_t bone = model.points.bone[row];
   return model.points.set[row] == PointSet::bone && bone >= 0 && !straight_[bone];

@@ -90,7 +90,8 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
   for (int32_t b = 0; b < bones.size(); ++b) {
     if (tied[b] > 0) continue;
     const std::string why = why_bare(scene, mesh, bones, b, attachment.reached[b]);
-    if (!scene.moves[b].is_identity() && !(touching && attachment.reached[b] > 0))
+    const bool planned = scene.plan && std::ranges::binary_search(scene.plan->pieces, size_t(b));
+    if ((planned || !scene.moves[b].is_identity()) && !(touching && attachment.reached[b] > 0))
       base::refuse("{}: bone '{}' moves but no tissue is attached to it: {}", file,
                    scene.bones[b].name, why);
     attachment.remarks.push_back(

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "travel.h"
-
 namespace repose::model {
 namespace {
 
@@ -17,11 +15,10 @@ double reach(const Release& release, double difference) {
 }
 
 /// Whether tissue at `point`, which holds to the bone `own`, lets go of it because of another one.
-bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones,
-                   const std::vector<scene::RigidMotion>& moves, const Release& release) {
-  const Vec3 moved = moves[own].apply(point);
+bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones, const MotionRange& range,
+                   const Release& release) {
   for (int32_t piece = 0; piece < bones.size(); ++piece) {
-    const double near = reach(release, (moves[piece].apply(point) - moved).norm());
+    const double near = reach(release, range.difference(point, own, piece));
     if (near >= 0 && bones.distance(piece, point) <= near) return true;
   }
   return false;
@@ -30,27 +27,26 @@ bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones,
 }  // namespace
 
 void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
-                               const std::vector<scene::RigidMotion>& moves, const Release& release,
+                               const MotionRange& range, const Release& release,
                                Attachment& attachment) {
   if (!(release.distance > 0)) return;
   for (size_t v = 0; v < deep.size(); ++v) {
     const int32_t own = attachment.bone[v];
-    if (own < 0 || !is_near_other(deep[v], own, bones, moves, release)) continue;
+    if (own < 0 || !is_near_other(deep[v], own, bones, range, release)) continue;
     attachment.settle(v, release.how);
     ++attachment.released;
   }
 }
 
 void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
-                      const std::vector<scene::RigidMotion>& moves, const Release& release,
-                      Attachment& attachment) {
+                      const MotionRange& range, const Release& release, Attachment& attachment) {
   if (!(release.distance > 0)) return;
   std::vector<Vec3> fixed;
   for (size_t v = 0; v < deep.size(); ++v)
     if (rim[v]) fixed.push_back(deep[v]);
   for (size_t v = 0; v < deep.size(); ++v) {
     if (attachment.bone[v] < 0) continue;
-    const double near = reach(release, travel(deep[v], moves[attachment.bone[v]]));
+    const double near = reach(release, range.travel(deep[v], attachment.bone[v]));
     if (near < 0 || std::none_of(fixed.begin(), fixed.end(), [&](const Vec3& p) {
           return (p - deep[v]).squaredNorm() <= near * near;
         }))

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "attachment.h"
-#include "repose/scene/rigid_motion.h"
+#include "motion_range.h"
 
 namespace repose::model {
 
@@ -15,16 +15,15 @@ struct Release {
 /// Lets go of the deepest points near a bone piece whose displacement there differs from that of
 /// their own bone (docs/theory/load_path.md: real tissue slides there). How near grows with the
 /// difference, from 0 to the whole distance where it is 4 mm, so that the attachment follows the
-/// plan without a jump where two pieces move alike. Distances are at the initial position; `moves`
-/// is [bones].
+/// plan without a jump where two pieces move alike. Distances are at the initial position. Of a
+/// scene with a plan the difference is the largest in its box.
 void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
-                               const std::vector<scene::RigidMotion>& moves, const Release& release,
+                               const MotionRange& range, const Release& release,
                                Attachment& attachment);
 
 /// Lets go by the same rule of deepest points near that of a rim column (`rim` [V], 1 or 0): the
 /// rim stays where it is, so to bones that move it is another piece.
 void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
-                      const std::vector<scene::RigidMotion>& moves, const Release& release,
-                      Attachment& attachment);
+                      const MotionRange& range, const Release& release, Attachment& attachment);
 
 }  // namespace repose::model

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include "bone_field.h"
+#include "motion_range.h"
 #include "region.h"
 #include "repose/meshtools/face.h"
-#include "travel.h"
 
 namespace repose::model {
 namespace {
@@ -20,8 +20,9 @@ meshtools::FaceRequest request_of(const Anatomy& anatomy) {
   for (const scene::SkinRegion& region : scene.tissue.face)
     request.regions.push_back(contains_of_skin(region));
   if (!scene.instruments.empty()) return request;
+  const MotionRange range(scene, anatomy.bones);
   for (size_t b = 0; b < anatomy.bones.size(); ++b)
-    if (travel(anatomy.bones[b], scene.moves[b]) > negligible_travel)
+    if (range.travel(anatomy.bones[b], static_cast<int32_t>(b)) > negligible_travel)
       request.beneath.push_back(anatomy.bones[b]);
   for (const scene::Force& force : scene.forces) request.places.push_back(force.at);
   for (const scene::Incision& cut : scene.incisions)

@@ -342,6 +342,20 @@ std::vector<Key> move_keys() {
   return rows;
 }
 
+std::vector<Key> plan_keys() {
+  return {
+      {"plan", map, "",
+       "Which pieces the plan moves and how far: attachment, border and contact follow from it, "
+       "not from the moves."},
+      {"plan.pieces", texts, "required", "The bones or pieces; no other bone may move."},
+      {"plan.box", map, "", "Ranges of the motions, both ways: a rotation, then a translation."},
+      {"plan.box.translate", vector, "[10, 10, 10]",
+       "Largest components of the translation of a piece's centroid.", "mm"},
+      {"plan.box.rotate", vector, "[10, 10, 10]",
+       "Largest components of the rotation vector (axis times angle) about its centroid.",
+       "degrees"}};
+}
+
 std::vector<Key> solve_keys() {
   return {
       {"solve", map, "", "How the rest position is found."},
@@ -469,8 +483,8 @@ const std::vector<Key>& all_keys() {
     std::vector<Key> rows;
     for (const auto& part :
          {surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(), load_keys(),
-          osteotomy_keys(), move_keys(), collision_keys(), instrument_keys(), contact_keys(),
-          regions_keys(), incision_keys(), tearing_keys(), solve_keys()})
+          osteotomy_keys(), move_keys(), plan_keys(), collision_keys(), instrument_keys(),
+          contact_keys(), regions_keys(), incision_keys(), tearing_keys(), solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

@@ -240,6 +240,39 @@ Collision read_collision(const Value& value) {
   return collision;
 }
 
+Vec3 read_range(const Map& box, const std::string& name, const Vec3& standard, double largest) {
+  const auto value = box.find(name);
+  if (!value) return standard;
+  const Vec3 range = value->vector();
+  if (range.minCoeff() < 0 || range.maxCoeff() > largest)
+    value->refuse("must be three numbers of 0 … {}", largest);
+  return range;
+}
+
+/// After the moves, which must lie within the plan's pieces.
+Plan read_plan(const Value& value, const Scene& scene) {
+  constexpr double longest = 100, widest = 90;  // mm, degrees
+  const Map map(value);
+  Plan plan;
+  for (const auto& [name, place] : map.at("pieces").texts())
+    plan.pieces.push_back(find_bone(name, place, scene.bones));
+  std::ranges::sort(plan.pieces);
+  plan.pieces.erase(std::unique(plan.pieces.begin(), plan.pieces.end()), plan.pieces.end());
+  if (plan.pieces.empty()) map.at("pieces").refuse("is an empty list; name a bone, or remove plan");
+  for (std::size_t b = 0; b < scene.bones.size(); ++b)
+    if (!scene.moves[b].is_identity() && !std::ranges::binary_search(plan.pieces, b))
+      map.at("pieces").refuse("lacks '{}', which moves; add it, or remove its moves",
+                              scene.bones[b].name);
+  if (const auto box = map.find("box")) {
+    const Map ranges(*box);
+    plan.translate = read_range(ranges, "translate", plan.translate, longest);
+    plan.rotate = read_range(ranges, "rotate", plan.rotate, widest);
+  }
+  if (scene.collision && scene.collision->mode == CollisionMode::clamp)
+    value.refuse("and collision.mode: clamp exclude each other, as that changes the moves");
+  return plan;
+}
+
 Solve read_solve(const Value& value) {
   const Map map(value);
   Solve solve;
@@ -314,6 +347,7 @@ Scene read_scene(const std::filesystem::path& file) {
   if (const auto named = map.find("landmarks")) landmarks = landmarks_by_name(named->file());
   if (const auto moves = map.find("moves")) read_moves(*moves, landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
+  if (const auto plan = map.find("plan")) scene.plan = read_plan(*plan, scene);
   if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);
   return scene;
 }

@@ -237,6 +237,13 @@ struct Solve {
   int load_steps = 0;     ///< 0: automatic
 };
 
+/// The motions that a plan may give to pieces of bone (scene/placement.h).
+struct Plan {
+  std::vector<std::size_t> pieces;      ///< rows of Scene::bones, ascending
+  Vec3 translate = Vec3::Constant(10);  ///< mm, largest components, either way
+  Vec3 rotate = Vec3::Constant(10);     ///< degrees, likewise
+};
+
 enum class CollisionMode { report, stop, clamp };
 
 /// What is done about bones that touch on their way.
@@ -256,6 +263,7 @@ struct Scene {
   std::optional<Vec3> scan_gravity;  ///< N/kg, when the surfaces were recorded; unset: as gravity
   Rim rim = Rim::automatic;
   std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
+  std::optional<Plan> plan;        ///< unset: the moves alone
   std::optional<Collision> collision;
   std::optional<Contact> contact;  ///< unset: what is free is not kept out of bones
   std::vector<Instrument> instruments;

@@ -9,6 +9,7 @@
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/skin_mesh.h"
+#include "repose/scene/placement.h"
 
 namespace repose::model {
 namespace build_test {
@@ -223,6 +224,39 @@ TEST(Build, tissue_lets_go_the_farther_the_more_differently_pieces_move) {
   EXPECT_EQ(released_at(-2), 41 * 4);  // 5 mm
   EXPECT_EQ(released_at(4), 41 * 8);   // 10 mm
   EXPECT_EQ(released_at(6), 41 * 8);   // at most
+}
+
+TEST(Build, a_plan_makes_attachment_and_contact_the_same_for_all_its_moves) {
+  TwoJaws jaws;
+  jaws.scene.contact.emplace();
+  const auto built = [&](double first, double second) {
+    jaws.scene.moves = {RigidMotion::translation({0, first, 0}),
+                        RigidMotion::translation({0, second, 0})};
+    return build_model(jaws.scene, jaws.skin, jaws.bones).model;
+  };
+  const auto same = [](const Model& a, const Model& b) {
+    return a.points.set == b.points.set && a.points.bone == b.points.bone &&
+           a.contact.touches.point == b.contact.touches.point &&
+           a.contact.touches.body == b.contact.touches.body;
+  };
+  EXPECT_FALSE(same(built(5, 5), built(5, 6)));
+  jaws.scene.plan = scene::Plan{{0, 1}, {0, 6, 0}, {0, 0, 0}};
+  const Model rest = built(0, 0);
+  for (const auto& [first, second] : {std::pair(5.0, 5.0), {5.0, 5.001}, {5.0, 6.0}, {-6.0, 6.0}})
+    EXPECT_TRUE(same(rest, built(first, second))) << first << ' ' << second;
+  for (const int32_t bone : rest.points.bone) EXPECT_LT(bone, 2);
+  EXPECT_EQ(std::ranges::count(rest.points.set, PointSet::boundary), 0) << "both jaws may move";
+}
+
+TEST(Build, a_plan_refuses_moves_out_of_its_box) {
+  TwoJaws jaws;
+  jaws.scene.plan = scene::Plan{{1}, {0, 6, 0}, {1, 1, 1}};
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6.1, 0});
+  EXPECT_TRUE(says(refusal(jaws.scene, jaws.skin, jaws.bones),
+                   "plan.box: 'lower' moves out of it: translation 6.1 mm along y is outside"));
+  jaws.scene.moves[1] = RigidMotion::rotation(
+      {1, 0, 0}, scene::centroid(jaws.bones[1].points, jaws.bones[1].triangles), -1.1);
+  EXPECT_TRUE(says(refusal(jaws.scene, jaws.skin, jaws.bones), "rotation -1.1 degrees along x"));
 }
 
 TEST(Build, a_rim_is_held_where_its_bone_hardly_moves) {

@@ -57,6 +57,30 @@ TEST(Scene, MinimalHasTheDefaults) {
   EXPECT_EQ(scene.solve.load_steps, 0);
 }
 
+TEST(Scene, PlanHoldsPiecesAndRanges) {
+  EXPECT_FALSE(read(minimal).plan);
+  const Scene scene = read(std::string(minimal) +
+                           "plan: {pieces: [mandible], box: {translate: [8, 4, 2]}}\n"
+                           "moves: [{bone: mandible, translate: [0, -3, 0]}]\n");
+  ASSERT_TRUE(scene.plan);
+  EXPECT_EQ(scene.plan->pieces, std::vector<std::size_t>{1});
+  expect_near(scene.plan->translate, {8, 4, 2});
+  expect_near(scene.plan->rotate, {10, 10, 10});
+}
+
+TEST(Scene, PlanRefusesWhatItDoesNotHold) {
+  const auto plan = [](const std::string& text) { return refused(minimal + text); };
+  EXPECT_NE(plan("plan: {pieces: [jaw]}\n").find("jaw"), std::string::npos);
+  EXPECT_NE(plan("plan: {pieces: []}\n").find("empty list"), std::string::npos);
+  EXPECT_NE(plan("plan: {pieces: skull}\nmoves: [{bone: mandible, translate: [0, 1, 0]}]\n")
+                .find("lacks 'mandible', which moves"),
+            std::string::npos);
+  EXPECT_NE(plan("plan: {pieces: skull, box: {rotate: [0, -1, 0]}}\n").find("0 … 90"),
+            std::string::npos);
+  EXPECT_NE(plan("plan: {pieces: skull}\ncollision: {mode: clamp}\n").find("clamp"),
+            std::string::npos);
+}
+
 TEST(Scene, TableHasTheDefaultsOfTheCode) {
   const Scene plain = read(minimal);
   const auto standard = [](const char* path) { return find_key(path).standard; };
