@@ -69,6 +69,9 @@ std::vector<base::Option> run_options() {
       {"sensitivity", OptionKind::flag, "",
        "Estimate how much the face depends on border, material and release, by a linear solve "
        "each."},
+      {"tangents", OptionKind::flag, "",
+       "Add the derivatives of the rest position by the motions of the plan's pieces, or of the "
+       "bones that move, to the result."},
       {"monitor_mm", OptionKind::flag, "",
        "Print time, evaluations and the estimated distance to go after each iteration."},
       {.name = "time_limit",

@@ -12,6 +12,7 @@
 #include <limits>
 #include <optional>
 
+#include "plan_pieces.h"
 #include "report.h"
 #include "repose/adapt/discretisation.h"
 #include "repose/adapt/given_skin.h"
@@ -140,7 +141,7 @@ bool Run::is_done(const model::StepNumbers& end) const {
          end.functional == settings.functional && end.volume == weights.volume &&
          equal(end.lambda, weights.elastic) &&
          (!penalty || equal(end.bulk_modulus, weights.volume_weight)) && !settings.stability &&
-         !strategy_.sensitivity && !strategy_.tears;
+         !strategy_.sensitivity && strategy_.tangents.empty() && !strategy_.tears;
 }
 
 /// Makes a finished result that of this run's name, unless it is. On rank 0.
@@ -221,6 +222,7 @@ Coarser Run::solve_coarser() {
 /// it: of a large model it is a fifth of the memory.
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
+  settings.tangents = strategy_.tangents;
   settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
                       strategy_.sensitivity || !job_.held.empty();
@@ -316,7 +318,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const std::string sensitivity = describe_sensitivity(summary, writer);
   say(describe_failure(summary, job_.recording.has_value()));
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
-  say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing));
+  say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing) +
+      describe_tangents(writer.point_fields()));
   if (path) say(describe_path(*path));
   say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
       describe_pierced(job_.bodies, summary.pierced));

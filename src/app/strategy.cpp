@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "plan_pieces.h"
 #include "report.h"
 #include "repose/adapt/discretisation.h"
 #include "repose/app/options.h"
@@ -163,6 +164,19 @@ void choose_sensitivity(const base::Options& options, const Job& job, Strategy& 
   s.sensitivity = true;
 }
 
+/// Collective.
+void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job, Strategy& s) {
+  if (!options.flag("tangents")) return;
+  const auto refuse_unless = [](bool possible, const char* why) {
+    if (!possible) base::refuse("-tangents: {}; leave the option out", why);
+  };
+  refuse_unless(!is_force(s), "the functional is force");
+  refuse_unless(!s.tears, "the tissue may tear");
+  refuse_unless(s.coarse != Coarse::instead, "a coarser model takes the place of the scene's own");
+  s.tangents = plan_pieces(comm, job);
+  refuse_unless(!s.tangents.empty(), "no bone moves, and the scene has no plan.pieces");
+}
+
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
   scene::Solve wanted = job.wanted;
   override_by(options, wanted);
@@ -188,6 +202,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   MPI_Bcast(&models, 1, MPI_INT, 0, comm);
   s.resolutions.resize(models);
   for (bool* flag : {&s.preview, &s.sensitivity, &s.tears}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  choose_tangents(comm, options, job, s);
   if (base::rank(comm) == 0 && options.flag("dry_run")) s.explanation = explain(wish, all, job, s);
   return s;
 }

@@ -50,6 +50,8 @@ class Writer {
   std::vector<double> volume_ratios() const;
   /// [N] N/mm², or nothing where tissue touches nothing; likewise.
   std::vector<double> contact_pressures() const;
+  /// This rank's rows of what else is known of the points at the last step.
+  const std::vector<model::PointField>& point_fields() const { return last_.rows.point_fields; }
   /// What the tissue does to the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const;
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "flops.h"
@@ -103,14 +102,15 @@ void Objective::round_bodies(bool rounded) {
   other_touches_.set_multipliers(touches_.multipliers());
   other_touches_.set_stiffness(touches_.stiffness());
   std::swap(touches_, other_touches_);
-  placed_at_ = std::numeric_limits<double>::quiet_NaN();
+  placed_at_ = -1;
 }
 
 void Objective::place_bodies() {
-  if (placed_at_ == positions_.load()) return;
-  placed_at_ = positions_.load();
+  if (placed_at_ == positions_.revision()) return;
+  placed_at_ = positions_.revision();
   mechanics::place_bodies(
-      placed_at_, [&](int32_t bone) { return positions_.bone_matrix(bone); }, touches_.bodies());
+      positions_.load(), [&](int32_t bone) { return positions_.bone_matrix(bone); },
+      touches_.bodies());
 }
 
 double Objective::add_contact(double scale, std::span<Vec3> gradient) {

@@ -43,7 +43,13 @@ Vec3 Positions::prescribed(int64_t row, double load) const {
 
 void Positions::set_load(double load) {
   load_ = load;
+  ++revision_;
   for (int32_t i : fixed_) local_[i] = prescribed(i, load);
+}
+
+void Positions::set_motion(int32_t bone, const scene::RigidMotion& motion) {
+  motion_.set(bone, motion);
+  set_load(load_);
 }
 
 double Positions::largest_travel() const {

@@ -252,6 +252,13 @@ void ResultFile::State::note_field(const std::string& field, bool vector, size_t
 void ResultFile::State::write_field(hid_t group, const model::PointField& field) {
   write_dataset(group, field.name.c_str(), counts.points, field.vector ? 3 : 0, slab(counts.points),
                 field.values.data());
+  on_disk([&] {
+    if (field.texts.empty() && field.flags.empty()) return;
+    const base::Hdf5Dataset dataset(H5Dopen2(group, field.name.c_str(), H5P_DEFAULT));
+    for (const auto& [name, text] : field.texts) write_attribute(dataset, name.c_str(), text);
+    for (const auto& [name, flag] : field.flags)
+      write_attribute(dataset, name.c_str(), static_cast<int64_t>(flag));
+  });
   note_field(field.name, field.vector, loads.size());
 }
 

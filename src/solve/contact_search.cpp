@@ -313,6 +313,27 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   return outcome;
 }
 
+Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
+  before_ = {std::vector<double>(objective_.touches().multipliers().size(), 0.0),
+             std::vector<double>(objective_.walls().size(), 0.0)};
+  const base::VecHandle guess = objective_.positions().make_vector();
+  check(VecCopy(displacement, guess));
+  stiffen(1);
+  int64_t iterations = 0;
+  const End end = newton(displacement, accuracy, iterations);
+  if (end == End::stopped) return stopped(displacement, {});
+  if (end == End::reached) {
+    Outcome outcome = finish(displacement, accuracy);
+    outcome.iterations += iterations;
+    if (outcome.converged) return outcome;
+  }
+  set_multipliers(before_);
+  check(VecCopy(guess, displacement));
+  Outcome outcome = run(displacement, accuracy);
+  outcome.iterations += iterations;
+  return outcome;
+}
+
 void ContactSearch::go_back(Vec) {
   objective_.round_bodies(false);
   set_multipliers(before_);

@@ -30,6 +30,8 @@ class ContactSearch : public RestSearch {
   int64_t evaluations_for_other() const { return evaluations_for_other_; }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
+  /// By quadratic programs alone, as long as they serve.
+  Outcome run_near(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
 
  private:

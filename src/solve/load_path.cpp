@@ -133,7 +133,8 @@ void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
   const int64_t folded_before = inverted(displacement);
   check(VecCopy(guess, trial_));
   objective_.positions().set_load(1);
-  const Outcome outcome = search_.run(trial_, settings_.accuracy);
+  const Outcome outcome = settings_.near_guess ? search_.run_near(trial_, settings_.accuracy)
+                                               : search_.run(trial_, settings_.accuracy);
   result_.iterations += outcome.iterations;
   if (outcome.stopped || (outcome.converged && inverted(trial_) <= folded_before)) {
     accept(outcome, 1, displacement);
@@ -164,8 +165,14 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   refused_ = 0;
   begun_ = function_.evaluations();
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
+  if (guess && settings_.near_guess && result_.load < 1) {
+    positions.set_load(result_.load);
+    leap(displacement, guess, on_step);
+    if (result_.leapt) return result_;
+  }
   settle(displacement, on_step);
-  if (guess && result_.last.converged && !result_.last.stopped && result_.load < 1)
+  if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
+      result_.load < 1)
     leap(displacement, guess, on_step);
   const double longest = longest_step();
   double step = longest;

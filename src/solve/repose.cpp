@@ -9,9 +9,11 @@
 #include <limits>
 #include <optional>
 
+#include "contact_pressures.h"
 #include "contact_search.h"
 #include "exact_penetration.h"
 #include "pierced_columns.h"
+#include "plan_tangents.h"
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
@@ -75,6 +77,7 @@ class Watcher {
   Watcher(MPI_Comm comm, const Settings& settings)
       : progress_(comm),
         interrupt_(settings.interrupt),
+        abandoned_(settings.abandoned),
         accuracy_(settings.path.accuracy),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
@@ -87,6 +90,7 @@ class Watcher {
                                i.load, i.number, i.objective, i.largest_force, to_go),
                    done(i));
     if (on_iteration_) on_iteration_(i);
+    if (abandoned_ && abandoned_()) return false;
     return !(interrupt_ && interrupt_->wanted());
   }
   void on_iteration(std::function<void(const Iteration&)> work) { on_iteration_ = std::move(work); }
@@ -118,6 +122,7 @@ class Watcher {
   using Clock = std::chrono::steady_clock;
   base::Progress progress_;
   base::Interrupt* interrupt_;
+  std::function<bool()> abandoned_;
   std::function<void(const Iteration&)> on_iteration_;
   double accuracy_, load_ = 0, reached_ = 0;
   double farthest_ = 0, nearest_ = 0;  // mm, in this search
@@ -294,6 +299,10 @@ class Steps {
     model::StepRows rows = natural_.rows(objective);
     if (stability && !std::isnan(stability->spectrum.smallest))
       rows.point_fields.push_back(natural_.field("stability_mode", stability->mode));
+    if (!settings_.tangents.empty() && load == 1 && outcome.converged)
+      for (model::PointField& field :
+           plan_tangents(searcher_.problem(), natural_, displacement, settings_.tangents))
+        rows.point_fields.push_back(std::move(field));
     receive_(last, rows);
   }
 
@@ -310,6 +319,19 @@ class Steps {
   std::vector<PenetrationDepth> depths_;
   int64_t evaluations_ = 0;  // up to the step before
 };
+
+/// Sets contact to the pressures at a guess of the rest position at load 1. Collective.
+void begin_near(const Start& start, const discrete::NaturalRows& natural, Vec guess,
+                discrete::Objective& objective) {
+  discrete::Positions& positions = objective.positions();
+  if (!positions.part().contact) return;
+  positions.set_load(1);
+  positions.update(guess);
+  objective.place_bodies();
+  std::vector<Vec3> rows;
+  for (const double p : start.pressure) rows.emplace_back(p, 0, 0);
+  set_pressures(objective, natural.owned(rows));
+}
 
 void end_stage(const Settings& settings, const char* name) {
   if (settings.stages) settings.stages->end(name);
@@ -335,7 +357,10 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
   if (settings.under_way) show_states(searcher, settings, natural);
   Summary summary;
   Steps steps(searcher, settings, natural, receive, summary);
-  LoadPath path(searcher.problem(), searcher.search(), settings.path);
+  PathSettings along = settings.path;
+  along.near_guess = start.near && positions.largest_travel() > 0;
+  if (along.near_guess) begin_near(start, natural, guess, searcher.objective());
+  LoadPath path(searcher.problem(), searcher.search(), along);
   summary.path =
       path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
         steps.add(outcome, load, seconds, displacement);

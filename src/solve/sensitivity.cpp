@@ -1,8 +1,8 @@
 #include "repose/solve/sensitivity.h"
 
-#include <limits>
 #include <utility>
 
+#include "contact_pressures.h"
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
@@ -43,29 +43,6 @@ void share_rows(MPI_Comm comm, std::vector<Vec3>& rows, int64_t total) {
   MPI_Bcast(rows.data(), static_cast<int>(3 * total), MPI_DOUBLE, 0, comm);
 }
 
-/// Gives the pressure of each owned point to what it is nearest to. Not collective.
-void press(discrete::Objective& objective, const std::vector<Vec3>& pressure) {
-  mechanics::TouchLoop& touches = objective.touches();
-  const auto position = objective.positions().local();
-  std::vector<double> least(pressure.size(), std::numeric_limits<double>::infinity());
-  std::vector<double*> nearest(pressure.size(), nullptr);
-  std::vector<double> multiplier(touches.multipliers().size(), 0.0);
-  const auto offer = [&](int64_t point, double gap, double& to) {
-    if (gap < least[point]) std::tie(least[point], nearest[point]) = std::pair(gap, &to);
-  };
-  touches.look_at_all(position);
-  for (size_t c = 0; c < multiplier.size(); ++c)
-    offer(touches.touches().point[c], touches.gaps()[c], multiplier[c]);
-  mechanics::WallLoop& walls = objective.walls();
-  std::vector<double> wall_multiplier(walls.size(), 0.0);
-  walls.look(position);
-  for (size_t w = 0; w < walls.size(); ++w) offer(walls.point(w), walls.gap(w), wall_multiplier[w]);
-  for (size_t i = 0; i < pressure.size(); ++i)
-    if (nearest[i]) *nearest[i] = pressure[i].x();
-  touches.set_multipliers(multiplier);
-  walls.set_multipliers(wall_multiplier);
-}
-
 /// Contact as it is at rest, at the positions' state. Collective.
 void bring_to_contact(const discrete::NaturalRows& natural, const RestState& rest,
                       Problem& problem) {
@@ -75,7 +52,7 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
   for (const double p : rest.pressure) rows.emplace_back(p, 0, 0);
   if (base::rank(comm) == 0) rows.resize(rest.position.size(), Vec3::Zero());
   const std::vector<Vec3> pressure = natural.owned(base::scatter(comm, rows));
-  press(objective, pressure);
+  set_pressures(objective, pressure);
   problem.tangent().forget();
 }
 

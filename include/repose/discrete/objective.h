@@ -68,7 +68,7 @@ class Objective : public Function {
   mechanics::TouchLoop touches_, other_touches_;  // those in use, and the others
   bool rounded_ = false;                          // bodies in use are
   mechanics::WallLoop walls_;
-  double placed_at_ = 0;          // load at which the bodies are
+  int64_t placed_at_ = -1;        // positions' revision at which the bodies are
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   mechanics::Totals initial_;     // this rank's share

@@ -17,6 +17,11 @@ class Positions {
   /// Moves bone and held points to where they are at `load`. Not collective.
   void set_load(double load);
   double load() const { return load_; }
+  /// Gives a bone another whole motion, and moves its points to where they are at the load. Not
+  /// collective.
+  void set_motion(int32_t bone, const scene::RigidMotion& motion);
+  /// Number of changes of load or motions so far.
+  int64_t revision() const { return revision_; }
   /// Where fixed point `local_row` is at a load.
   Vec3 prescribed(int64_t local_row, double load) const;
 
@@ -52,6 +57,7 @@ class Positions {
   base::ScatterHandle scatter_;
   std::vector<Vec3> local_;
   double load_ = 0;
+  int64_t revision_ = 0;
 };
 
 /// Largest Euclidean norm of the 3-vectors of `v`. Collective.

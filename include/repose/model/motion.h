@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "repose/model/model.h"
-#include "repose/scene/rigid_motion.h"
+#include "repose/scene/placement.h"
 
 namespace repose::model {
 
@@ -20,6 +20,8 @@ class PrescribedMotion {
   /// Position (mm) of point `row` of the model it was made from, at `load` in [0, 1]; the initial
   /// position for a soft-tissue point.
   Vec3 at(const Model& model, int64_t row, double load) const;
+  /// Gives a bone another whole motion.
+  void set(int32_t bone, const scene::RigidMotion& motion);
   /// 4×4 matrix of a bone at a load, identity where it moves on straight lines.
   Mat4 bone_matrix(int32_t bone, double load) const;
   /// Whether the points of a bone move on straight lines because no rigid motion takes them to

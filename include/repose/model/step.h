@@ -3,6 +3,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "repose/base/geometry.h"
@@ -89,6 +90,9 @@ struct PointField {
   std::string name;            ///< with the unit's meaning in docs/reference/formats.md
   bool vector = false;         ///< [N,3], else [N]
   std::vector<double> values;  ///< row by row
+  /// Attributes of the dataset: texts and flags.
+  std::vector<std::pair<std::string, std::string>> texts = {};
+  std::vector<std::pair<std::string, bool>> flags = {};
 };
 
 /// This rank's slab (base::slab of N, M, S rows) of each array of a step, in natural row order.

@@ -26,9 +26,10 @@ class Predictor {
 
 /// How the bones are taken to their places.
 struct PathSettings {
-  double accuracy = 0.1;  ///< mm, of every step
-  int load_steps = 0;     ///< equal steps; 0: as many as the motion needs
-  double start_load = 0;  ///< of a restarted run
+  double accuracy = 0.1;    ///< mm, of every step
+  int load_steps = 0;       ///< equal steps; 0: as many as the motion needs
+  double start_load = 0;    ///< of a restarted run
+  bool near_guess = false;  ///< the guess is tried before anything else, as near to rest
 };
 
 /// Load steps that were made again in two parts, by the reason.

@@ -6,6 +6,7 @@
 #include "repose/base/interrupt.h"
 #include "repose/base/program.h"
 #include "repose/discrete/part.h"
+#include "repose/model/motion.h"
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
 #include "repose/solve/stability.h"
@@ -18,6 +19,13 @@ using Receiver = std::function<void(const model::StepNumbers&, const model::Step
 /// Hands the state that a search is at to a receiver, as a step that has not converged. Collective.
 using Look = std::function<void(const Receiver&)>;
 
+/// A piece of bone whose motion is a parameter of the rest position.
+struct PlanPiece {
+  int32_t bone = -1;             ///< row of Model::bones
+  Vec3 centroid = Vec3::Zero();  ///< mm, at load 0
+  scene::Placement placement;    ///< at load 1
+};
+
 /// What is asked of a run.
 struct Settings {
   mechanics::Weights weights;                                ///< the objective
@@ -28,6 +36,11 @@ struct Settings {
   bool finds_other_rest = true;          ///< contact searches for another rest position at load 1
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene asks for one
+  /// Pieces by whose motions the rest position at load 1 is differentiated: point fields
+  /// `tangent_…` of the last step.
+  std::vector<PlanPiece> tangents = {};
+  /// Returns whether to end the search as if interrupted; called at each iteration, collective.
+  std::function<bool()> abandoned = {};
   /// Called at each iteration, on all ranks.
   std::function<void(double load, const Look&)> under_way;
   PathSettings path;
@@ -81,6 +94,9 @@ struct Start {
   /// `position` is a guess of the rest position at load 1, tried before the path is followed;
   /// otherwise the state at the settings' start_load.
   bool guess = false;
+  /// The guess is near to rest: it is tried before anything else, with contact at `pressure`.
+  bool near = false;
+  std::vector<double> pressure = {};  ///< N/mm², [points] this rank's slab
 };
 
 /// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest

@@ -52,6 +52,10 @@ class RestSearch {
   }
   /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
+  /// The same from a `displacement` that is near to rest. Collective.
+  virtual Outcome run_near(Vec displacement, double accuracy) {
+    return run(displacement, accuracy);
+  }
   /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
   /// `displacement`, from which the way goes on. Collective.
   virtual void go_back(Vec /*displacement*/) {}

@@ -1,0 +1,58 @@
+#include "plan_pieces.h"
+
+#include <algorithm>
+
+#include "report.h"
+#include "repose/base/agreement.h"
+
+namespace repose::app {
+
+namespace {
+
+/// On rank 0.
+std::vector<solve::PlanPiece> find_pieces(const Job& job) {
+  const model::Model& model = job.model;
+  const scene::Plan* plan =
+      job.anatomy && job.anatomy->scene.plan ? &*job.anatomy->scene.plan : nullptr;
+  std::vector<solve::PlanPiece> pieces;
+  for (size_t b = 0; b < model.bone_transform.size(); ++b) {
+    const auto motion = scene::RigidMotion::from_matrix(model.bone_transform[b]);
+    if (plan ? !std::ranges::binary_search(plan->pieces, b) : motion.is_identity()) continue;
+    const surface::Surface& bone = model.bone_surfaces[b];
+    const Vec3 centroid = scene::centroid(bone.points, bone.triangles);
+    pieces.push_back({static_cast<int32_t>(b), centroid, scene::placement_of(motion, centroid)});
+  }
+  return pieces;
+}
+
+}  // namespace
+
+std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
+  std::vector<solve::PlanPiece> pieces;
+  base::on_first_rank(comm, [&] { pieces = find_pieces(job); });
+  auto count = static_cast<int>(pieces.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  pieces.resize(count);
+  for (solve::PlanPiece& piece : pieces) {
+    MPI_Bcast(&piece.bone, 1, MPI_INT32_T, 0, comm);
+    for (Vec3* vector : {&piece.centroid, &piece.placement.translation, &piece.placement.rotation})
+      MPI_Bcast(vector->data(), 3, MPI_DOUBLE, 0, comm);
+  }
+  return pieces;
+}
+
+std::string describe_tangents(const std::vector<model::PointField>& fields) {
+  int columns = 0, found = 0;
+  for (const model::PointField& field : fields) {
+    if (!field.name.starts_with("tangent_")) continue;
+    ++columns;
+    found += std::ranges::all_of(field.flags, [](const auto& flag) { return flag.second; });
+  }
+  if (columns == 0) return "";
+  const std::string missing =
+      found == columns ? "" : "; the others are 0, and their flags finished and convex say why";
+  return report_row("tangents", fmt::format("{} of {} derivatives by motions of pieces{}", found,
+                                            columns, missing));
+}
+
+}  // namespace repose::app

@@ -1,0 +1,81 @@
+"""The scene key plan: the face as a continuous function of the plan, and its derivatives."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+from conftest import PROJECT
+
+PLAN = "plan:\n  pieces: [mandible, chin]\n  box: {translate: [0, 8, 0], rotate: [2, 0, 0]}\n"
+JAWS = "moves:\n  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, translate: [0, %g, 0]}\n"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """scene(moves, plan) → a genioplasty with these moves."""
+    text = (PROJECT / "meshes/head_genioplasty.yaml").read_text().split("moves:")[0]
+    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text)
+
+    def write(moves, plan=PLAN):
+        path = tmp_path / "scene.yaml"
+        path.write_text(text + moves + plan)
+        return path
+    return write
+
+
+def skin(file):
+    with h5py.File(file) as result:
+        assert result["step/0000"].attrs["load"] in (0, 1)
+        last = result["step"][sorted(result["step"])[-1]]
+        layer = result["model/point/layer"][:]
+        return last["point/position"][:][layer == 0]
+
+
+def test_a_sweep_through_equal_moves_is_continuous(run, scene, tmp_path):
+    faces = []
+    for move in (-4.95, -5, -5.001, -5.05):
+        name = tmp_path / f"at{move:g}"
+        result = run("repose-solve", scene(JAWS % move), "-output", name, "-accuracy", "0.01")
+        assert result.returncode == 0, result
+        faces.append(skin(f"{name}.h5"))
+    steps = [np.linalg.norm(b - a, axis=1).max() for a, b in zip(faces, faces[1:])]
+    assert steps[1] < 0.02, "a thousandth of a millimetre more, where pieces move alike"
+    assert max(steps) < 0.1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
+    def solve(move, *options):
+        name = tmp_path / "face"
+        result = run("repose-solve", scene(JAWS % move), "-output", name, "-accuracy", "1e-4",
+                     *options, ranks=ranks)
+        assert result.returncode == 0, result
+        return result.stdout, f"{name}.h5"
+    said, file = solve(-4, "-tangents")
+    assert "12 of 12 derivatives" in said
+    assert run("repose-check", file).returncode == 0
+    with h5py.File(file) as result:
+        last = result["step"][sorted(result["step"])[-1]]["point"]
+        names = [name.decode() for name in result["model/bone"]]
+        column = last[f"tangent_{names.index('chin')}_ty"]
+        assert column.attrs["unit"].decode() == "mm/mm"
+        assert column.attrs["finished"] == column.attrs["convex"] == 1
+        tangent = column[:][result["model/point/layer"][:] == 0]
+    step = 0.05
+    faces = [skin(solve(-4 + shift)[1]) for shift in (-step, step)]
+    difference = (faces[1] - faces[0]) / (2 * step)
+    error = np.linalg.norm(tangent - difference, axis=1)
+    assert np.linalg.norm(difference, axis=1).max() > 0.5
+    assert np.percentile(error, 95) < 0.01 and error.max() < 0.1
+
+
+def test_moves_outside_the_plan_are_refused(run, scene):
+    for moves, plan, words in (
+            (JAWS % -9, PLAN, "plan.box: 'chin' moves out of it: translation -9 mm along y"),
+            (JAWS % -5, "plan: {pieces: chin}\n", "lacks 'mandible', which moves")):
+        result = run("repose-solve", scene(moves, plan))
+        assert result.returncode == 1 and words in result.stderr
+        assert result.stderr.count("\n") == 1
+    result = run("repose-solve", scene("", ""), "-tangents")
+    assert result.returncode == 1 and "no bone moves" in result.stderr
