@@ -13,7 +13,7 @@ install(DIRECTORY include/repose DESTINATION include)
 # Scripts find each other, and the Slicer panel the programs, by where they lie.
 install(DIRECTORY meshes examples DESTINATION share/repose)
 install(DIRECTORY drivers/ DESTINATION share/repose USE_SOURCE_PERMISSIONS
-  FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN *.css PATTERN norms.json PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
+  FILES_MATCHING PATTERN *.py PATTERN *.js PATTERN *.css PATTERN *.html PATTERN norms.json PATTERN setup.sh PATTERN repose.slurm PATTERN slicer/Repose PATTERN Repose.xml)
 
 # Manual pages and bash completion, printed by the programs' own tables of options.
 foreach(program ${programs})

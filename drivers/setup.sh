@@ -4,7 +4,7 @@ build_packages=(
   g++ cmake ninja-build ccache pkg-config
   openmpi-bin libopenmpi-dev libpetsc-real-dev libslepc-real-dev libhdf5-openmpi-dev
   libopenblas0-serial # a fast BLAS, serial because MPI ranks already use the cores
-  libeigen3-dev libcgal-dev libyaml-cpp-dev libfmt-dev
+  libeigen3-dev libcgal-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev
   libinsighttoolkit5-dev zlib1g-dev # volumes: DICOM, NIfTI, NRRD, MetaImage
 )
 report_packages=(python3 python3-numpy python3-h5py) # drivers/report.py

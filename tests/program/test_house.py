@@ -24,6 +24,7 @@ ROOMS = {
     "results": {"base", "model"},
     "adapt": {"base", "scene", "surface", "meshtools", "model", "mechanics", "discrete", "linear",
               "solve"},
+    "live": {"base", "scene", "surface", "model", "solve", "app"},
     "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
             "results", "adapt", "check"},
 }
@@ -33,6 +34,7 @@ PETSC_ROOMS = [f"{top}/{room}" for room in ROOMS if room != "mechanics"
 LIBRARIES = {
     "CGAL/": ["src/surface", "src/meshtools"],
     "itk": ["src/imaging"],
+    "nlohmann/": ["src/live"],
     "yaml-cpp": ["src/scene"],
     "slepc": ["src/solve"],
     "petsctao": ["src/solve", "include/repose/solve"],

@@ -1,0 +1,247 @@
+"""A resident solver: repose-live, started and asked."""
+
+import dataclasses
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import threading
+
+import numpy as np
+
+COMPONENTS = ("tx", "ty", "tz", "rx", "ry", "rz")  # mm, then degrees
+
+
+class Refused(ValueError):
+    """What repose-live says about a request that it does not answer."""
+
+
+@dataclasses.dataclass
+class Piece:
+    """A piece of the plan: its row among the bones, its centroid (mm), and the scene's own motion."""
+    name: str
+    bone: int
+    centroid: np.ndarray
+    translate: np.ndarray  # mm
+    rotate: np.ndarray     # degrees
+
+
+@dataclasses.dataclass
+class Tangent:
+    """∂x/∂p of the skin, [N, 3] for each component of each piece: mm per mm, mm per degree."""
+    columns: dict          # (piece, "tx" … "rz") -> array
+    missing: list          # those whose linear solve did not end or met negative curvature
+
+    def displacement(self, change):
+        """First-order displacement of the skin by a change of the plan (as a plan)."""
+        total = 0
+        for piece, motion in change.items():
+            values = np.concatenate([motion.get("translate", (0, 0, 0)),
+                                     motion.get("rotate", (0, 0, 0))])
+            for name, value in zip(COMPONENTS, values):
+                if value and (piece, name) in self.columns:
+                    total = total + value * self.columns[piece, name]
+        return total
+
+
+@dataclasses.dataclass
+class Face:
+    """An answer: the skin at rest, mm."""
+    plan: dict
+    position: np.ndarray      # [N, 3] mm
+    initial: np.ndarray       # [N, 3] mm
+    triangles: np.ndarray     # [T, 3]
+    error: float              # mm, estimated distance to the rest position
+    converged: bool
+    fields: dict              # name -> array
+    tangent: object           # Tangent, or None
+    info: dict                # the answer's head
+
+    @property
+    def displacement(self):
+        return self.position - self.initial
+
+    def mesh(self):
+        """meshio mesh of the skin with displacement and fields."""
+        import meshio
+        return meshio.Mesh(self.position, [("triangle", self.triangles)],
+                           point_data={"displacement": self.displacement, **self.fields})
+
+    def polydata(self):
+        """PyVista mesh of the same."""
+        import pyvista
+        faces = np.column_stack([np.full(len(self.triangles), 3), self.triangles]).ravel()
+        mesh = pyvista.PolyData(self.position, faces)
+        for name, values in {"displacement": self.displacement, **self.fields}.items():
+            mesh.point_data[name] = values
+        return mesh
+
+
+def find_program():
+    """repose-live: REPOSE_LIVE, else on the PATH, else built in the project around this file."""
+    if "REPOSE_LIVE" in os.environ:
+        return os.environ["REPOSE_LIVE"]
+    found = shutil.which("repose-live")
+    for folder in () if found else pathlib.Path(__file__).resolve().parents:
+        built = sorted(folder.glob("build*/bin/repose-live"))
+        if built:
+            return str(built[0])
+    if not found:
+        raise FileNotFoundError("repose-live is not found: build or install Repose, or set REPOSE_LIVE")
+    return found
+
+
+class Session:
+    """A scene that is built once and solved for many plans. A plan is a dictionary
+    {piece: {"translate": [x, y, z], "rotate": [x, y, z]}}, mm and degrees (rotation vector about the
+    piece's centroid); a piece that is not named stays. Answers do not depend on their order.
+    Threads may share a session; a newer `solve` abandons the one under way, which raises Refused."""
+
+    def __init__(self, scene, ranks=1, program=None):
+        path = pathlib.Path(getattr(scene, "path", scene)).resolve()
+        command = [program or find_program(), str(path)]
+        if ranks > 1:
+            command = ["mpirun", "-n", str(ranks), *command]
+        self._errors = []
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                         stderr=subprocess.PIPE, cwd=path.parent)
+        threading.Thread(target=self._listen, daemon=True).start()
+        self._writing, self._waiting, self._last = threading.Lock(), {}, 0
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        try:
+            head, arrays = self.describe()
+        except Refused:
+            self.close()
+            raise
+        self.pieces = [Piece(one["name"], one["bone"], *(np.array(one[key]) for key in
+                                                         ("centroid", "translate", "rotate")))
+                       for one in head["pieces"]]
+        self.box, self.accuracy = head["box"], head["accuracy"]
+        self.initial = arrays["position"].astype(float)
+        self.triangles = arrays["triangles"]
+        self.bones = {name: (arrays[f"bone_{row}_points"], arrays[f"bone_{row}_triangles"])
+                      for row, name in enumerate(head["bones"])}
+
+    def solve(self, plan, accuracy=None, tangents=False, base="scene"):
+        """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
+        "scene", the plan of the scene's moves, "rest", the initial state, or another plan."""
+        request = {"do": "solve", "plan": _plain(plan), "tangents": tangents,
+                   "base": base if isinstance(base, str) else _plain(base)}
+        if accuracy is not None:
+            request["accuracy"] = accuracy
+        head, arrays = self.ask(request)
+        columns, missing, fields = {}, [], {}
+        names = {piece.bone: piece.name for piece in self.pieces}
+        for name, values in arrays.items():
+            if not name.startswith("tangent_"):
+                fields[name] = values
+                continue
+            bone, component = name.split("_")[1:]
+            columns[names[int(bone)], component] = values
+            if not all(head["flags"][name].values()):
+                missing.append((names[int(bone)], component))
+        position = fields.pop("position").astype(float)
+        return Face(plan, position, self.initial, self.triangles, head["error"], head["converged"],
+                    fields, Tangent(columns, missing) if tangents else None, head)
+
+    def tangents(self, plan=None, accuracy=None):
+        """The derivatives of the skin at a plan, by default the scene's own."""
+        return self.solve(self.scene_plan if plan is None else plan, accuracy, True).tangent
+
+    @property
+    def scene_plan(self):
+        """The plan of the scene's moves."""
+        return {piece.name: {"translate": piece.translate.tolist(), "rotate": piece.rotate.tolist()}
+                for piece in self.pieces}
+
+    def describe(self):
+        """The scene as repose-live describes it: (head, arrays)."""
+        return self.ask({"do": "describe"})
+
+    def write(self, output):
+        """Writes the last answer as a full result OUTPUT.h5 with its XDMF files."""
+        self.ask({"do": "write", "output": str(pathlib.Path(output).resolve())})
+
+    def close(self):
+        """Ends repose-live."""
+        process = self._process
+        if process.poll() is None:
+            try:
+                process.stdin.close()
+                process.wait(timeout=20)
+            except (OSError, subprocess.TimeoutExpired):
+                process.terminate()
+                process.wait()
+        self._reader.join(timeout=5)
+        process.stdout.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def _listen(self):
+        with self._process.stderr as stream:
+            for line in stream:
+                self._errors = self._errors[-20:] + [line.decode(errors="replace").rstrip()]
+
+    def _read(self):
+        stream = self._process.stdout
+        while line := stream.readline():
+            try:
+                head = json.loads(line)
+            except ValueError:
+                break
+            arrays = {}
+            for one in head["arrays"]:
+                kind = np.dtype("<" + one["type"])
+                size = int(np.prod(one["shape"])) * kind.itemsize
+                arrays[one["name"]] = np.frombuffer(stream.read(size), kind).reshape(one["shape"])
+            self._give(head["id"], head, arrays)
+        for number in list(self._waiting):
+            self._give(number, None, {})
+
+    def _give(self, number, head, arrays):
+        waiting = self._waiting.pop(number, None)
+        if waiting:
+            waiting["answer"] = head, arrays
+            waiting["event"].set()
+
+    def ask(self, request):
+        """The answer to a request of the protocol: (head, arrays); Refused where there is none."""
+        waiting = {"event": threading.Event()}
+        with self._writing:
+            self._last += 1
+            number = self._last
+            self._waiting[number] = waiting
+            try:
+                self._process.stdin.write(json.dumps({"id": number, **request}).encode() + b"\n")
+                self._process.stdin.flush()
+            except (OSError, ValueError):
+                self._waiting.pop(number, None)
+                raise Refused(self._end()) from None
+            if not self._reader.is_alive():
+                self._give(number, None, {})
+        waiting["event"].wait()
+        head, arrays = waiting["answer"]
+        if head is None:
+            raise Refused(self._end())
+        if not head["ok"]:
+            raise Refused(head["error"])
+        return head, arrays
+
+    def _end(self):
+        try:
+            status = self._process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            status = "unknown"
+        said = next((line for line in self._errors if line.startswith("error:")), "")
+        return said[7:] or f"repose-live has ended (status {status}): {' '.join(self._errors[-3:])}"
+
+
+def _plain(plan):
+    return {piece: {key: [float(value) for value in values] for key, values in motion.items()}
+            for piece, motion in plan.items()}

@@ -1,0 +1,69 @@
+#pragma once
+#include <mpi.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "repose/model/build.h"
+#include "repose/solve/repose.h"
+
+namespace repose::app {
+
+/// A scene that is built once and solved for many plans. Each solve begins at a defined state: the
+/// initial one or, with its tangents, the rest position of a base plan, which is itself solved from
+/// the initial one. So an answer depends on its plan and base alone, not on the solves before it.
+/// All members are collective; what they return is on rank 0 unless said otherwise.
+class PlanSession {
+ public:
+  /// A piece of the plan; on all ranks.
+  struct Piece {
+    std::string name;
+    int32_t bone;
+    Vec3 centroid;            ///< mm, at load 0
+    scene::Placement scenes;  ///< by the scene's moves
+  };
+  /// [pieces] The motion of each.
+  using Placements = std::vector<scene::Placement>;
+  struct Request {
+    Placements plan;
+    double accuracy = 0;               ///< mm
+    bool tangents = false;             ///< derivatives by the motions of the pieces
+    const Placements* base = nullptr;  ///< where it begins; null: the initial state
+    std::function<bool()> abandoned;   ///< as solve::Settings
+  };
+  struct Answer {
+    solve::Summary summary;                ///< on all ranks
+    std::vector<Vec3> position;            ///< [N] mm
+    std::vector<model::PointField> field;  ///< [N] contact and tangents
+    bool from_base = false;                ///< the search began at the base and ended there
+  };
+
+  /// Reads and builds a scene. Throws InputError where it has no plan, or what a session does not
+  /// solve: tearing, the functional force.
+  PlanSession(MPI_Comm comm, const std::filesystem::path& input);
+  ~PlanSession();
+  PlanSession(const PlanSession&) = delete;
+  PlanSession& operator=(const PlanSession&) = delete;
+
+  const std::vector<Piece>& pieces() const;
+  const scene::Plan& box() const;
+  double accuracy() const;            ///< mm, the scene's
+  const model::Model& model() const;  ///< at most its skin and bones where ranks build their parts
+  std::vector<Vec3> initial() const;  ///< [N] mm
+  int64_t layers() const;             ///< points of a column where all have as many, else 0
+  const std::string& building() const;  ///< report of the build
+
+  /// Throws InputError where the plan is outside the box.
+  Answer solve(const Request& request);
+  /// Writes the last answer as NAME.h5 with its XDMF files. Throws InputError without one.
+  void write(const std::filesystem::path& name);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace repose::app

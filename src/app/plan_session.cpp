@@ -1,0 +1,222 @@
+#include "repose/app/plan_session.h"
+
+#include <algorithm>
+#include <list>
+
+#include "job.h"
+#include "plan_pieces.h"
+#include "repose/app/settings.h"
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/results/name_lock.h"
+#include "repose/results/result_file.h"
+
+namespace repose::app {
+
+namespace {
+
+constexpr size_t most_bases = 32;
+
+/// A solved plan that searches begin at: this rank's slabs.
+struct Base {
+  PlanSession::Placements plan;
+  std::vector<Vec3> position;
+  std::vector<double> pressure;
+  std::vector<model::PointField> tangents;  // empty: it is no rest position
+};
+
+bool same(const PlanSession::Placements& a, const PlanSession::Placements& b) {
+  return std::ranges::equal(a, b, [](const scene::Placement& p, const scene::Placement& q) {
+    return p.translation == q.translation && p.rotation == q.rotation;
+  });
+}
+
+bool is_tangent(const model::PointField& field) { return field.name.starts_with("tangent_"); }
+
+/// Gives the bones of a model other motions.
+void set_motions(const std::vector<solve::PlanPiece>& pieces, model::Model& model) {
+  for (const solve::PlanPiece& piece : pieces) {
+    const scene::RigidMotion motion = scene::motion_of(piece.placement, piece.centroid);
+    model.bone_transform[piece.bone] = motion.matrix();
+    model::Points& points = model.points;
+    for (size_t i = 0; i < points.position.size(); ++i)
+      if (points.set[i] == model::PointSet::bone && points.bone[i] == piece.bone)
+        points.target[i] = motion.apply(points.position[i]);
+  }
+}
+
+/// Refuses what a session does not solve. On rank 0.
+void require_plan(const std::filesystem::path& input, const Job& job) {
+  const std::string file = input.string();
+  if (!job.anatomy) base::refuse("{}: a session needs a scene (.yaml)", file);
+  if (!job.anatomy->scene.plan)
+    base::refuse("{}: the scene has no plan; add plan: {{pieces: [BONE, …]}}", file);
+  if (job.tearing) base::refuse("{}: tissue that tears has no session; remove tearing", file);
+  if (job.wanted.functional == scene::Functional::force)
+    base::refuse("{}: a session minimizes the energy; remove solve.functional", file);
+}
+
+}  // namespace
+
+struct PlanSession::State {
+  MPI_Comm comm;
+  Job job;
+  discrete::Part own;  // where the model was built on rank 0
+  std::vector<Piece> pieces;
+  std::vector<solve::PlanPiece> plan;
+  scene::Plan box;
+  solve::Settings settings;
+  std::list<Base> bases;  // the latest first
+  std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
+
+  discrete::Part& part() { return job.raised ? job.raised->part : own; }
+  void require_inside(const Placements& placements) const;
+  void take(const Placements& placements);
+  solve::Summary search(const solve::Settings& settings, const solve::Start& start);
+  const Base* base(const Placements& placements, const std::function<bool()>& abandoned);
+  solve::Start start_at(const Base& base, const Placements& placements) const;
+};
+
+void PlanSession::State::require_inside(const Placements& placements) const {
+  if (placements.size() != pieces.size())
+    throw base::InternalError("a plan places as many pieces as the session has");
+  for (size_t k = 0; k < pieces.size(); ++k)
+    if (const std::string outside = scene::outside_box(placements[k], box); !outside.empty())
+      base::refuse("plan: '{}': {}", pieces[k].name, outside);
+}
+
+void PlanSession::State::take(const Placements& placements) {
+  for (size_t k = 0; k < plan.size(); ++k) plan[k].placement = placements[k];
+  set_motions(plan, part().model);
+  if (base::rank(comm) == 0) set_motions(plan, job.model);
+}
+
+solve::Summary PlanSession::State::search(const solve::Settings& with, const solve::Start& start) {
+  return solve::find_repose(comm, part(), with, start, [&](const auto& numbers, const auto& rows) {
+    last = {numbers, rows};
+  });
+}
+
+/// Solves a base from the initial state, unless it is known; null where that was abandoned.
+const Base* PlanSession::State::base(const Placements& placements,
+                                     const std::function<bool()>& abandoned) {
+  const auto known =
+      std::ranges::find_if(bases, [&](const Base& other) { return same(other.plan, placements); });
+  if (known != bases.end()) {
+    bases.splice(bases.begin(), bases, known);
+    return &bases.front();
+  }
+  require_inside(placements);
+  take(placements);
+  solve::Settings with = settings;
+  with.tangents = plan;
+  with.abandoned = abandoned;
+  const solve::Summary summary = search(with, {});
+  Base base{placements, last->second.position, {}, {}};
+  for (model::PointField& field : last->second.point_fields) {
+    if (field.name == "contact_pressure") base.pressure = field.values;
+    if (is_tangent(field) && summary.path.complete()) base.tangents.push_back(field);
+  }
+  if (summary.path.last.stopped) return nullptr;
+  bases.push_front(std::move(base));
+  if (bases.size() > most_bases) bases.pop_back();
+  return &bases.front();
+}
+
+/// The rest position that the base's tangents predict.
+solve::Start PlanSession::State::start_at(const Base& base, const Placements& placements) const {
+  solve::Start start{base.position, true, true, base.pressure};
+  size_t column = 0;
+  for (size_t k = 0; k < placements.size(); ++k)
+    for (int c = 0; c < 6; ++c, ++column) {
+      const auto component = [&](const scene::Placement& p) {
+        return (c < 3 ? p.translation : p.rotation)[c % 3];
+      };
+      const double by = component(placements[k]) - component(base.plan[k]);
+      const double* values = base.tangents[column].values.data();
+      for (size_t i = 0; i < start.position.size(); ++i)
+        start.position[i] += by * Eigen::Map<const Vec3>(values + 3 * i);
+    }
+  return start;
+}
+
+PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input)
+    : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.comm = comm;
+  s.job = read_job(comm, input, "");
+  base::on_first_rank(comm, [&] {
+    require_plan(input, s.job);
+    s.box = *s.job.anatomy->scene.plan;
+  });
+  s.box.pieces.clear();
+  MPI_Bcast(s.box.translate.data(), 3, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(s.box.rotate.data(), 3, MPI_DOUBLE, 0, comm);
+  s.settings = settings_of(s.job.wanted, s.job.solid);
+  s.settings.initial_equilibrium = s.job.initial_equilibrium;
+  s.settings.finds_other_rest = false;
+  s.plan = plan_pieces(comm, s.job);
+  for (const solve::PlanPiece& piece : s.plan) {
+    std::string name = base::rank(comm) == 0 ? s.job.model.bones[piece.bone] : "";
+    base::share(comm, name);
+    s.pieces.push_back({name, piece.bone, piece.centroid, piece.placement});
+  }
+  if (!s.job.raised) s.own = discrete::distribute(comm, s.job.model);
+}
+
+PlanSession::~PlanSession() = default;
+
+const std::vector<PlanSession::Piece>& PlanSession::pieces() const { return state_->pieces; }
+const scene::Plan& PlanSession::box() const { return state_->box; }
+double PlanSession::accuracy() const { return state_->settings.path.accuracy; }
+const model::Model& PlanSession::model() const { return state_->job.model; }
+const std::string& PlanSession::building() const { return state_->job.building; }
+int64_t PlanSession::layers() const { return state_->job.raised ? state_->job.layers : 0; }
+
+std::vector<Vec3> PlanSession::initial() const {
+  State& s = *state_;
+  const discrete::NaturalRows natural(s.comm, s.part());
+  return discrete::gather_points(s.comm, natural.natural(s.part().model.points.position));
+}
+
+PlanSession::Answer PlanSession::solve(const Request& request) {
+  State& s = *state_;
+  s.require_inside(request.plan);
+  Answer answer;
+  solve::Start start;
+  if (request.base) {
+    const Base* base = s.base(*request.base, request.abandoned);
+    if (base && !base->tangents.empty()) start = s.start_at(*base, request.plan);
+  }
+  s.take(request.plan);
+  solve::Settings with = s.settings;
+  with.path.accuracy = request.accuracy;
+  with.abandoned = request.abandoned;
+  if (request.tangents) with.tangents = s.plan;
+  answer.summary = s.search(with, start);
+  answer.from_base = answer.summary.path.leapt;
+  answer.position = discrete::gather_points(s.comm, s.last->second.position);
+  for (const model::PointField& field : s.last->second.point_fields) {
+    answer.field.push_back(field);
+    answer.field.back().values = discrete::gather(s.comm, field.values.data(), field.values.size());
+  }
+  return answer;
+}
+
+void PlanSession::write(const std::filesystem::path& name) {
+  State& s = *state_;
+  if (!s.last) base::refuse("there is no solved plan to write; solve one first");
+  std::optional<results::NameLock> lock;
+  base::on_first_rank(s.comm, [&] { lock.emplace(name); });
+  results::ResultFile file =
+      s.job.raised ? results::ResultFile(s.comm, name, s.job.model,
+                                         discrete::NaturalRows::of_model(s.comm, *s.job.raised),
+                                         results::Kind::result)
+                   : results::ResultFile(s.comm, name, s.job.model, results::Kind::result);
+  file.append(s.last->first, s.last->second);
+  file.commit();
+}
+
+}  // namespace repose::app

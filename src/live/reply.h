@@ -1,0 +1,33 @@
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+
+namespace repose::live {
+
+/// An answer: a line of JSON, then the bytes of the arrays that its member `arrays` lists.
+class Reply {
+ public:
+  explicit Reply(const nlohmann::json& id)
+      : head_{{"id", id}, {"ok", true}, {"arrays", nlohmann::json::array()}} {}
+
+  nlohmann::json& head() { return head_; }
+  /// Adds little-endian float32 rows of three.
+  void add(const std::string& name, const std::vector<Vec3>& rows);
+  void add(const std::string& name, const std::vector<double>& values);
+  void add(const std::string& name, const std::vector<Triangle>& triangles);  ///< int32
+  /// Turns the answer into a refusal.
+  void refuse(const std::string& error);
+  std::string bytes() const;
+
+ private:
+  void append(const std::string& name, const char* type, std::vector<int64_t> shape,
+              const void* data, size_t size);
+  nlohmann::json head_;
+  std::string arrays_;
+};
+
+}  // namespace repose::live

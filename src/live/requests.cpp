@@ -1,0 +1,111 @@
+#include "requests.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+
+#include "repose/base/agreement.h"
+#include "repose/base/error.h"
+
+namespace repose::live {
+
+namespace {
+
+constexpr size_t longest_line = 1 << 20;
+
+/// Rank 0's text on all ranks, which wait for it asleep.
+void share_asleep(MPI_Comm comm, std::string& text) {
+  using namespace std::chrono_literals;
+  const auto wait = [](MPI_Request request) {
+    for (int done = 0; !done;) {
+      MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+      if (!done) std::this_thread::sleep_for(1ms);
+    }
+  };
+  auto length = static_cast<int>(text.size());
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Ibcast(&length, 1, MPI_INT, 0, comm, &request);
+  wait(request);
+  text.resize(length);
+  MPI_Ibcast(text.data(), length, MPI_CHAR, 0, comm, &request);
+  wait(request);
+}
+
+}  // namespace
+
+Requests::Requests(MPI_Comm comm, int input) : comm_(comm), input_(input) {
+  if (base::rank(comm) > 0) return;
+  if (pipe(stop_) != 0) throw base::InternalError("no pipe can be made");
+  reader_ = std::thread([this] { read(); });
+}
+
+Requests::~Requests() {
+  if (!reader_.joinable()) return;
+  close(stop_[1]);
+  reader_.join();
+  close(stop_[0]);
+}
+
+void Requests::add(std::string line) {
+  const std::lock_guard lock(mutex_);
+  lines_.push_back(std::move(line));
+  changed_.notify_one();
+}
+
+/// On the thread.
+void Requests::read() {
+  std::string text;
+  std::array<char, 1 << 16> buffer;
+  while (true) {
+    std::array<pollfd, 2> watched = {pollfd{input_, POLLIN, 0}, pollfd{stop_[0], POLLIN, 0}};
+    if (poll(watched.data(), watched.size(), -1) < 0) continue;
+    if (watched[1].revents != 0) break;
+    const ssize_t count = ::read(input_, buffer.data(), buffer.size());
+    if (count <= 0) break;
+    text.append(buffer.data(), count);
+    size_t begin = 0;
+    for (size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
+      add(text.substr(begin, end - begin));
+    text.erase(0, begin);
+    if (text.size() > longest_line) break;  // no request: nothing after it can be told apart
+  }
+  const std::lock_guard lock(mutex_);
+  ended_ = true;
+  changed_.notify_one();
+}
+
+/// On rank 0.
+std::optional<std::string> Requests::wait() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ended_ || !lines_.empty(); });
+  if (lines_.empty()) return {};
+  std::string line = std::move(lines_.front());
+  lines_.pop_front();
+  return line;
+}
+
+std::optional<std::string> Requests::next() {
+  std::string text;  // with a first character that tells a line from the end
+  if (base::rank(comm_) == 0) {
+    const std::optional<std::string> line = wait();
+    text = line ? "l" + *line : "e";
+  }
+  share_asleep(comm_, text);
+  if (text[0] == 'e') return {};
+  return text.substr(1);
+}
+
+bool Requests::overtaken(const std::function<bool(const std::string&)>& overtakes) {
+  int overtaken = 0;
+  if (base::rank(comm_) == 0) {
+    const std::lock_guard lock(mutex_);
+    overtaken = ended_ || std::ranges::any_of(lines_, overtakes);
+  }
+  MPI_Bcast(&overtaken, 1, MPI_INT, 0, comm_);
+  return overtaken != 0;
+}
+
+}  // namespace repose::live

@@ -1,0 +1,44 @@
+#pragma once
+#include <mpi.h>
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+namespace repose::live {
+
+/// Lines that a thread of rank 0 reads from a file descriptor as they come, for all ranks.
+class Requests {
+ public:
+  Requests(MPI_Comm comm, int input);
+  ~Requests();
+  Requests(const Requests&) = delete;
+  Requests& operator=(const Requests&) = delete;
+
+  /// The next line, the same on all ranks; nothing once the input has ended. Waits without load.
+  /// Collective.
+  std::optional<std::string> next();
+  /// Returns whether the input has ended or a line waits that `overtakes` the present request.
+  /// Collective.
+  bool overtaken(const std::function<bool(const std::string&)>& overtakes);
+
+ private:
+  void read();
+  void add(std::string line);
+  std::optional<std::string> wait();
+
+  MPI_Comm comm_;
+  int input_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::string> lines_;
+  bool ended_ = false;
+  int stop_[2] = {-1, -1};  // a pipe that ends the thread
+  std::thread reader_;
+};
+
+}  // namespace repose::live

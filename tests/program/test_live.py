@@ -1,0 +1,142 @@
+"""repose-live and the package repose, as a client sees them."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import PROJECT, programs
+
+sys.path.insert(0, str(PROJECT / "drivers/python"))
+import repose  # noqa: E402
+
+SCENE = PROJECT / "meshes/head_live.yaml"
+A = {"mandible": {"translate": [0, -5, 1], "rotate": [2, 0, 0]}, "maxilla": {"translate": [0, -2, 0]}}
+B = {"mandible": {"translate": [1, -3, 0]}, "chin": {"translate": [0, -6, 0]}}
+
+
+@pytest.fixture(scope="module")
+def session(environment):
+    os.environ.update(environment)
+    with repose.Session(SCENE, program=programs() / "repose-live") as opened:
+        yield opened
+
+
+def distance(one, other):
+    return np.linalg.norm(one.position - other.position, axis=1).max()
+
+
+def test_answers_do_not_depend_on_their_order(session):
+    first = session.solve(A)
+    other = session.solve(B)
+    again = session.solve(A)
+    assert first.converged and other.converged and first.error < 0.1
+    assert distance(first, other) > 1
+    assert distance(first, again) == 0
+    assert distance(first, session.solve(A, base="rest")) < 0.2, "from another start, both to 0.1"
+
+
+def test_tangents_predict_a_face_nearby(session):
+    face = session.solve(A, accuracy=0.01, tangents=True)
+    assert not face.tangent.missing and len(face.tangent.columns) == 18
+    change = {"mandible": {"translate": [0, -0.5, 0], "rotate": [0, 0, 0.5]}}
+    near = {**A, "mandible": {"translate": [0, -5.5, 1], "rotate": [2, 0, 0.5]}}
+    exact = session.solve(near, accuracy=0.01)
+    error = np.linalg.norm(face.position + face.tangent.displacement(change) - exact.position, axis=1)
+    assert distance(face, exact) > 0.4 and np.percentile(error, 95) < 0.05
+
+
+def test_refusals_name_the_place_and_the_session_goes_on(session):
+    for plan, words in ((({"mandible": {"translate": [0, -9, 0]}}), "'mandible': translation -9 mm"),
+                        (({"jaw": {}}), "'jaw' is no piece"),
+                        (({"chin": {"turn": [0, 0, 1]}}), "no member 'turn'")):
+        with pytest.raises(repose.Refused, match=re.escape(words)):
+            session.solve(plan)
+    for request in ({"do": "dance"}, {"do": "solve", "plan": 3}, {"do": "solve", "accuracy": -1},
+                    {"do": "solve", "plan": {"chin": {"translate": [0, 1]}}}, {"do": "write"},
+                    {"do": "solve", "tangents": "yes"}):
+        with pytest.raises(repose.Refused) as refusal:
+            session.ask(request)
+        assert "\n" not in str(refusal.value)
+    assert session.solve(B).converged
+
+
+def test_a_later_solve_ends_the_one_under_way(session):
+    outcome = []
+
+    def slow():
+        try:
+            outcome.append(session.solve(A, accuracy=1e-6, base="rest"))
+        except repose.Refused as refusal:
+            outcome.append(str(refusal))
+    thread = threading.Thread(target=slow)
+    thread.start()
+    time.sleep(0.2)
+    assert session.solve(B).converged
+    thread.join()
+    assert "a later request overtook it" in str(outcome[0])
+
+
+def test_a_full_result_passes_the_check(session, run, tmp_path):
+    face = session.solve(B)
+    session.write(tmp_path / "plan")
+    result = run("repose-check", tmp_path / "plan.h5")
+    assert result.returncode == 0, result
+    mesh = face.mesh()
+    assert mesh.points.shape == session.initial.shape
+
+
+def talk(environment, lines, ranks=1):
+    """What repose-live writes for these lines, and its status."""
+    command = [str(programs() / "repose-live"), str(SCENE)]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), *command]
+    done = subprocess.run(command, input=lines, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          timeout=60, env={**os.environ, **environment})
+    return done.returncode, done.stdout
+
+
+def test_malformed_lines_and_the_end_of_the_input(environment):
+    status, said = talk(environment, b'{"do": \n\n[1]\n\xff\xfe\n{"id": "x", "do": "quit"}\n')
+    answers = [json.loads(line) for line in said.splitlines()]
+    assert status == 0 and [answer["ok"] for answer in answers] == [False, False, False, True]
+    assert answers[-1]["id"] == "x"
+    assert talk(environment, b"") == (0, b"")
+
+
+def test_a_closed_pipe_ends_the_program(environment):
+    process = subprocess.Popen([programs() / "repose-live", SCENE], stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               env={**os.environ, **environment})
+    process.stdout.close()
+    process.stdin.write(b'{"do": "describe"}\n')
+    process.stdin.flush()
+    assert process.wait(timeout=60) == 0
+    process.stdin.close()
+    process.stderr.close()
+
+
+def test_two_ranks_give_the_same_face(session, environment):
+    with repose.Session(SCENE, ranks=2, program=programs() / "repose-live") as shared:
+        assert distance(shared.solve(A), session.solve(A)) < 0.1
+        assert len(shared.tangents(A).columns) == 18
+
+
+def test_a_scene_without_a_plan_is_refused(environment):
+    with pytest.raises(repose.Refused, match="the scene has no plan"):
+        repose.Session(PROJECT / "meshes/head_genioplasty.yaml", program=programs() / "repose-live")
+
+
+def test_the_client_of_the_guide_works(environment, tmp_path):
+    page = (PROJECT / "docs/guide/live.md").read_text()
+    client = re.findall(r"```python\n(import json.*?)```", page, re.S)[0]
+    said = subprocess.run([sys.executable, "-c", client, SCENE], text=True, check=True, timeout=60,
+                          stdout=subprocess.PIPE,
+                          env={**os.environ, **environment,
+                               "PATH": f"{programs()}:{os.environ['PATH']}"}).stdout
+    assert re.search(r"mandible 2 mm forward: the skin moves by up to [12]\.\d+ mm", said)
