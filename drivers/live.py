@@ -1,0 +1,174 @@
+#!/usr/bin/env python3
+"""drivers/live.py SCENE: plan in the browser. Bones are dragged, the face follows: at once by
+derivatives, and exactly a moment later (docs/guide/live.md).
+
+    drivers/live.py meshes/head_live.yaml
+    drivers/live.py meshes/head_live.yaml -ranks 2 -port 8123 -no_browser
+
+Starts repose-live and a server for this machine alone (127.0.0.1); its address holds a token,
+without which nothing is answered. Ends with Ctrl-C. Needs NumPy and a browser with WebGL 2."""
+
+import argparse
+import hmac
+import http.server
+import json
+import pathlib
+import re
+import secrets
+import signal
+import sys
+import urllib.parse
+import webbrowser
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "python"))
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,"><title>{title}</title><style>{style}</style></head>
+<body>{body}<script>{scripts}</script></body></html>
+"""
+LONGEST_REQUEST = 1 << 20
+
+
+def page(scene):
+    """The page with all that it needs: no request but to this server."""
+    web = HERE / "web"
+    read = lambda name: (web / name).read_text(encoding="utf-8")
+    scripts = "\n".join(read(name).replace("</script", "<\\/script")
+                        for name in ("three.js", "viewer.js", "live.js"))
+    style = read("viewer.css") + read("live.css")
+    return PAGE.format(title=scene.stem, style=style, body=read("live.html"),
+                       scripts=scripts).encode()
+
+
+def packed(head, arrays):
+    """A line of JSON, then the arrays: as repose-live answers."""
+    return json.dumps(head).encode() + b"\n" + b"".join(values.tobytes()
+                                                        for values in arrays.values())
+
+
+def scene_with_moves(path, moves):
+    """The text of the scene with these moves (piece, 4×4 matrix) in place of its own."""
+    kept, inside = [], False
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if re.match(r"[^\s#]", line):
+            inside = line.startswith("moves:")
+        if not inside:
+            kept.append(line)
+    rows = [f"  - {{bone: {json.dumps(piece)}, transform: {json.dumps(matrix)}}}"
+            for piece, matrix in moves.items()]
+    return "\n".join([f"# The plan of {path.name} as of drivers/live.py; belongs in its folder.",
+                      *kept, "moves:", *rows]) + "\n"
+
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    """Answers GET / (the page), GET /scene, POST /solve, /scene_file and /result."""
+    protocol_version = "HTTP/1.1"
+
+    def allowed(self, token):
+        """Whether a request has the token and was meant for this machine (no DNS rebinding)."""
+        host = self.headers.get("Host", "").rsplit(":", 1)[0]
+        good = hmac.compare_digest(token.encode(), self.server.token.encode())
+        if good and host in ("127.0.0.1", "localhost"):
+            return True
+        self.reply(403, b"the request lacks the token of the address that drivers/live.py printed\n",
+                   "text/plain")
+        return False
+
+    def reply(self, status, content, kind="application/octet-stream"):
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        try:
+            self.wfile.write(content)
+        except OSError:
+            pass  # the page was closed
+
+    def do_GET(self):
+        address = urllib.parse.urlsplit(self.path)
+        query = urllib.parse.parse_qs(address.query)
+        if not self.allowed(query.get("token", [self.headers.get("X-Token", "")])[0]):
+            return
+        if address.path == "/":
+            self.reply(200, self.server.page, "text/html; charset=utf-8")
+        elif address.path == "/scene":
+            self.reply(200, packed(*self.server.session.describe()))
+        else:
+            self.reply(404, b"there is no such page\n", "text/plain")
+
+    def do_POST(self):
+        length = int(self.headers.get("Content-Length") or 0)
+        content = self.rfile.read(min(length, LONGEST_REQUEST))
+        if not self.allowed(self.headers.get("X-Token", "")):
+            return
+        from repose import Refused
+        try:
+            request = json.loads(content)
+            work = {"/solve": self.solve, "/scene_file": self.scene_file,
+                    "/result": self.result}[self.path]
+            self.reply(200, work(request))
+        except Refused as refusal:
+            overtaken = str(refusal).startswith("abandoned")  # the page has asked for another since
+            self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
+                       "text/plain; charset=utf-8")
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
+
+    def solve(self, request):
+        return packed(*self.server.session.ask({**request, "do": "solve"}))
+
+    def scene_file(self, request):
+        return scene_with_moves(self.server.scene, request["moves"]).encode()
+
+    def result(self, request):
+        self.server.session.ask({"do": "solve", "plan": request["plan"]})
+        output = self.server.scene.with_name(self.server.scene.stem + "_plan")
+        self.server.session.write(output)
+        return f"{output}.h5".encode()
+
+    def log_message(self, *_):
+        pass
+
+
+def make_server(session, scene, port=0):
+    """A server of the page about a session of this scene, and its address."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    server.daemon_threads = True
+    server.session, server.scene = session, scene.resolve()
+    server.token, server.page = secrets.token_urlsafe(18), page(server.scene)
+    return server, f"http://127.0.0.1:{server.server_address[1]}/?token={server.token}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Plan in the browser.")
+    parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
+    parser.add_argument("-ranks", type=int, default=1, help="processes of the solver")
+    parser.add_argument("-port", type=int, default=0, help="port of 127.0.0.1; default: a free one")
+    parser.add_argument("-no_browser", action="store_true", help="only print the address")
+    options = parser.parse_args()
+    try:
+        import repose
+    except ImportError as missing:
+        sys.exit(f"error: {missing.name} is missing; install python3-numpy")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        with repose.Session(options.scene, options.ranks) as session:
+            server, address = make_server(session, options.scene, options.port)
+            print(f"{options.scene}: {address}\nCtrl-C ends it.", flush=True)
+            if not options.no_browser:
+                webbrowser.open(address)
+            with server:
+                server.serve_forever()
+    except KeyboardInterrupt:
+        print()
+    except OSError as error:
+        sys.exit(f"error: {error}; if the port is taken, choose another -port")
+    except repose.Refused as refusal:
+        sys.exit(f"error: {refusal}")
+
+
+if __name__ == "__main__":
+    main()

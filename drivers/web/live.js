@@ -1,0 +1,486 @@
+// The page of drivers/live.py: bones are dragged, the face follows. At once by the derivatives of
+// the latest plan solved with them ("preview"), and exactly as soon as the solver has answered.
+"use strict";
+
+const byId = id => document.getElementById(id);
+const TOKEN = new URLSearchParams(location.search).get("token");
+const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
+// How numbers are shown: [label, of a placement, axis, sign, unit]. +x left, +y back, +z up.
+const NUMBERS = [
+  ["forward", "translate", 1, -1, "mm"], ["up", "translate", 2, 1, "mm"],
+  ["to the patient's left", "translate", 0, 1, "mm"], ["pitch, front down", "rotate", 0, 1, "°"],
+  ["yaw, front to the left", "rotate", 2, 1, "°"], ["roll, left side down", "rotate", 1, 1, "°"]];
+const BEFORE = 0, NOW = 1, KEPT = 2;
+const DEGREE = Math.PI / 180;
+
+async function ask(path, request) {
+  const response = await fetch(path, request === undefined
+    ? {headers: {"X-Token": TOKEN}}
+    : {method: "POST", headers: {"X-Token": TOKEN}, body: JSON.stringify(request)});
+  if (!response.ok) throw new Error((await response.text()).trim());
+  return response.arrayBuffer();
+}
+
+// An answer of repose-live: a line of JSON, then arrays.
+function unpack(buffer) {
+  const bytes = new Uint8Array(buffer), end = bytes.indexOf(10);
+  const head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end))), arrays = {};
+  let at = end + 1;
+  for (const {name, type, shape} of head.arrays) {
+    const size = 4 * shape.reduce((product, n) => product * n, 1);
+    const part = buffer.slice(at, at + size);
+    arrays[name] = type === "f4" ? new Float32Array(part) : new Uint32Array(part);
+    at += size;
+  }
+  return {head, arrays};
+}
+
+const zero = () => ({translate: [0, 0, 0], rotate: [0, 0, 0]});
+const copyOf = plan => JSON.parse(JSON.stringify(plan));
+
+function quaternionOf({rotate}) {
+  const angle = Math.hypot(...rotate);
+  return angle > 0 ? new THREE.Quaternion().setFromAxisAngle(
+    new THREE.Vector3(...rotate).divideScalar(angle), angle * DEGREE) : new THREE.Quaternion();
+}
+
+function rotationOf(quaternion) {
+  const {x, y, z, w} = quaternion.w < 0 ? quaternion.clone().set(
+    -quaternion.x, -quaternion.y, -quaternion.z, -quaternion.w) : quaternion;
+  const sine = Math.hypot(x, y, z);
+  const scale = sine > 1e-12 ? 2 * Math.atan2(sine, w) / sine / DEGREE : 2 / DEGREE;
+  return [x * scale, y * scale, z * scale];
+}
+
+// The 4×4 matrix of a placement about a centroid, as rows.
+function matrixOf(placement, centroid) {
+  const shift = new THREE.Vector3(...centroid), turn = new THREE.Matrix4()
+    .makeRotationFromQuaternion(quaternionOf(placement));
+  const moved = shift.clone().add(new THREE.Vector3(...placement.translate))
+    .sub(shift.clone().applyMatrix4(turn));
+  turn.setPosition(moved);
+  const m = turn.elements;
+  return [0, 1, 2, 3].map(row => [0, 1, 2, 3].map(column => m[4 * column + row]));
+}
+
+class Planner {
+  constructor({head, arrays}) {
+    this.head = head;
+    this.pieces = new Map(head.pieces.map(piece => [piece.name, piece]));
+    this.scenePlan = Object.fromEntries(head.pieces.map(({name, translate, rotate}) =>
+      [name, {translate, rotate}]));
+    this.plan = copyOf(this.scenePlan);
+    this.past = [];
+    this.future = [];
+    this.reference = null;  // {plan, position, columns}: the latest solved with tangents
+    this.exact = null;      // {plan, position, error}: the latest solved
+    this.asked = 0;
+    this.initial = arrays.position;
+    this.triangles = arrays.triangles;
+    this.makeView(arrays);
+    this.makePanel();
+    this.choose(head.pieces[head.pieces.length - 1].name);
+    this.change(this.plan, false);
+  }
+
+  makeView(arrays) {
+    this.viewer = new FaceViewer(byId("view"));
+    this.skin = this.viewer.add({name: "skin", triangles: this.triangles,
+                                 states: [this.initial, this.initial.slice(), null]});
+    this.bones = this.head.bones.map((name, row) => {
+      const points = arrays[`bone_${row}_points`];
+      const states = [points, this.pieces.has(name) ? points.slice() : points, null];
+      return this.viewer.add({name, kind: "bone", states,
+                              triangles: arrays[`bone_${row}_triangles`]});
+    });
+    this.viewer.fit(this.initial);
+    this.viewer.onHover = hit => this.tell(hit);
+    this.makeGizmo();
+    this.viewer.look("three-quarter");
+  }
+
+  makeGizmo() {
+    const {scene, camera, renderer, controls} = this.viewer.three;
+    this.handle = new THREE.Group();
+    scene.add(this.handle);
+    this.gizmo = new THREE.TransformControls(camera, renderer.domElement);
+    this.gizmo.setSize(0.9);
+    scene.add(this.gizmo.getHelper());
+    this.gizmo.attach(this.handle);
+    this.gizmo.addEventListener("change", () => this.viewer.draw());
+    this.gizmo.addEventListener("dragging-changed", event => {
+      controls.enabled = !event.value;
+      if (event.value) this.begin = copyOf(this.plan);
+      else this.remember(this.begin);
+    });
+    this.gizmo.addEventListener("objectChange", () => this.dragged());
+  }
+
+  makePanel() {
+    for (const name of this.pieces.keys()) {
+      const button = document.createElement("button");
+      button.textContent = name;
+      button.setAttribute("role", "radio");
+      button.onclick = () => this.choose(name);
+      byId("pieces").append(button);
+    }
+    this.inputs = NUMBERS.map(([label, key, axis, sign, unit]) => {
+      const row = document.createElement("label"), input = document.createElement("input");
+      const range = this.head.box[key][axis];
+      Object.assign(input, {type: "number", step: 0.5, min: -range, max: range, value: 0});
+      input.setAttribute("aria-label", label);
+      row.append(label, input, unit);
+      byId("numbers").append(row);
+      input.addEventListener("change", () => {
+        const plan = copyOf(this.plan), value = Number(input.value);
+        if (!Number.isFinite(value) || input.value === "") return this.showNumbers();
+        plan[this.chosen][key][axis] = sign * Math.min(Math.max(value, -range), range);
+        this.change(plan);
+      });
+      return input;
+    });
+    this.connect();
+    this.viewer.setScale({low: 0});
+  }
+
+  connect() {
+    const click = (id, work) => { byId(id).onclick = work; };
+    click("move", () => this.setGizmo("translate"));
+    click("turn", () => this.setGizmo("rotate"));
+    click("undo", () => this.step(this.past, this.future));
+    click("redo", () => this.step(this.future, this.past));
+    click("reset", () => this.change(Object.fromEntries(
+      [...this.pieces.keys()].map(name => [name, zero()]))));
+    click("scene", () => this.change(copyOf(this.scenePlan)));
+    click("keep", () => this.keep());
+    click("save_scene", () => this.saveScene());
+    click("save_stl", () => this.saveStl());
+    click("save_result", () => this.writeResult());
+    byId("mode").onchange = () => this.showMode();
+    byId("look").onchange = () => this.viewer.look(byId("look").value);
+    byId("colored").onchange = () => this.color();
+    byId("opacity").oninput = () => this.setOpacity();
+    addEventListener("keydown", event => this.key(event));
+    this.setOpacity();
+  }
+
+  key(event) {
+    if (event.target.matches?.("input, select")) return;
+    const key = event.key.toLowerCase();
+    if (key === "w") this.setGizmo("translate");
+    if (key === "e") this.setGizmo("rotate");
+    if (event.key === "Escape" && this.gizmo.dragging) {
+      this.gizmo.reset();
+      this.dragged();
+    }
+    if (!event.ctrlKey && !event.metaKey) return;
+    if (key === "z") this.step(this.past, this.future);
+    if (key === "y") this.step(this.future, this.past);
+  }
+
+  setGizmo(mode) {
+    this.gizmo.setMode(mode);
+    byId("move").setAttribute("aria-pressed", mode === "translate");
+    byId("turn").setAttribute("aria-pressed", mode === "rotate");
+    this.viewer.draw();
+  }
+
+  setOpacity() {
+    this.skin.setStyle({opacity: byId("opacity").value / 100});
+    this.viewer.draw();
+  }
+
+  choose(name) {
+    this.chosen = name;
+    byId("piece").textContent = name;
+    for (const button of byId("pieces").children)
+      button.setAttribute("aria-checked", button.textContent === name);
+    this.placeHandle();
+    this.showNumbers();
+    this.viewer.draw();
+  }
+
+  placeHandle() {
+    const {centroid} = this.pieces.get(this.chosen), {translate} = this.plan[this.chosen];
+    this.handle.position.set(...centroid.map((x, a) => x + translate[a]));
+    this.handle.quaternion.copy(quaternionOf(this.plan[this.chosen]));
+    this.handle.updateMatrixWorld();
+  }
+
+  showNumbers() {
+    NUMBERS.forEach(([, key, axis, sign], k) => {
+      this.inputs[k].value = String(Number((sign * this.plan[this.chosen][key][axis]).toFixed(2)));
+    });
+  }
+
+  // The gizmo has moved its handle: the plan follows, within the box.
+  dragged() {
+    const {centroid} = this.pieces.get(this.chosen), {box} = this.head;
+    const clamp = (values, range) => values.map((v, a) => Math.min(Math.max(v, -range[a]), range[a]));
+    const plan = copyOf(this.plan);
+    plan[this.chosen] = {
+      translate: clamp(this.handle.position.toArray().map((x, a) => x - centroid[a]), box.translate),
+      rotate: clamp(rotationOf(this.handle.quaternion), box.rotate)};
+    this.change(plan, false);
+  }
+
+  remember(before) {
+    if (JSON.stringify(before) === JSON.stringify(this.plan)) return;
+    this.past.push(before);
+    this.future = [];
+    this.showHistory();
+  }
+
+  step(from, to) {
+    if (!from.length) return;
+    to.push(copyOf(this.plan));
+    this.change(from.pop(), false);
+    this.showHistory();
+  }
+
+  showHistory() {
+    byId("undo").disabled = !this.past.length;
+    byId("redo").disabled = !this.future.length;
+  }
+
+  // Takes another plan: preview at once, the exact face when the solver has it.
+  change(plan, remembered = true) {
+    const before = this.plan;
+    this.plan = plan;
+    if (remembered) this.remember(before);
+    this.showHistory();
+    this.placeHandle();
+    this.showNumbers();
+    this.moveBones();
+    this.preview();
+    this.solveSoon();
+  }
+
+  moveBones() {
+    this.bones.forEach(bone => {
+      const piece = this.pieces.get(bone.name);
+      if (!piece) return;
+      const rows = matrixOf(this.plan[bone.name], piece.centroid);
+      const matrix = new THREE.Matrix4().set(...rows.flat());
+      const mesh = bone.object(NOW);
+      mesh.matrixAutoUpdate = false;
+      mesh.matrix.copy(matrix);
+      mesh.matrixWorldNeedsUpdate = true;
+    });
+  }
+
+  preview() {
+    const began = performance.now(), {reference} = this;
+    const base = reference ?? this.exact;
+    if (!base) return this.mark("", "solving the scene's plan …");
+    const position = base.position.slice();
+    if (reference)
+      for (const {piece, key, axis, values} of reference.columns) {
+        const by = this.plan[piece][key][axis] - reference.plan[piece][key][axis];
+        if (by) for (let i = 0; i < position.length; ++i) position[i] += by * values[i];
+      }
+    this.showFace(position);
+    this.previewed = performance.now() - began;
+    this.mark("preview", "preview");
+  }
+
+  showFace(position) {
+    this.position = position;
+    this.skin.setPositions(NOW, position);
+    this.color();
+    this.drawProfile();
+  }
+
+  mark(kind, text) {
+    byId("mark").className = kind;
+    byId("mark").textContent = text;
+  }
+
+  solveSoon() {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.solve(false), 60);
+  }
+
+  async solve(tangents) {
+    const number = ++this.asked, plan = copyOf(this.plan);
+    const current = () => number === this.asked &&
+      JSON.stringify(plan) === JSON.stringify(this.plan);
+    try {
+      const answer = await ask("/solve", {plan, tangents});
+      if (!answer.byteLength) return;  // overtaken
+      const {head, arrays} = unpack(answer);
+      this.exact = {plan, position: arrays.position, error: head.error};
+      if (tangents) this.takeTangents(plan, head, arrays);
+      if (!current()) return;
+      this.showFace(arrays.position);
+      if (!head.converged) this.mark("failed", `not converged: ${head.reason}`);
+      else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm`);
+      if (!tangents) this.timer = setTimeout(() => this.solve(true), 150);
+    } catch (error) {
+      if (current()) this.mark("failed", error.message);
+    }
+  }
+
+  takeTangents(plan, {flags}, arrays) {
+    const columns = [];
+    for (const [name, values] of Object.entries(arrays)) {
+      const [, bone, component] = name.match(/^tangent_(\d+)_(..)$/) ?? [];
+      if (!component || !Object.values(flags[name]).every(Boolean)) continue;
+      const index = COMPONENTS.indexOf(component);
+      columns.push({piece: this.head.bones[Number(bone)], values, axis: index % 3,
+                    key: index < 3 ? "translate" : "rotate"});
+    }
+    this.reference = {plan, position: arrays.position, columns};
+  }
+
+  movement(position) {
+    const length = new Float32Array(position.length / 3), from = this.initial;
+    for (let i = 0; i < length.length; ++i) length[i] = Math.hypot(
+      position[3 * i] - from[3 * i], position[3 * i + 1] - from[3 * i + 1],
+      position[3 * i + 2] - from[3 * i + 2]);
+    return length;
+  }
+
+  color() {
+    if (!this.position) return;
+    const colored = byId("colored").checked, now = this.movement(this.position);
+    const high = Math.max(1, Math.ceil(now.reduce((most, v) => Math.max(most, v), 0)));
+    byId("high").textContent = String(high);
+    byId("bar").hidden = !colored;
+    this.viewer.setScale({low: 0, high});
+    this.skin.setField(NOW, colored ? now : null);
+    if (this.kept) this.skin.setField(KEPT, colored ? this.movement(this.kept) : null);
+    this.drawRamp();
+    this.viewer.draw();
+  }
+
+  drawRamp() {
+    const context = byId("ramp").getContext("2d");
+    for (let i = 0; i < 160; ++i) {
+      context.fillStyle = `rgb(${rampColor(this.viewer.scale.ramp, i / 159).map(Math.round)})`;
+      context.fillRect(i, 0, 1, 10);
+    }
+  }
+
+  tell(hit) {
+    const text = hit?.surface === this.skin && this.position ? this.describe(hit) : "";
+    byId("under").textContent = text;
+  }
+
+  describe(hit) {
+    const position = hit.state === KEPT ? this.kept : hit.state === NOW ? this.position
+      : this.initial;
+    const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
+    const [x, y, z] = shift, part = (value, plus, minus) =>
+      Math.abs(value) < 0.05 ? "" : `, ${Math.abs(value).toFixed(1)} ${value > 0 ? plus : minus}`;
+    return `${Math.hypot(...shift).toFixed(2)} mm` + part(-y, "forward", "back") +
+      part(z, "up", "down") + part(x, "to the left", "to the right");
+  }
+
+  // Segments of the skin in the plane through the middle of the head, as [y, z] pairs.
+  section(position) {
+    const middle = this.viewer.center.x, segments = [];
+    for (let t = 0; t < this.triangles.length; t += 3) {
+      const cut = [];
+      for (let k = 0; k < 3; ++k) {
+        const a = 3 * this.triangles[t + k], b = 3 * this.triangles[t + (k + 1) % 3];
+        const from = position[a] - middle, to = position[b] - middle;
+        if ((from < 0) === (to < 0)) continue;
+        const share = from / (from - to);
+        cut.push(position[a + 1] + share * (position[b + 1] - position[a + 1]),
+                 position[a + 2] + share * (position[b + 2] - position[a + 2]));
+      }
+      if (cut.length === 4) segments.push(cut);
+    }
+    return segments;
+  }
+
+  drawProfile() {
+    const before = this.profileBefore ??= this.section(this.initial);
+    const now = this.section(this.position), all = before.concat(now).flat();
+    if (!all.length) return;
+    const bound = parity => all.filter((_, i) => i % 2 === parity)
+      .reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
+    const [front, back] = bound(0), [bottom, top] = bound(1);
+    byId("profile").setAttribute("viewBox", `${-back - 4} ${-top - 4} ${back - front + 8} ` +
+      `${top - bottom + 8}`);
+    const path = segments => segments.map(([y, z, v, w]) =>
+      `M${(-y).toFixed(2)} ${(-z).toFixed(2)}L${(-v).toFixed(2)} ${(-w).toFixed(2)}`).join("");
+    byId("profile").innerHTML =
+      [["#9a9a9a", before], ["#1f6fb4", now]].map(([color, segments]) =>
+        `<path d="${path(segments)}" fill="none" stroke="${color}" stroke-width="0.9"/>`).join("");
+    const most = segments => segments.reduce((least, one) => Math.min(least, one[0], one[2]), Infinity);
+    const forward = most(before) - most(now);
+    byId("measured").textContent = `; the foremost point goes ${Math.abs(forward).toFixed(1)} mm ` +
+      (forward >= 0 ? "forward" : "back");
+  }
+
+  keep() {
+    if (!this.position) return;
+    this.kept = this.position.slice();
+    this.skin.setPositions(KEPT, this.kept);
+    this.bones.forEach(bone => {
+      bone.setPositions(KEPT, bone.positions[NOW]);
+      const piece = this.pieces.get(bone.name), mesh = bone.object(KEPT);
+      mesh.matrixAutoUpdate = false;
+      mesh.matrix.copy(piece ? bone.object(NOW).matrix : new THREE.Matrix4());
+    });
+    byId("mode").value = "plans";
+    this.showMode();
+    this.color();
+  }
+
+  showMode() {
+    const mode = byId("mode").value;
+    if (mode === "plans" && !this.kept) return this.keep();
+    this.viewer.show(mode === "after" ? {mode: "single", states: [NOW, NOW]}
+      : mode === "split" ? {mode, states: [BEFORE, NOW]}
+      : mode === "side" ? {mode, states: [BEFORE, NOW]}
+      : {mode: "split", states: [KEPT, NOW]});
+  }
+
+  async saveScene() {
+    const moves = Object.fromEntries([...this.pieces].map(([name, {centroid}]) =>
+      [name, matrixOf(this.plan[name], centroid)]));
+    this.save("plan.yaml", await ask("/scene_file", {moves}));
+  }
+
+  saveStl() {
+    const {triangles, position} = this, count = triangles.length / 3;
+    const view = new DataView(new ArrayBuffer(84 + 50 * count));
+    view.setUint32(80, count, true);
+    for (let t = 0; t < count; ++t) for (let k = 0; k < 3; ++k) for (let a = 0; a < 3; ++a)
+      view.setFloat32(84 + 50 * t + 12 + 12 * k + 4 * a, position[3 * triangles[3 * t + k] + a], true);
+    this.save("skin.stl", view.buffer);
+  }
+
+  save(name, content) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([content]));
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  async writeResult() {
+    try {
+      const path = new TextDecoder().decode(await ask("/result", {plan: this.plan}));
+      this.mark("exact", `written: ${path}`);
+    } catch (error) {
+      this.mark("failed", error.message);
+    }
+  }
+}
+
+async function main() {
+  try {
+    byId("title").textContent = document.title;
+    window.planner = new Planner(unpack(await ask("/scene")));
+    byId("mode").onchange();
+  } catch (error) {
+    byId("mark").className = "failed";
+    byId("mark").textContent = error.message;
+  }
+}
+
+main();

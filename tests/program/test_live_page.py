@@ -1,0 +1,153 @@
+"""The page of drivers/live.py and its server: who is answered, and what a browser does with it."""
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import urllib.error
+import urllib.request
+
+import pytest
+from browser import CHROMIUM, FOUND, OPTIONS, needs_browser
+from conftest import PROJECT, programs
+
+sys.path.insert(0, str(PROJECT / "drivers/python"))
+import repose  # noqa: E402
+
+SCENE = PROJECT / "meshes/head_live.yaml"
+SCRIPT = """
+const sleep = time => new Promise(end => setTimeout(end, time));
+const mark = () => document.getElementById("mark");
+const exact = async () => { while (mark().className !== "exact") await sleep(30); };
+(async () => {
+  const found = {};
+  while (!window.planner || !planner.reference) await sleep(30);
+  await exact();
+  found.pieces = [...planner.pieces.keys()];
+  found.first = Math.max(...planner.movement(planner.position));
+  const canvas = planner.viewer.three.renderer.domElement;
+  canvas.setPointerCapture = canvas.releasePointerCapture = () => {};
+  document.getElementById("look").value = "right";
+  document.getElementById("look").onchange();
+  const box = canvas.getBoundingClientRect();
+  const at = planner.handle.position.clone().project(planner.viewer.three.camera);
+  const fire = (kind, y) => canvas.dispatchEvent(new PointerEvent(kind, {
+    pointerType: "mouse", bubbles: true, button: kind === "pointermove" ? -1 : 0, buttons: 1,
+    clientX: box.left + (at.x + 1) / 2 * box.width, clientY: box.top + (1 - at.y) / 2 * box.height - y}));
+  const before = JSON.stringify(planner.plan);
+  for (const start of [40, 50, 60, 70]) {
+    fire("pointermove", start);
+    if (planner.gizmo.axis !== "Z") continue;
+    fire("pointerdown", start);
+    for (let y = start; y < start + 4; ++y) fire("pointermove", y);
+    found.during = mark().textContent;
+    const shown = planner.position.slice();
+    fire("pointerup", start + 3);
+    await exact();
+    found.off = Math.max(...shown.map((x, i) => Math.abs(x - planner.position[i])));
+    break;
+  }
+  found.dragged = planner.plan.chin.translate[2];
+  document.getElementById("undo").click();
+  found.undone = JSON.stringify(planner.plan) === before;
+  await exact();
+  const pixel = new Uint8Array(4 * canvas.width * canvas.height), gl = canvas.getContext("webgl2");
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  found.colors = new Set(new Uint32Array(pixel.buffer)).size;
+  found.wide = document.documentElement.scrollWidth - innerWidth;
+  found.loaded = performance.getEntriesByType("resource").map(one => new URL(one.name).host)
+    .filter(host => host !== location.host);
+  return found;
+})().catch(reason => ({error: String(reason.stack)})).then(found => {
+  const told = document.createElement("pre");
+  told.id = "found";
+  told.textContent = JSON.stringify(found);
+  document.body.append(told);
+});
+"""
+
+
+@pytest.fixture(scope="module")
+def live():
+    specification = importlib.util.spec_from_file_location("live", PROJECT / "drivers/live.py")
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def served(live, environment):
+    """A running server and its address."""
+    os.environ.update(environment)
+    with repose.Session(SCENE, program=programs() / "repose-live") as session:
+        server, address = live.make_server(session, SCENE)
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server, address
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def status(address, path, headers=None, content=None):
+    request = urllib.request.Request(address.split("/?")[0] + path, content, headers or {})
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status, answer.read()
+    except urllib.error.HTTPError as refusal:
+        return refusal.code, refusal.read()
+
+
+def test_nothing_is_answered_without_the_token(served):
+    server, address = served
+    token = {"X-Token": server.token}
+    assert status(address, "/scene")[0] == 403
+    assert status(address, "/?token=guess")[0] == 403
+    assert status(address, "/solve", {"X-Token": "x"}, b"{}")[0] == 403
+    assert status(address, "/scene", {**token, "Host": "elsewhere.example"})[0] == 403
+    assert status(address, "/scene", token)[0] == 200
+    assert status(address, "/elsewhere", token)[0] == 404
+    assert server.server_address[0] == "127.0.0.1"
+
+
+def test_requests_are_answered_or_refused_in_words(served):
+    server, address = served
+    token = {"X-Token": server.token}
+    for content in (b"", b"[]", b"{", b"\xff"):
+        code, said = status(address, "/solve", token, content)
+        assert code == 400 and said.count(b"\n") == 1
+    far = json.dumps({"plan": {"chin": {"translate": [0, 99, 0]}}}).encode()
+    code, said = status(address, "/solve", token, far)
+    assert code == 409 and b"'chin': translation 99 mm" in said
+
+
+def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
+    server, address = served
+    matrix = [[1, 0, 0, 0], [0, 1, 0, -1.5], [0, 0, 1, 0], [0, 0, 0, 1]]
+    code, text = status(address, "/scene_file", {"X-Token": server.token},
+                        json.dumps({"moves": {"chin": matrix}}).encode())
+    scene = tmp_path / "plan.yaml"
+    scene.write_text(re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text.decode()))
+    assert code == 200 and scene.read_text().count("moves:") == 1
+    assert run("repose-solve", scene, "-dry_run").returncode == 0
+
+
+def test_a_bone_is_dragged_and_the_face_follows(live, served):
+    needs_browser()
+    server, address = served
+    server.page = live.page(SCENE).replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode())
+    with tempfile.TemporaryDirectory() as profile:
+        said = subprocess.run(
+            [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],
+             f"--user-data-dir={profile}", "--window-size=390,844", "--virtual-time-budget=60000",
+             "--dump-dom", address], capture_output=True, text=True, timeout=110).stdout
+    found = json.loads(FOUND.search(said)[1].replace("&amp;", "&"))
+    assert "error" not in found, found
+    assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
+    assert found["during"] == "preview" and found["undone"]
+    assert 0.5 < abs(found["dragged"]) < 2 and 0 < found["off"] < 0.5
+    assert found["colors"] > 1000 and found["wide"] <= 0 and found["loaded"] == []
