@@ -25,6 +25,9 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap
+
+from sheet import RAMP
 
 # Study → the column that it varies, and how a value of it reads.
 STUDIES = {"layers": ("layers", "{} layers"), "springs": ("layers", "{} layers of springs"),
@@ -32,6 +35,7 @@ STUDIES = {"layers": ("layers", "{} layers"), "springs": ("layers", "{} layers o
            "mesh": ("edge_mm", "{} mm edges")}
 MAPPED = ("layers", "springs", "volume", "mesh")  # studies of the discrete model
 MARKS = {"ntr": "o", "nls": "s", "lmvm": "^", "cg": "v", "bnls": "D", "bntr": "P"}
+COLORS = LinearSegmentedColormap.from_list("distance", [f"#{color}" for color in RAMP])
 INK, ACCENT = "#303030", "#b02020"
 NUMBERS = ("accuracy_mm", "cpu_s", "evaluations", "estimate_mm", "error_mm", "skin_rms_mm",
            "skin_95_mm", "skin_max_mm")
@@ -115,12 +119,14 @@ def draw_choices(axes, rows):
 
 def draw_study(name, rows):
     others = [row for row in rows if row["study"] != "solver" and np.isfinite(row["skin_95_mm"])]
-    count = 3 if others else 2
-    figure, panels = plt.subplots(1, count, figsize=(4 * count, 3.6))
-    draw_methods(panels[0], rows, "evaluations", "evaluations of value and gradient")
-    draw_methods(panels[1], rows, "cpu_s", "time, relative to the fastest")
+    methods = not others or any(row["study"] == "solver" and row["error_mm"] > 0 for row in rows)
+    count = 2 * methods + bool(others)
+    figure, panels = plt.subplots(1, count, figsize=(4 * count, 3.6), squeeze=False)
+    if methods:
+        draw_methods(panels[0][0], rows, "evaluations", "evaluations of value and gradient")
+        draw_methods(panels[0][1], rows, "cpu_s", "time, relative to the fastest")
     if others:
-        draw_choices(panels[2], others)
+        draw_choices(panels[0][-1], others)
     figure.tight_layout()
     save(figure, name + ".png")
 
@@ -139,7 +145,7 @@ def draw_map(name):
     figure, panels = plt.subplots(1, len(shown), figsize=(1.7 * len(shown), 2.6), squeeze=False)
     order = np.argsort(-points[triangles][:, :, 1].mean(axis=1))
     for axes, k in zip(panels[0], shown):
-        faces = PolyCollection(points[triangles][order][:, :, [0, 2]], cmap="magma_r", lw=0)
+        faces = PolyCollection(points[triangles][order][:, :, [0, 2]], cmap=COLORS, lw=0)
         faces.set_array(error[:, k][triangles].mean(axis=1)[order])
         faces.set_clim(0, largest)
         axes.add_collection(faces)

@@ -20,7 +20,9 @@
 #include "repose/base/program.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
+#include "tradeoff/conclusion.h"
 #include "tradeoff/study.h"
+#include "tradeoff/ways.h"
 
 namespace {
 
@@ -125,14 +127,18 @@ base::Exit run(const base::Options& options) {
   base::together(comm, [&] { plan.scene = scene::read_scene(input); });
   const std::string name =
       options.has("output") ? options.text("output") : input.stem().string() + "_tradeoff";
-  const tradeoff::Findings found = tradeoff::measure(plan, [](const std::string& line, double) {
-    if (base::rank(comm) == 0) std::printf("  %s\n", line.c_str());
+  const auto tell = [](const std::string& line, size_t number, size_t runs) {
+    const std::string counter = fmt::format("{:>3} of {}", number, runs);
+    if (base::rank(comm) == 0)
+      std::printf("  %s  %s\n", number > 0 ? counter.c_str() : "first", line.c_str());
     std::fflush(stdout);
-  });
+  };
+  const tradeoff::Findings found = tradeoff::measure(plan, tell);
   base::on_first_rank(comm, [&] {
     base::write_whole_file(name + ".csv", tradeoff::table(found.measurements));
     base::write_whole_file(name + "_map.csv", tradeoff::map_table(found.map));
     base::write_whole_file(name + "_triangles.csv", triangle_table(found.map.triangles));
+    std::printf("%s\n", tradeoff::conclude(found.measurements, tradeoff::usual_way(plan)).c_str());
     std::printf("%s.csv, %s_map.csv, %s_triangles.csv: drivers/plot_tradeoff.py %s draws them\n",
                 name.c_str(), name.c_str(), name.c_str(), name.c_str());
   });

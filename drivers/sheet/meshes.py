@@ -22,12 +22,14 @@ def coarser(points, corners, attributes, most, still=None):
         key = ((cell[:, 2] << 40) + (cell[:, 1] << 20) + cell[:, 0]) * 2 + (size > 1)
         _, row, count = np.unique(key, return_inverse=True, return_counts=True)
         faces = row.ravel()[corners]
-        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
+        whole = (faces != np.roll(faces, 1, axis=1)).all(1)
+        faces = faces[whole]
         _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
         if len(first) <= most:
             break
         edge *= 1.1
-    faces = faces[np.sort(first)]
+    kept = np.sort(first)
+    faces, origin = faces[kept], corners[whole][kept]
     used, faces = np.unique(faces, return_inverse=True)
 
     def mean(values):
@@ -35,7 +37,16 @@ def coarser(points, corners, attributes, most, still=None):
         sums = np.stack([np.bincount(row.ravel(), flat[:, k]) for k in range(flat.shape[1])], 1)
         return (sums / count[:, None])[used].reshape(-1, *values.shape[1:])
 
-    return mean(points), faces.reshape(-1, 3), [mean(values) for values in attributes]
+    places, faces = mean(points), faces.reshape(-1, 3)
+    turned = (normals(places, faces) * normals(points, origin)).sum(1) < 0
+    faces[turned] = faces[turned][:, ::-1]  # by the merging of their corners
+    return places, faces, [mean(values) for values in attributes]
+
+
+def normals(points, corners):
+    """[T, 3], of twice the triangles' areas."""
+    a, b, c = (points[corners[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 class Pack:

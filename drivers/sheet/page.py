@@ -325,8 +325,8 @@ def ratio_table(plans):
         return '<p class="note">No soft-to-hard ratio: none of the bones under subnasale, lips and ' \
             "chin moves by a millimeter, or their landmarks are not given.</p>"
     return table(("skin to bone", "skin, mm", "bone, mm", "ratio", "published"), rows) + \
-        f'<p class="note">Published ranges: {FOLLOWS_SOURCE}, after surgery, a year and more; a ' \
-        "ratio outside them is a reason to look again, not an error.</p>"
+        f'<p class="note">Published ranges: {FOLLOWS_SOURCE}. A ratio outside them is a ' \
+        "reason to look again, not an error.</p>"
 
 
 def region_columns(plans):
@@ -460,7 +460,7 @@ def write(plans, norms, scene, appearance):
 <section class="two"><div><h2 class="page-two">Profile</h2>{profile_section(plans)}</div>
 <div><h2 class="page-two">How far the skin follows the bone</h2>{ratio_table(plans)}
 <h2>Parts of the face</h2>{region_table(plans)}</div></section>
-<section><h2>Measures of the soft tissue</h2>{measure_table(plans, norms)}</section>
+<section class="measures"><h2>Measures of the soft tissue</h2>{measure_table(plans, norms)}</section>
 <section class="screen"><h2>Landmarks</h2>{landmarks}</section>
 {"".join(folded([(plan.name, plan.result) for plan in plans], scene))}
 </main><script type="application/json" id="described">{words}</script>

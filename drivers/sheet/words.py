@@ -92,11 +92,11 @@ def mesh_caution(result, parts):
     if result.uncertainty is None or parts is None:
         return
     found = by_part(result.skin, parts, result.uncertainty)
-    large = [f"the {name} to {numbers[2]:.1f} mm" for name, numbers in found.items()
+    large = [f"by up to {numbers[2]:.1f} mm at the {name}" for name, numbers in found.items()
              if numbers[2] > LARGE_ERROR]
     if large:
-        yield (f"The mesh leaves {', '.join(large)} uncertain (95 % of each). A finer mesh helps "
-               "(tissue.edge, or repose-solve -adapt).")
+        yield (f"The mesh is coarse: the face may be off {', '.join(large)} (95 % of each). A finer "
+               "mesh helps (tissue.edge, or repose-solve -adapt).")
 
 
 def trust(result):

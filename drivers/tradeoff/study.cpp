@@ -46,8 +46,7 @@ struct Discretisation {
 
 class Study {
  public:
-  Study(const Plan& plan, const std::function<void(const std::string&, double)>& tell)
-      : plan_(plan), tell_(tell) {}
+  Study(const Plan& plan, const Tell& tell) : plan_(plan), tell_(tell) {}
 
   Findings run() {
     base::on_first_rank(comm, [&] { load(); });
@@ -55,8 +54,7 @@ class Study {
     const std::vector<Way> ways = ways_of(plan_);
     prepare(ways);
     for (size_t k = 0; k < ways.size(); ++k) {
-      tell_(fmt::format("{}: {}", ways[k].study, label(ways[k])),
-            static_cast<double>(k) / static_cast<double>(ways.size()));
+      tell_(fmt::format("{}: {}", ways[k].study, label(ways[k])), k + 1, ways.size());
       add(ways[k]);
     }
     return std::move(findings_);
@@ -115,7 +113,7 @@ class Study {
   void prepare(const std::vector<Way>& ways) {
     Way finest = usual_way(plan_);
     for (const Way& way : ways) finest.layers = std::max(finest.layers, way.layers);
-    tell_("the reference", 0);
+    tell_("the reference", 0, ways.size());
     const Discretisation& reference = discretisation(finest);
     base::on_first_rank(comm, [&] {
       if (reference.rest.empty())
@@ -223,7 +221,7 @@ class Study {
   }
 
   Plan plan_;
-  const std::function<void(const std::string&, double)>& tell_;
+  const Tell& tell_;
   model::Anatomy anatomy_;  // on rank 0
   model::Model own_;        // on rank 0
   std::map<Key, Discretisation> known_;
@@ -233,8 +231,6 @@ class Study {
 
 }  // namespace
 
-Findings measure(const Plan& plan, const std::function<void(const std::string&, double)>& tell) {
-  return Study(plan, tell).run();
-}
+Findings measure(const Plan& plan, const Tell& tell) { return Study(plan, tell).run(); }
 
 }  // namespace repose::tradeoff

@@ -64,11 +64,13 @@ struct Findings {
   Map map;  ///< of the ways that differ in layers, mesh or volume term
 };
 
-/// Runs the study; `tell` is given a line before each run, with how much is done. The plan is the
-/// same on all ranks; findings are complete on rank 0.
+/// Receives a line before each run, its number from 1 and how many there are; 0 for the reference.
+using Tell = std::function<void(const std::string& line, size_t number, size_t runs)>;
+
+/// Runs the study. The plan is the same on all ranks; findings are complete on rank 0.
 /// The reference has the most layers and the skin as it is. Throws InputError as the solver does.
 /// Collective.
-Findings measure(const Plan& plan, const std::function<void(const std::string&, double)>& tell);
+Findings measure(const Plan& plan, const Tell& tell);
 
 /// CSV: a line of names, then one row a measurement.
 std::string table(const std::vector<Measurement>& measurements);

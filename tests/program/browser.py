@@ -1,5 +1,6 @@
 """Pages in headless Chromium: what a script finds in them, and pictures of them. No network."""
 
+import contextlib
 import json
 import re
 import shutil
@@ -29,20 +30,28 @@ def browse(page, *options, size=(500, 500), seconds=100):
         return subprocess.run(command, capture_output=True, text=True, timeout=seconds).stdout
 
 
-def evaluate(page, script, **options):
-    """What an asynchronous JavaScript function, given as its body, returns on the page, as JSON.
-    It runs when the page says data-ready."""
+@contextlib.contextmanager
+def scripted(page, script):
+    """A copy of the page that runs the body of an asynchronous function when it says data-ready."""
     copy = page.with_name(page.stem + "_run.html")
     copy.write_text(page.read_text(encoding="utf-8").replace("</body>", f"""<script>(async () => {{
   const sleep = time => new Promise(end => setTimeout(end, time));
   while (!document.documentElement.dataset.ready) await sleep(20);
+  {script}
+}})();</script></body>"""), encoding="utf-8")
+    yield copy
+    copy.unlink()
+
+
+def evaluate(page, script, **options):
+    """What an asynchronous JavaScript function, given as its body, returns on the page, as JSON."""
+    with scripted(page, f"""
   const told = document.createElement("pre");
   told.id = "found";
   try {{ told.textContent = JSON.stringify(await (async () => {{ {script} }})() ?? null); }}
   catch (reason) {{ told.textContent = JSON.stringify({{error: String(reason.stack)}}); }}
-  document.body.append(told);
-}})();</script></body>"""), encoding="utf-8")
-    printed = browse(copy, "--virtual-time-budget=4000", "--dump-dom", **options)
+  document.body.append(told);""") as copy:
+        printed = browse(copy, "--virtual-time-budget=4000", "--dump-dom", **options)
     found = FOUND.search(printed)
     assert found, printed[-2000:]
     return json.loads(found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))

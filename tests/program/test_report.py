@@ -275,6 +275,9 @@ def test_a_fine_bone_is_drawn_coarser_and_the_page_stays_small(report, opened, t
     corners, places, _ = View(tmp_path / "page.html").surface("skull")
     assert 20_000 < len(corners) <= 80_000 and corners.max() < len(places)
     assert np.abs(np.linalg.norm(places - (0, 20, 10), axis=1) - 60).max() < 0.1
+    a, b, c = (places[corners.astype(int)[:, k]] - (0, 20, 10) for k in range(3))
+    outward = (np.cross(b - a, c - a) * (a + b + c)).sum(1)
+    assert (outward * np.sign(np.median(outward)) > -1e-3).all(), "no triangle is turned round"
 
 
 def test_landmarks_beyond_the_solved_skin_are_kept(report, run, tmp_path):

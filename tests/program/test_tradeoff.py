@@ -26,6 +26,7 @@ def folder(tmp_path_factory, environment):
     top = tmp_path_factory.mktemp("tradeoff")
     result = runner(top, environment)("repose-tradeoff", SCENE, *FEW, "-output", "few")
     assert (result.returncode, result.stderr) == (0, ""), result
+    (top / "said").write_text(result.stdout)
     return top
 
 
@@ -62,6 +63,28 @@ def test_a_coarser_mesh_is_further_from_the_reference(folder):
     coarse, own = rows(folder / "few.csv")[-1], rows(folder / "few.csv")[-2]
     assert coarse["edge_mm"] == "20" and int(coarse["points"]) < 0.8 * int(own["points"])
     assert 0.1 < float(coarse["skin_max_mm"]) < 6 and float(coarse["error_mm"]) < 0.1
+
+
+def test_the_runs_are_counted_and_a_conclusion_is_drawn(folder):
+    *lines, conclusion, _ = (folder / "said").read_text().splitlines()
+    assert lines[0].split() == ["first", "the", "reference"]
+    assert [line.split()[:3] for line in lines[1:]] == [[str(k), "of", "9"] for k in range(1, 10)]
+    solver = [row for row in rows(folder / "few.csv") if row["study"] == "solver"]
+    fastest = min((row for row in solver if row["accuracy_mm"] == "0.01"),
+                  key=lambda row: float(row["cpu_s"]))
+    assert f"0.01 mm {float(fastest['cpu_s']):.2g} s ({fastest['method']})." in conclusion
+    mesh = rows(folder / "few.csv")[-1]
+    assert f"edges of 20 mm is {float(mesh['skin_95_mm']):.2g} mm away (95 %)." in conclusion
+    assert conclusion.endswith("Compare more layers (-layers) to learn what the model leaves.")
+
+
+def test_a_conclusion_says_what_to_refine(run):
+    result = run("repose-tradeoff", SCENE, "-methods", "ntr", "-accuracies", "1", "-load_steps", ",",
+                 "-volumes", ",", "-layers", "4,5", "-edges", ",", "-reference", "1e-4", "-output", "five")
+    assert result.returncode == 0, result
+    conclusion = result.stdout.splitlines()[-2]
+    assert " 4 layers leave 95 % of the skin within " in conclusion and " of 5 layers." in conclusion
+    assert conclusion.endswith("Refine layers and mesh before asking for more than 0.1 mm.")
 
 
 def test_the_map_is_of_the_whole_face(folder):
