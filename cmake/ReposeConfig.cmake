@@ -1,5 +1,6 @@
-# find_package(Repose): targets Repose::base … Repose::tradeoff, one a room of docs/develop/design.md; a room
-# brings those it builds on. On Debian the packages that build Repose are needed.
+# find_package(Repose): Repose::core solves a face, Repose::tools is what the other programs call. Each room
+# of docs/develop/design.md is a target, too (Repose::surface), and brings those it builds on. On Debian the
+# packages that build Repose are needed.
 include(CMakeFindDependencyMacro)
 find_dependency(MPI COMPONENTS C)
 find_dependency(Eigen3 NO_MODULE)

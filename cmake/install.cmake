@@ -1,7 +1,9 @@
 # cmake --install, find_package(Repose) for programs of one's own, and Debian packages by cpack.
 include(CMakePackageConfigHelpers)
 
-set(rooms base scene volume surface imaging meshtools anatomy model mechanics discrete linear check solve results adapt app)
+set(rooms base scene volume surface imaging meshtools anatomy model mechanics discrete linear solve results adapt app core tools)
+list(TRANSFORM tools PREPEND tools_ OUTPUT_VARIABLE tool_rooms)
+list(APPEND rooms ${tool_rooms})
 list(TRANSFORM rooms PREPEND repose_ OUTPUT_VARIABLE libraries)
 foreach(room ${rooms})
   set_target_properties(repose_${room} PROPERTIES EXPORT_NAME ${room})

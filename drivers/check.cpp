@@ -7,9 +7,9 @@
 /// Exit status: 0 all agree to 1e-9, 1 the file is bad or its numbers do not agree.
 #include <cstdio>
 
-#include "repose/app/check_file.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/tools/check/check_file.h"
 
 namespace {
 
@@ -17,7 +17,7 @@ using namespace repose;
 
 void run(const base::Options& options) {
   const std::string file = options.arguments()[0];
-  const base::Comparison comparison = app::check_file(file);
+  const tools::check::Comparison comparison = tools::check::check_file(file);
   const std::string table = options.flag("verbose") ? comparison.table() : comparison.summary();
   std::fputs(table.c_str(), stdout);
   std::fflush(stdout);

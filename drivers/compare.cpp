@@ -19,19 +19,19 @@
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
-#include "repose/meshtools/compare.h"
-#include "repose/meshtools/face_parts.h"
-#include "repose/meshtools/paint.h"
-#include "repose/meshtools/register.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/read.h"
 #include "repose/surface/write.h"
+#include "repose/tools/comparison/compare.h"
+#include "repose/tools/comparison/face_parts.h"
+#include "repose/tools/comparison/paint.h"
+#include "repose/tools/registration/register.h"
 
 namespace {
 
 using namespace repose;
 using base::OptionKind;
-using meshtools::Sample;
+using tools::comparison::Sample;
 
 std::vector<base::Option> option_table() {
   const base::Range length{1e-3, 1000};
@@ -78,7 +78,7 @@ void print_header() {
 }
 
 void print_row(const std::string& name, const std::vector<Sample>& samples) {
-  const auto s = meshtools::statistics(samples);
+  const auto s = tools::comparison::statistics(samples);
   std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.1f %8.1f\n", name.c_str(),
               static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.median,
               s.percentile_90, s.percentile_95, s.most, 100 * s.within_1, 100 * s.within_2);
@@ -96,7 +96,7 @@ int64_t label_at(const imaging::Volume& labels, const Mat3& to_index, const Vec3
 }
 
 void print_painted(const std::string& file, const std::vector<Sample>& samples) {
-  const meshtools::Paint paint(file);
+  const tools::comparison::Paint paint(file);
   std::vector<std::vector<Sample>> regions(paint.names().size());
   for (const Sample& sample : samples)
     if (const int row = paint.at(sample.point); row >= 0) regions[row].push_back(sample);
@@ -123,7 +123,7 @@ void print_landmarks(const std::string& file, double radius, const std::vector<S
   }
 }
 
-void print_parts(const meshtools::FaceParts& parts, const std::vector<Sample>& samples) {
+void print_parts(const tools::comparison::FaceParts& parts, const std::vector<Sample>& samples) {
   std::map<std::string, std::vector<Sample>> regions;
   for (const Sample& sample : samples) regions[parts.at(sample.point)].push_back(sample);
   for (const char* name : {"nose", "upper lip", "lower lip", "chin", "left cheek", "right cheek"})
@@ -148,7 +148,7 @@ surface::Surface above(const surface::Surface& whole, double height) {
 using Marks = std::map<std::string, Vec3>;
 
 /// What brings landmarks of ACTUAL to those of PREDICTED; nothing where fewer than three agree.
-meshtools::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
+base::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
   std::vector<Vec3> moving, fixed;
   for (const auto& [name, position] : actual)
     if (const auto found = predicted.find(name); found != predicted.end()) {
@@ -156,21 +156,23 @@ meshtools::Similarity by_landmarks(const Marks& predicted, const Marks& actual) 
       fixed.push_back(found->second);
     }
   if (moving.size() < 3) return {};
-  return meshtools::fit_landmarks(moving, fixed, false).transform;
+  return tools::registration::fit_landmarks(moving, fixed, false).transform;
 }
 
-meshtools::Similarity bring(const base::Options& options, const surface::Surface& actual,
-                            const surface::Surface& predicted, const Marks& marks,
-                            const Marks& actual_marks) {
-  const meshtools::Similarity start = by_landmarks(marks, actual_marks);
-  surface::Surface moving = surface::weld_and_orient(meshtools::moved(actual, start));
+base::Similarity bring(const base::Options& options, const surface::Surface& actual,
+                       const surface::Surface& predicted, const Marks& marks,
+                       const Marks& actual_marks) {
+  const base::Similarity start = by_landmarks(marks, actual_marks);
+  surface::Surface moving = surface::weld_and_orient(tools::registration::moved(actual, start));
   surface::Surface fixed = surface::weld_and_orient(predicted);
   if (options.text("register") == "upper") {
-    const double height = meshtools::FaceParts(marks, options.text("landmarks")).upper_face();
+    const double height =
+        tools::comparison::FaceParts(marks, options.text("landmarks")).upper_face();
     moving = above(moving, height);
     fixed = above(fixed, height);
   }
-  const meshtools::IcpResult icp = meshtools::refine_by_icp(moving, fixed, {}, {});
+  const tools::registration::IcpResult icp =
+      tools::registration::refine_by_icp(moving, fixed, {}, {});
   std::printf("ACTUAL is brought to PREDICTED (%s): rms %.4g mm over the nearest %lld vertices\n",
               icp.converged ? "converged" : "NOT CONVERGED", icp.rms_plane,
               static_cast<long long>(icp.pairs));
@@ -189,8 +191,7 @@ void print_vertices(const surface::Surface& predicted, const surface::Surface& a
 }
 
 /// From each landmark of ACTUAL to that of PREDICTED.
-void print_pairs(const Marks& predicted, const Marks& actual,
-                 const meshtools::Similarity& brought) {
+void print_pairs(const Marks& predicted, const Marks& actual, const base::Similarity& brought) {
   std::printf("%-28s %10s %10s %10s %10s\n", "predicted - actual, mm", "distance", "forward",
               "left", "up");
   for (const auto& [name, position] : predicted)
@@ -219,8 +220,8 @@ void require_landmarks(const base::Options& options) {
 std::vector<Sample> measure(const base::Options& options, const surface::Surface& from,
                             const meshtools::SignedDistance& to, const std::string& name) {
   base::Progress progress(MPI_COMM_WORLD);
-  auto samples = meshtools::sample_distances(from, to, options.number("spacing"),
-                                             [&](double done) { progress.show(name, done); });
+  auto samples = tools::comparison::sample_distances(
+      from, to, options.number("spacing"), [&](double done) { progress.show(name, done); });
   progress.clear();
   if (options.flag("skip_rim"))
     std::erase_if(samples, [](const Sample& sample) { return sample.beyond_rim; });
@@ -254,7 +255,7 @@ void write_results(const std::string& name, const surface::Surface& predicted,
   data.fields.push_back({"distance", {}});
   for (const Vec3& point : predicted.points) {
     data.fields[0].values.push_back(to.at(point).distance);
-    data.colours.push_back(meshtools::distance_colour(data.fields[0].values.back(), reach));
+    data.colours.push_back(tools::comparison::distance_colour(data.fields[0].values.back(), reach));
   }
   surface::write_surface(name + ".vtp", predicted, data);
   base::write_whole_file(name + ".csv", histogram(samples, reach));
@@ -268,24 +269,24 @@ void run(const base::Options& options) {
   surface::Surface actual = surface::read_surface(options.arguments()[1]);
   const Marks marks = marks_of(options, "landmarks"),
               actual_marks = marks_of(options, "actual_landmarks");
-  meshtools::Similarity brought;
+  base::Similarity brought;
   if (options.text("register") != "none") {
     brought = bring(options, actual, predicted, marks, actual_marks);
-    actual = meshtools::moved(actual, brought);
+    actual = tools::registration::moved(actual, brought);
   }
   const meshtools::SignedDistance to_actual(actual);
   print_header();
   const auto samples = measure(options, predicted, to_actual, "PREDICTED to ACTUAL");
   print_vertices(predicted, actual);
   if (options.flag("parts"))
-    print_parts(meshtools::FaceParts(marks, options.text("landmarks")), samples);
+    print_parts(tools::comparison::FaceParts(marks, options.text("landmarks")), samples);
   if (options.has("regions")) print_regions(options.text("regions"), samples);
   if (options.has("landmarks"))
     print_landmarks(options.text("landmarks"), options.number("radius"), samples);
   if (options.flag("both"))
     measure(options, actual, meshtools::SignedDistance(predicted), "ACTUAL to PREDICTED");
   if (!actual_marks.empty()) print_pairs(marks, actual_marks, brought);
-  const double widest = std::max(meshtools::statistics(samples).percentile_95, 1e-3);
+  const double widest = std::max(tools::comparison::statistics(samples).percentile_95, 1e-3);
   const double reach = options.text("reach") == "auto" ? widest : options.number("reach");
   write_results(options.text("output"), predicted, to_actual, samples, reach);
 }

@@ -10,10 +10,10 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
-#include "repose/meshtools/decimate.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
+#include "repose/tools/decimation/decimate.h"
 
 namespace {
 
@@ -38,8 +38,8 @@ std::vector<base::Option> option_table() {
       {"output", OptionKind::path, "decimated.ply", "The file to write (PLY)."}};
 }
 
-meshtools::DecimateOptions wanted(const base::Options& options) {
-  meshtools::DecimateOptions wanted;
+tools::decimation::DecimateOptions wanted(const base::Options& options) {
+  tools::decimation::DecimateOptions wanted;
   const std::filesystem::path output = options.text("output");
   if (output.extension() != ".ply")
     base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
@@ -59,7 +59,8 @@ void print(const char* what, const surface::Surface& surface) {
               surface.points.size(), describe(surface::inspect(surface)).c_str());
 }
 
-void print(const meshtools::Decimated& result, const meshtools::DecimateOptions& wanted) {
+void print(const tools::decimation::Decimated& result,
+           const tools::decimation::DecimateOptions& wanted) {
   if (std::isfinite(wanted.distance)) std::printf("  bound asked      %g mm\n", wanted.distance);
   std::printf("  bound proven     %.6g mm from the result to the input (reached: %.6g mm)\n",
               result.to_input.upper, result.to_input.lower);
@@ -71,16 +72,17 @@ void print(const meshtools::Decimated& result, const meshtools::DecimateOptions&
 }
 
 void run(const base::Options& options) {
-  const meshtools::DecimateOptions choice = wanted(options);
+  const tools::decimation::DecimateOptions choice = wanted(options);
   const surface::Surface input = surface::load_surface(options.arguments()[0], surface::Role::mesh);
   print("input", input);
   base::Progress progress(MPI_COMM_WORLD);
   const auto before = static_cast<double>(input.triangles.size());
-  const meshtools::Decimated result = meshtools::decimate(input, choice, [&](int64_t left) {
-    progress.show(fmt::format("decimating: {} triangles left ({:.1f} %)", left,
-                              100 * static_cast<double>(left) / before),
-                  -1);
-  });
+  const tools::decimation::Decimated result =
+      tools::decimation::decimate(input, choice, [&](int64_t left) {
+        progress.show(fmt::format("decimating: {} triangles left ({:.1f} %)", left,
+                                  100 * static_cast<double>(left) / before),
+                      -1);
+      });
   progress.clear();
   print("result", result.surface);
   print(result, choice);

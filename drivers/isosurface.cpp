@@ -15,12 +15,12 @@
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/imaging/extract.h"
-#include "repose/imaging/part_bones.h"
 #include "repose/imaging/volume_filter.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/write.h"
+#include "repose/tools/bone_separation/part_bones.h"
 
 namespace {
 
@@ -165,8 +165,8 @@ void write_apart(const imaging::Volume& volume, imaging::Extraction wanted,
   wanted.otsu = false;
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("parting the bones", -1);
-  const imaging::PartedBones bones =
-      imaging::part_bones(volume, *wanted.level, {points_in(files[0]), points_in(files[1])});
+  const tools::bone_separation::PartedBones bones = tools::bone_separation::part_bones(
+      volume, *wanted.level, {points_in(files[0]), points_in(files[1])});
   progress.clear();
   std::printf("  parted where voxels share %.0f mm²\n", bones.cut_area);
   for (int part = 0; part < 2; ++part)

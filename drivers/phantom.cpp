@@ -10,7 +10,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/meshtools/phantom.h"
+#include "repose/tools/phantom/phantom.h"
 
 namespace {
 
@@ -22,12 +22,12 @@ std::vector<base::Option> option_table() {
            .kind = OptionKind::integer,
            .default_text = "2000",
            .help = "Vertices of the skin; 477 is the paper's mesh.",
-           .range = {meshtools::phantom_vertices_min, meshtools::phantom_vertices_max}},
+           .range = {tools::phantom::phantom_vertices_min, tools::phantom::phantom_vertices_max}},
           {.name = "bone_edge",
            .kind = OptionKind::number,
            .default_text = "auto",
            .help = "Edges of the bones at the face; auto: as the skin's, between 1 and 5.",
-           .range = {meshtools::phantom_bone_edge_min, meshtools::phantom_bone_edge_max},
+           .range = {tools::phantom::phantom_bone_edge_min, tools::phantom::phantom_bone_edge_max},
            .unit = "mm",
            .choices = {"auto"}},
           {"springs", OptionKind::flag, "", "Scenes of springs, as the paper's, not of a solid."},
@@ -35,16 +35,16 @@ std::vector<base::Option> option_table() {
 }
 
 void write_head(const base::Options& options) {
-  meshtools::PhantomOptions wanted;
+  tools::phantom::PhantomOptions wanted;
   wanted.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
-  const meshtools::Phantom head = meshtools::make_phantom(wanted);
+  const tools::phantom::Phantom head = tools::phantom::make_phantom(wanted);
   for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
     std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),
                 part->triangles.size());
-  const auto tissue =
-      options.flag("springs") ? meshtools::PhantomTissue::springs : meshtools::PhantomTissue::solid;
-  for (const auto& file : meshtools::write_phantom(options.text("output"), head, tissue))
+  const auto tissue = options.flag("springs") ? tools::phantom::PhantomTissue::springs
+                                              : tools::phantom::PhantomTissue::solid;
+  for (const auto& file : tools::phantom::write_phantom(options.text("output"), head, tissue))
     std::printf("  wrote %s\n", file.c_str());
 }
 

@@ -11,10 +11,10 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/meshtools/register.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/transform_file.h"
 #include "repose/surface/read.h"
+#include "repose/tools/registration/register.h"
 
 namespace {
 
@@ -104,7 +104,7 @@ Pairs read_pairs(const base::Options& options) {
   return pairs;
 }
 
-void print_warnings(const meshtools::LandmarkFit& fit) {
+void print_warnings(const tools::registration::LandmarkFit& fit) {
   if (fit.rms_mirrored < 0.3 * fit.rms_all)
     std::printf(
         "  note: a mirror image fits better (rms %.3g against %.3g mm): left and right are "
@@ -119,7 +119,7 @@ void print_warnings(const meshtools::LandmarkFit& fit) {
     std::printf("  note: of three landmarks none can be checked by the others; place more\n");
 }
 
-void print(const meshtools::LandmarkFit& fit, const Pairs& pairs) {
+void print(const tools::registration::LandmarkFit& fit, const Pairs& pairs) {
   std::printf("  %-20s %12s %12s\n", "landmark", "residual", "leave-one-out");
   for (size_t i = 0; i < pairs.names.size(); ++i) {
     std::printf("  %-20s %9.3f mm ", pairs.names[i].c_str(), fit.residual[i]);
@@ -136,11 +136,12 @@ void print(const meshtools::LandmarkFit& fit, const Pairs& pairs) {
 }
 
 base::Exit refine(const base::Options& options, const surface::Surface& moving,
-                  const surface::Surface& fixed, meshtools::Similarity& transform) {
-  meshtools::IcpOptions wanted;
+                  const surface::Surface& fixed, tools::registration::Similarity& transform) {
+  tools::registration::IcpOptions wanted;
   wanted.trim = options.number("trim");
   wanted.most_steps = static_cast<int>(options.integer("icp_steps"));
-  const meshtools::IcpResult icp = meshtools::refine_by_icp(moving, fixed, transform, wanted);
+  const tools::registration::IcpResult icp =
+      tools::registration::refine_by_icp(moving, fixed, transform, wanted);
   transform = icp.transform;
   std::printf(
       "  ICP %s after %d step(s): rms %.4g mm point to plane, %.4g mm point to point over "
@@ -155,15 +156,15 @@ base::Exit run(const base::Options& options) {
   const Pairs pairs = read_pairs(options);
   const surface::Surface moving = surface::read_surface(files[0]);
   const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));
-  const meshtools::LandmarkFit fit =
-      meshtools::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
+  const tools::registration::LandmarkFit fit =
+      tools::registration::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
   print(fit, pairs);
-  meshtools::Similarity transform = fit.transform;
+  tools::registration::Similarity transform = fit.transform;
   base::Exit exit = base::Exit::done;
   if (options.flag("icp"))
     exit = refine(options, surface::weld_and_orient(moving), fixed, transform);
   const std::string name = options.text("output");
-  surface::write_ply(name + ".ply", meshtools::moved(moving, transform));
+  surface::write_ply(name + ".ply", tools::registration::moved(moving, transform));
   scene::write_transform(name + ".tfm", transform.matrix());
   std::printf("  wrote %s.tfm and %s.ply\n", name.c_str(), name.c_str());
   return exit;

@@ -14,8 +14,8 @@
 #include "repose/base/program.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
-#include "repose/surface/range_scan.h"
 #include "repose/surface/write.h"
+#include "repose/tools/range_scan/range_scan.h"
 
 namespace {
 
@@ -49,7 +49,7 @@ std::vector<base::Option> option_table() {
 }
 
 /// mm per unit of the file.
-double scale_of(const base::Options& options, const surface::RangeGrid& grid) {
+double scale_of(const base::Options& options, const tools::range_scan::RangeGrid& grid) {
   const std::string unit = options.text("unit");
   if (unit != "auto") return unit == "m" ? 1000 : 1;
   Vec3 low = Vec3::Constant(1e300), high = -low;
@@ -63,7 +63,7 @@ double scale_of(const base::Options& options, const surface::RangeGrid& grid) {
   return 1000;
 }
 
-void print_mesh(const std::string& file, const surface::ScanMesh& mesh) {
+void print_mesh(const std::string& file, const tools::range_scan::ScanMesh& mesh) {
   const auto count = [](size_t number) { return static_cast<long long>(number); };
   std::printf("  steps cut: %lld triangles with an edge > %.3g mm, %lld more too steep\n",
               static_cast<long long>(mesh.cut_long), mesh.longest_edge,
@@ -73,7 +73,7 @@ void print_mesh(const std::string& file, const surface::ScanMesh& mesh) {
                 static_cast<long long>(mesh.dropped));
   std::printf("  points: %lld in no triangle left out, %lld doubled where sheets met in a point\n",
               static_cast<long long>(mesh.unused), static_cast<long long>(mesh.split));
-  const auto holes = surface::hole_lengths(mesh.surface);
+  const auto holes = tools::range_scan::hole_lengths(mesh.surface);
   std::printf("  holes: %lld", count(holes.size()));
   if (!holes.empty()) std::printf(", the longest %.3g mm around", holes.front());
   std::printf("\n%s: %lld vertices, %lld triangles, area %.6g mm²%s\n", file.c_str(),
@@ -85,18 +85,19 @@ void print_mesh(const std::string& file, const surface::ScanMesh& mesh) {
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
-  const surface::RangeGrid grid = surface::read_range_grid(options.arguments()[0]);
+  const tools::range_scan::RangeGrid grid =
+      tools::range_scan::read_range_grid(options.arguments()[0]);
   const auto filled =
       grid.cell.size() - static_cast<size_t>(std::count(grid.cell.begin(), grid.cell.end(), -1));
   std::printf("%s: %lld × %lld cells, %zu of them with a point\n", grid.name.c_str(),
               static_cast<long long>(grid.columns), static_cast<long long>(grid.rows), filled);
-  surface::ScanOptions wanted;
+  tools::range_scan::ScanOptions wanted;
   wanted.scale = scale_of(options, grid);
   if (options.text("max_edge") != "auto") wanted.longest_edge = options.number("max_edge");
   wanted.steepest = options.number("max_angle");
   wanted.cylinder = options.flag("cylinder");
   wanted.largest = options.flag("largest");
-  const surface::ScanMesh mesh = surface::mesh_of(grid, wanted);
+  const tools::range_scan::ScanMesh mesh = tools::range_scan::mesh_of(grid, wanted);
   surface::write_surface(output, mesh.surface, mesh.data);
   print_mesh(output, mesh);
 }

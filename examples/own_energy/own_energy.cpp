@@ -5,13 +5,13 @@
 ///     own_energy meshes/paper_jaw_advance.yaml -pressure 0.002        (writes own_energy.h5)
 #include <Eigen/Geometry>
 
-#include "repose/app/check_file.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/mechanics/term.h"
 #include "repose/model/build.h"
 #include "repose/results/result_file.h"
 #include "repose/solve/repose.h"
+#include "repose/tools/check/check_file.h"
 
 using namespace repose;
 
@@ -43,7 +43,7 @@ base::Exit run(const base::Options& options) {
       [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
   file.commit();
   base::on_first_rank(MPI_COMM_WORLD, [] {
-    const base::Comparison comparison = app::check_file("own_energy.h5");
+    const tools::check::Comparison comparison = tools::check::check_file("own_energy.h5");
     if (comparison.disagreeing() > 0) base::refuse("{} is wrong", comparison.worst());
   });
   return summary.path.complete() ? base::Exit::done : base::Exit::not_converged;

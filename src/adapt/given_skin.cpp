@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "repose/meshtools/compare.h"
+#include "repose/meshtools/signed_distance.h"
 #include "repose/surface/triangle_tree.h"
 
 namespace repose::adapt {

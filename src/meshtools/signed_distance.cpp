@@ -1,13 +1,12 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "repose/meshtools/compare.h"
+#include "repose/meshtools/signed_distance.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 
 namespace repose::meshtools {
 using namespace surface;
-using namespace imaging;
 namespace {
 
 constexpr double on_border_of_triangle = 1e-9;  // barycentric

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "fans.h"
 #include "repose/surface/intersections.h"
 
 namespace repose::surface {

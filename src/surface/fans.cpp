@@ -1,4 +1,4 @@
-#include "fans.h"
+#include "repose/surface/edges.h"
 
 #include <map>
 

@@ -1,4 +1,3 @@
-#include "fans.h"
 #include "repose/base/error.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/edges.h"

@@ -1,5 +1,4 @@
 #include <CGAL/IO/OBJ.h>
-#include <CGAL/IO/PLY.h>
 #include <CGAL/IO/STL.h>
 
 #include <algorithm>
@@ -7,13 +6,12 @@
 #include <sstream>
 
 #include "cgal.h"
-#include "ply.h"
 #include "repose/base/error.h"
 #include "repose/base/text.h"
 #include "soup.h"
 #include "stl.h"
 
-/// PLY, STL and OBJ through CGAL's readers, which answer only yes or no and trust what they read:
+/// STL and OBJ through CGAL's readers, which answer only yes or no and trust what they read:
 /// each file is brought into the plainest form of its format first.
 namespace repose::surface {
 namespace {
@@ -50,14 +48,14 @@ Complaint damaged_binary(const std::string& file) {
   };
 }
 
-/// Names FILE:LINE and shows the line; the text read has `added` lines more than the file.
-Complaint damaged_text(const std::string& file, int64_t added) {
-  return [=](std::string_view text, size_t stop) {
+/// Names FILE:LINE and shows the line.
+Complaint damaged_text(const std::string& file) {
+  return [file](std::string_view text, size_t stop) {
     const size_t last = stop > 0 ? stop - 1 : 0;
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<int64_t>(last), '\n');
     size_t begin = last > 0 ? text.rfind('\n', last - 1) + 1 : 0;  // npos + 1 is the beginning
     base::refuse("{}:{}: truncated, or not a number where one belongs, near {}; export it anew",
-                 file, line - added, base::shown(base::next_line(text, begin)));
+                 file, line, base::shown(base::next_line(text, begin)));
   };
 }
 
@@ -114,20 +112,6 @@ std::string plain_obj(const Content& content) {
 
 }  // namespace
 
-Soup parse_ply(Content content) {
-  const PlyHeader header = parse_ply_header(content);
-  check_ply(header, content);
-  const std::string plain = plain_ply_header(header);
-  const auto added = std::count(plain.begin(), plain.end(), '\n') - header.lines;
-  const bool text = header.format == "ascii";
-  const Reader read = [](std::istream& in, Points& points, Polygons& polygons) {
-    return CGAL::IO::read_PLY(in, points, polygons);
-  };
-  const std::string file = content.file.string();
-  return read_with(read, plain + content.bytes.substr(header.bytes),
-                   text ? damaged_text(file, added) : damaged_binary(file));
-}
-
 Soup parse_stl_text(Content content) {
   const Complaint complain = [&](std::string_view, size_t) {
     base::refuse(
@@ -160,7 +144,7 @@ Soup parse_obj(Content content) {
   const Reader read = [](std::istream& in, Points& points, Polygons& polygons) {
     return CGAL::IO::read_OBJ(in, points, polygons);
   };
-  return read_with(read, plain_obj(content), damaged_text(content.file.string(), 0));
+  return read_with(read, plain_obj(content), damaged_text(content.file.string()));
 }
 
 }  // namespace repose::surface

@@ -1,7 +1,8 @@
-#include "ply.h"
+#include "repose/surface/ply.h"
 
 #include <algorithm>
-#include <array>
+#include <cstring>
+#include <vector>
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
@@ -9,18 +10,27 @@
 namespace repose::surface {
 namespace {
 
-struct TypeName {
-  const char *name, *alias;
-  size_t bytes;
-};
-constexpr std::array<TypeName, 8> known_types = {{{"char", "int8", 1},
-                                                  {"uchar", "uint8", 1},
-                                                  {"short", "int16", 2},
-                                                  {"ushort", "uint16", 2},
-                                                  {"int", "int32", 4},
-                                                  {"uint", "uint32", 4},
-                                                  {"float", "float32", 4},
-                                                  {"double", "float64", 8}}};
+template <class Number>
+double decode(const char* bytes) {
+  Number number;
+  std::memcpy(&number, bytes, sizeof number);
+  return static_cast<double>(number);
+}
+
+template <class Number>
+PlyType type_of(const char* name) {
+  return {name, sizeof(Number), decode<Number>};
+}
+
+/// Each type with its two names.
+const std::vector<std::pair<PlyType, const char*>>& known_types() {
+  static const std::vector<std::pair<PlyType, const char*>> types = {
+      {type_of<int8_t>("char"), "int8"},    {type_of<uint8_t>("uchar"), "uint8"},
+      {type_of<int16_t>("short"), "int16"}, {type_of<uint16_t>("ushort"), "uint16"},
+      {type_of<int32_t>("int"), "int32"},   {type_of<uint32_t>("uint"), "uint32"},
+      {type_of<float>("float"), "float32"}, {type_of<double>("double"), "float64"}};
+  return types;
+}
 
 /// Reads the lines of one header.
 class HeaderParser {
@@ -70,8 +80,8 @@ class HeaderParser {
   }
 
   PlyType type(std::string_view word) const {
-    for (const auto& known : known_types)
-      if (word == known.name || word == known.alias) return {known.name, known.bytes};
+    for (const auto& [known, alias] : known_types())
+      if (word == known.name || word == alias) return known;
     fail(fmt::format("unknown type {} (char, uchar, short, ushort, int, uint, float, double)",
                      base::shown(word)));
   }
@@ -85,21 +95,10 @@ class HeaderParser {
   PlyHeader header_{"", {}, 0, 0};
 };
 
-const PlyElement* find_element(const PlyHeader& header, const char* name, const char* other) {
-  const auto found =
-      std::find_if(header.elements.begin(), header.elements.end(),
-                   [&](const PlyElement& e) { return e.name == name || e.name == other; });
+const PlyElement* find_element(const PlyHeader& header, bool (PlyElement::*is)() const) {
+  const auto found = std::find_if(header.elements.begin(), header.elements.end(),
+                                  [&](const PlyElement& e) { return (e.*is)(); });
   return found == header.elements.end() ? nullptr : &*found;
-}
-
-bool is_index_list(const PlyProperty& property) {
-  return property.name == "vertex_indices" || property.name == "vertex_index";
-}
-
-const char* plain_name(const PlyProperty& property) {
-  for (const char* axis : {"x", "y", "z"})
-    if (property.name == axis) return axis;
-  return is_index_list(property) ? "vertex_indices" : "skipped";
 }
 
 void check_coordinates(const PlyElement& vertex, const std::string& file) {
@@ -110,67 +109,23 @@ void check_coordinates(const PlyElement& vertex, const std::string& file) {
     if (found == all.end())
       base::refuse("{}: its vertices have no property {}; export the mesh with x, y and z", file,
                    axis);
-    if (found->list_size || (found->type.name != "float" && found->type.name != "double"))
+    if (found->list_size || !found->type.is_real())
       base::refuse("{}: property {} is {}; export coordinates as float or double", file, axis,
                    found->list_size ? "a list" : found->type.name);
   }
 }
 
 void check_indices(const PlyElement& face, const std::string& file) {
-  for (const auto& property : face.properties) {
-    if (!is_index_list(property)) continue;
-    if (!property.list_size) base::refuse("{}: property {} is not a list", file, property.name);
-    const auto& size = property.list_size->name;
-    if (size == "float" || size == "double" || property.type.bytes != 4 ||
-        property.type.name == "float")
-      base::refuse("{}: property {} is a list {} {}; export vertex indices as list uchar int", file,
-                   property.name, size, property.type.name);
-    return;
-  }
-  base::refuse("{}: its faces have no property vertex_indices; export the mesh as polygons", file);
+  const size_t row = index_list(face);
+  if (row == face.properties.size())
+    base::refuse("{}: its faces have no property vertex_indices; export the mesh as polygons",
+                 file);
+  const PlyProperty& property = face.properties[row];
+  if (!property.list_size) base::refuse("{}: property {} is not a list", file, property.name);
+  if (property.list_size->is_real() || property.type.bytes != 4 || property.type.is_real())
+    base::refuse("{}: property {} is a list {} {}; export vertex indices as list uchar int", file,
+                 property.name, property.list_size->name, property.type.name);
 }
-
-/// Walks a binary body row by row to its end, reading list sizes only.
-class BodyWalk {
- public:
-  BodyWalk(const Content& content, const PlyHeader& header)
-      : content_(content),
-        position_(header.bytes),
-        big_endian_(header.format == "binary_big_endian") {}
-
-  void step_over(const PlyElement& element) {
-    for (uint64_t row = 0; row < element.count; ++row)
-      for (const auto& property : element.properties) {
-        const uint64_t entries = property.list_size ? list_size(*property.list_size) : 1;
-        if (entries > remaining() / property.type.bytes)
-          base::refuse(
-              "{}: truncated or damaged: {} {} of {} lies beyond the end of the file ({} "
-              "bytes); export it anew",
-              content_.file.string(), base::shown(element.name), row, element.count,
-              content_.bytes.size());
-        position_ += entries * property.type.bytes;
-      }
-  }
-
- private:
-  size_t remaining() const { return content_.bytes.size() - position_; }
-
-  /// The size that a list states; a negative one or one cut off becomes too large to fit.
-  uint64_t list_size(const PlyType& type) {
-    if (remaining() < type.bytes) return UINT64_MAX;
-    uint64_t value = 0;
-    for (size_t i = 0; i < type.bytes; ++i) {
-      const size_t byte = big_endian_ ? i : type.bytes - 1 - i;
-      value = value << 8 | static_cast<unsigned char>(content_.bytes[position_ + byte]);
-    }
-    position_ += type.bytes;
-    return value;
-  }
-
-  const Content& content_;
-  size_t position_;
-  bool big_endian_;
-};
 
 /// Every value of a text body takes a character and a blank.
 void check_text_size(const PlyHeader& header, const Content& content) {
@@ -196,35 +151,24 @@ void check_ply(const PlyHeader& header, const Content& content) {
   if (!text && header.format != "binary_little_endian" && header.format != "binary_big_endian")
     base::refuse("{}: format {} is none of ascii, binary_little_endian, binary_big_endian", file,
                  base::shown(header.format));
-  const PlyElement* vertex = find_element(header, "vertex", "vertices");
-  const PlyElement* face = find_element(header, "face", "faces");
+  const PlyElement* vertex = find_element(header, &PlyElement::is_vertex);
+  const PlyElement* face = find_element(header, &PlyElement::is_face);
   if (!vertex || vertex->count == 0)
     base::refuse("{}: holds no vertices; export the mesh anew", file);
   if (!face || face->count == 0)
     base::refuse("{}: holds no faces (a point cloud?); export a triangle mesh", file);
   check_coordinates(*vertex, file);
   check_indices(*face, file);
-  if (text) return check_text_size(header, content);
-  BodyWalk walk(content, header);
-  for (const auto& element : header.elements) walk.step_over(element);
+  if (text) check_text_size(header, content);
 }
 
-std::string plain_ply_header(const PlyHeader& header) {
-  const bool text = header.format == "ascii";
-  const PlyElement* vertex = find_element(header, "vertex", "vertices");
-  const PlyElement* face = find_element(header, "face", "faces");
-  std::string plain = fmt::format("ply\nformat {} 1.0\n", header.format);
-  for (const auto& element : header.elements) {
-    const char* name = &element == vertex ? "vertex" : &element == face ? "face" : "skipped";
-    plain += fmt::format("element {} {}\n", name, element.count);
-    for (const auto& property : element.properties) {
-      plain += "property ";
-      if (property.list_size)
-        plain += fmt::format("list {} ", text ? "ushort" : property.list_size->name);
-      plain += fmt::format("{} {}\n", property.type.name, plain_name(property));
-    }
-  }
-  return plain + "end_header\n";
+size_t index_list(const PlyElement& face) {
+  const auto& all = face.properties;
+  return std::find_if(all.begin(), all.end(),
+                      [](const PlyProperty& p) {
+                        return p.name == "vertex_indices" || p.name == "vertex_index";
+                      }) -
+         all.begin();
 }
 
 }  // namespace repose::surface

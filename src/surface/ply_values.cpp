@@ -1,33 +1,13 @@
-#include "ply_values.h"
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <cmath>
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/surface/ply.h"
 
 namespace repose::surface {
-namespace {
-
-template <class Number>
-double as_number(const char* bytes) {
-  Number number;
-  std::memcpy(&number, bytes, sizeof number);
-  return static_cast<double>(number);
-}
-
-double decode(const std::string& type, const char* bytes) {
-  if (type == "char") return as_number<int8_t>(bytes);
-  if (type == "uchar") return as_number<uint8_t>(bytes);
-  if (type == "short") return as_number<int16_t>(bytes);
-  if (type == "ushort") return as_number<uint16_t>(bytes);
-  if (type == "int") return as_number<int32_t>(bytes);
-  if (type == "uint") return as_number<uint32_t>(bytes);
-  return type == "float" ? as_number<float>(bytes) : as_number<double>(bytes);
-}
-
-}  // namespace
-
 PlyValues::PlyValues(const Content& content, const PlyHeader& header)
     : content_(content),
       position_(header.bytes),
@@ -51,28 +31,37 @@ void PlyValues::read(const PlyElement& element,
   }
 }
 
-double PlyValues::text_value() {
+double PlyValues::text_value(const PlyType& type) {
   constexpr auto blanks = " \t\v\f\r\n";
   const std::string& bytes = content_.bytes;
   const size_t begin = std::min(bytes.find_first_not_of(blanks, position_), bytes.size());
   position_ = std::min(bytes.find_first_of(blanks, begin), bytes.size());
   const auto number = base::parse_number(std::string_view(bytes).substr(begin, position_ - begin));
-  if (!number) fail();
+  if (!number || (!type.is_real() && *number != std::floor(*number))) fail();
   return *number;
 }
 
 double PlyValues::binary_value(const PlyType& type) {
   if (type.bytes > content_.bytes.size() - position_) fail();
-  char bytes[8];
-  std::memcpy(bytes, content_.bytes.data() + position_, type.bytes);
-  if (big_endian_) std::reverse(bytes, bytes + type.bytes);
+  const char* const stored = content_.bytes.data() + position_;
   position_ += type.bytes;
-  return decode(type.name, bytes);
+  if (!big_endian_) return type.decode(stored);
+  std::array<char, 8> bytes;
+  std::reverse_copy(stored, stored + type.bytes, bytes.begin());
+  return type.decode(bytes.data());
 }
 
 void PlyValues::fail() const {
-  base::refuse("{}: truncated or damaged: {} lies beyond the end or holds no number ({} bytes)",
-               content_.file.string(), place_, content_.bytes.size());
+  if (text_) {
+    const std::string_view all = content_.bytes;
+    const auto line =
+        1 + std::count(all.begin(), all.begin() + static_cast<int64_t>(position_), '\n');
+    base::refuse("{}:{}: truncated or damaged: {} holds no number here; export it anew",
+                 content_.file.string(), line, place_);
+  }
+  base::refuse(
+      "{}: truncated or damaged: {} lies beyond the end of the file ({} bytes); export it anew",
+      content_.file.string(), place_, content_.bytes.size());
 }
 
 }  // namespace repose::surface

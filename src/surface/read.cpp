@@ -13,7 +13,7 @@ constexpr size_t most_corners = 1000;        // of one polygon
 Soup parse(Content content) {
   switch (recognise(content)) {
     case Format::ply:
-      return parse_ply(std::move(content));
+      return parse_ply(content);
     case Format::stl_text:
       return parse_stl_text(std::move(content));
     case Format::stl_binary:

@@ -1,10 +1,9 @@
 #pragma once
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "repose/base/geometry.h"
+#include "repose/surface/ply.h"
 
 /// What a mesh file holds, between its bytes and a Surface.
 namespace repose::surface {
@@ -17,22 +16,13 @@ struct Soup {
 
 enum class Format { ply, stl_text, stl_binary, obj, off };
 
-/// The bytes of one file.
-struct Content {
-  std::filesystem::path file;  ///< for messages
-  std::string bytes;
-};
-
-/// Reads the whole of a regular file. Throws InputError when it is missing, unreadable or empty.
-Content read_content(const std::filesystem::path& file);
-
 /// The format by content; the ending decides only where the content does not. Throws InputError
 /// when it is none of the known ones.
 Format recognise(const Content& content);
 
 /// Readers of one format each; they refuse what is damaged, truncated or promises more than the
 /// file can hold, in one line. Indices and coordinates are left to read_surface.
-Soup parse_ply(Content content);
+Soup parse_ply(const Content& content);
 Soup parse_stl_text(Content content);
 Soup parse_stl_binary(Content content);
 Soup parse_obj(Content content);

@@ -16,9 +16,9 @@
 #include <cstdio>
 #include <string>
 
-#include "repose/meshtools/hausdorff.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
+#include "repose/tools/decimation/hausdorff.h"
 
 namespace {
 
@@ -70,8 +70,8 @@ void collapse(const std::string& how, Mesh& mesh, double number) {
 /// triangles, distance to the input (lower, upper), CGAL's figure for it, from the input, defects
 void measure(const surface::Surface& input, const std::string& file) {
   const surface::Surface result = surface::read_surface(file);
-  const auto to = meshtools::one_sided_distance(result, input, 1e-3);
-  const auto from = meshtools::one_sided_distance(input, result, 1e-2);
+  const auto to = tools::decimation::one_sided_distance(result, input, 1e-3);
+  const auto from = tools::decimation::one_sided_distance(input, result, 1e-2);
   const surface::Defects defects = surface::inspect(result);
   double cgal = NAN;
   if (defects.non_manifold_edges + defects.non_manifold_vertices + defects.misoriented_edges == 0)

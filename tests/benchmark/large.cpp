@@ -14,10 +14,10 @@
 #include "repose/base/petsc.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/objective.h"
-#include "repose/meshtools/phantom.h"
 #include "repose/model/build.h"
 #include "repose/results/model_file.h"
 #include "repose/results/result_file.h"
+#include "repose/tools/phantom/phantom.h"
 #include "stage_clock.h"
 
 namespace {
@@ -43,8 +43,9 @@ void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
   surface::Surface skin;
   std::vector<surface::Surface> bones;
   if (base::rank(comm) == 0) {
-    skin = meshtools::make_phantom_skin(skin_vertices);
-    bones = {meshtools::make_phantom_skull(bone_edge), meshtools::make_phantom_mandible(bone_edge)};
+    skin = tools::phantom::make_phantom_skin(skin_vertices);
+    bones = {tools::phantom::make_phantom_skull(bone_edge),
+             tools::phantom::make_phantom_mandible(bone_edge)};
   }
   clock.end("surfaces");
   model::Model model;

@@ -8,9 +8,9 @@
 #include "repose/base/petsc.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/objective.h"
-#include "repose/meshtools/phantom.h"
 #include "repose/model/build.h"
 #include "repose/results/result_file.h"
+#include "repose/tools/phantom/phantom.h"
 #include "stage_clock.h"
 
 namespace {
@@ -36,9 +36,9 @@ scene::Scene jaw_advance() {
 model::Anatomy anatomy_of(int64_t skin_vertices) {
   model::Anatomy anatomy{jaw_advance(), {}, {}, {}, {}};
   if (base::rank(comm) > 0) return anatomy;
-  anatomy.skin = meshtools::make_phantom_skin(skin_vertices);
-  anatomy.bones = {meshtools::make_phantom_skull(bone_edge),
-                   meshtools::make_phantom_mandible(bone_edge)};
+  anatomy.skin = tools::phantom::make_phantom_skin(skin_vertices);
+  anatomy.bones = {tools::phantom::make_phantom_skull(bone_edge),
+                   tools::phantom::make_phantom_mandible(bone_edge)};
   return anatomy;
 }
 

@@ -14,8 +14,8 @@
 #include "repose/base/whole_file.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
-#include "repose/meshtools/phantom.h"
 #include "repose/model/build.h"
+#include "repose/tools/phantom/phantom.h"
 
 namespace {
 
@@ -79,7 +79,7 @@ void measure_solver(const model::Model& model, Cost& cost) {
 }
 
 Cost measure(int64_t skin_vertices, const std::vector<surface::Surface>& bones) {
-  const surface::Surface skin = meshtools::make_phantom_skin(skin_vertices);
+  const surface::Surface skin = tools::phantom::make_phantom_skin(skin_vertices);
   const scene::Scene scene = jaw_opening();
   const double before = heap_bytes(), begin = cpu_seconds();
   const model::BuiltModel built = model::build_model(scene, skin, bones);
@@ -143,8 +143,8 @@ int main(int argc, char** argv) {
     return 1;
   }
   const base::Session session(1, argv, nullptr);
-  const std::vector<surface::Surface> bones = {meshtools::make_phantom_skull(bone_edge),
-                                               meshtools::make_phantom_mandible(bone_edge)};
+  const std::vector<surface::Surface> bones = {tools::phantom::make_phantom_skull(bone_edge),
+                                               tools::phantom::make_phantom_mandible(bone_edge)};
   std::vector<Cost> costs;
   for (const int64_t vertices : skin_sizes) {
     costs.push_back(measure(vertices, bones));

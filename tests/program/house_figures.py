@@ -18,7 +18,7 @@ import tempfile
 
 import test_house
 from conftest import PROJECT
-from test_house import LONGEST, USUAL, functions, sources
+from test_house import LONGEST, USUAL, functions, room_of, sources
 
 PARAMETERS = 5
 # A TaoSolve that tells how many frames of the program's own are above it.
@@ -89,7 +89,7 @@ def main():
     lengths, many = [], []
     for name, text in sources():
         public = name.startswith("include/")
-        room = name.split("/")[2 if public else 1]
+        room = room_of(name)
         lines[room] += text.count("\n")
         headers[room] += public
         lengths += [length for _, length in functions(text)]

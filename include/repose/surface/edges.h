@@ -93,4 +93,11 @@ double six_volumes(const std::vector<Vec3>& points, const std::vector<Triangle>&
 /// Throws InputError naming the surface where a coordinate is not finite or an index has no point.
 void require_sound(const Surface& surface);
 
+/// Returns the corners (3 · triangle + k) united to fans: the triangles at a vertex that hang
+/// together over edges of two triangles. A manifold surface has one fan at each vertex.
+UnionFind fans(const std::vector<Triangle>& triangles, const EdgeTable& edges);
+
+/// Gives every fan a point of its own: where sheets touch in a point, copies of it come last.
+void split_fans(Surface& surface);
+
 }  // namespace repose::surface

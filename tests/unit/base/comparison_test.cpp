@@ -1,11 +1,11 @@
-#include "repose/base/comparison.h"
+#include "repose/tools/check/comparison.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <sstream>
 
-namespace repose::base {
+namespace repose::tools::check {
 namespace comparison_test {
 
 std::vector<std::string> lines_with(const std::string& text, const std::string& word) {
@@ -54,4 +54,4 @@ TEST(Comparison, TheTableHasEveryNumber) {
 }
 
 }  // namespace comparison_test
-}  // namespace repose::base
+}  // namespace repose::tools::check

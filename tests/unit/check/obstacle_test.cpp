@@ -1,11 +1,11 @@
-#include "check/obstacle.h"
+#include "tools/check/obstacle.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-namespace repose::check {
+namespace repose::tools::check {
 namespace obstacle_test {
 
 /// An axis-parallel box of n × n squares a side, outward.
@@ -111,4 +111,4 @@ TEST(Obstacle, ANormalIsGivenOnlyAwayFromEdges) {
 }
 
 }  // namespace obstacle_test
-}  // namespace repose::check
+}  // namespace repose::tools::check

@@ -1,4 +1,4 @@
-#include "repose/imaging/part_bones.h"
+#include "repose/tools/bone_separation/part_bones.h"
 
 #include <Eigen/Geometry>
 
@@ -8,7 +8,8 @@
 #include "repose/surface/defects.h"
 #include "volumes.h"
 
-namespace repose::imaging {
+namespace repose::tools::bone_separation {
+using namespace imaging;
 namespace part_bones_test {
 
 constexpr double level = 200;
@@ -79,4 +80,4 @@ TEST(PartBones, what_is_apart_stays_and_points_beside_bone_are_refused) {
 }
 
 }  // namespace part_bones_test
-}  // namespace repose::imaging
+}  // namespace repose::tools::bone_separation

@@ -2,16 +2,17 @@
 
 #include "../surface/shapes.h"
 #include "repose/imaging/extract.h"
-#include "repose/meshtools/compare.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
+#include "repose/tools/comparison/compare.h"
 
 /// Surfaces from the CT of a real head against those that others made of it. The data are not
 /// shipped: they lie beside the project, in ../shared/data/head.
 namespace repose::imaging {
 using namespace surface;
 using namespace meshtools;
+using namespace tools::comparison;
 namespace real_volume_test {
 
 constexpr double voxel = 0.9765625;  // mm, the shorter one

@@ -1,4 +1,4 @@
-#include "repose/meshtools/compare.h"
+#include "repose/tools/comparison/compare.h"
 
 #include <Eigen/Geometry>
 #include <random>
@@ -7,7 +7,7 @@
 #include "../surface/shapes.h"
 #include "repose/imaging/isosurface.h"
 
-namespace repose::meshtools {
+namespace repose::tools::comparison {
 using namespace surface;
 using namespace imaging;
 namespace compare_test {
@@ -94,4 +94,4 @@ TEST(Compare, colours_go_from_blue_over_white_to_red) {
 }
 
 }  // namespace compare_test
-}  // namespace repose::meshtools
+}  // namespace repose::tools::comparison

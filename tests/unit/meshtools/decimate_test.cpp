@@ -1,4 +1,4 @@
-#include "repose/meshtools/decimate.h"
+#include "repose/tools/decimation/decimate.h"
 
 #include <algorithm>
 #include <random>
@@ -9,7 +9,7 @@
 #include "repose/surface/distance.h"
 #include "repose/surface/read.h"
 
-namespace repose::meshtools {
+namespace repose::tools::decimation {
 using namespace surface;
 namespace decimate_test {
 
@@ -235,4 +235,4 @@ TEST(Hausdorff, an_empty_surface_is_an_internal_error) {
 }
 
 }  // namespace decimate_test
-}  // namespace repose::meshtools
+}  // namespace repose::tools::decimation

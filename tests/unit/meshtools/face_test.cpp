@@ -10,7 +10,7 @@
 #include "../surface/shapes.h"
 #include "imaging/distance_volume.h"
 #include "repose/imaging/isosurface.h"
-#include "repose/meshtools/compare.h"
+#include "repose/meshtools/signed_distance.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
 

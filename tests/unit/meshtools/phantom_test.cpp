@@ -1,4 +1,4 @@
-#include "repose/meshtools/phantom.h"
+#include "repose/tools/phantom/phantom.h"
 
 #include <unistd.h>
 
@@ -9,13 +9,13 @@
 #include <string>
 
 #include "../surface/shapes.h"
-#include "meshtools/phantom_shape.h"
-#include "meshtools/phantom_solid.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/read.h"
+#include "tools/phantom/phantom_shape.h"
+#include "tools/phantom/phantom_solid.h"
 
-namespace repose::meshtools {
+namespace repose::tools::phantom {
 using namespace surface;
 namespace phantom_test {
 
@@ -268,4 +268,4 @@ TEST(Solid, head_is_nowhere_much_steeper_than_a_distance) {
 }
 
 }  // namespace phantom_test
-}  // namespace repose::meshtools
+}  // namespace repose::tools::phantom

@@ -1,4 +1,4 @@
-#include "repose/meshtools/register.h"
+#include "repose/tools/registration/register.h"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "../surface/shapes.h"
 
-namespace repose::meshtools {
+namespace repose::tools::registration {
 using namespace surface;
 namespace register_test {
 
@@ -211,4 +211,4 @@ TEST(Register, transforms_compose_as_matrices) {
 }
 
 }  // namespace register_test
-}  // namespace repose::meshtools
+}  // namespace repose::tools::registration

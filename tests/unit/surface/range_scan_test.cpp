@@ -1,11 +1,12 @@
-#include "repose/surface/range_scan.h"
+#include "repose/tools/range_scan/range_scan.h"
 
 #include <fmt/format.h>
 
 #include "repose/surface/defects.h"
 #include "shapes.h"
 
-namespace repose::surface {
+namespace repose::tools::range_scan {
+using namespace surface;
 namespace range_scan_test {
 
 /// A text range grid of a relief z(x, y), 1 mm apart; nothing where `hole` says so.
@@ -169,11 +170,11 @@ TEST_F(RangeScan, what_is_no_range_grid_is_refused) {
   says(with("range_grid", "other_grid"), "it has no element range_grid");
   says(with("property float x", "property float u"), "lack x, y or z");
   says(with("0 0 0\n", "0 nan 0\n"), "'vertex' 0 of 63");
-  says(refused("no ply\n"), "none of PLY, STL");
+  says(refused("no ply\n"), "not a PLY file");
   Relief empty;
   empty.hole = [](int i, int j) { return (i + j) % 2 == 0; };
   says(refused(empty.text()), "no two neighbouring cells hold points");
 }
 
 }  // namespace range_scan_test
-}  // namespace repose::surface
+}  // namespace repose::tools::range_scan

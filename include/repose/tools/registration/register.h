@@ -1,0 +1,68 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "repose/base/geometry.h"
+#include "repose/surface/surface.h"
+
+/// Registration: the rigid or similarity transform that takes a moving shape to a fixed one.
+namespace repose::tools::registration {
+
+using surface::Surface;
+
+using base::Similarity;
+
+/// Of landmarks (base::breadth); below it, the turn about their line is noise.
+constexpr double least_breadth = 0.01;
+
+struct LandmarkFit {
+  Similarity transform;           ///< from the landmarks that were not left out
+  std::vector<double> residual;   ///< of each landmark, left out or not, mm
+  std::vector<double> predicted;  ///< of each, by the fit of the others used (leave-one-out), mm;
+                                  ///< NaN where those are fewer than three or on a line
+  std::vector<bool> left_out;
+  double rms = 0;               ///< of the residuals of those used, mm
+  double rms_all = 0;           ///< of the fit to all landmarks, none left out, mm
+  double rms_mirrored = 0;      ///< of the best fit to all with a reflection, mm
+  bool can_be_checked = false;  ///< enough landmarks that one bad one would show
+};
+
+/// Fits landmarks, and leaves out bad ones one by one: the one that the fit of the others predicts
+/// worst, where its error is too large for the scatter of the others, at a level of 0.1 % over all
+/// landmarks (an F test on the prediction variance of the rigid fit, to first order). At most a
+/// third of them is left out, and at least four remain, but of four one may go. Three cannot be
+/// checked. Throws InputError for fewer than three, or a set on a line (least_breadth).
+LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
+                          bool with_scale);
+
+struct IcpOptions {
+  double trim = 0.8;  ///< share of the pairs, the nearest, that counts, (0, 1]
+  int most_steps = 100;
+  int64_t samples = 20000;  ///< vertices of the moving surface that are used, evenly
+  double tolerance = 1e-5;  ///< converged when a step moves no point by more, × extent
+};
+
+struct IcpResult {
+  Similarity transform;
+  int steps = 0;
+  bool converged = false;
+  double rms_plane = 0;  ///< of the pairs that count, to the fixed surface's planes, mm
+  double rms = 0;        ///< of the same, point to point, mm
+  double median = 0;     ///< distance of all samples to the fixed surface, mm
+  int64_t pairs = 0;     ///< that count
+};
+
+/// Refines `start` by iterated closest points (Chen and Medioni, 1992: point to plane; Chetverikov
+/// et al., 2005: trimmed). Each step pairs samples of the moving surface with their closest points
+/// on the fixed one, drops pairs on the fixed surface's border and those whose normals differ by
+/// over 60°, keeps the nearest share, and turns and shifts (never scales) by the linearised least
+/// squares. A step that does not lower the trimmed error is halved. Throws InputError where fewer
+/// than six pairs remain.
+IcpResult refine_by_icp(const Surface& moving, const Surface& fixed, const Similarity& start,
+                        const IcpOptions& options);
+
+/// The surface with every point moved; triangles are kept.
+Surface moved(const Surface& surface, const Similarity& transform);
+
+}  // namespace repose::tools::registration

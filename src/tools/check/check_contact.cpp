@@ -1,0 +1,374 @@
+#include "check_contact.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "obstacle.h"
+#include "repose/mechanics/wall_contact.h"
+
+namespace repose::tools::check {
+
+namespace {
+
+constexpr double considered = 6;       // mm, the stated gap where nothing is nearer
+constexpr double largest_slope = 1.4;  // of interpolated distances, beside edges
+constexpr double exact_to = 1e-4;      // mm, of a penetration that two programs measure exactly
+
+const std::vector<double>* field(const model::StepRows& rows, const char* name) {
+  for (const model::PointField& field : rows.point_fields)
+    if (field.name == name) return &field.values;
+  return nullptr;
+}
+
+/// mm, by which smoothed distances may differ from those on grids that lie elsewhere.
+double smoothing_bound(double spacing) { return 0.1 * spacing + 0.05; }
+
+/// mm, that a step's positions are uncertain by.
+double slack_of(const model::StepNumbers& numbers) {
+  return std::max(1e-9, numbers.displacement_error);
+}
+
+/// What is true of one point.
+struct AtPoint {
+  double gap = considered;  // mm, the smallest
+  double wall_gap = considered;
+  int32_t body = -1;      // that it is to; −1: the side of a cut
+  int near = 0;           // bodies that may press, …
+  int32_t pressing = -1;  // … the last one of them
+  bool slides = false, mesh = false, wall = false;
+  double area = 0;  // mm², that the point stands for
+};
+
+/// What is true of a step.
+struct Truth {
+  std::vector<AtPoint> points;
+  double into_bodies = 0;  // mm, inside rigid bodies beyond the initial depth, …
+  int64_t deepest_point = -1;
+  int32_t deepest_body = -1;
+
+  void offer(double depth, int64_t point, int32_t body) {
+    if (depth <= into_bodies) return;
+    into_bodies = depth;
+    deepest_point = point;
+    deepest_body = body;
+  }
+};
+
+/// The bodies of a model's contact at a load.
+class Bodies {
+ public:
+  Bodies(const model::Model& model, const model::PrescribedMotion& motion, double load)
+      : spacing_(model.contact.spacing), kept_(std::max(considered, 4 * spacing_)) {
+    for (const model::Body& body : model.contact.bodies) {
+      shapes_.emplace_back(model, body);
+      Mat4 pose = Mat4::Identity();
+      if (body.bone >= 0)
+        pose = motion.bone_matrix(body.bone, load);
+      else
+        pose.topRightCorner<3, 1>() = load * body.push;
+      poses_.push_back(pose);
+    }
+  }
+  bool is_mesh(int32_t body) const { return shapes_[body].is_mesh(); }
+  /// Where a point in space is beside a body at load 0.
+  Vec3 beside(int32_t body, const Vec3& point) const {
+    const Mat4& pose = poses_[body];
+    return pose.topLeftCorner<3, 3>().transpose() * (point - pose.topRightCorner<3, 1>());
+  }
+  /// mm, of a point given by beside().
+  double distance(int32_t body, const Vec3& beside) const {
+    return shapes_[body].distance(beside, reach);
+  }
+  /// Distance to a mesh by the solver's cubic B-spline, on a grid that has one of its points, or
+  /// the middle of a cell, at the point.
+  double smoothed_distance(int32_t body, const Vec3& beside, bool in_cell) const {
+    if (!is_mesh(body)) return distance(body, beside);
+    const double here = averaged_distance(body, beside, in_cell);
+    double second_differences = -6 * here;
+    for (int a = 0; a < 3; ++a)
+      for (const double side : {-spacing_, spacing_})
+        second_differences += averaged_distance(body, beside + side * Vec3::Unit(a), in_cell);
+    return here - second_differences / 6;
+  }
+  Vec3 normal(int32_t body, const Vec3& point, double radius) const {
+    return poses_[body].topLeftCorner<3, 3>() * shapes_[body].normal(beside(body, point), radius);
+  }
+
+ private:
+  /// With the distances themselves as coefficients.
+  double averaged_distance(int32_t body, const Vec3& beside, bool in_cell) const {
+    static const std::vector<std::pair<double, double>> at_point = {
+        {-1, 1.0 / 6}, {0, 2.0 / 3}, {1, 1.0 / 6}};
+    static const std::vector<std::pair<double, double>> at_middle = {
+        {-1.5, 1.0 / 48}, {-0.5, 23.0 / 48}, {0.5, 23.0 / 48}, {1.5, 1.0 / 48}};
+    const auto& nodes = in_cell ? at_middle : at_point;
+    double sum = 0;
+    for (const auto& [x, wx] : nodes)
+      for (const auto& [y, wy] : nodes)
+        for (const auto& [z, wz] : nodes)
+          sum += wx * wy * wz * shapes_[body].distance(beside + spacing_ * Vec3(x, y, z), kept_);
+    return sum;
+  }
+
+  static constexpr double reach = considered + 2;  // mm
+  double spacing_;                                 // mm
+  double kept_;                                    // mm, up to which the solver keeps distances
+  std::vector<Obstacle> shapes_;
+  std::vector<Mat4> poses_;
+};
+
+/// `slack` in mm: bodies that are nearer may press.
+void add_bodies(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
+                double slack, Truth& truth) {
+  const model::Touches& touches = model.contact.touches;
+  const double bound = smoothing_bound(model.contact.spacing);
+  for (size_t c = 0; c < touches.point.size(); ++c) {
+    const int64_t row = touches.point[c];
+    const int32_t body = touches.body[c];
+    const bool slides = touches.binding[c] == model::Binding::slides;
+    const bool mesh = bodies.is_mesh(body);
+    const double now = bodies.distance(body, bodies.beside(body, position[row]));
+    double initial = slides || now < 0 ? bodies.distance(body, model.points.position[row]) : 0;
+    if (slides && initial >= considered) initial = now;  // distances are kept no farther
+    const double gap = now - (slides ? initial : std::min(initial, 0.0));
+    AtPoint& point = truth.points[row];
+    point.slides = point.slides || slides;
+    point.mesh = point.mesh || mesh;
+    point.area = touches.area[c];
+    if (slides || gap <= slack + (mesh ? bound : 0)) {
+      ++point.near;
+      point.pressing = body;
+    }
+    if (gap <= point.gap) {
+      point.gap = gap;
+      point.body = body;
+    }
+    truth.offer(std::min(initial, 0.0) - now, row, body);
+  }
+}
+
+/// The sides of cuts, as the solver sees them.
+void add_walls(const model::Model& model, const std::vector<Vec3>& position, Truth& truth) {
+  for (const int64_t p : model.contact.walls.point) truth.points[p].wall = true;
+  mechanics::WallLoop walls(model.contact.walls, model.contact.stiffness);
+  walls.look(position);
+  for (size_t w = 0; w < walls.size(); ++w) {
+    AtPoint& point = truth.points[walls.point(w)];
+    if (walls.gap(w) < point.gap) point.body = -1;
+    point.gap = std::min(point.gap, walls.gap(w));
+    point.wall_gap = std::min(point.wall_gap, walls.gap(w));
+  }
+}
+
+Truth find_truth(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
+                 double slack) {
+  Truth truth;
+  truth.points.resize(position.size());
+  add_bodies(model, bodies, position, slack, truth);
+  add_walls(model, position, truth);
+  return truth;
+}
+
+/// The worst of many values in one line.
+class Worst {
+ public:
+  template <class Text>
+  void offer(double excess, Text&& text) {
+    if (excess <= excess_) return;
+    excess_ = excess;
+    text_ = text();
+  }
+  /// The statement that none exceeds its bound, or which one does and by how much.
+  void state(const std::string& what, Comparison& comparison) const {
+    comparison.statement(text_.empty() ? what : text_, text_.empty());
+  }
+
+ private:
+  double excess_ = 0;
+  std::string text_;
+};
+
+/// What a step states about contact, beside the truth.
+class Claims {
+ public:
+  Claims(const model::Model& model, const model::StepNumbers& numbers,
+         const std::vector<Vec3>& position, const Bodies& bodies, const Truth& truth,
+         Comparison& comparison)
+      : model_(model),
+        numbers_(numbers),
+        position_(position),
+        bodies_(bodies),
+        truth_(truth),
+        comparison_(comparison),
+        bound_(smoothing_bound(model.contact.spacing)) {}
+
+  void check_gaps(const std::vector<double>& stated);
+  void check_depths(const std::vector<double>& gap);
+  void check_pressures(const std::vector<double>& gap, const std::vector<double>& pressure);
+  void check_forces(const std::vector<double>& pressure, const std::vector<double>& force);
+
+ private:
+  double smoothed_gap(int64_t point, bool in_cell) const;
+  bool explained(int64_t point, double stated) const;
+  /// mm, by which a gap may differ from the exact one without a closer look: more where nothing can
+  /// press for long.
+  double allowed(double gap) const {
+    constexpr double far = 3;  // mm
+    return gap > far ? 0.5 * model_.contact.spacing + 0.1 : bound_;
+  }
+  std::string name_of(int32_t body) const {
+    return body < 0 ? "the sides of cuts" : "'" + model_.contact.bodies[body].name + "'";
+  }
+
+  const model::Model& model_;
+  const model::StepNumbers& numbers_;
+  const std::vector<Vec3>& position_;
+  const Bodies& bodies_;
+  const Truth& truth_;
+  Comparison& comparison_;
+  double bound_;  // mm
+};
+
+/// mm, the gap of a point to bodies whose distances are averaged as the solver's grids do.
+double Claims::smoothed_gap(int64_t point, bool in_cell) const {
+  const model::Touches& touches = model_.contact.touches;
+  const double spacing = model_.contact.spacing;  // more than an average lies off
+  double gap = truth_.points[point].wall_gap;
+  for (size_t c = 0; c < touches.point.size(); ++c) {
+    if (touches.point[c] != point) continue;
+    const int32_t body = touches.body[c];
+    const bool slides = touches.binding[c] == model::Binding::slides;
+    const Vec3 beside = bodies_.beside(body, position_[point]);
+    const Vec3& before = model_.points.position[point];
+    if (!slides && bodies_.distance(body, beside) - spacing > gap) continue;
+    const double now = bodies_.smoothed_distance(body, beside, in_cell);
+    double initial = 0;
+    if (slides || bodies_.distance(body, before) < spacing)
+      initial = bodies_.smoothed_distance(body, before, in_cell);
+    gap = std::min(gap, now - (slides ? initial : std::min(initial, 0.0)));
+  }
+  return gap;
+}
+
+/// Whether a gap lies between the exact one and a smoothed one.
+bool Claims::explained(int64_t point, double stated) const {
+  const double exact = truth_.points[point].gap;
+  if (std::abs(stated - exact) <= allowed(std::min(stated, exact))) return true;
+  for (const bool in_cell : {false, true}) {
+    const auto [low, high] = std::minmax({exact, smoothed_gap(point, in_cell)});
+    if (stated >= low - bound_ && stated <= high + bound_) return true;
+  }
+  return false;
+}
+
+void Claims::check_gaps(const std::vector<double>& stated) {
+  std::vector<double> gaps, again;
+  Worst worst;
+  for (size_t i = 0; i < stated.size(); ++i) {
+    const AtPoint& point = truth_.points[i];
+    if (!point.mesh) {
+      gaps.push_back(stated[i]);
+      again.push_back(point.gap);
+    } else if (!explained(static_cast<int64_t>(i), stated[i])) {
+      worst.offer(std::abs(stated[i] - point.gap), [&] {
+        return fmt::format(
+            "contact_gap of point {} to {}: stated {:.4g} mm, by the triangles {:.4g} mm, which "
+            "the smoothing of a grid of {:.3g} mm does not explain",
+            i, name_of(point.body), stated[i], point.gap, model_.contact.spacing);
+      });
+    }
+  }
+  comparison_.array("point/contact_gap", gaps, again, considered);
+  worst.state("gaps to meshes are those to their triangles, but for smoothing", comparison_);
+}
+
+void Claims::check_depths(const std::vector<double>& gap) {
+  const double deepest = -*std::min_element(gap.begin(), gap.end());
+  comparison_.number("penetration", numbers_.penetration, std::max(0.0, deepest), considered);
+  if (!std::isfinite(numbers_.penetration_exact)) return;
+  const double off = std::abs(numbers_.penetration_exact - truth_.into_bodies);
+  Worst worst;
+  worst.offer(off <= exact_to ? 0 : off, [&] {
+    return fmt::format(
+        "penetration_exact: stated {:.4g} mm, by the bodies' own shapes {:.4g} mm (point {} in {})",
+        numbers_.penetration_exact, truth_.into_bodies, truth_.deepest_point,
+        name_of(truth_.deepest_body));
+  });
+  worst.state("penetration_exact is that into the bodies' own shapes", comparison_);
+}
+
+void Claims::check_pressures(const std::vector<double>& gap, const std::vector<double>& pressure) {
+  double pull = 0, across = 0;
+  for (size_t i = 0; i < pressure.size(); ++i) {
+    if (truth_.points[i].slides) continue;
+    pull = std::max(pull, -pressure[i]);
+    if (pressure[i] > 0) across = std::max(across, gap[i]);
+  }
+  comparison_.statement("contact only presses", pull <= 0);
+  comparison_.statement("pressure is where gaps are closed", across <= slack_of(numbers_));
+}
+
+void Claims::check_forces(const std::vector<double>& pressure, const std::vector<double>& force) {
+  constexpr double aside = 0.6;  // of a force, where normals are within 30° of one another
+  std::vector<double> forces, again;
+  double largest = 0;
+  Worst too_large, oblique;
+  for (size_t i = 0; i < position_.size(); ++i) {
+    const AtPoint& point = truth_.points[i];
+    const Vec3 stated = Vec3::Map(force.data() + 3 * i);
+    const double pressed = pressure[i] * point.area;
+    if (point.wall) continue;
+    if (!point.slides)
+      too_large.offer(stated.norm() - largest_slope * pressed * (1 + 1e-9), [&] {
+        return fmt::format(
+            "contact_force of point {}: stated {:.4g} N, pressure times area {:.4g} N", i,
+            stated.norm(), pressed);
+      });
+    if (point.near != 1 || point.pressing < 0) continue;
+    const bool mesh = bodies_.is_mesh(point.pressing);
+    const double around = 2.5 * model_.contact.spacing + std::abs(point.gap);
+    const Vec3 expected = pressed * bodies_.normal(point.pressing, position_[i], around);
+    if (!mesh)
+      for (int a = 0; a < 3; ++a) {
+        forces.push_back(stated[a]);
+        again.push_back(expected[a]);
+        largest = std::max(largest, std::abs(stated[a]));
+      }
+    const double off = (stated - expected).norm();
+    if (!mesh || expected.isZero(0)) continue;
+    oblique.offer(off - aside * std::abs(pressed), [&] {
+      return fmt::format(
+          "contact_force of point {} on {}: stated ({:.4g}, {:.4g}, {:.4g}) N, by the "
+          "triangles' normal ({:.4g}, {:.4g}, {:.4g}) N",
+          i, name_of(point.pressing), stated.x(), stated.y(), stated.z(), expected.x(),
+          expected.y(), expected.z());
+    });
+  }
+  comparison_.array("point/contact_force", forces, again, largest);
+  too_large.state("contact forces are no larger than pressure times area", comparison_);
+  oblique.state("contact forces are along the meshes' normals", comparison_);
+}
+
+}  // namespace
+
+void check_contact(const model::Model& model, const model::PrescribedMotion& motion,
+                   const model::StepNumbers& numbers, const model::StepRows& rows,
+                   Comparison& comparison) {
+  if (model.contact.empty()) return;
+  const auto *gap = field(rows, "contact_gap"), *pressure = field(rows, "contact_pressure"),
+             *force = field(rows, "contact_force");
+  comparison.statement("contact_gap, contact_pressure and contact_force are there",
+                       gap && pressure && force);
+  if (!gap || !pressure || !force) return;
+  const Bodies bodies(model, motion, numbers.load);
+  const Truth truth = find_truth(model, bodies, rows.position, slack_of(numbers));
+  Claims claims(model, numbers, rows.position, bodies, truth, comparison);
+  claims.check_gaps(*gap);
+  claims.check_depths(*gap);
+  claims.check_pressures(*gap, *pressure);
+  claims.check_forces(*pressure, *force);
+}
+
+}  // namespace repose::tools::check

@@ -1,0 +1,35 @@
+#pragma once
+#include <vector>
+
+#include "repose/model/model.h"
+#include "repose/model/step.h"
+
+namespace repose::tools::check {
+
+/// A number computed again, and the size its difference from another computation is measured
+/// against: its own, or, where terms cancel, a billion times what their rounding leaves.
+struct Recomputed {
+  double value = 0, scale = 0;
+};
+
+/// All of a step that follows from the model and the positions (docs/theory/model.md, Eqs. 6 to
+/// 12).
+struct RecomputedStep {
+  model::StepRows rows;
+  std::vector<Vec3> displacement;                                           ///< [N] mm
+  double position_scale = 0, displacement_scale = 0, elongation_scale = 0;  ///< mm
+  double tension_scale = 0, force_scale = 0;                                ///< N
+  double ratio_scale = 0;
+  double stress_scale = 0;  ///< N/mm²
+  double stretch_scale = 0;
+  Recomputed f_e, potential, f_f, f_v, penalty, objective, gradient_max, volume_error_max;
+  int64_t inverted_prisms = 0;  ///< v ≤ 0, of those with a soft-tissue point
+};
+
+/// Computes a step again by plain serial loops over the whole model, sharing with the solver only
+/// the formulas of spring_law.h and prism_geometry.h. Of `claimed` it takes what defines the
+/// objective: functional, volume, lambda, bulk_modulus, epsilon; of `rows`, the position.
+RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
+                         const model::StepRows& rows);
+
+}  // namespace repose::tools::check

@@ -1,0 +1,75 @@
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "quadric.h"
+#include "repose/tools/decimation/decimate.h"
+#include "tolerance.h"
+
+namespace repose::tools::decimation {
+
+using surface::Corners;
+using surface::Surface;
+using surface::TriangleTree;
+
+/// Edge collapse on a manifold surface, open or closed, step by step. A step is taken only where
+/// the topology stays (link condition), no triangle turns over or loses its shape, all new
+/// triangles are proven to lie within the tolerance, and none meets another triangle of the
+/// surface (exact predicates). So the surface is in order after every step.
+class Collapser {
+ public:
+  /// Locked vertices are neither moved nor removed.
+  Collapser(const Surface& surface, std::vector<bool> locked);
+
+  int64_t triangles() const { return alive_; }
+
+  /// Collapses edges, that of the least quadric error first, until `target` triangles are left or
+  /// no edge can be collapsed within the tolerance (null: none). `report` is called now and then.
+  /// May be called again with a wider tolerance.
+  void run(int64_t target, const Tolerance* tolerance, const std::function<void()>& report);
+
+  Surface result() const;
+
+ private:
+  struct Candidate {
+    double cost;
+    int64_t kept, removed;
+    uint32_t kept_version, removed_version;
+    bool operator<(const Candidate& other) const { return cost > other.cost; }
+  };
+  /// The triangles around an edge: those that go with it, and those that stay.
+  struct Star {
+    std::vector<int64_t> dying, staying;
+  };
+
+  bool locks(int64_t vertex) const { return locked_[vertex]; }
+  Candidate candidate(int64_t a, int64_t b) const;
+  std::vector<int64_t> neighbours(int64_t vertex) const;
+  bool gather(int64_t kept, int64_t removed, Star& star) const;
+  bool attempt(const Candidate& candidate);
+  std::vector<Vec3> placements(int64_t kept, int64_t removed) const;
+  bool fits(const Star& star, int64_t kept, int64_t removed, const Vec3& at, Vec3* outside);
+  bool shapes_stay(const Star& star) const;
+  bool within(Vec3* outside) const;
+  bool meets_another(const Star& star) const;
+  Vec3 pulled(int64_t kept, const Vec3& at, const Vec3& outside) const;
+  void collapse(const Star& star, int64_t kept, int64_t removed, const Vec3& at);
+  int64_t pass(int64_t target, uint64_t since, const std::function<void()>& report);
+
+  Surface surface_;
+  const Tolerance* tolerance_ = nullptr;
+  std::vector<bool> locked_;
+  TriangleTree tree_;
+  std::vector<std::vector<int64_t>> star_;  ///< vertex → triangles
+  std::vector<Quadric> quadric_;
+  std::vector<uint32_t> version_;  ///< of a vertex: its edges' costs
+  std::vector<uint64_t> changed_;  ///< the step that last changed a vertex's star
+  std::vector<bool> dead_;
+  int64_t alive_;
+  uint64_t steps_ = 0;
+  Vec3 origin_;
+  std::vector<Triangle> new_triangles_;  ///< of the step at hand
+  std::vector<Corners> new_corners_;
+};
+
+}  // namespace repose::tools::decimation

@@ -1,0 +1,101 @@
+#include "repose/tools/decimation/decimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "collapse.h"
+#include "repose/base/error.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/intersections.h"
+
+namespace repose::tools::decimation {
+using namespace surface;
+namespace {
+
+/// Shares of the distance: kept free while collapsing, so that the last proof, which is this
+/// accurate, ends below the distance asked for.
+constexpr double proof_accuracy = 5e-4;
+/// The distances of a result without a bound are known to this share of the input's extent.
+constexpr double measure_accuracy = 1e-5;
+/// Of the input's extent: the first and the last tolerance on the way to a count.
+constexpr double first_share = 5e-4, last_share = 0.1;
+
+std::vector<bool> border_vertices(const Surface& surface) {
+  std::vector<bool> at_border(surface.points.size(), false);
+  const EdgeTable edges(surface.triangles);
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    if (edges[e].size() == 1) at_border[edges[e][0].low] = at_border[edges[e][0].high] = true;
+  return at_border;
+}
+
+int64_t nearest_vertex(const Surface& surface, const Vec3& point) {
+  const auto nearer = [&](const Vec3& a, const Vec3& b) {
+    return (a - point).squaredNorm() < (b - point).squaredNorm();
+  };
+  return std::min_element(surface.points.begin(), surface.points.end(), nearer) -
+         surface.points.begin();
+}
+
+void check_intersections(const Surface& result, const Surface& input) {
+  const size_t pairs = self_intersections(result).size();
+  if (pairs > 0 && self_intersections(input).empty())
+    throw base::InternalError(
+        fmt::format("{}: decimation made {} pairs of triangles intersect", input.name, pairs));
+}
+
+void measure(Decimated& decimated, const Surface& input, double distance) {
+  const double extent = bounding_diagonal(input.points);
+  const bool bounded = std::isfinite(distance);
+  const double coarse = std::max(measure_accuracy * extent, 1e-300);
+  decimated.to_input =
+      one_sided_distance(decimated.surface, input, bounded ? proof_accuracy * distance : coarse);
+  decimated.from_input = one_sided_distance(input, decimated.surface,
+                                            bounded ? std::max(0.01 * distance, coarse) : coarse);
+  if (!(decimated.to_input.upper <= distance))
+    throw base::InternalError(fmt::format("{}: distance {} mm could not be proven, only {} mm",
+                                          input.name, distance, decimated.to_input.upper));
+}
+
+/// For a count alone the tolerance widens step by step, so that the distance stays small: the least
+/// quadric error first says little about the worst point.
+void collapse(Collapser& collapser, const Surface& surface, const DecimateOptions& options,
+              const std::function<void(int64_t)>& report) {
+  const TriangleTree tree(surface);
+  const double extent = bounding_diagonal(surface.points);
+  const auto run = [&](const Tolerance* tolerance) {
+    collapser.run(options.triangles, tolerance, [&] { report(collapser.triangles()); });
+  };
+  if (std::isfinite(options.distance)) {
+    const Tolerance tolerance(tree, (1 - proof_accuracy) * options.distance, extent);
+    return run(&tolerance);
+  }
+  double distance = first_share * extent;
+  while (distance < last_share * extent) {
+    if (collapser.triangles() <= options.triangles) return;
+    const Tolerance tolerance(tree, distance, extent);
+    run(&tolerance);
+    distance *= 2;
+  }
+  run(nullptr);
+}
+
+}  // namespace
+
+Decimated decimate(const Surface& surface, const DecimateOptions& options,
+                   const std::function<void(int64_t)>& report) {
+  Decimated decimated;
+  std::vector<bool> locked = border_vertices(surface);
+  for (const Vec3& landmark : options.landmarks) {
+    const int64_t vertex = nearest_vertex(surface, landmark);
+    locked[vertex] = true;
+    decimated.landmark_distance.push_back((surface.points[vertex] - landmark).norm());
+  }
+  Collapser collapser(surface, std::move(locked));
+  collapse(collapser, surface, options, report);
+  decimated.surface = collapser.result();
+  check_intersections(decimated.surface, surface);
+  measure(decimated, surface, options.distance);
+  return decimated;
+}
+
+}  // namespace repose::tools::decimation

@@ -1,0 +1,95 @@
+#include "repose/tools/decimation/hausdorff.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+
+#include "piece.h"
+#include "repose/base/error.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
+
+namespace repose::tools::decimation {
+using namespace surface;
+namespace {
+
+constexpr size_t most_pieces = 50'000'000;
+/// Triangles this many times the distance across are worth a cut along their edges.
+constexpr double large = 4;
+
+class Search {
+ public:
+  Search(const Surface& from, const Surface& to, double accuracy)
+      : from_(from), tree_(to), accuracy_(accuracy) {}
+
+  DistanceBounds run() {
+    for (const auto& triangle : from_.triangles)
+      for (const int64_t vertex : triangle) see(from_.points[vertex]);
+    for (const auto& triangle : from_.triangles) offer(Piece(corners(from_, triangle)));
+    size_t refined = 0;
+    while (!pieces_.empty() && pieces_.top().upper > lower_ + accuracy_ && refined++ < most_pieces)
+      refine();
+    const double upper = pieces_.empty() ? 0 : pieces_.top().upper;
+    return {lower_, std::max({upper, lower_, dropped_}), worst_, upper <= lower_ + accuracy_};
+  }
+
+ private:
+  struct Bounded {
+    double upper;
+    Piece piece;
+    bool operator<(const Bounded& other) const { return upper < other.upper; }
+  };
+
+  /// Cuts the piece with the greatest bound: along the edges of the triangle nearest to its centre,
+  /// or in halves.
+  void refine() {
+    Piece piece = pieces_.top().piece;
+    pieces_.pop();
+    const auto nearest = tree_.nearest(piece.centre());
+    parts_.clear();
+    const Corners& under = tree_.corners_of(nearest.triangle);
+    if (!longer(under, large * (lower_ + accuracy_)) || !piece.cut_to(under, 0, parts_))
+      parts_.push_back(piece.halve());
+    parts_.push_back(piece);
+    for (const Piece& part : parts_) {
+      for (const Vec3& corner : part.corners()) see(corner);
+      offer(part);
+    }
+  }
+
+  void see(const Vec3& point) {
+    if (tree_.any_within(point, lower_ * lower_) >= 0) return;
+    lower_ = std::sqrt(tree_.nearest(point).squared);
+    worst_ = point;
+  }
+
+  /// Pieces that cannot matter are not kept.
+  void offer(const Piece& piece) {
+    const double enough = lower_ + 0.5 * accuracy_;
+    const double upper = std::sqrt(tree_.least_greatest(
+        piece.corners(), std::numeric_limits<double>::infinity(), enough * enough));
+    if (upper <= enough)
+      dropped_ = std::max(dropped_, upper);
+    else
+      pieces_.push({upper, piece});
+  }
+
+  const Surface& from_;
+  TriangleTree tree_;
+  double accuracy_, lower_ = 0, dropped_ = 0;
+  Vec3 worst_ = Vec3::Zero();
+  std::priority_queue<Bounded> pieces_;
+  std::vector<Piece> parts_;
+};
+
+}  // namespace
+
+DistanceBounds one_sided_distance(const Surface& from, const Surface& to, double accuracy) {
+  if (from.triangles.empty() || to.triangles.empty())
+    throw base::InternalError("distance of surfaces without triangles");
+  DistanceBounds bounds = Search(from, to, accuracy).run();
+  bounds.upper += 1e-12 * (bounding_diagonal(to.points) + bounding_diagonal(from.points));
+  return bounds;
+}
+
+}  // namespace repose::tools::decimation

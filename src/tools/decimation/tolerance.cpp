@@ -1,0 +1,52 @@
+#include "tolerance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace repose::tools::decimation {
+using namespace surface;
+namespace {
+
+constexpr double kept_free = 1e-9;
+constexpr size_t most_open_pieces = 5000;
+/// Of how far a point as high over a triangle as a piece's centre may lie beside it.
+constexpr double margin_share = 0.5;
+/// Triangles this many times the distance across are worth a cut along their edges.
+constexpr double halved_above = 4;
+
+}  // namespace
+
+Tolerance::Tolerance(const TriangleTree& tree, double distance, double extent)
+    : tree_(tree), distance_(distance - kept_free * extent), squared_(distance_ * distance_) {}
+
+bool Tolerance::contains(const Vec3& point) const {
+  const int64_t found = tree_.any_within(point, squared_, hint_);
+  if (found >= 0) hint_ = found;
+  return found >= 0;
+}
+
+bool Tolerance::contains(const Corners& triangle, Vec3* outside) const {
+  const auto fail = [&](const Vec3& point) {
+    *outside = point;
+    return false;
+  };
+  pieces_.assign(1, Piece(triangle));
+  for (size_t i = 0; i < pieces_.size(); ++i) {  // large pieces first: they show a fault soonest
+    Piece piece = pieces_[i];
+    if (tree_.one_covers(piece.corners(), squared_, hint_)) continue;
+    for (const Vec3& corner : piece.corners())
+      if (!contains(corner)) return fail(corner);
+    const Vec3 centre = piece.centre();
+    const auto nearest = tree_.nearest(centre, squared_);
+    if (nearest.triangle < 0 || pieces_.size() > most_open_pieces) return fail(centre);
+    hint_ = nearest.triangle;
+    const double margin = margin_share * std::sqrt(squared_ - nearest.squared);
+    const Corners& under = tree_.corners_of(nearest.triangle);
+    if (!longer(under, halved_above * distance_) || !piece.cut_to(under, margin, pieces_))
+      pieces_.push_back(piece.halve());
+    pieces_.push_back(piece);
+  }
+  return true;
+}
+
+}  // namespace repose::tools::decimation

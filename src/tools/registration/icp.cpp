@@ -1,0 +1,205 @@
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "repose/base/error.h"
+#include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
+#include "repose/tools/registration/register.h"
+
+namespace repose::tools::registration {
+using namespace surface;
+namespace {
+
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double least_cosine = 0.5;  ///< between the normals of a pair
+constexpr double on_border = 1e-6;    ///< barycentric share
+constexpr int most_halvings = 6;
+
+Vec3 unit_normal(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
+
+struct Pair {
+  Vec3 from, to, normal;  ///< moved sample, its closest point, the fixed surface's normal there
+  double squared;         ///< mm²
+};
+
+struct Error {
+  double plane = 0, point = 0;  ///< rms, mm
+};
+
+Error error_of(const std::vector<Pair>& pairs) {
+  Error sum;
+  for (const Pair& pair : pairs) {
+    const double height = pair.normal.dot(pair.to - pair.from);
+    sum.plane += height * height;
+    sum.point += pair.squared;
+  }
+  const auto n = static_cast<double>(pairs.size());
+  return {std::sqrt(sum.plane / n), std::sqrt(sum.point / n)};
+}
+
+Similarity shortened(const Similarity& step, double share) {
+  const Eigen::AngleAxisd turn(step.rotation);
+  return {1, Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix(),
+          share * step.translation};
+}
+
+class Icp {
+ public:
+  Icp(const Surface& moving, const Surface& fixed, const IcpOptions& options)
+      : fixed_(fixed),
+        options_(options),
+        tree_(fixed),
+        border_edge_(fixed.triangles.size()),
+        border_vertex_(fixed.points.size()) {
+    const EdgeTable edges(fixed.triangles);
+    for (int64_t e = 0; e < edges.edges(); ++e) {
+      if (edges[e].size() != 1) continue;
+      const HalfEdge& half = edges[e].front();
+      border_edge_[half.triangle][half.corner] = true;
+      border_vertex_[half.low] = border_vertex_[half.high] = true;
+    }
+    std::vector<Vec3> normals(moving.points.size(), Vec3::Zero());
+    for (const auto& triangle : moving.triangles) {
+      const Corners t = corners(moving, triangle);
+      for (const int64_t vertex : triangle) normals[vertex] += (t[1] - t[0]).cross(t[2] - t[0]);
+    }
+    const auto count = static_cast<int64_t>(moving.points.size());
+    const int64_t used = std::min(count, options.samples);
+    for (int64_t i = 0; i < used; ++i) {
+      const int64_t vertex = i * count / used;
+      points_.push_back(moving.points[vertex]);
+      normals_.push_back(normals[vertex].normalized());
+    }
+  }
+
+  IcpResult run(const Similarity& start) {
+    IcpResult result{.transform = start};
+    std::vector<Pair> pairs = match(start);
+    while (result.steps < options_.most_steps && !result.converged) {
+      ++result.steps;
+      const Similarity best = solve(pairs);
+      double share = 1;
+      for (int halving = 0;; ++halving, share /= 2) {
+        const Similarity next = shortened(best, share).after(result.transform);
+        std::vector<Pair> next_pairs = match(next);
+        const bool better = error_of(next_pairs).plane <= error_of(pairs).plane;
+        result.converged = largest_move(result.transform, next) <= options_.tolerance * extent();
+        if (!better && !result.converged && halving < most_halvings) continue;
+        if (better) {
+          result.transform = next;
+          pairs = std::move(next_pairs);
+        }
+        result.converged = result.converged || !better;
+        break;
+      }
+    }
+    return measured(result, pairs);
+  }
+
+ private:
+  double extent() const { return bounding_diagonal(fixed_.points); }
+
+  /// Whether a point of a triangle lies on the surface's border: on an edge that no other triangle
+  /// shares, or in an end of one.
+  bool at_border(int64_t triangle, const Vec3& point) const {
+    const Triangle& vertices = fixed_.triangles[triangle];
+    const Corners t = corners(fixed_, vertices);
+    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 &a = t[(k + 1) % 3], &b = t[(k + 2) % 3];
+      const double share = (a - point).cross(b - point).dot(normal) / normal.squaredNorm();
+      if (std::abs(share) < on_border && border_edge_[triangle][(k + 1) % 3]) return true;
+      if (std::abs(1 - share) < on_border && border_vertex_[vertices[k]]) return true;
+    }
+    return false;
+  }
+
+  /// The nearest share of the pairs that may count.
+  std::vector<Pair> match(const Similarity& transform) const {
+    std::vector<Pair> pairs;
+    for (size_t i = 0; i < points_.size(); ++i) {
+      const Vec3 from = transform.apply(points_[i]);
+      const auto nearest = tree_.nearest(from);
+      const Vec3 normal = unit_normal(corners(fixed_, fixed_.triangles[nearest.triangle]));
+      if (!((transform.rotation * normals_[i]).dot(normal) > least_cosine)) continue;
+      if (at_border(nearest.triangle, nearest.point)) continue;
+      pairs.push_back({from, nearest.point, normal, nearest.squared});
+    }
+    const auto kept = static_cast<int64_t>(options_.trim * static_cast<double>(pairs.size()));
+    if (kept < 6)
+      base::refuse(
+          "ICP: {} of {} samples have a partner on the fixed surface, six are needed; the start is "
+          "too far off: check the landmarks",
+          kept, points_.size());
+    std::nth_element(pairs.begin(), pairs.begin() + kept - 1, pairs.end(),
+                     [](const Pair& a, const Pair& b) { return a.squared < b.squared; });
+    pairs.resize(kept);
+    return pairs;
+  }
+
+  /// Least squares of n·(p + ω×(p − c) + u − q) over ω, u, about the pairs' mean c.
+  static Similarity solve(const std::vector<Pair>& pairs) {
+    Vec3 centre = Vec3::Zero();
+    for (const Pair& pair : pairs) centre += pair.from / static_cast<double>(pairs.size());
+    Mat6 matrix = Mat6::Zero();
+    Vec6 right = Vec6::Zero();
+    for (const Pair& pair : pairs) {
+      Vec6 row;
+      row << (pair.from - centre).cross(pair.normal), pair.normal;
+      matrix += row * row.transpose();
+      right += row * pair.normal.dot(pair.to - pair.from);
+    }
+    const double angular = matrix.topLeftCorner<3, 3>().trace(),
+                 shift = matrix.bottomRightCorner<3, 3>().trace();
+    matrix.topLeftCorner<3, 3>().diagonal().array() +=
+        1e-9 * angular;  // a sphere or a plane slides
+    matrix.bottomRightCorner<3, 3>().diagonal().array() += 1e-9 * shift;
+    const Vec6 x = matrix.ldlt().solve(right);
+    const double angle = x.head<3>().norm();
+    const Mat3 rotation = angle > 0
+                              ? Eigen::AngleAxisd(angle, x.head<3>() / angle).toRotationMatrix()
+                              : Mat3::Identity();
+    return {1, rotation, centre + x.tail<3>() - rotation * centre};
+  }
+
+  double largest_move(const Similarity& a, const Similarity& b) const {
+    double largest = 0;
+    for (const Vec3& point : points_)
+      largest = std::max(largest, (a.apply(point) - b.apply(point)).norm());
+    return largest;
+  }
+
+  IcpResult measured(IcpResult result, const std::vector<Pair>& pairs) const {
+    const Error error = error_of(pairs);
+    result.rms_plane = error.plane;
+    result.rms = error.point;
+    result.pairs = static_cast<int64_t>(pairs.size());
+    std::vector<double> distances;
+    for (const Vec3& point : points_)
+      distances.push_back(tree_.nearest(result.transform.apply(point)).squared);
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    result.median = std::sqrt(*middle);
+    return result;
+  }
+
+  const Surface& fixed_;
+  IcpOptions options_;
+  TriangleTree tree_;
+  std::vector<std::array<bool, 3>> border_edge_;  ///< of each triangle, by their first corner
+  std::vector<bool> border_vertex_;
+  std::vector<Vec3> points_, normals_;
+};
+
+}  // namespace
+
+IcpResult refine_by_icp(const Surface& moving, const Surface& fixed, const Similarity& start,
+                        const IcpOptions& options) {
+  return Icp(moving, fixed, options).run(start);
+}
+
+}  // namespace repose::tools::registration
