@@ -8,7 +8,7 @@ namespace {
 
 using Filter = std::function<bool(const Functional&)>;
 
-/// How many of the one-step methods arrived at a minimum.
+/// Number of of the one-step methods arrived at a minimum.
 struct Score {
   int64_t arrived = 0, other = 0, run = 0;
   double share() const { return run ? static_cast<double>(arrived) / static_cast<double>(run) : 0; }

@@ -18,7 +18,7 @@ inline constexpr std::array<Functional, 4> functionals = {
      {.name = "f_f", .force = true},
      {.name = "f_f + f_v", .force = true, .volume = true}}};
 
-/// What repose-solve would be asked for, with automatic load steps.
+/// What repose-solve would be requested, with automatic load steps.
 solve::Settings settings_of(const Functional& functional, double accuracy);
 
 }  // namespace repose::paper

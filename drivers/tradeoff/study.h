@@ -14,7 +14,7 @@ namespace repose::tradeoff {
 struct Way {
   std::string study;   ///< what is varied: solver, load steps, volume, layers, springs, mesh
   std::string method;  ///< -tao_type
-  double accuracy;     ///< mm asked for
+  double accuracy;     ///< mm requested
   scene::VolumeTerm volume;
   int load_steps = 0;  ///< 0: automatic
   int layers = 0;      ///< point layers

@@ -13,7 +13,7 @@ namespace {
 
 using model::Model;
 
-/// What the springs of one kind are made of.
+/// Material of the springs of one kind.
 struct Material {
   double stiffness = 0;  // Σ k0 r_0², N·mm
   double volume = 0;     // Σ v_j, mm³

@@ -13,8 +13,8 @@ struct LipCrease {
   double gap = 0;            ///< mm, the widest
 };
 
-/// How far, mm, the skin at a place lies behind the mean of that 4 mm above and below it; nothing
-/// where one of the three has no skin.
+/// Returns how far, mm, the skin at a place lies behind the mean of that 4 mm above and below it;
+/// nothing where one of the three has no skin.
 std::optional<double> crease_depth(const FrontMap& skin, double x, double z);
 
 /// The height of the middle of the gap between open lips, within 12 mm of z; nothing where there is

@@ -37,7 +37,7 @@ std::string why_whole(MPI_Comm comm, const model::Anatomy& anatomy, const std::s
   return model::beyond_columns(anatomy.scene);
 }
 
-/// What a scene says, before its model is made. On rank 0.
+/// Takes over what a scene states before its model is built. On rank 0.
 void read_scene(const scene::Scene& scene, Job& job) {
   job.anatomy = model::load_anatomy(scene);
   job.remeshed = job.anatomy->given_skin.has_value();

@@ -15,7 +15,7 @@ namespace repose::app {
 /// A scene or a model, read and built: what is to be solved.
 struct Job {
   model::Model model;                          ///< on rank 0; where it is raised, its frame
-  std::optional<discrete::RaisedPart> raised;  ///< on all ranks, of a model that is nowhere whole
+  std::optional<discrete::RaisedPart> raised;  ///< on all ranks, of a fully distributed model
   int64_t layers = 0;                          ///< where it is raised, on all ranks
   scene::Solve wanted;                         ///< the scene's, bulk modulus set; on all ranks
   std::optional<model::Anatomy> anatomy;       ///< of a scene, on rank 0
@@ -33,7 +33,7 @@ struct Job {
 
 /// Reads a scene (.yaml) or a model (.h5), builds the scene's model with its initial equilibrium
 /// and makes its incisions. On several ranks each makes its part of a scene's model, unless the
-/// scene asks for more than is known by columns or `whole` says why it is to be whole. Where no
+/// scene needs more than is known by columns or `whole` says why it is to be whole. Where no
 /// tissue fits, the places of the skin to look at are written to NAME_refused.ply. Throws
 /// InputError. Collective.
 Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole);

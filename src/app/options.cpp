@@ -28,7 +28,7 @@ base::Option from_key(const char* name, const char* path) {
           .removed = key.removed};
 }
 
-/// What is computed, and how near.
+/// Options of the objective and the accuracy.
 std::vector<base::Option> method_options() {
   return {{.name = "output",
            .kind = OptionKind::path,
@@ -57,7 +57,7 @@ std::vector<base::Option> model_options() {
        "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."}};
 }
 
-/// How the run goes on, ends and tells of itself.
+/// Options of restarting, stopping and reporting.
 std::vector<base::Option> run_options() {
   return {
       {"stability", OptionKind::flag, "",
@@ -104,7 +104,7 @@ void choose(const base::Options& options, const char* name, const char* path, Ta
                               words.begin());
 }
 
-/// mm that a profile asks for, if it does.
+/// mm of a profile, if it has one.
 std::optional<double> accuracy_of(const std::string& profile) {
   if (profile == "preview") return 1.0;
   if (profile == "exact") return 1e-6;

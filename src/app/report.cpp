@@ -13,7 +13,7 @@ std::string report_row(const std::string& name, const std::string& value) {
 
 namespace {
 
-/// How rounds that must settle ended.
+/// Describes how repeated searches ended.
 std::string ending(bool settled, bool stopped, const std::string& unsettled) {
   if (settled) return "settled";
   return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");

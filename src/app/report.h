@@ -7,16 +7,16 @@
 #include "repose/solve/repose.h"
 #include "repose/solve/tearing.h"
 
-/// What a person reads when a run ends.
+/// End-of-run summary.
 namespace repose::app {
 
-/// A name and what is said of it, in a line.
+/// Formats a name and its text as one row.
 std::string report_row(const std::string& name, const std::string& value);
 
 /// Points, springs and prisms of a model, by set. Lines ending in a newline.
 std::string describe_model(const model::Counts& counts);
 
-/// What the builder did: columns, thickness, attachment, remarks.
+/// Describes the built model: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
 /// An incision and how many points it doubled.
 std::string describe_cut(const model::Cut& cut, int64_t doubled);
@@ -24,22 +24,23 @@ std::string describe_cut(const model::Cut& cut, int64_t doubled);
 /// The initial equilibrium in one row.
 std::string describe_prestress(const solve::Prestress& prestress);
 
-/// How many points each instrument holds, and the force (N) with which the tissue pushes on it.
+/// Describes the number of points that each instrument holds, and the force (N) with which the
+/// tissue pushes on it.
 std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
                                const std::vector<Vec3>& forces);
 
-/// What the tissue presses on in the end, a row a body of those names, and how deep anything
-/// passes.
+/// Describes contact at the end: one row for each named body pressed on, and the depth to which
+/// anything passes.
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s);
 
 /// Columns that bone enters between their points; empty if there is none.
 std::string describe_pierced(const std::vector<std::string>& bodies,
                              const solve::PiercedColumns& pierced);
 
-/// What tore and where, in two rows; nothing where no limit was asked for.
+/// Describes torn springs in two rows; empty without a limit.
 std::string describe_tearing(const solve::Tearing& tearing);
 
-/// Whether a run in twice the load steps comes to the same rest position.
+/// Comparison of the rest position with that of twice the load steps.
 struct PathCheck {
   int64_t steps = 0;          ///< of the first run; 0: nothing moves
   double allowed = 0;         ///< mm, that two searches for one rest position may differ by
@@ -51,17 +52,17 @@ struct PathCheck {
   bool holds() const { return steps == 0 || (again.path.complete() && largest <= allowed); }
 };
 
-/// What came of it, in a row.
+/// Describes the comparison in one row.
 std::string describe_path(const PathCheck& check);
 
-/// How many prisms have volume ratios [M] ≤ 0 and where the worst one was at first, in a line that
-/// says what can be done; nothing where there is none.
+/// Describes the number of prisms that have volume ratios [M] ≤ 0 and where the worst one was at
+/// first, in a line that says what can be done; nothing where there is none.
 std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio);
 
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 
-/// A run has been told to end, and what it has reached so far is safe.
+/// Describes a run that was interrupted and the state that it saved.
 std::string describe_saved(const std::string& name);
 
 /// A result, of which `end` is the last step, that a run to `accuracy` mm has nothing to add to.
@@ -72,7 +73,8 @@ std::string describe_finished(const std::string& file, const model::StepNumbers&
 /// `stretched`: it began in an initial equilibrium.
 std::string describe_failure(const solve::Summary& summary, bool stretched);
 
-/// How it ended: load, accuracy, reason, work, inverted prisms, and time and memory of each stage.
+/// Describes the end of a run: load, accuracy, reason, work, inverted prisms, and time and memory
+/// of each stage.
 std::string describe_run(const solve::Summary& summary, const solve::Settings& settings, int ranks,
                          const base::Stages& stages);
 

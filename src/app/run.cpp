@@ -52,7 +52,7 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   base::refuse("{}: the result would replace the input; give another -output", input.string());
 }
 
-/// The option that asks for more than the parts of a model that ranks make themselves, or nothing.
+/// The option that needs more than the parts of a model that ranks make themselves, or nothing.
 std::string needs_whole(const base::Options& options) {
   for (const std::string name : {"adapt", "discretisation", "sensitivity", "verify_path"})
     if (options.flag(name)) return "-" + name;
@@ -127,11 +127,11 @@ class Run {
   base::Stages& stages_;
   base::Interrupt interrupt_;
   solve::Start start_;
-  std::filesystem::path earlier_;  // the result it goes on from, …
+  std::filesystem::path earlier_;  // the result it resumes from, …
   int64_t kept_ = 0;               // … and of its steps how many
 };
 
-/// Whether a rest position at load 1 is all that is asked for.
+/// Returns whether the finished result satisfies all options.
 bool Run::is_done(const model::StepNumbers& end) const {
   const solve::Settings& settings = strategy_.settings;
   const mechanics::Weights& weights = settings.weights;
@@ -218,7 +218,7 @@ Coarser Run::solve_coarser() {
   return coarser;
 }
 
-/// Finds the rest position of the job's model, which rank 0 lets go of where only the search needs
+/// Finds the rest position of the job's model, which rank 0 frees where only the search needs
 /// it: of a large model it is a fifth of the memory.
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
@@ -238,7 +238,7 @@ solve::Summary Run::search(Writer& writer) {
   return summary;
 }
 
-/// What is said of tissue that is inside out at the end. Collective.
+/// Describes inverted tissue at the end. Collective.
 std::string Run::describe_folds(const model::StepNumbers& last, const Writer& writer) const {
   if (last.inverted_prisms == 0) return "";
   const std::vector<double> ratios = writer.volume_ratios();
@@ -248,7 +248,7 @@ std::string Run::describe_folds(const model::StepNumbers& last, const Writer& wr
   return text;
 }
 
-/// Solves what came to rest again, in twice the load steps, where that is asked for. Collective.
+/// Solves what came to rest again, in twice the load steps, where that is requested. Collective.
 std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.verifies_path || !summary.path.complete()) return {};
   PathCheck check = verify_path(comm, job_.model, strategy_.settings, summary, writer.positions());
@@ -291,7 +291,7 @@ std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summ
   return text;
 }
 
-/// What the answer would be if the scene's assumptions were others. Collective.
+/// Describes the change of the result under varied assumptions. Collective.
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
   const solve::RestState rest{writer.positions(), writer.contact_pressures()};

@@ -5,7 +5,7 @@
 #include "job.h"
 #include "repose/solve/sensitivity.h"
 
-/// How much a face depends on what a scene knows least.
+/// Sensitivity of a face to the least known properties of a scene.
 namespace repose::app {
 
 /// The scene with one of its assumptions replaced by another that is as likely.
@@ -14,11 +14,11 @@ struct Variation {
   scene::Scene scene;
 };
 
-/// Border held or let go, a lower Poisson's ratio, a stiffer skin, more tissue let go of bone:
+/// Border held or free, a lower Poisson's ratio, a stiffer skin, more tissue released from bone:
 /// those that apply to a scene.
 std::vector<Variation> variations(const scene::Scene& scene);
 
-/// How far the skin goes by a variation, over the skin that moves by more than 0.5 mm.
+/// Displacement of the skin under a variation, over the skin that moves by more than 0.5 mm.
 struct Sensitivity {
   std::string name;
   bool known = false;                                 ///< the linear system was solved

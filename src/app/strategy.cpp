@@ -48,7 +48,7 @@ std::string first_obstacle(const std::vector<Obstacle>& obstacles, bool Obstacle
   return "";
 }
 
-/// What the options want of coarser models; the scene alone never asks for any.
+/// Request for coarser models by options; a scene alone requests none.
 struct Wish {
   Coarse coarse = Coarse::none;
   const char* option = "";

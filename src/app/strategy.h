@@ -8,9 +8,9 @@
 
 namespace repose::app {
 
-/// How a job is solved. What goes with what is decided in make_strategy, and nowhere else.
+/// Method by which a job is solved. Only make_strategy decides which parts go together.
 struct Strategy {
-  /// What coarser models of the scene are for.
+  /// Purpose of coarser models of the scene.
   enum class Coarse {
     none,
     instead,  ///< the coarsest that is near enough takes the place of the scene's own
@@ -22,14 +22,14 @@ struct Strategy {
   std::string limit;                           ///< why a solid's go no finer, on rank 0
   bool preview = false;                        ///< the last of them is taken in any case
   bool verifies_path = false;                  ///< solved again in twice the load steps
-  bool sensitivity = false;                    ///< asked for, of a rest position at load 1
+  bool sensitivity = false;                    ///< requested, of a rest position at load 1
   std::vector<solve::PlanPiece> tangents;      ///< derivatives by their motions, on all ranks
   bool tears = false;                          ///< in rounds of searches, on all ranks
   std::string explanation;                     ///< what is done and why, a row each; on rank 0
 };
 
 /// Chooses by the job and the options of solve_options(). Throws InputError, one line, where an
-/// option asks for what cannot go with the rest. Collective.
+/// option is incompatible with the others. Collective.
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job);
 
 }  // namespace repose::app

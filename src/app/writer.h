@@ -10,10 +10,10 @@
 
 namespace repose::app {
 
-/// What coarser models gave.
+/// Result of coarser models.
 struct Coarser {
   std::string told;                             ///< on rank 0
-  std::optional<adapt::GridSequence> compared;  ///< with the scene's own model, where asked for
+  std::optional<adapt::GridSequence> compared;  ///< with the scene's own model, where requested
   std::optional<double> discretisation_error;   ///< mm, of the model that was chosen, if one was
 };
 
@@ -21,7 +21,7 @@ struct Coarser {
 /// members that write or gather are collective.
 class Writer {
  public:
-  /// `raised`: what there is of a model that is nowhere whole, or none; `model` is its frame then.
+  /// `raised`: what there is of a fully distributed model, or none; `model` is its frame then.
   /// `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a rest position at
   /// load 1 is the end, or empty.
   Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
@@ -41,18 +41,18 @@ class Writer {
   bool makes_checkpoints() const { return interval_ > 0; }
   bool compares() const { return coarser_.compared.has_value(); }
   const std::string& unsettled() const { return unsettled_; }
-  /// How far the mesh and the layers leave the skin from the continuum, on rank 0.
+  /// Returns the estimated discretization error of the skin, on rank 0.
   const std::string& comparison() const { return comparison_; }
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
-  /// Of every so many points the first: of a model of layers, the skin.
+  /// Returns every `layers`-th point: in a model of layers, the skin.
   std::vector<Vec3> skin_positions(int64_t layers) const;
   std::vector<double> volume_ratios() const;
   /// [N] N/mm², or nothing where tissue touches nothing; likewise.
   std::vector<double> contact_pressures() const;
   /// This rank's rows of what else is known of the points at the last step.
   const std::vector<model::PointField>& point_fields() const { return last_.rows.point_fields; }
-  /// What the tissue does to the instruments in the last step, on rank 0.
+  /// Describes the reaction forces on the instruments in the last step, on rank 0.
   std::string reactions(const std::vector<std::vector<int64_t>>& held) const;
 
  private:

@@ -46,7 +46,7 @@ std::string duration(double seconds) {
   return fmt::format("{:.0f} min", seconds / 60);
 }
 
-/// Whether a person sees what is written to stderr: it is a terminal, or mpirun, which started this
+/// Returns whether stderr is shown on a terminal: it is one, or mpirun, which started this
 /// process with a pipe for stderr, passes it on to one.
 bool watched() {
   if (isatty(STDERR_FILENO)) return true;

@@ -91,7 +91,7 @@ bool is_valid(const Option& option, const std::string& value) {
   return false;
 }
 
-/// What stands behind the name in the help, e.g. "MM", "N|auto", "energy|force".
+/// Returns the placeholder for a value in the help, e.g. "MM", "N|auto", "energy|force".
 std::string placeholder(const Option& option) {
   switch (option.kind) {
     case OptionKind::flag:
@@ -122,13 +122,13 @@ std::string help_line(const Option& option) {
                      notes.empty() ? "" : fmt::format(" [{}]", notes));
 }
 
-/// What PETSc asks for in PetscFinalize.
+/// Returns whether PETSc reads the option only in PetscFinalize.
 bool read_at_the_end(const std::string& name) {
   return name == "options_left" || name == "options_view" || name == "objects_dump" ||
          name == "malloc_dump" || name == "mpidump";
 }
 
-/// The names in PETSc's database that nobody has asked for so far.
+/// The names in PETSc's database that nobody has requested so far.
 std::vector<std::string> left_in_database() {
   PetscInt count = 0;
   char **names = nullptr, **values = nullptr;

@@ -12,7 +12,7 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
   }
   std::vector<int64_t> first = gather_by_column(comm, columns + 1, own, count);
   if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
-  // Every rank asks for the first rows of its columns.
+  // Every rank requests the first rows of its columns.
   ColumnRows rows;
   std::vector<int64_t> begin;
   if (base::rank(comm) > 0) {

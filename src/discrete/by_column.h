@@ -15,7 +15,7 @@ struct ColumnRows {
   int64_t total = 0;
 };
 
-/// Of items of this rank's own columns, `column` [items] ascending, all those of a column. O(all
+/// Returns the global rows of items of this rank's columns; `column` [items] is ascending. O(all
 /// columns) on rank 0. Collective.
 ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column);
 

@@ -9,7 +9,7 @@ namespace repose::discrete {
 /// PETSc can count: 2³¹ − 1 unless it was built with 64-bit indices.
 void require_countable(int64_t points, PetscInt largest = PETSC_MAX_INT);
 
-/// The same of a rank's assembled second derivatives, nine numbers a pair of points.
+/// Checks the size of a rank's assembled Hessian, nine numbers a pair of points.
 void require_addressable(int64_t pairs, PetscInt largest = PETSC_MAX_INT);
 
 }  // namespace repose::discrete

@@ -46,7 +46,7 @@ ColumnGraph graph_of(const model::Ground& ground) {
   return graph;
 }
 
-/// What rank 0 knows while it deals the ground out.
+/// Distributes columns from rank 0.
 class Dealer {
  public:
   Dealer(const model::Ground& ground, const scene::Scene& scene, const ColumnGraph& graph,

@@ -8,7 +8,7 @@
 
 namespace repose::discrete {
 
-/// What a rank is given: a piece of the ground, and where its columns stand in the whole.
+/// Columns given to a rank, and their place in the whole model.
 struct Deal {
   model::Piece piece;
   std::vector<int> owner;                          ///< [C] rank of each column

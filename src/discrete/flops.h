@@ -10,7 +10,7 @@ struct ElementFlops {
 inline constexpr ElementFlops gradient_flops{32, 20, 250};  ///< energy and gradient
 inline constexpr ElementFlops action_flops{46, 12, 450};    ///< the Hessian times a vector
 
-/// Of all elements of a rank.
+/// Returns the operations for all elements of a rank.
 inline double flops_of(const mechanics::Loops& loops, const ElementFlops& each) {
   double flops = each.edge * static_cast<double>(loops.edges.size()) +
                  each.prism * static_cast<double>(loops.prisms.size());

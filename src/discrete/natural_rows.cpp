@@ -79,7 +79,7 @@ std::vector<double> NaturalRows::bring(const Rows& rows, const std::vector<doubl
 
 namespace {
 
-/// How many numbers a value is.
+/// Number of components of a value.
 template <class Value>
 constexpr int width = 1;
 template <>

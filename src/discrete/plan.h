@@ -8,7 +8,7 @@
 
 namespace repose::discrete {
 
-/// What is known of a model, or of a piece of it, where parts are made of it.
+/// Assignment of a model's points, or of those of a piece, to ranks and unknowns.
 struct Plan {
   const model::Model& model;         ///< of which rows are meant
   std::vector<int> owner;            ///< [N] rank of each point
@@ -21,7 +21,7 @@ struct Plan {
   int64_t total_points = 0, total_unknowns = 0;
 };
 
-/// What one rank owns.
+/// Points owned by one rank.
 struct Share {
   int rank;
   std::span<const int64_t> points;  ///< rows, by their places

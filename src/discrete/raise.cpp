@@ -51,7 +51,7 @@ void take_means(MPI_Comm comm, const scene::Scene& scene, const Deal& deal,
   MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
 }
 
-/// What the piece's points touch, if those of any rank touch anything.
+/// Distributes contact of the piece's points, where any rank has contact.
 /// Collective.
 void plan_contact(MPI_Comm comm, model::Model& model, Plan& plan) {
   int64_t touching = !model.contact.touches.point.empty();

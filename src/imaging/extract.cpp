@@ -20,7 +20,7 @@ std::string size_text(const Volume& volume) {
                      volume.spacing(2));
 }
 
-/// What goes into the isosurface: the volume itself where nothing is done to it, else `changed`.
+/// Returns the input of the isosurface: the volume itself if it is unchanged, else `changed`.
 const Volume& prepare(const Volume& volume, const Extraction& wanted, const StepWatch& watch,
                       Volume& changed, std::vector<std::string>& remarks) {
   const Volume* field = &volume;

@@ -21,7 +21,7 @@ std::vector<float> gauss_weights(double sigma) {
   return weights;
 }
 
-/// One axis smoothed; beyond the border the outermost value goes on.
+/// One axis smoothed; beyond the border the outermost value is repeated.
 void smooth_axis(Volume& volume, int axis, const std::vector<float>& weights) {
   int64_t inner = 1, outer = 1;
   for (int a = 0; a < axis; ++a) inner *= volume.size[a];

@@ -23,8 +23,8 @@ constexpr std::string_view implicit_little_endian = "1.2.840.10008.1.2",
                            explicit_little_endian = "1.2.840.10008.1.2.1",
                            explicit_big_endian = "1.2.840.10008.1.2.2";
 
-/// How many bytes come out of a zlib or gzip stream, or several in a row, from `offset` on; of a
-/// damaged one those before the damage.
+/// Returns the number of bytes in a zlib or gzip stream, or several in a row, from `offset` on; of
+/// a damaged one those before the damage.
 int64_t unpacked_bytes(const std::filesystem::path& file, int64_t offset) {
   constexpr int any_header = 47;  // zlib's code for: zlib or gzip, found out
   std::ifstream in(file, std::ios::binary);
@@ -58,7 +58,7 @@ int64_t size_of(const std::filesystem::path& file) {
   return error ? 0 : static_cast<int64_t>(size);
 }
 
-/// What a MetaImage header says of where its voxels are.
+/// Location of the voxels stated by a MetaImage header.
 struct MetaHeader {
   std::string data;  ///< LOCAL, or a file's name
   bool compressed = false;
@@ -103,7 +103,7 @@ std::string transfer_syntax(const std::filesystem::path& file) {
   return syntax.substr(0, syntax.find('\0'));
 }
 
-/// Whether a DICOM file packs its pixels.
+/// Returns whether a DICOM file compresses its pixels.
 bool is_packed_dicom(const std::filesystem::path& file) {
   const std::string syntax = transfer_syntax(file);
   return !syntax.empty() && syntax != implicit_little_endian && syntax != explicit_little_endian &&
@@ -218,7 +218,7 @@ void check_nifti_header(const std::filesystem::path& file) {
 
 void check_meta_dimensions(const std::filesystem::path& file) {
   constexpr int64_t most = 10;
-  // ITK takes ':' for '=', several of them for one, and goes on behind a data file's name.
+  // ITK takes ':' for '=', several of them for one, and reads on behind a data file's name.
   std::string begin(size_t{1} << 16, '\0');
   std::ifstream in(file, std::ios::binary);
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));

@@ -12,7 +12,7 @@ namespace repose::imaging {
 void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes);
 
 /// Throws InputError where an element of a DICOM file in little endian says it holds more than the
-/// file: its library asks for that memory at once. Elements up to the pixels are looked
+/// file: its library allocates that memory at once. Elements up to the pixels are looked
 /// at; a file without DICOM's mark passes.
 void check_dicom_lengths(const std::filesystem::path& file);
 

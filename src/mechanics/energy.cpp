@@ -32,7 +32,7 @@ double in_sections(const Loop& loop, Add&& add) {
   return counted;
 }
 
-/// Of some rows of a loop: the gradient, and the energy as a sum.
+/// Adds the gradient of some rows of a loop and returns the sum of their energies.
 template <int p>
 double spring_gradient(const SpringLoop& loop, const Section& rows, std::span<const Vec3> position,
                        double scale, std::span<Vec3> gradient) {

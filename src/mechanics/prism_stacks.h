@@ -13,7 +13,7 @@ struct Face {
   Triple<Pair> corner, edge1, edge2;
 };
 
-/// What pulls at a triangle's edges and at the triangle as a whole.
+/// Forces on a triangle's edges and on the triangle as a whole.
 struct FaceForce {
   Triple<Pair> edge1{}, edge2{}, whole{};
   void add(const FaceForce& o) {

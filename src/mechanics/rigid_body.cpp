@@ -11,8 +11,8 @@ namespace {
 
 using surface::Distance;
 
-/// Of a point `from` beside the middle of a ball, or of the nearest ball of a capsule with the axis
-/// `along` (0 for none).
+/// Returns the distance of a point at `from` relative to the center of a ball, or to the nearest
+/// ball of a capsule with the axis `along` (0 for none).
 Distance from_middle(const Vec3& from, double radius, const Vec3& along) {
   const double length = from.norm();
   if (!(length > 0)) return {-radius, Vec3::Zero(), Mat3::Zero()};

@@ -7,7 +7,7 @@ namespace repose::meshtools {
 
 using surface::Surface;
 
-/// What stands on the two sides of a sheet: the bone in front of a cut, behind it, or the gap that
+/// Content on the two sides of a sheet: the bone in front of a cut, behind it, or the gap that
 /// the saw leaves.
 enum class Side { ahead, behind, kerf, none };
 

@@ -5,7 +5,8 @@ namespace repose::meshtools {
 
 using surface::Surface;
 
-/// What of a closed manifold surface has values ≥ 0, linear in its triangles: cut exactly along 0.
+/// Returns the part of a closed manifold surface with values ≥ 0, linear in its triangles: cut
+/// exactly along 0.
 Surface cut_at_zero(const Surface& surface, const std::vector<double>& values);
 
 }  // namespace repose::meshtools

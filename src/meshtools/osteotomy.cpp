@@ -24,7 +24,7 @@ constexpr double slack = 1e-3;  // mm, more than a cut is ever shifted
 
 enum class CellPart { outside, piece, kerf, rest };
 
-/// What a cell of the arrangement touches.
+/// Contents of a cell of the arrangement.
 struct Cell {
   bool air = false, bone = false;  // outside of the bone's surface; its inside
   bool ahead = false, kerf = false, behind = false;
@@ -228,7 +228,7 @@ class Sorter {
   std::map<int64_t, CellPart> parts_;
 };
 
-/// Whether a part can be written, read again and cut again.
+/// Returns whether a part can be written, read again and cut again.
 bool is_sound(const Surface& part) {
   const Defects d = inspect(part, false);
   return d.outward && d.border_edges + d.non_manifold_edges + d.non_manifold_vertices +

@@ -4,14 +4,14 @@
 
 namespace repose::model {
 
-/// What the tissue of a model of make_layers touches: bones that it may reach as they move, unless
+/// Adds the contact of a model of make_layers: bones that the tissue may reach as they move, unless
 /// the scene's contact leaves them out; bones that it slides along; instruments on which the skin
 /// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
 /// its median thickness. Throws InputError naming the scene and an instrument that reaches no free
 /// point of the skin.
 void add_contact(const scene::Scene& scene, const Foundation& on, Model& model);
 
-/// Of this the bones alone, and the points that may come to them: of a part of a model, too.
+/// Adds the bones alone, and the points that may reach them; also for a part of a model.
 void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model);
 

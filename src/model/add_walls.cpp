@@ -128,7 +128,8 @@ class Wall {
     return area;
   }
 
-  /// Whether a net's normal, along the cut × inwards, points into the tissue of the doubles.
+  /// Returns whether a net's normal, along the cut × inwards, points into the tissue of the
+  /// doubles.
   bool faces_away() const {
     const auto& x = model_.points.position;
     std::map<int64_t, std::pair<Vec3, int>> middle;  // of the doubles' prisms, by what is doubled

@@ -14,7 +14,7 @@ namespace {
 constexpr double gap = 1.5;            // mm
 constexpr double gap_per_depth = 0.5;  // of the column's thickness
 
-/// What each column is to do, by region.
+/// Returns the requested attachment of each column, by region.
 std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& scene,
                                   Attachment& attachment) {
   const scene::Tissue& tissue = scene.tissue;

@@ -31,7 +31,7 @@ void require_free_cuts(const scene::Scene& scene, const std::vector<Cut>& cuts,
     }
 }
 
-/// What is given to points and elements.
+/// Adds the properties of points and elements.
 void complete(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
   const std::string file = scene.file.string();
   if (scene.tissue.material)

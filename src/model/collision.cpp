@@ -117,7 +117,7 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
   return movers;
 }
 
-/// Remarks on bones that end inside others, of a scene that asks for nothing about contacts.
+/// Remarks on bones that end inside others, of a scene that has no key collision.
 void tell_of_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
                       std::vector<std::string>& remarks) {
   constexpr double worth_saying = 1;  // mm: segmented teeth overlap by some tenths

@@ -70,7 +70,7 @@ class Knife {
   int64_t double_of(int64_t row) const { return doubled(row) ? doubles_[row] : row; }
   int64_t column(int64_t row) const { return model_.points.column[row]; }
 
-  /// Whether a spring lies in the cut and must become two.
+  /// Returns whether a spring lies in the cut and must become two.
   bool in_cut(int64_t p, int64_t q) const {
     return (doubled(p) || doubled(q)) &&
            (column(p) == column(q) || sides_.in_cut(column(p), column(q)));
@@ -143,7 +143,7 @@ class Knife {
     model_.springs = std::move(springs);
   }
 
-  /// Of a solid's edges the weights that skin tension and an initial equilibrium gave them.
+  /// Returns the weights that skin tension and an initial equilibrium gave to a solid's edges.
   std::vector<double> weights_beyond_material() {
     std::vector<double> beyond = model_.edges.weight;
     if (!is_solid(model_)) return beyond;

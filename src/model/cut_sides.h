@@ -15,13 +15,14 @@ class CutSides {
   /// `columns` are the path's vertices. InternalError where they are no path inside the surface.
   CutSides(const std::vector<int64_t>& columns, const std::vector<Triangle>& triangles);
 
-  /// Whether a vertex lies on the path, not at its tips.
+  /// Returns whether a vertex lies on the path, not at its tips.
   bool parted(int64_t vertex) const { return parted_.contains(vertex); }
-  /// Whether an edge belongs to the path.
+  /// Returns whether an edge belongs to the path.
   bool in_cut(int64_t a, int64_t b) const;
-  /// Of a parted vertex: whether an edge to another vertex, not in the cut, lies left of the path.
+  /// Returns whether an edge from a parted vertex, not in the cut, lies left of the path.
   bool left_edge(int64_t vertex, int64_t other) const;
-  /// The same for a triangle around it, its corners in any order.
+  /// Returns whether a triangle around a parted vertex lies left of the path, its corners in any
+  /// order.
   bool left_triangle(int64_t vertex, const Triangle& corners) const;
 
  private:

@@ -7,11 +7,11 @@
 /// Columns that cross: where tissue between neighbouring columns would be folded.
 namespace repose::model {
 
-/// How far the prisms between three columns are from folding, whatever the layers. With the column
-/// of corner i running X_i + s w_i, s in [0, 1], and N(s) the cross product of the triangle's sides
-/// at s, the Jacobian of the wedge map at that corner is J_i(s) = N(s) · w_i, a quadratic; returned
-/// is its least value over s and the three corners, over |N(0)| |w_i|. Positive: every prism of
-/// every number of layers has positive volume and no folded corner.
+/// Returns the margin of the prisms between three columns from folding, for any layers. With the
+/// column of corner i running X_i + s w_i, s in [0, 1], and N(s) the cross product of the
+/// triangle's sides at s, the Jacobian of the wedge map at that corner is J_i(s) = N(s) · w_i, a
+/// quadratic; returned is its least value over s and the three corners, over |N(0)| |w_i|.
+/// Positive: every prism of every number of layers has positive volume and no folded corner.
 double fold_margin(const std::array<Vec3, 3>& skin, const std::array<Vec3, 3>& column);
 
 /// The triangles whose columns, directions[v] · thickness[v], have less than the margin wanted.

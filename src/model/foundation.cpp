@@ -37,7 +37,7 @@ SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin
   return make_skin_mesh(refined);
 }
 
-/// Which columns are held as the rim; those let go of bone, as do those near other pieces.
+/// Which columns are held as the rim; those released from bone, as do those near other pieces.
 std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range,
                              const SkinMesh& mesh, const Columns& columns, const BoneField& field,
                              Attachment& attachment) {

@@ -29,7 +29,7 @@ struct Ground::State {
 
 namespace {
 
-/// What the layers will make of the columns.
+/// Counts the points and elements that the layers will have.
 Counts count(const Foundation& on, int64_t layers) {
   Counts counts;
   for (size_t c = 0; c < on.rim.size(); ++c) {

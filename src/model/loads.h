@@ -5,7 +5,7 @@
 #include "repose/model/skin_mesh.h"
 #include "repose/scene/scene.h"
 
-/// What pulls on the points: masses and external forces.
+/// Loads on the points: masses and external forces.
 namespace repose::model {
 
 /// Masses (kg) of a model of make_layers: each layer's mass shared over its points in proportion to

@@ -64,7 +64,7 @@ Inside inside_of(const scene::SkinRegion& region) {
   };
 }
 
-/// How deep a prism's upper and lower triangle lie below the skin, mm.
+/// Returns the depth of a prism's upper and lower triangle below the skin, mm.
 std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism) {
   std::array<double, 2> depth{};
   for (int c = 0; c < 6; ++c) {

@@ -7,12 +7,13 @@ namespace repose::model {
 
 using Contains = std::function<bool(const Vec3&)>;
 
-/// Whether a point lies in a region, or no farther than `near` mm from it (to half a voxel of a
-/// label map). Reads the region's file; throws InputError for a mesh that is not closed.
+/// Returns a test of whether a point lies in a region, or no farther than `near` mm from it (to
+/// half a voxel of a label map). Reads the region's file; throws InputError for a mesh that is not
+/// closed.
 Contains contains_of(const scene::Region& region, double near = 0);
 
-/// Whether a point of the skin lies in a region of space, or the painted mesh's vertex nearest to
-/// it, within 10 mm, is painted.
+/// Returns a test of whether a point of the skin lies in a region of space, or the painted mesh's
+/// vertex nearest to it, within 10 mm, is painted.
 Contains contains_of_skin(const scene::SkinRegion& region);
 
 }  // namespace repose::model

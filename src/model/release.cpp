@@ -8,13 +8,14 @@ namespace {
 constexpr double full_difference = 4;  // mm, of displacements, from which the distance is the whole
 constexpr double alike = 1e-9;         // mm: pieces whose displacements differ by less move alike
 
-/// mm, up to which tissue lets go of bone whose displacement differs by so many mm there.
+/// mm, up to which tissue is released from bone whose displacement differs by so many mm there.
 double reach(const Release& release, double difference) {
   if (difference <= alike) return -1;
   return release.distance * std::min(1.0, difference / full_difference);
 }
 
-/// Whether tissue at `point`, which holds to the bone `own`, lets go of it because of another one.
+/// Returns whether tissue at `point`, attached to the bone `own`, is released because of another
+/// bone.
 bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones, const MotionRange& range,
                    const Release& release) {
   for (int32_t piece = 0; piece < bones.size(); ++piece) {

@@ -6,7 +6,7 @@
 
 namespace repose::model {
 
-/// How tissue lets go of bone.
+/// Release of tissue from bone.
 struct Release {
   double distance;    ///< mm, at most; 0: nowhere
   scene::Attach how;  ///< what it does then

@@ -7,7 +7,7 @@
 
 namespace repose::model {
 
-/// What each column meets on its way inwards, [V] each.
+/// Distances that each column meets on its way inwards, [V] each.
 struct Reach {
   std::vector<double> to_bone;  ///< mm along the column to the first bone, infinite where none
   std::vector<double> room;     ///< mm a column that ends free may be long

@@ -24,7 +24,7 @@ std::vector<double> shape_row(const model::Body& body) {
 
 namespace {
 
-/// How many numbers a value is, if it is not one.
+/// Number of components of a value.
 template <class Value>
 constexpr hsize_t width = 0;
 template <>

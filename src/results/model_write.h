@@ -9,7 +9,7 @@ namespace repose::results {
 
 /// Writes format, version and /model, serially; and, where there are bone surfaces,
 /// /model/bone_surfaces (points f64 [P,3], triangles i64 [T,3], bone i32 [T]), the same merged. Of
-/// a model that is nowhere whole `slabs` says what arrays of points and elements there are, which
+/// a fully distributed model `slabs` says what arrays of points and elements there are, which
 /// are left for fill_model().
 void write_model(const base::Hdf5File& file, const model::Model& model,
                  const model::ModelRows* slabs, const MergedBones& bones);
@@ -17,7 +17,7 @@ void write_model(const base::Hdf5File& file, const model::Model& model,
 /// Work on a file that all ranks do, and all fail if one does.
 using OnDisk = std::function<void(const std::function<void()>&)>;
 
-/// What a body's shape is made of, in a row of model::shape_numbers; zeros for a bone, which has
+/// Returns the numbers of a body's shape, model::shape_numbers of them; zeros for a bone, which has
 /// its surface.
 std::vector<double> shape_row(const model::Body& body);
 

@@ -20,7 +20,7 @@ namespace repose::results {
 
 namespace {
 
-/// Whether the open file is still the one at `path`: a holder removes it when it is done.
+/// Returns whether the open file is still the one at `path`: a holder removes it when it is done.
 bool is_at(const std::filesystem::path& path, int descriptor) {
   struct stat open_one = {}, there = {};
   return fstat(descriptor, &open_one) == 0 && stat(path.c_str(), &there) == 0 &&
@@ -61,7 +61,7 @@ void write_holder(int descriptor) {
   if (ftruncate(descriptor, 0) != 0 || pwrite(descriptor, text.data(), text.size(), 0) < 0) return;
 }
 
-/// Whether what follows the name is that of a run's unfinished file, not of another run's.
+/// Returns whether what follows the name is that of a run's unfinished file, not of another run's.
 bool is_ending(const std::string& rest) {
   static const std::regex endings(
       "(_checkpoint)?(\\.h5|_(tissue|springs|skin|bones)\\.xdmf)\\.[0-9]+\\.part");

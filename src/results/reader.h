@@ -29,9 +29,9 @@ class Reader {
   explicit Reader(const std::filesystem::path& file);
 
   const std::string& file() const { return name_; }
-  /// Whether something of that path is there, at the end of links that lead somewhere.
+  /// Returns whether something of that path is there, at the end of links that lead somewhere.
   bool has(const std::string& path) const;
-  /// How many links a group has.
+  /// Returns the number of links of a group.
   int64_t links(const std::string& group) const;
   [[noreturn]] void refuse(const std::string& path, const std::string& what) const;
 

@@ -412,8 +412,8 @@ void ResultFile::State::write_step(const model::StepNumbers& numbers, const mode
   loads.push_back(numbers.load);
 }
 
-/// Whether the last step, a rest position at a load below 1, reads as that of a run that ended
-/// there.
+/// Returns whether the last step, a rest position at a load below 1, reads as that of a run that
+/// ended there.
 void ResultFile::State::mark_last(bool as_end) {
   const base::Hdf5Group step(H5Gopen2(file, group_of(loads.size() - 1).c_str(), H5P_DEFAULT));
   on_disk([&] {
@@ -451,7 +451,8 @@ bool ResultFile::State::save() {
   return true;
 }
 
-/// On rank 0. Attributes are written anew: HDF5 crashes where it copies strings of variable length.
+/// On rank 0. Attributes are written again: HDF5 crashes where it copies strings of variable
+/// length.
 void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t count) {
   const Reader in(earlier);
   unfinished->reserve(static_cast<int64_t>(std::filesystem::file_size(earlier)));

@@ -6,7 +6,7 @@
 
 namespace repose::results {
 
-/// How much of everything a result file holds.
+/// Sizes of the arrays in a result file.
 struct FileCounts {
   int64_t points = 0, springs = 0, prisms = 0, skin = 0;
   int64_t bone_points = 0, bone_triangles = 0;  ///< of the merged bone surfaces
@@ -21,9 +21,9 @@ struct OptionalField {
   std::vector<bool> in_step;  ///< [steps]
 };
 
-/// What ParaView is offered of a result file, one block a file: tissue (wedges), springs (lines),
-/// skin and bones (triangles). `bones_moved` [steps]: whether the step stores moved bone surfaces.
-/// Tissue and skin show the optional fields. Blocks without a cell are listed too.
+/// Returns the views of a result file for ParaView, one block a file: tissue (wedges), springs
+/// (lines), skin and bones (triangles). `bones_moved` [steps]: whether the step stores moved bone
+/// surfaces. Tissue and skin show the optional fields. Blocks without a cell are listed too.
 std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<OptionalField>& fields,
                              const std::vector<bool>& bones_moved);
 

@@ -110,7 +110,7 @@ void write_attribute(hid_t object, const char* name, const std::vector<int64_t>&
 
 namespace {
 
-/// What the rows of a virtual dataset hold that no piece covers.
+/// Sets the fill value for rows of a virtual dataset that no piece covers.
 void set_fill(hid_t creation, hid_t type) {
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   const int64_t none = -1;

@@ -60,7 +60,7 @@ base::Hdf5Dataset create_rows(hid_t place, const std::string& name, int64_t rows
 
 /// Writes rows `mine` of a dataset of numbers, row by row in `values`, of the HDF5 type
 /// `memory_type`. Collective over `comm`; in pieces
-/// that fit MPI's int counts. A rank that fails goes on to the end before it throws, so that all
+/// that fit MPI's int counts. A rank that fails continues to the end before it throws, so that all
 /// can agree on the outcome afterwards.
 void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Slab& mine,
                 const void* values, hid_t memory_type = H5T_NATIVE_DOUBLE);

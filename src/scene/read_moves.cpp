@@ -56,7 +56,7 @@ class Forms {
   Forms(const std::map<std::string, Vec3>& landmarks, std::vector<std::string>& remarks)
       : landmarks_(landmarks), remarks_(remarks) {}
 
-  /// What an entry adds to the motion `before` of its bone.
+  /// Returns the motion of an entry that follows the motion `before` of its bone.
   RigidMotion read_entry(const Map& entry, const RigidMotion& before) {
     const Value form = only_form(entry, {"translate", "rotate", "landmark", "transform"});
     if (const auto list = entry.find("translate")) return read_translations(*list);

@@ -8,7 +8,7 @@ namespace repose::scene {
 /// curve (with radius) of an item.
 Region read_region(const Map& map);
 
-/// The same, or with the key painted what is painted on a mesh of the skin.
+/// Reads a region, or with the key painted the painted part of a mesh of the skin.
 SkinRegion read_skin_region(const Map& map);
 
 Box read_box(const Map& map);

@@ -25,7 +25,7 @@ void set(Target& target, const Map& map, const char* name, Result (Value::*read)
   if (const auto value = map.find(name)) target = ((*value).*read)();
 }
 
-/// The same for an enumeration whose values are numbered as the key's choices.
+/// Sets an enumeration whose values are numbered as the key's choices.
 template <class Enum, class Target>
 void set_choice(Target& target, const Map& map, const char* name) {
   if (const auto value = map.find(name)) target = static_cast<Enum>(value->choice());

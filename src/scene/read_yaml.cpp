@@ -58,7 +58,7 @@ class Documents : public YAML::EventHandler {
   void OnMapEnd() override {}
 };
 
-/// The line of the second document, 0 for none. YAML::LoadAll, which would tell, goes on for ever
+/// The line of the second document, 0 for none. YAML::LoadAll, which would tell, never ends
 /// with some damaged files.
 int second_document(const std::string& text) {
   std::istringstream stream(text);

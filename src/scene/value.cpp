@@ -176,7 +176,7 @@ void Value::add_entries(const YAML::Node& map, bool merged, int depth,
   }
 }
 
-/// What stands in the map itself beats what is merged into it, and an earlier merge a later one.
+/// Adds an entry: those of the map itself override merged ones, and an earlier merge a later one.
 void Value::add_entry(Entry entry, std::vector<Entry>& found) const {
   const auto same = std::find_if(found.begin(), found.end(),
                                  [&](const Entry& other) { return other.name == entry.name; });

@@ -48,7 +48,7 @@ class Value {
   /// Absolute path of a file or folder that exists.
   std::filesystem::path file_or_folder() const;
 
-  /// The same value under another key of the table.
+  /// Returns the value under another key of the table.
   Value as(std::string path) const { return {*this, node_, mark_, std::move(path), place_}; }
 
   /// The items of a list of maps, each under the key "path[]".

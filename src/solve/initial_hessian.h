@@ -5,7 +5,7 @@
 
 namespace repose::solve {
 
-/// How much slower a quasi-Newton search has become since its initial Hessian was made, in
+/// Slowdown of a quasi-Newton search since its initial Hessian was made, in
 /// iterations: what the line searches cut off the full steps, and what went beyond the iterations
 /// that the same reduction of the force takes at the best rate seen since. Renewed when that
 /// exceeds the price of a new one, as LagPolicy (lag_policy.h).
@@ -51,9 +51,9 @@ class InitialHessian {
   int64_t renewals_ = 0;  // of the preconditioner, when last looked at
 };
 
-/// Whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial stiffness`, the
-/// default of a solid) or with the diagonal that TAO estimates (`diagonal`, that of springs).
-/// Throws InputError. Collective.
+/// Returns whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial
+/// stiffness`, the default of a solid) or with the diagonal that TAO estimates (`diagonal`, that of
+/// springs). Throws InputError. Collective.
 bool begins_with_stiffness(const discrete::Positions& positions);
 
 }  // namespace repose::solve

@@ -152,7 +152,7 @@ bool LoadPath::in_vain(const Attempt& tried) const {
   return refused_ > most_refused + refused_a_taken * taken;
 }
 
-/// Of the step that ends the path without rest.
+/// Explains the step that ends the path without rest.
 void LoadPath::explain_failure() {
   if (result_.last.converged || result_.last.stopped || result_.halvings.count() == 0) return;
   result_.last.reason += fmt::format("; {} load steps have been halved, which took {} evaluations",

@@ -77,8 +77,8 @@ discrete::Part stiffness_part(discrete::Part part, const std::vector<char>& skin
   return part;
 }
 
-/// What Σ q² r⁴/(Y v) + Σ p² V/K makes of a solid: springs of stiffness Y v / r² in place of its
-/// edges, prisms of modulus K that are at rest.
+/// Returns the part of the quadratic form Σ q² r⁴/(Y v) + Σ p² V/K: springs of stiffness Y v / r²
+/// in place of its edges, prisms of modulus K that are at rest.
 discrete::Part solid_stiffness_part(discrete::Part part) {
   constexpr double pairs = 15;
   remove_contact(part);
@@ -132,7 +132,7 @@ class Stiffness {
     solver_.solve(initial, force, multiplier, 1e-10);
     positions_.spread(multiplier, multiplier_);
   }
-  /// Of K Aᵀ μ what a spring carries, N.
+  /// Returns a spring's component of K Aᵀ μ, N.
   double tension(size_t spring) const {
     const Model& model = part_.model;
     const auto& [p, q] = model.springs.points[spring];

@@ -28,7 +28,7 @@ using model::VolumeTerm;
 
 namespace {
 
-/// What a state amounts to.
+/// Computes the energies and errors of a state.
 void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   const mechanics::Totals totals = objective.totals();
   const mechanics::Weights& weights = objective.weights();
@@ -70,7 +70,7 @@ model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& se
   return n;
 }
 
-/// Shows each iteration on a terminal, prints it where that is asked for, and ends the search where
+/// Shows each iteration on a terminal, prints it where that is requested, and ends the search where
 /// a signal or the time limit wants it.
 class Watcher {
  public:
@@ -130,7 +130,7 @@ class Watcher {
   Clock::time_point begin_ = Clock::now();
 };
 
-/// What finds the rest position of a model under the settings. One object so that its parts live
+/// Search for the rest position of a model under the settings. One object so that its parts live
 /// and end together.
 class Searcher {
  public:
@@ -156,7 +156,7 @@ class Searcher {
   Problem& problem() { return problem_; }
   Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
-  /// Of the searches.
+  /// Returns the evaluations of the searches alone.
   int64_t evaluations() { return problem_.function().evaluations() - looks_; }
   int64_t evaluations_for_other() const { return contact_ ? contact_->evaluations_for_other() : 0; }
   void count_look() { ++looks_; }
@@ -171,7 +171,7 @@ class Searcher {
   int64_t looks_ = 0;  // evaluations for those who look at a state
 };
 
-/// Lets the one who asks for it look at the state of each iteration.
+/// Lets the caller inspect the state of each iteration.
 void show_states(Searcher& searcher, const Settings& settings,
                  const discrete::NaturalRows& natural) {
   searcher.watcher().on_iteration([&](const Iteration& i) {

@@ -40,7 +40,7 @@ void choose_factors(KSP krylov) {
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-/// How many eigenvalues are below `shift`: as many as the pivots of H − shift that are negative.
+/// Returns the number of eigenvalues below `shift`: that of negative pivots of H − shift.
 PetscInt eigenvalues_below(Mat matrix, double shift) {
   // ICNTL: without ScaLAPACK, which does not know the inertia, and with room on many ranks.
   constexpr int parallel_root = 13, more_memory = 14;

@@ -3,7 +3,7 @@
 
 #include "repose/surface/surface.h"
 
-/// What every CGAL-based file of this room shares. Predicates are exact, constructions rounded.
+/// Kernel and conversions of all CGAL-based files. Predicates are exact, constructions rounded.
 namespace repose::surface {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;

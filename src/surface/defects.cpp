@@ -46,8 +46,8 @@ void count_fans(const Surface& surface, UnionFind& corners, Defects& d) {
         std::find_if(fans_at.begin(), fans_at.end(), several) - fans_at.begin();
 }
 
-/// A border goes on from edge to edge where both belong to one fan, as if each fan had a vertex of
-/// its own.
+/// A border continues from edge to edge where both belong to one fan, as if each fan had a vertex
+/// of its own.
 int64_t count_border_loops(const EdgeTable& edges, UnionFind& corners, size_t triangles) {
   std::vector<int64_t> edge_at_fan(3 * triangles, -1);
   UnionFind loops(edges.edges());

@@ -8,7 +8,8 @@ namespace repose::surface {
 
 namespace {
 
-/// Whether the upward edge from `low` to `high` crosses the half-line from (y, z) in +y direction.
+/// Returns whether the upward edge from `low` to `high` crosses the half-line from (y, z) in +y
+/// direction.
 bool crosses_beyond(const Vec3& low, const Vec3& high, const Kernel::Point_2& point) {
   return CGAL::left_turn(Kernel::Point_2(low.y(), low.z()), Kernel::Point_2(high.y(), high.z()),
                          point);

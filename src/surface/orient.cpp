@@ -97,7 +97,7 @@ class Orienter {
     return six_volumes(alone.points, alone.triangles) > 0;
   }
 
-  /// How many other closed parts part `p` lies in.
+  /// Returns the number of other closed parts that contain part `p`.
   int64_t depth(size_t p) {
     const auto& triangle = surface_.triangles[parts_[p].triangles.front()];
     const Vec3 inside = (surface_.points[triangle[0]] + surface_.points[triangle[1]] +

@@ -5,7 +5,7 @@
 #include "repose/base/geometry.h"
 #include "repose/surface/ply.h"
 
-/// What a mesh file holds, between its bytes and a Surface.
+/// Contents of a mesh file, between its bytes and a Surface.
 namespace repose::surface {
 
 /// Points and polygons as a file stores them; nothing checked.

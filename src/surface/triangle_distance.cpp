@@ -30,7 +30,7 @@ void sides(const Vec3& p, const Vec3& d, const Vec3& q, const Vec3& e, ShortestW
   offer(p + s * d, q + t * e, best);
 }
 
-/// Whether the foot of `p` on the plane of `t` lies in it, for the unscaled normal n.
+/// Returns whether the foot of `p` on the plane of `t` lies in it, for the unscaled normal n.
 bool above(const Vec3& p, const Corners& t, const Vec3& n) {
   for (int k = 0; k < 3; ++k)
     if (n.cross(t[(k + 1) % 3] - t[k]).dot(p - t[k]) < 0) return false;

@@ -15,7 +15,7 @@ struct Entry {
   int64_t node;
 };
 
-/// Of a triangle's barycentric regions the one that holds the foot of `q`.
+/// Returns the point of a triangle nearest to `q`, by barycentric regions.
 Vec3 closest_point(const Vec3& q, const Corners& t) {
   const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = q - t[0], bp = q - t[1], cp = q - t[2];
   const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),

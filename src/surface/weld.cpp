@@ -16,7 +16,7 @@ void weld_points(Surface& surface) {
   std::erase_if(surface.triangles, repeats_vertex);
 }
 
-/// Of triangles with the same three vertices, in any order, the first stays.
+/// Keeps the first of triangles with the same three vertices, in any order.
 void drop_duplicates(std::vector<Triangle>& triangles) {
   std::set<Triangle> seen;
   std::erase_if(triangles, [&](Triangle triangle) {

@@ -4,7 +4,7 @@
 /// Cheaper models of a scene, and what they say about its own.
 namespace repose::adapt {
 
-/// How finely tissue is divided.
+/// Resolution of a model: edge length of the skin and number of layers.
 struct Resolution {
   double edge = 0;  ///< mm, of the skin's triangles; 0: the skin as it is
   int layers = 0;   ///< point layers; 0: the scene's
@@ -18,7 +18,7 @@ struct Resolution {
 model::BuiltModel coarse_model(const model::Anatomy& anatomy, const model::Model& fine,
                                const Resolution& resolution);
 
-/// Whether the number of layers may differ from the scene's: it names none of them.
+/// Returns whether the number of layers may differ from the scene's: it names none of them.
 bool layers_are_free(const scene::Tissue& tissue);
 
 }  // namespace repose::adapt

@@ -4,7 +4,7 @@
 
 #include "repose/adapt/grid_sequence.h"
 
-/// How far a model's own mesh and layers leave the skin from the continuum that it stands for.
+/// Estimate of the discretization error: the distance of a model's skin from that of the continuum.
 namespace repose::adapt {
 
 /// Resolutions to compare a scene's own with, coarsest first: edges four times and twice as long, a

@@ -11,7 +11,7 @@
 
 namespace repose::adapt {
 
-/// What one coarse model took, and how far it brought the answer.
+/// Work and error of one coarse model.
 struct Level {
   Resolution resolution;
   int64_t points = 0, unknowns = 0;
@@ -25,7 +25,7 @@ struct Level {
   double discretisation_error = 0;
 };
 
-/// What coarser models of a scene came to.
+/// Results of a sequence of coarser models.
 struct GridSequence {
   std::vector<Level> levels;        ///< coarsest first, those that came to rest
   std::vector<Vec3> position;       ///< [N] on rank 0: the last one's answer at the scene's points
@@ -37,7 +37,7 @@ struct GridSequence {
   std::string refusal;              ///< why it ended before its last level, or empty; on rank 0
 };
 
-/// What is wanted of a sequence.
+/// Levels and accuracy of a sequence of models.
 struct SequencePlan {
   std::vector<Resolution> levels;             ///< coarsest first
   std::optional<solve::Recording> recording;  ///< initial equilibrium of every model

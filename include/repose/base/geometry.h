@@ -44,7 +44,7 @@ enum class Handedness { kept, mirrored };
 
 /// The least-squares transform taking `moving` to `fixed`, pairs in order (Umeyama, Least-squares
 /// estimation of transformation parameters between two point patterns, 1991): the best rotation,
-/// or the best reflection. The scale stays 1 unless asked for. At least three pairs that fix a
+/// or the best reflection. The scale stays 1 unless requested. At least three pairs that fix a
 /// rotation (breadth).
 Similarity fit_similarity(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
                           bool with_scale, Handedness handedness = Handedness::kept);

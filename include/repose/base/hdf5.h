@@ -73,7 +73,7 @@ Hdf5File open_hdf5(const std::filesystem::path& file, MPI_Comm comm);
 /// Creates a group without time stamps. Collective where the file is.
 Hdf5Group create_hdf5_group(hid_t place, const char* name);
 
-/// Whether there is something at a path whose parent exists.
+/// Returns whether there is something at a path whose parent exists.
 bool hdf5_has(hid_t file, const std::string& path);
 
 /// All numbers of a dataset, as doubles.

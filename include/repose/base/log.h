@@ -4,11 +4,11 @@
 #include <chrono>
 #include <string>
 
-/// What PETSc's log (-log_view) tells of this program: events inside stages. Nothing is collective,
+/// Events and stages of this program in PETSc's log (-log_view). Nothing is collective,
 /// and without the log nothing costs more than a test.
 namespace repose::base {
 
-/// The event of that name, registered when first asked for, −1 without PETSc: keep it in a static
+/// The event of that name, registered when first requested, −1 without PETSc: keep it in a static
 /// of the function.
 PetscLogEvent log_event(const char* name);
 
@@ -33,7 +33,7 @@ class LogStage {
   LogStage& operator=(const LogStage&) = delete;
 };
 
-/// One line on a terminal that is written over as work goes on, with the time it will still take;
+/// One line on a terminal that is written over as work continues, with the time it will still take;
 /// nothing at all where neither stderr nor that of mpirun is a terminal, and on ranks other than
 /// the first.
 class Progress {

@@ -57,7 +57,7 @@ class Options {
   /// -help was given. With `-help petsc` or `-help intro` it goes to PETSc instead, and this is
   /// false.
   bool help_wanted() const { return help_wanted_; }
-  /// What the program does, its arguments and options: one screen, from the table.
+  /// Returns the help page: description, arguments and options, from the table.
   std::string help() const;
 
   /// The command line for PetscInitialize: the program's name and PETSc's options with their
@@ -83,7 +83,7 @@ class Options {
   std::string text(std::string_view name) const;  ///< text, path, choice; a number as typed
   std::vector<std::string> texts(std::string_view name) const;  ///< all values; empty if none
 
-  /// The PETSc options of the command line that PETSc never asked for. PETSc must be initialised.
+  /// The PETSc options of the command line that PETSc never requested. PETSc must be initialised.
   std::vector<std::string> unused() const;
   /// The options by which the user changes what PETSc computes, as typed, or empty. After check().
   const std::string& petsc_settings() const { return petsc_settings_; }

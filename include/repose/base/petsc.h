@@ -26,7 +26,7 @@ class PetscError : public InternalError {
 /// Throws PetscError with PETSc's own text when `code` is not zero. Not collective.
 void check(PetscErrorCode code);
 
-/// The same for PETSc's …SetFromOptions, whose errors are the user's: throws InputError.
+/// Checks the result of PETSc's …SetFromOptions, whose errors are the user's: throws InputError.
 void check_options(PetscErrorCode code);
 
 /// Owns one reference to a PETSc object; move-only. `Destroy` is the type's own destructor.

@@ -24,7 +24,7 @@ double heap_bytes();
 /// CPU time of this process so far, s.
 double cpu_seconds();
 
-/// What a result is to be traced back by, as (name, text): "program" with its version, "command" as
+/// Returns the provenance of a result as (name, text): "program" with its version, "command" as
 /// it was typed (where the system tells), "ranks", "libraries" with their versions. Not collective;
 /// PETSc must be initialised.
 std::vector<std::pair<std::string, std::string>> this_run(MPI_Comm comm);

@@ -45,7 +45,7 @@ struct Range {
   std::string text() const;
 };
 
-/// What a number must be, for a message: "a number of mm, > 0, or auto". `words` may stand in its
+/// Describes a valid number for a message: "a number of mm, > 0, or auto". `words` may stand in its
 /// place; `unit` may be empty.
 std::string wanted_number(bool whole, std::string_view unit, const Range& range,
                           const std::vector<std::string>& words);

@@ -56,12 +56,12 @@ class Hessian {
   /// last assemble(). Collective.
   virtual Mat convex() = 0;
   virtual void renew() {}
-  /// What acts as exact(), with or without entries.
+  /// Returns an operator that acts as exact(), with or without entries.
   virtual Mat action() { return exact(); }
   /// The one whose quadratic model a Newton method steps by.
   virtual Mat model() { return action(); }
-  /// Whether multigrid can precondition it: it couples neighbours as elasticity does, and its
-  /// relative can be visited.
+  /// Returns whether multigrid can precondition it: it couples neighbours as elasticity does, and
+  /// its relative can be visited.
   virtual bool elliptic() const { return true; }
   /// Shows all blocks of the relative that touch this rank's points, at the state of the last
   /// assemble(), but for those of contact, which change more often. Not collective.
@@ -69,7 +69,7 @@ class Hessian {
   /// Shows those of contact, where visit_convex couples points. Not collective.
   virtual void visit_contact(const BlockVisitor&) const {}
   int64_t assemblies() const { return assemblies_; }
-  /// Of them, those at a new displacement or load; at others contact alone changed.
+  /// Returns the assemblies at a new displacement or load; at others contact alone changed.
   int64_t states() const { return states_; }
 
  protected:

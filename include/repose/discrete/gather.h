@@ -9,7 +9,7 @@ namespace repose::discrete {
 
 /// All ranks' values one after the other, on rank 0; empty on the others. Collective.
 std::vector<double> gather(MPI_Comm comm, const double* values, size_t count);
-/// The same of points.
+/// Gathers points in the same way.
 std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab);
 
 }  // namespace repose::discrete

@@ -21,7 +21,7 @@ class NaturalRows {
 
   /// This rank's slab of values [at least owned points] at the points, in natural order.
   std::vector<Vec3> natural(std::span<const Vec3> values) const;
-  /// The same as a field of the result.
+  /// Returns values in natural order as a field of the result.
   model::PointField field(const std::string& name, std::span<const Vec3> values) const;
   /// [owned points] the values of this rank's points, of which `slab` has this rank's natural rows.
   std::vector<Vec3> owned(const std::vector<Vec3>& slab) const;

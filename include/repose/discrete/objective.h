@@ -75,7 +75,7 @@ class Objective : public Function {
   std::vector<Vec3> work_;        // [local points]
 };
 
-/// What points touch at the objective's last update, [owned points].
+/// Contact of points at the objective's last update, [owned points].
 struct ContactState {
   std::vector<double> gap;       ///< mm, the smallest; what is looked at at most where none is
   std::vector<double> pressure;  ///< N/mm², the sum

@@ -11,9 +11,9 @@
 /// Distribution of a model over ranks: columns are the unit, nothing is ever added across ranks.
 namespace repose::discrete {
 
-/// What one rank works on. `model` is a model in local numbers: the points of its own columns come
-/// first, column after column, then ghosts; springs, edges and prisms whose first point it owns
-/// come first (they count in energies and are written here), then those that merely touch a
+/// Part of a model on one rank. `model` is a model in local numbers: the points of its own columns
+/// come first, column after column, then ghosts; springs, edges and prisms whose first point it
+/// owns come first (they count in energies and are written here), then those that merely touch a
 /// soft-tissue point it owns, and of a solid the other prisms around its points and, where volumes
 /// are averaged around points, around those of its prisms. Bones that do not move rigidly appear as
 /// held points.
@@ -37,11 +37,11 @@ struct Part {
   int64_t total_points = 0, total_springs = 0, total_prisms = 0, total_unknowns = 0;
 };
 
-/// Shares `model` (looked at on rank 0 only) out over the ranks by a graph partition of its columns
+/// Shares `model` (read on rank 0 only) out over the ranks by a graph partition of its columns
 /// (PT-Scotch through MatPartitioning). Collective.
 Part distribute(MPI_Comm comm, const model::Model& model);
 
-/// A part that its own rank has made, and what else is told of the model.
+/// Part built by its own rank, and global numbers of the model.
 struct RaisedPart {
   Part part;
   model::Model frame;              ///< Ground::frame() and its contact's bodies, on rank 0
@@ -52,10 +52,10 @@ struct RaisedPart {
   double effective_modulus = 0;    ///< N/mm², on rank 0
 };
 
-/// The same as distribute() of the scene's model, which is nowhere whole: rank 0, which alone has
-/// the `ground`, gives every rank the columns that it owns and those around them, and the rank
-/// makes the model of these. `scene` is read on all ranks; its moves are rank 0's. Throws
-/// InputError. Collective.
+/// Builds the parts of a fully distributed model, equal to distribute() of the scene's model: rank
+/// 0, which alone has the `ground`, gives every rank the columns that it owns and those around
+/// them, and the rank makes the model of these. `scene` is read on all ranks; its moves are rank
+/// 0's. Throws InputError. Collective.
 RaisedPart raise(MPI_Comm comm, const model::Ground* ground, scene::Scene scene);
 
 }  // namespace repose::discrete

@@ -8,7 +8,7 @@ namespace repose::discrete {
 
 /// The Hessian of an objective: the exact one acts spring by spring and prism by prism, without
 /// entries (MATSHELL); the convex one, from which a positive definite preconditioner is made, is
-/// given block by block. Matrices of either are made only where they are asked for.
+/// given block by block. Matrices of either are made only where they are requested.
 class Tangent : public Hessian {
  public:
   explicit Tangent(Objective& objective);  ///< collective

@@ -12,7 +12,8 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// What to take from a volume: one of level, otsu and label; the rest in the order it is done.
+/// Options of a surface from a volume: one of level, otsu and label; the rest in the order it is
+/// done.
 struct Extraction {
   std::optional<double> level;             ///< HU, or whatever the volume holds
   bool otsu = false;                       ///< the level by Otsu's method

@@ -6,7 +6,7 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// What becomes of a surface where the volume ends.
+/// Treatment of a surface at the border of the volume.
 enum class VolumeBorder {
   closed,  ///< capped in the outermost voxel centres: the result is closed
   open     ///< cut off: the result has a rim there

@@ -5,7 +5,8 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// What is seen of a surface when a ball is rolled over its outside and another over its inside.
+/// Options of the skin that a ball rolled over the outside of a surface, and another over its
+/// inside, touch.
 struct Rolling {
   double voxel = 1.5;    ///< mm of the grid on which it is done
   double outside = 3.0;  ///< mm, radius: closes holes, slits and nostrils up to twice as wide

@@ -23,7 +23,7 @@ double add_edge_gradient(const EdgeLoop& loop, std::span<const Vec3> position, d
 double add_prism_gradient(const PrismLoop& loop, std::span<const Vec3> position,
                           const Weights& weights, std::span<Vec3> gradient);
 
-/// The same, and that of averaged volumes.
+/// Adds the gradient of the volume terms, averaged volumes included.
 double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
                            const Weights& weights, std::span<Vec3> gradient);
 
@@ -40,7 +40,7 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
                         std::span<const Vec3> direction, std::span<Vec3> product,
                         std::span<const double> nodal_slopes);
 
-/// What a state of the tissue amounts to, over the counted elements (to be summed over ranks).
+/// Totals of a state of the tissue over the counted elements (to be summed over ranks).
 struct Totals {
   double spring_energy = 0;     ///< f_e of springs, N·mm
   double solid_energy = 0;      ///< edges' and prisms' of a solid, to a constant, N·mm

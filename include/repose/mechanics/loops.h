@@ -78,7 +78,7 @@ struct Weights {
   double volume_weight = 0;
 };
 
-/// Of a solid: its edges, and its prisms with moduli of their own.
+/// Weights for a solid: its edges, and its prisms with moduli of their own.
 inline constexpr Weights solid_weights{1, VolumeTerm::material, 1};
 
 }  // namespace repose::mechanics

@@ -76,7 +76,7 @@ void add_nodal_action(const NodalVolumes& nodal, std::span<const Vec3> position,
                       std::span<const double> slopes, double weight,
                       std::span<const Vec3> direction, std::span<Vec3> product);
 
-/// What couples all points of the prisms around a point, beyond the prisms' blocks (hessian.h): its
+/// Coupling of all points of the prisms around a point, beyond the prisms' blocks (hessian.h): its
 /// curvature is stiffness · Σ g gᵀ.
 struct NodalGradient {
   std::vector<int32_t> points;

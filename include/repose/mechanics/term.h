@@ -36,8 +36,8 @@ struct Expansion {
   Eigen::Matrix<double, n, n> hessian;
 };
 
-/// Of `function`, by automatic differentiation (forward mode); it is called with Corners of a dual
-/// number of duals.
+/// Differentiates `function` twice automatically (forward mode); it is called with Corners of a
+/// dual number of duals.
 template <int points, class Function>
 Expansion<points> differentiate(const std::array<Vec3, points>& at, Function&& function) {
   constexpr int n = 3 * points;
@@ -57,7 +57,7 @@ Expansion<points> differentiate(const std::array<Vec3, points>& at, Function&& f
   return expansion;
 }
 
-/// The same without the Hessian; returns the value.
+/// Differentiates `function` once; returns the value.
 template <int points, class Function>
 double differentiate(const std::array<Vec3, points>& at, Function&& function,
                      Eigen::Matrix<double, 3 * points, 1>& gradient) {

@@ -8,7 +8,7 @@ namespace repose::meshtools {
 using imaging::Rolling;
 using surface::Surface;
 
-/// What of a given skin is solved, and how it is meshed.
+/// Request for the part of a given skin that is solved, and for its mesh.
 struct FaceRequest {
   double edge;                                              ///< mm, of the triangles
   std::vector<std::function<bool(const Vec3&)>> regions{};  ///< the skin in these is taken

@@ -19,7 +19,7 @@ struct CutPlane {
   double radius = std::numeric_limits<double>::infinity();  ///< mm: cuts within this disc only
 };
 
-/// How one piece is cut off a bone.
+/// Cuts that take one piece off a bone.
 struct Osteotomy {
   std::string piece;               ///< name of the piece
   std::vector<CutPlane> planes;    ///< and

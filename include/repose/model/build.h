@@ -13,12 +13,12 @@
 
 namespace repose::model {
 
-/// What was done to make a valid model, for the closing table.
+/// Report on the building of a model, for the end-of-run summary.
 struct BuildReport {
   int64_t skin_vertices = 0, skin_edges = 0, skin_triangles = 0;
   int64_t attached = 0;   ///< columns that end in bone
   int64_t free_deep = 0;  ///< columns that end free: no bone near, unattached, or released
-  int64_t released = 0;   ///< of those, let go near a piece that moves differently
+  int64_t released = 0;   ///< of those, released near a piece that moves differently
   int64_t shortened = 0;  ///< columns made shorter so that neighbours do not cross
   double thickness_min = 0, thickness_median = 0, thickness_max = 0;  ///< mm
   double effective_modulus = 0;      ///< N/mm², as the function below
@@ -37,9 +37,9 @@ struct BuiltModel {
 BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones);
 
-/// What a scene's model is built from, at any resolution.
+/// Input of a scene's model at any resolution.
 struct Anatomy {
-  scene::Scene scene;     ///< with moves that heed collisions
+  scene::Scene scene;     ///< with moves that resolve collisions
   surface::Surface skin;  ///< that is solved
   /// The skin that the scene names, where another is solved in its place (solved_skin.h).
   std::optional<surface::Surface> given_skin;
@@ -47,7 +47,7 @@ struct Anatomy {
   std::vector<std::string> remarks;     ///< lines for a person, each complete
 };
 
-/// Reads the scene's surfaces, cuts its bones and heeds collisions. Serial.
+/// Reads the scene's surfaces, cuts its bones and resolves collisions. Serial.
 Anatomy load_anatomy(const scene::Scene& scene);
 
 BuiltModel build_model(const Anatomy& anatomy);
@@ -67,7 +67,7 @@ struct Piece {
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
 };
 
-/// What the tissue of a scene stands on, known column by column: of a model, all but its layers.
+/// Geometry of the columns of tissue: all of a model but its layers.
 /// Takes memory by the skin, where the model takes it by the skin times the layers.
 class Ground {
  public:
@@ -92,7 +92,7 @@ class Ground {
   std::unique_ptr<State> state_;
 };
 
-/// What of a scene is not known by columns, so that one process builds its model whole; or nothing.
+/// Returns the reason why a scene's model cannot be built column by column, or an empty text.
 std::string beyond_columns(const scene::Scene& scene);
 
 /// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
@@ -102,13 +102,13 @@ std::string beyond_columns(const scene::Scene& scene);
 Model raise(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
             const Piece& piece, std::vector<int64_t>& found);
 
-/// Of a column, for the means over the whole tissue.
+/// Sums over one column, for the means over the whole tissue.
 struct ColumnSums {
   double stiffness = 0;  ///< N mm, as in effective_modulus(), of elements that begin in the column
   double volume = 0;     ///< mm³, of the same
   double thickness = 0;  ///< mm
 };
-/// Of the columns of a model of make_layers, in their order.
+/// Returns the sums of the columns of a model of make_layers, in their order.
 std::vector<ColumnSums> column_sums(const Model& model, int64_t layers);
 /// N/mm²: the stiffness of all over their volume.
 double effective_modulus(const std::vector<ColumnSums>& columns);

@@ -26,7 +26,7 @@ struct CollisionReport {
   double safe_load = 1;  ///< all bones can move so far together without a contact
 };
 
-/// Whether two bones keep their places towards each other, to rounding.
+/// Returns whether two bones keep their places towards each other, to rounding.
 bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b);
 
 /// Follows the moves, screw motions from load 0 to 1, of all pairs of bones that move differently

@@ -23,7 +23,7 @@ struct Body {
 /// Numbers that say what a closed form is, at most: from, to, radius of a capsule.
 inline constexpr int shape_numbers = 7;
 
-/// How a point is bound to a body (values as in the file): it may lift off but never passes, or it
+/// Binding of a point to a body (values as in the file): it may lift off but never passes, or it
 /// keeps its distance and slides along.
 enum class Binding : int8_t { touches = 0, slides = 1 };
 

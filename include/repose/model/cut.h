@@ -32,13 +32,13 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
 /// come at the end of the points, in the same column and layer, and belong to the left of the path.
 /// A spring that lies in the cut becomes two, its stiffness shared in proportion to the prisms'
 /// volume on either side, and so do the mass and the force of a doubled point. The edges of a solid
-/// are made anew from its prisms, and what tension they carried besides is shared like that.
+/// are made again from its prisms, and what tension they carried besides is shared like that.
 /// Positions and rest lengths stay as they are: where the tissue was in equilibrium, the tension
 /// that crossed the cut now opens it. Returns the rows of the doubled points, the double second.
 /// Throws InternalError where the columns are no path of edges.
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model);
 
-/// What went with springs that tore.
+/// Elements removed with torn springs.
 struct Tear {
   int64_t prisms = 0, triangles = 0;  ///< removed, triangles of the drawn skin
 };

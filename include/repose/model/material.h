@@ -52,7 +52,7 @@ Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Ve
 std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string& file,
                                   Model& model);
 
-/// The edges anew from the prisms and their shear moduli, sorted by their points. InputError as
+/// The edges again from the prisms and their shear moduli, sorted by their points. InputError as
 /// above. Serial, O(prisms).
 void assemble_edges(const std::string& file, Model& model);
 

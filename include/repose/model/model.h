@@ -13,7 +13,7 @@
 /// The discrete model as flat arrays, exactly /model of the result file.
 namespace repose::model {
 
-/// What a point is (values as in the file).
+/// Kinds of points (values as in the file).
 enum class PointSet : int8_t { soft_tissue = 0, boundary = 1, bone = 2, held = 3 };
 
 struct Points {
@@ -87,7 +87,7 @@ struct Model {
   std::vector<Mat4> bone_transform;             ///< [bones] or empty: recovered from targets
 };
 
-/// Whether the tissue is a neo-Hookean solid, not springs.
+/// Returns whether the tissue is a neo-Hookean solid, not springs.
 inline bool is_solid(const Model& model) { return !model.prisms.modulus.empty(); }
 
 /// Some rows of the prisms, with all that belongs to them.
@@ -97,7 +97,7 @@ Prisms pick_prisms(const Prisms& prisms, const std::vector<int64_t>& rows);
 /// position; zero where there is no skin above.
 std::vector<Vec3> outward_normals(const Model& model);
 
-/// The numbers a person asks for first.
+/// Principal counts of a model.
 struct Counts {
   int64_t points = 0, soft = 0, boundary = 0, bone = 0, held = 0, springs = 0, prisms = 0;
   int64_t edges = 0;
@@ -136,7 +136,7 @@ void for_each_array(Group& of, Visit&& visit) {
   }
 }
 
-/// Of a model that is nowhere whole this rank's slabs (base::slab) of its arrays, in natural order.
+/// Slabs (base::slab) of the arrays of a fully distributed model on this rank, in natural order.
 struct ModelRows {
   Counts counts;        ///< of the whole
   int64_t touches = 0;  ///< likewise, rows of contact

@@ -24,8 +24,8 @@ class PrescribedMotion {
   void set(int32_t bone, const scene::RigidMotion& motion);
   /// 4×4 matrix of a bone at a load, identity where it moves on straight lines.
   Mat4 bone_matrix(int32_t bone, double load) const;
-  /// Whether the points of a bone move on straight lines because no rigid motion takes them to
-  /// their targets.
+  /// Returns whether the points of a bone move on straight lines because no rigid motion takes them
+  /// to their targets.
   bool straight(int32_t bone) const { return straight_[bone]; }
   /// Largest path length of any point between load 0 and 1, mm (chord of the screw over 16 parts).
   double largest_travel(const Model& model) const;

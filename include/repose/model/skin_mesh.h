@@ -48,7 +48,7 @@ struct SkinMesh {
 /// of an edge disagree about which side is outside.
 SkinMesh make_skin_mesh(const surface::Surface& skin);
 
-/// The same skin seen from the other side: every triangle and normal turned round.
+/// Reverses every triangle and normal.
 void flip(SkinMesh& mesh);
 
 /// A skin that no tissue fits, with the triangles where it does not.

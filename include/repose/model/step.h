@@ -31,10 +31,11 @@ struct StepNumbers {
   double seconds = 0;
   std::string reason;
   bool converged = false;
-  /// Of the exact Hessian over the unknowns, N/mm; NaN, and no attribute, where not asked for.
+  /// Eigenvalue of the exact Hessian over the unknowns, N/mm; NaN, and no attribute, unless
+  /// requested.
   double smallest_eigenvalue = std::numeric_limits<double>::quiet_NaN();
   double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
-  /// mm, estimate for the skin of a model coarser than the scene asks for; NaN for the scene's own.
+  /// mm, estimate for the skin of a model coarser than the scene requests; NaN for the scene's own.
   double discretisation_error = std::numeric_limits<double>::quiet_NaN();
   /// mm, largest depth past what is touched, by the smoothed distances that the search uses; NaN
   /// without contact.
@@ -108,7 +109,7 @@ struct StepRows {
   std::vector<double> discretisation_error = {};
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
-  /// What else is known of the points at this step; the same names on all ranks.
+  /// Further fields of the points at this step; the same names on all ranks.
   std::vector<PointField> point_fields = {};
 };
 

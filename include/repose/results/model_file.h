@@ -16,7 +16,7 @@ namespace repose::results {
 /// bone_surface and bone_transform (none).
 model::Model read_model(const std::filesystem::path& file);
 
-/// Whether the file is HDF5 by its signature (a scene is not).
+/// Returns whether the file is HDF5 by its signature (a scene is not).
 bool is_hdf5(const std::filesystem::path& file);
 
 /// One whole step of a result file, serially.
@@ -29,10 +29,11 @@ struct StoredStep {
   std::vector<Vec3> bone_displacement;  ///< mm, of the same points; empty: none
 };
 
-/// Whether a file is a checkpoint of a run that went on.
+/// Returns whether a file is a checkpoint of a run that continued.
 bool is_checkpoint(const std::filesystem::path& file);
 
-/// How many steps a file has; 0 for a model. InputError where /step/0000 … are not in sequence.
+/// Returns the number of steps of a file; 0 for a model. InputError where /step/0000 … are not in
+/// sequence.
 int64_t step_count(const std::filesystem::path& file);
 /// Bulk modulus κ of the penalty (N/mm²) in the last step of a file; nothing where it has none.
 std::optional<double> last_bulk_modulus(const std::filesystem::path& file);

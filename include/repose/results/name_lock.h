@@ -4,8 +4,8 @@
 
 namespace repose::results {
 
-/// Whether the process that a lock file names may still live: not if it is one of this host's that
-/// has ended, even if its number has been given to another since.
+/// Returns whether the process that a lock file names may still live: not if it is one of this
+/// host's that has ended, even if its number has been given to another since.
 bool may_live(const std::string& holder);
 
 /// The right to write results of one name, NAME.h5 and what goes with it: one run's at a time. It

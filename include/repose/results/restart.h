@@ -22,7 +22,7 @@ struct Restart {
 
 /// The last converged step of a result file; where that is not past load 0, or there is none, the
 /// last step as a guess, if it is at load 1, else the start. Refuses (InputError) a file whose
-/// model has other points than `model` (looked at on rank 0 only), or that holds no step.
+/// model has other points than `model` (read on rank 0 only), or that holds no step.
 /// Collective.
 Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const model::Model& model);
 

@@ -10,7 +10,7 @@
 
 namespace repose::results {
 
-/// What a file is: where a run ended, or a state on its way, from which it can be gone on.
+/// Kind of a file: the end of a run, or a state on the way from which a run can be resumed.
 enum class Kind { result, checkpoint };
 
 /// Why a run ended whose last step is a rest position on the way to load 1.
@@ -25,11 +25,11 @@ inline constexpr std::string_view stopped_at_rest = "stopped before it was done,
 class ResultFile {
  public:
   /// Opens the part of NAME.h5 (`name` is a path without the ending) and writes /model (`model` is
-  /// looked at on rank 0 only, and copied as far as it is needed later).
+  /// read on rank 0 only, and copied as far as it is needed later).
   ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
              Kind kind = Kind::result);
-  /// The same of a model that is nowhere whole: `frame`, on rank 0, has what is neither point nor
-  /// element; no rank's slabs are empty.
+  /// Creates the file of a fully distributed model: `frame`, on rank 0, has what is neither point
+  /// nor element; no rank's slabs are empty.
   ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& frame,
              const model::ModelRows& slabs, Kind kind = Kind::result);
   ~ResultFile();

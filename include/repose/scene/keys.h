@@ -53,7 +53,7 @@ std::vector<const Key*> keys_below(std::string_view path);
 /// The last word of a path: what is written in the file.
 std::string last_word(std::string_view path);
 
-/// What a value must be, for messages and the documentation: "a number of mm, > 0".
+/// Describes a valid value, for messages and the documentation: "a number of mm, > 0".
 std::string wanted(const Key& key);
 
 /// The table in Markdown, one row a key: key, value, default, meaning.

@@ -24,7 +24,7 @@ struct Landmark {
 /// place, for a frame that is not said or is neither, a coordinate that is not a finite number, a
 /// name that comes twice, and a file that holds no point.
 std::vector<Landmark> read_landmarks(const std::filesystem::path& file);
-/// The same by name; of a name that comes twice the last.
+/// Reads landmarks by name; of a name that occurs twice the last.
 std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file);
 
 /// The text of a .mrk.json file of these landmarks (LPS, mm), as 3D Slicer's Markups module reads

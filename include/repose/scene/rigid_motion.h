@@ -52,8 +52,8 @@ struct RigidFit {
 /// fix a rotation (below). Throws InputError otherwise.
 RigidFit fit_rigid_motion(const std::vector<Vec3>& from, const std::vector<Vec3>& to);
 
-/// Whether points fix a rotation: at least three, and not all within 1e-6 of their extent of a
-/// line.
+/// Returns whether points determine a rotation: at least three, and not all within 1e-6 of their
+/// extent of a line.
 bool determines_rotation(const std::vector<Vec3>& points);
 
 }  // namespace repose::scene

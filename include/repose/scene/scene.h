@@ -45,7 +45,7 @@ struct CutPlane {
   std::optional<double> radius;  ///< mm: cuts within this disc only
 };
 
-/// How a piece is cut off a bone, which keeps its name.
+/// Cuts that take a piece off a bone, which keeps its name.
 struct Osteotomy {
   std::size_t bone, piece;  ///< rows of Scene::bones
   std::vector<CutPlane> planes;
@@ -85,7 +85,7 @@ struct MeshRegion {
   std::filesystem::path file;  ///< absolute
 };
 
-/// What is painted on a mesh of the skin, and what lies below it.
+/// Region painted on a mesh of the skin, and the tissue below it.
 struct PaintedRegion {
   std::filesystem::path file;  ///< absolute, a PLY
   std::string property;        ///< of its vertices; empty: their color
@@ -106,7 +106,7 @@ struct Stratum {
   Elasticity elasticity;
 };
 
-/// What is near a line of points.
+/// Region near a line of points.
 struct CurveRegion {
   std::vector<Vec3> path;  ///< mm
   double radius;           ///< mm
@@ -115,8 +115,8 @@ struct CurveRegion {
 using Region = std::variant<SphereRegion, Box, MeshRegion, LabelRegion, CurveRegion>;
 using SkinRegion = std::variant<Region, PaintedRegion>;
 
-/// What tissue that ends at bone does: it moves with it; it keeps its distance and slides along; it
-/// may lift off but never passes; it does not know of it.
+/// Attachment of tissue that ends at bone: it moves with it; it keeps its distance and slides
+/// along; it may lift off but never passes; it does not know of it.
 enum class Attach { fixed, slide, contact, free };
 
 struct AttachRegion {
@@ -129,7 +129,7 @@ struct MaterialRegion {
   Elasticity elasticity;
 };
 
-/// Of what the volume ratio in a solid's energy is the mean.
+/// Elements over which a solid's volume ratio is averaged.
 enum class Dilatation { prism, nodal };
 
 /// Tissue as a neo-Hookean solid (docs/theory/continuum.md).
@@ -153,7 +153,7 @@ struct Tissue {
   Attach attach = Attach::fixed;             ///< outside all regions
   std::vector<AttachRegion> attach_regions;  ///< each beats the ones before it
   double release = 10;                       ///< mm
-  Attach released = Attach::contact;         ///< what becomes of tissue that lets go
+  Attach released = Attach::contact;         ///< attachment of released tissue
   std::optional<Material> material;          ///< unset: springs
   std::optional<Elasticity> isotropic;  ///< of springs: moduli by set that resemble such a solid
   std::map<std::string, SpringRule> springs;  ///< "default", "layer", "layer 0", "connecting 1", …
@@ -162,12 +162,13 @@ struct Tissue {
   std::optional<double> density;  ///< kg/mm³, excludes mass
 };
 
-/// What becomes of the outermost border of an open skin; automatic: fixed over bone that rests.
+/// Boundary condition at the outermost border of an open skin; automatic: fixed over bone that
+/// rests.
 enum class Rim { fixed, free, automatic };
 
 enum class Functional { energy, force };
-/// Of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no scene's:
-/// its moduli say how it keeps its volume.
+/// Volume term of an objective (docs/theory/model.md "Objectives"); `material` is a solid's, and no
+/// scene's: its moduli say how it keeps its volume.
 enum class VolumeTerm { none, paper, penalty, material };
 /// As scenes, options and results spell them.
 inline constexpr std::array<std::string_view, 2> words(Functional) { return {"energy", "force"}; }
@@ -196,7 +197,7 @@ struct Capsule {
   double radius;  ///< mm
 };
 
-/// What lies behind a plane, away from its normal.
+/// Half-space behind a plane, away from its normal.
 struct HalfSpace {
   Vec3 point;   ///< mm
   Vec3 normal;  ///< any length but 0
@@ -246,7 +247,7 @@ struct Plan {
 
 enum class CollisionMode { report, stop, clamp };
 
-/// What is done about bones that touch on their way.
+/// Treatment of bones that touch while they move.
 struct Collision {
   CollisionMode mode = CollisionMode::report;
   double clearance = 0;     ///< mm to be kept between bones

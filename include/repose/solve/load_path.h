@@ -9,13 +9,14 @@
 
 namespace repose::solve {
 
-/// How the unknowns move, to first order, when the fixed points go on: −H⁻¹ H_sb Δx_b.
+/// Predicts the motion of the unknowns, to first order, when the fixed points move on: −H⁻¹ H_sb
+/// Δx_b.
 class Predictor {
  public:
   Predictor(discrete::Objective& objective, linear::TangentSolver& solver);
 
   /// The increment from `displacement` at the positions' load to `load`. Returns false where the
-  /// Hessian is indefinite or the linear solver comes to no end. Collective.
+  /// Hessian is indefinite or the linear solver does not converge. Collective.
   bool predict(Vec displacement, double load, Vec increment);
 
  private:
@@ -24,7 +25,7 @@ class Predictor {
   base::VecHandle force_;
 };
 
-/// How the bones are taken to their places.
+/// Settings of the load path.
 struct PathSettings {
   double accuracy = 0.1;    ///< mm, of every step
   int load_steps = 0;       ///< equal steps; 0: as many as the motion needs
@@ -41,7 +42,7 @@ struct Halvings {
   Halvings& operator+=(const Halvings& more);
 };
 
-/// What a run came to.
+/// Outcome of a load path.
 struct PathOutcome {
   Outcome last;
   double load = 0;    ///< reached

@@ -5,7 +5,7 @@
 
 namespace repose::solve {
 
-/// What the initial equilibrium came to.
+/// Outcome of the initial equilibrium.
 struct Prestress {
   double residual = 0;          ///< largest |F_i| left on a soft-tissue point, N
   double largest_force = 0;     ///< largest |F_i| before: skin tension and weight, N
@@ -14,7 +14,7 @@ struct Prestress {
   double largest_pressure = 0;  ///< of a solid, N/mm²
 };
 
-/// How the tissue was when its surfaces were recorded.
+/// State of the tissue when its surfaces were recorded.
 struct Recording {
   double turgor = 0;            ///< initial strain of the skin springs; a solid's model has its own
   Vec3 gravity = Vec3::Zero();  ///< N/kg
@@ -26,7 +26,7 @@ struct Recording {
 /// tension and weight at the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T =
 /// K Aᵀ μ, l_j = r_j − T⁻¹(T_j). External forces are not balanced: they act. Changes the rest
 /// lengths of `model`. F is 1e-12 of the largest force before, or what the rounding of lengths
-/// leaves where that is more. Model and recording are looked at on rank 0 only. Throws InputError
+/// leaves where that is more. Model and recording are read on rank 0 only. Throws InputError
 /// naming the springs where a rest length would not be positive, or the point that no spring can
 /// hold. Collective.
 ///
@@ -35,7 +35,7 @@ struct Recording {
 /// the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift the
 /// edges' weights and the prisms' target volumes (docs/theory/continuum.md).
 Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
-/// The same of a solid that is shared out already.
+/// Balances a solid that is already distributed.
 Prestress prestress(MPI_Comm comm, discrete::Part& part, Recording as);
 
 }  // namespace repose::solve

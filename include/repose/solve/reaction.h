@@ -13,7 +13,7 @@ namespace repose::solve {
 ///     f = Σ_i [ Σ_springs at i (force of the spring on i) − Σ_prisms at i Φ_v'(v) ∂v/∂x_i ],
 /// over all springs and prisms, also those that move no soft-tissue point; with volume form paper
 /// both are weighted as in the objective, with the force functional it is the springs alone.
-/// `model` and `groups` are looked at on rank 0 only, which also has the result; `rows` are the
+/// `model` and `groups` are read on rank 0 only, which also has the result; `rows` are the
 /// slabs of the step `numbers`. Collective.
 std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
                             const std::vector<std::vector<int64_t>>& groups,

@@ -26,7 +26,7 @@ struct PlanPiece {
   scene::Placement placement;    ///< at load 1
 };
 
-/// What is asked of a run.
+/// Settings of a solve.
 struct Settings {
   mechanics::Weights weights;                                ///< the objective
   model::Functional functional = model::Functional::energy;  ///< what is minimised
@@ -35,7 +35,7 @@ struct Settings {
   bool monitor = false;                  ///< print a line for every iteration
   bool finds_other_rest = true;          ///< contact searches for another rest position at load 1
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
-  bool initial_equilibrium = false;      ///< … and at its start, because the scene asks for one
+  bool initial_equilibrium = false;      ///< … and at its start, because the scene requests one
   /// Pieces by whose motions the rest position at load 1 is differentiated: point fields
   /// `tangent_…` of the last step.
   std::vector<PlanPiece> tangents = {};
@@ -54,7 +54,7 @@ struct PenetrationDepth {
   Vec3 where = Vec3::Zero();               ///< mm, current place of the deepest point
 };
 
-/// What the tissue presses on.
+/// Contact of the tissue with one body.
 struct BodyContact {
   int64_t points = 0;         ///< that press
   Vec3 force = Vec3::Zero();  ///< N, of the tissue on the body; of cuts' sides, of one on the other
@@ -72,7 +72,7 @@ struct PiercedColumns {
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
 };
 
-/// What a run came to, for the closing table.
+/// Outcome of a solve, for the end-of-run summary.
 struct Summary {
   PathOutcome path;
   model::StepNumbers last;
@@ -80,8 +80,8 @@ struct Summary {
   int64_t evaluations = 0;                   ///< of objective and gradient
   int64_t evaluations_for_other = 0;         ///< of these, in search of another rest position
   int64_t assemblies = 0;                    ///< of the Hessian
-  std::optional<Spectrum> initial_spectrum;  ///< at the start, where asked for
-  std::optional<Spectrum> final_spectrum;    ///< where the run ended, where asked for
+  std::optional<Spectrum> initial_spectrum;  ///< at the start, where requested
+  std::optional<Spectrum> final_spectrum;    ///< where the run ended, where requested
   std::vector<BodyContact>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
   PiercedColumns pierced;
@@ -99,15 +99,15 @@ struct Start {
   std::vector<double> pressure = {};  ///< N/mm², [points] this rank's slab
 };
 
-/// The whole main job on a model (looked at on rank 0 only): distributes it, follows the rest
+/// The whole main job on a model (read on rank 0 only): distributes it, follows the rest
 /// position along the load path, hands every step to `receive`. Throws InputError where nothing is
 /// free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive);
-/// The same for a model that is shared out.
+/// Finds the rest position of a model that is already distributed.
 Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
                     const Start& start, const Receiver& receive);
-/// The same for a model that nobody needs any more: its memory is free once it is shared out.
+/// Takes ownership of the model, which is freed after distribution.
 Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
                     const Start& start, const Receiver& receive);
 

@@ -7,7 +7,7 @@
 
 namespace repose::solve {
 
-/// What a person watching wants to know after each iteration.
+/// State of a search after an iteration, for progress reports.
 struct Iteration {
   int64_t number = 0;
   double load = 0;
@@ -27,9 +27,9 @@ struct OtherRest {
   double place[3] = {};  ///< mm, where on the initial skin
 };
 
-/// How a search for the rest position at one load ended.
+/// Outcome of a search for the rest position at one load.
 struct Outcome {
-  bool converged = false;         ///< the estimated distance is below the accuracy asked for
+  bool converged = false;         ///< the estimated distance is below the accuracy requested
   bool stopped = false;           ///< it was asked to end early
   bool stable = false;            ///< no negative curvature was met at the end
   double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
@@ -57,7 +57,7 @@ class RestSearch {
     return run(displacement, accuracy);
   }
   /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
-  /// `displacement`, from which the way goes on. Collective.
+  /// `displacement`, from which the path continues. Collective.
   virtual void go_back(Vec /*displacement*/) {}
 };
 

@@ -14,8 +14,8 @@ struct RestState {
   std::vector<double> pressure;  ///< [N] N/mm², of contact; empty where there is none
 };
 
-/// How far points at rest go, to first order, when their model turns into `other`, which has the
-/// same points in other sets, of other material or otherwise loaded:
+/// Returns the first-order displacement of points at rest when their model changes into `other`,
+/// which has the same points in other sets, of other material or otherwise loaded:
 ///     H δ = −∇Φ − H_sb Δx_b
 /// with the energy of `other` at load 1 and the way Δx_b to where it has fixed points. Of points
 /// that touch bodies those press that δ would take inside, in up to four solves. [N] mm on rank 0,

@@ -5,7 +5,7 @@
 
 namespace repose::solve {
 
-/// The ends of the spectrum of a Hessian, N/mm; not a number where not found or not asked for.
+/// The ends of the spectrum of a Hessian, N/mm; not a number where not found or not requested.
 struct Spectrum {
   double smallest = std::numeric_limits<double>::quiet_NaN();  ///< positive at a strict minimum
   double largest = std::numeric_limits<double>::quiet_NaN();

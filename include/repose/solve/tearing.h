@@ -6,9 +6,9 @@
 
 namespace repose::solve {
 
-/// How the search for the springs that tear ended. Counts and lengths are rank 0's.
+/// Outcome of the search for springs that tear. Counts and lengths are rank 0's.
 struct Tearing {
-  std::optional<double> limit;  ///< N; unset where none was asked for
+  std::optional<double> limit;  ///< N; unset where none was requested
   int rounds = 0;               ///< rest positions found
   bool settled = true;          ///< nothing at a loaded point or a tear is above the limit
   bool stopped = false;         ///< a search was asked to end early
@@ -26,7 +26,7 @@ struct Tearing {
 /// reached until none is. All of a round together, not the largest first: springs of nearly equal
 /// tension then do not tear in an order that rounding chooses. Ends unsettled after 100 rounds,
 /// where a rest position is not found or where the settings' interrupt is wanted. `limit` (N) and
-/// `model` are looked at, and the model changed, on rank 0; `start` as in find_repose. Throws
+/// `model` are read, and the model changed, on rank 0; `start` as in find_repose. Throws
 /// InputError where tissue is torn off. Collective.
 Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& limit,
              const Settings& settings, const std::vector<Vec3>& start);

@@ -51,8 +51,8 @@ struct Approach {
   Vec3 at = Vec3::Zero();  ///< mm, the middle of the shortest way between them, in a's frame
 };
 
-/// Whether the surfaces come within contact_margin with `b` placed by `pose` (rigid) in the frame
-/// of `a`. A surface that lies wholly inside the other does not touch it.
+/// Returns whether the surfaces come within contact_margin with `b` placed by `pose` (rigid) in the
+/// frame of `a`. A surface that lies wholly inside the other does not touch it.
 bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose);
 
 /// The nearest triangles, no farther than `limit` mm apart.

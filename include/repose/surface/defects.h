@@ -6,7 +6,7 @@
 
 namespace repose::surface {
 
-/// What is wrong with a surface, by number. All counts are exact.
+/// Counts of the defects of a surface. All counts are exact.
 struct Defects {
   int64_t border_loops = 0;  ///< holes, or the rim of an open patch, taken from fan to fan
   int64_t border_edges = 0;

@@ -7,8 +7,8 @@
 /// Exact questions about triangles.
 namespace repose::surface {
 
-/// Whether two triangles with area meet anywhere but in a vertex or an edge that they share by
-/// number (true where they share all three).
+/// Returns whether two triangles with area meet anywhere but in a vertex or an edge that they share
+/// by number (true where they share all three).
 bool meet(const Triangle& a, const Corners& a_corners, const Triangle& b, const Corners& b_corners);
 
 /// For each triangle whether it has no area: its corners lie on one line or coincide (exact).
@@ -16,7 +16,7 @@ std::vector<bool> without_area(const Surface& surface);
 
 /// All pairs of triangles that meet anywhere but in a vertex or an edge they share by number, the
 /// lower triangle first, sorted. Triangles without area are left out. The test is that of CGAL's
-/// does_self_intersect (Botsch et al.; exact predicates), but asks for no manifold.
+/// does_self_intersect (Botsch et al.; exact predicates), but needs no manifold.
 /// O(T log T + pairs).
 std::vector<std::pair<int64_t, int64_t>> self_intersections(const Surface& surface);
 

@@ -8,7 +8,7 @@
 
 namespace repose::surface {
 
-/// What a surface is for, which decides what it must satisfy.
+/// Purpose of a surface, which decides what it must satisfy.
 enum class Role {
   skin,  ///< may be open: a manifold patch or a closed surface, one component
   bone,  ///< closed, manifold, oriented outwards; several components are allowed
@@ -20,7 +20,7 @@ enum class Role {
 /// stored: polygons are triangulated, nothing is welded (but STL stores no vertices: its equal
 /// corners come as one). Throws InputError naming the file when it is missing, unreadable,
 /// truncated, empty, has no faces, or holds a coordinate that is not finite or an index out of
-/// range. Never asks for more memory than a small multiple of the file's size.
+/// range. Never allocates more memory than a small multiple of the file's size.
 Surface read_surface(const std::filesystem::path& file);
 
 /// Welds coincident vertices (distance ≤ 1e-9 of the bounding diagonal: STL, or duplicates),
@@ -38,7 +38,7 @@ void write_ply(const std::filesystem::path& file, const Surface& surface);
 /// across is refused, but as a mesh, as being in metres or in micrometres, saying so.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
-/// The same for a surface that has been read, or taken from a volume, already.
+/// Checks a surface that has been read, or taken from a volume, as load_surface does.
 Surface accept_surface(const Surface& raw, Role role);
 
 /// A PLY file's vertices with all that is stored at them: colors, masks, what an editor painted.

@@ -64,12 +64,12 @@ class TriangleTree {
   /// A triangle within √limit of the point, −1 for none. `hint` is tried first.
   int64_t any_within(const Vec3& query, double limit, int64_t hint = -1) const;
 
-  /// Of all triangles the least max over `points` of the squared distance to it, if below `limit`
-  /// (`limit` otherwise); stops at the first one that is at most `enough`.
+  /// Returns the least of all triangles of the max over `points` of the squared distance to it, if
+  /// below `limit` (`limit` otherwise); stops at the first one that is at most `enough`.
   double least_greatest(std::span<const Vec3> points, double limit, double enough) const;
 
-  /// Whether all points lie within √limit of one and the same triangle. `hint` is tried first and
-  /// receives that triangle.
+  /// Returns whether all points lie within √limit of one and the same triangle. `hint` is tried
+  /// first and receives that triangle.
   bool one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const;
 
   /// Calls visit(triangle) for each triangle whose box overlaps `box`, until it returns true;

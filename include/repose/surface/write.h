@@ -9,7 +9,7 @@
 
 namespace repose::surface {
 
-/// What goes with the points of a surface into a file; each empty or one entry a point.
+/// Data at the points of a surface in a file; each empty or one entry a point.
 struct PointData {
   struct Field {
     std::string name;            ///< letters, digits and _

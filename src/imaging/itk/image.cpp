@@ -25,7 +25,7 @@
 namespace repose::imaging {
 namespace {
 
-/// What ITK's libraries write to the terminal is dropped, and where one aborts, as Debian's GDCM
+/// Drops what ITK's libraries write to the terminal. Where one aborts, as Debian's GDCM
 /// does at many a damaged file, for it is built with its assertions, control comes back.
 class Shield {
  public:
@@ -46,7 +46,7 @@ class Shield {
     close(terminal_);
   }
 
-  /// Whether `work` came to its end. What it held when it did not is lost.
+  /// Returns whether `work` completed. Memory that it held when it did not is lost.
   bool survives(const std::function<void()>& work) {
     if (sigsetjmp(place_, 1) != 0) return false;
     work();

@@ -21,7 +21,7 @@ struct Image {
   std::vector<float> values;                         ///< first axis fastest
 };
 
-/// Whether the file is DICOM. Throws InputError for one that begins so and is damaged.
+/// Returns whether the file is DICOM. Throws InputError for one that begins so and is damaged.
 bool is_dicom(const std::filesystem::path& file);
 
 /// The header alone; `values` stay empty. An axis that the file lacks has the spacing 1. Throws

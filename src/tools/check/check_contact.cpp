@@ -30,7 +30,7 @@ double slack_of(const model::StepNumbers& numbers) {
   return std::max(1e-9, numbers.displacement_error);
 }
 
-/// What is true of one point.
+/// Recomputed contact of one point.
 struct AtPoint {
   double gap = considered;  // mm, the smallest
   double wall_gap = considered;
@@ -41,7 +41,7 @@ struct AtPoint {
   double area = 0;  // mm², that the point stands for
 };
 
-/// What is true of a step.
+/// Recomputed contact of a step.
 struct Truth {
   std::vector<AtPoint> points;
   double into_bodies = 0;  // mm, inside rigid bodies beyond the initial depth, …
@@ -190,7 +190,7 @@ class Worst {
   std::string text_;
 };
 
-/// What a step states about contact, beside the truth.
+/// Comparison of a step's stated contact with the recomputed one.
 class Claims {
  public:
   Claims(const model::Model& model, const model::StepNumbers& numbers,
@@ -252,7 +252,7 @@ double Claims::smoothed_gap(int64_t point, bool in_cell) const {
   return gap;
 }
 
-/// Whether a gap lies between the exact one and a smoothed one.
+/// Returns whether a gap lies between the exact one and a smoothed one.
 bool Claims::explained(int64_t point, double stated) const {
   const double exact = truth_.points[point].gap;
   if (std::abs(stated - exact) <= allowed(std::min(stated, exact))) return true;

@@ -39,7 +39,7 @@ void check_advance(const model::Model& model, const std::vector<Vec3>& normals,
   comparison.array("point/advance", step.advance, again, scale);
 }
 
-/// What the steps say of each other: the path leads from smaller to larger loads, to the end or to
+/// Checks the sequence of steps: the path leads from smaller to larger loads, to the end or to
 /// a step that did not converge. A checkpoint is no end.
 void check_path(const std::vector<model::StepNumbers>& steps, bool is_checkpoint,
                 Comparison& comparison) {

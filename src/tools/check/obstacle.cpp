@@ -63,7 +63,7 @@ Mat3 oblique() {
   return turn;
 }
 
-/// Of cells along the longest side of the box: about as large as triangles.
+/// Returns the number of cells along the longest side of the box: about as large as triangles.
 double cells_along(size_t triangles) {
   return std::clamp(0.4 * std::sqrt(static_cast<double>(triangles)), 2.0, 96.0);
 }

@@ -16,8 +16,8 @@ class TriangleGrid {
 
   /// mm to the closest triangle, `reach` where none is nearer.
   double distance(const Vec3& point, double reach) const;
-  /// Whether the surface winds around a point: by the signed crossings of a ray, or, where it has
-  /// holes, by winding_number().
+  /// Returns whether the surface winds around a point: by the signed crossings of a ray, or, where
+  /// it has holes, by winding_number().
   bool contains(const Vec3& point) const;
   /// The solid angles of all triangles (van Oosterom & Strackee 1983) over 4π: 1 inside a surface
   /// that faces outward, 0 outside.

@@ -18,7 +18,7 @@ namespace {
 
 using Color = std::array<double, 3>;
 
-/// What the vertices hold: colors, or labels as the first of three numbers.
+/// Values at the vertices: colors, or labels as the first of three numbers.
 struct Held {
   std::vector<Color> values;
   bool colors;
@@ -44,7 +44,7 @@ double apart(const Color& one, const Color& other) {
   return most;
 }
 
-/// What is painted with, the most frequent first.
+/// Returns the paints, the most frequent first.
 std::vector<Color> paints_of(const Held& held) {
   constexpr double blended = 40;
   constexpr size_t least_part = 200;

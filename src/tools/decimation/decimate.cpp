@@ -13,11 +13,11 @@ using namespace surface;
 namespace {
 
 /// Shares of the distance: kept free while collapsing, so that the last proof, which is this
-/// accurate, ends below the distance asked for.
+/// accurate, ends below the distance requested.
 constexpr double proof_accuracy = 5e-4;
 /// The distances of a result without a bound are known to this share of the input's extent.
 constexpr double measure_accuracy = 1e-5;
-/// Of the input's extent: the first and the last tolerance on the way to a count.
+/// First and last tolerance on the way to a count, as shares of the input's extent.
 constexpr double first_share = 5e-4, last_share = 0.1;
 
 std::vector<bool> border_vertices(const Surface& surface) {

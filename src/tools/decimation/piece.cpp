@@ -7,7 +7,7 @@ namespace repose::tools::decimation {
 using namespace surface;
 namespace {
 
-/// What a cut must take off on either side, as a share of the piece's size: less is rounding.
+/// Least share of a piece's size that a cut takes off on either side: less is rounding.
 constexpr double least_cut = 1e-3;
 
 }  // namespace

@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kept_free = 1e-9;
 constexpr size_t most_open_pieces = 5000;
-/// Of how far a point as high over a triangle as a piece's centre may lie beside it.
+/// Share of the distance that a point as high over a triangle as a piece's centre may lie beside
+/// it.
 constexpr double margin_share = 0.5;
 /// Triangles this many times the distance across are worth a cut along their edges.
 constexpr double halved_above = 4;

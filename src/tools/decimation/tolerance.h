@@ -23,8 +23,8 @@ class Tolerance {
 
   double distance() const { return distance_; }  ///< mm, what is kept free taken off
 
-  /// Whether all of the triangle is proven to lie within the distance. If not, `outside` is a point
-  /// of it that does not, or the middle of a piece for which that could not be decided.
+  /// Returns whether all of the triangle is proven to lie within the distance. If not, `outside` is
+  /// a point of it that does not, or the middle of a piece for which that could not be decided.
   bool contains(const Corners& triangle, Vec3* outside) const;
   bool contains(const Vec3& point) const;
   /// The point of the surface closest to `point`.

@@ -24,7 +24,7 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
-/// Bound on a triangle's circumradius: for edges of the length asked for around the face and the
+/// Bound on a triangle's circumradius: for edges of the length requested around the face and the
 /// jaw's joint, growing behind them to four times that.
 struct Sizing {
   using FT = Kernel::FT;

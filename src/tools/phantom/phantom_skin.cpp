@@ -132,7 +132,7 @@ std::vector<double> turns(const std::vector<Vec3>& points) {
   return result;
 }
 
-/// Whether triangles b c d and a d c have a larger smallest angle than a b c and b a d.
+/// Returns whether triangles b c d and a d c have a larger smallest angle than a b c and b a d.
 bool better_diagonal(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const double now = std::max(sharpness(a, b, c), sharpness(b, a, d));
   const double then = std::max(sharpness(c, d, b), sharpness(d, c, a));
@@ -260,8 +260,8 @@ class SkinMesher {
     return better && !joined(left, right);
   }
 
-  /// Whether an edge joins the vertices two halfedges point to. Walks round both at once, so that a
-  /// vertex with an edge to half the rim costs no more than the other.
+  /// Returns whether an edge joins the vertices two halfedges point to. Walks round both at once,
+  /// so that a vertex with an edge to half the rim costs no more than the other.
   bool joined(Halfedge g, Halfedge h) const {
     const Vertex u = mesh_.target(g), v = mesh_.target(h);
     Halfedge at_u = g, at_v = h;

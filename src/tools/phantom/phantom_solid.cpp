@@ -52,7 +52,7 @@ double sheet_distance(const std::vector<Bead>& beads, const Vec3& point) {
   return nearest - beads[0].radius;
 }
 
-/// Whether the distance to a part is certainly more than `reach`.
+/// Returns whether the distance to a part is certainly more than `reach`.
 bool beyond(const Part& part, const Vec3& point, double reach) {
   const double radius = part.extent + (reach > 0 ? part.stretch * reach : reach);
   return radius < 0 || (point - part.middle).squaredNorm() > radius * radius;

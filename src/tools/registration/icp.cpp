@@ -103,8 +103,8 @@ class Icp {
  private:
   double extent() const { return bounding_diagonal(fixed_.points); }
 
-  /// Whether a point of a triangle lies on the surface's border: on an edge that no other triangle
-  /// shares, or in an end of one.
+  /// Returns whether a point of a triangle lies on the surface's border: on an edge that no other
+  /// triangle shares, or in an end of one.
   bool at_border(int64_t triangle, const Vec3& point) const {
     const Triangle& vertices = fixed_.triangles[triangle];
     const Corners t = corners(fixed_, vertices);

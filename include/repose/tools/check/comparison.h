@@ -17,10 +17,12 @@ class Comparison {
   /// `scale`: what the difference is measured against; 0: they must be equal. Not finite: never
   /// agrees.
   void number(const std::string& name, double stored, double recomputed, double scale);
-  /// The same for every entry; the table shows the worst. Arrays of different length disagree.
+  /// Compares every entry of two arrays; the table shows the worst. Arrays of different length
+  /// disagree.
   void array(const std::string& name, std::span<const double> stored,
              std::span<const double> recomputed, double scale);
-  /// What cannot be recomputed: within [least, most], and not NaN. The table says "range only".
+  /// Checks a number that cannot be recomputed: within [least, most], and not NaN. The table says
+  /// "range only".
   void range(const std::string& name, double stored, double least, double most);
   /// A statement about the file that holds or does not.
   void statement(const std::string& text, bool holds);

@@ -5,7 +5,7 @@
 #include "repose/imaging/volume.h"
 #include "repose/meshtools/signed_distance.h"
 
-/// How far one surface lies from another.
+/// Distances between two surfaces.
 namespace repose::tools::comparison {
 
 using imaging::Watch;
@@ -35,7 +35,7 @@ struct DistanceStatistics {
   double within_1 = 0, within_2 = 0;  ///< share of the area with |distance| of at most 1, 2 mm
 };
 
-/// Of no samples: zeros.
+/// Returns the statistics of samples; zeros without samples.
 DistanceStatistics statistics(const std::vector<Sample>& samples);
 
 /// A colour map for distances from −reach (blue) over 0 (white) to +reach (red), mm.

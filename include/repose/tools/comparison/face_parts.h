@@ -21,7 +21,7 @@ class FaceParts {
   /// upper half, from there to 15 mm above pronasale, at most 70 mm from the midline and behind
   /// pronasale. Empty: none of them.
   std::string at(const Vec3& point) const;
-  /// Of subnasale: what lies above no jaw surgery moves, but for the nose.
+  /// Height of subnasale: jaw surgery moves nothing above it but the nose.
   double upper_face() const { return subnasale_; }
 
  private:

@@ -13,7 +13,7 @@ using surface::Surface;
 
 using base::Similarity;
 
-/// Of landmarks (base::breadth); below it, the turn about their line is noise.
+/// Least breadth of landmarks (base::breadth); below it, the turn about their line is noise.
 constexpr double least_breadth = 0.01;
 
 struct LandmarkFit {
