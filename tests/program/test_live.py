@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -118,6 +119,24 @@ def test_a_closed_pipe_ends_the_program(environment):
     process.stdin.flush()
     assert process.wait(timeout=60) == 0
     process.stdin.close()
+    process.stderr.close()
+
+
+def test_a_socket_answers_clients_with_its_token_alone(environment):
+    process = subprocess.Popen([programs() / "repose-live", SCENE, "-port", "0"],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               env={**os.environ, **environment})
+    address = json.loads(process.stdout.readline())
+
+    def client(token, request):
+        with socket.create_connection(("127.0.0.1", address["port"]), timeout=60) as connection:
+            connection.sendall(json.dumps({"token": token}).encode() + b"\n" + request + b"\n")
+            return json.loads(connection.makefile("rb").readline())
+    assert "the first line must be" in client("guess", b'{"do": "quit"}')["error"]
+    assert client(address["token"], b'{"do": "describe"}')["pieces"]
+    assert client(address["token"], b'{"do": "quit"}')["ok"]
+    assert process.wait(timeout=60) == 0
+    process.stdout.close()
     process.stderr.close()
 
 
