@@ -131,7 +131,7 @@ def packed_fields(values, count, pack):
     if "uncertainty" in values:
         most = max(float(np.percentile(values["uncertainty"], 99)), 0.1)
         stored = pack.numbers(values["uncertainty"])
-        fields.append({"name": "uncertainty", "label": "sure to, mm", "high": most,
+        fields.append({"name": "uncertainty", "label": "uncertain by, mm", "high": most,
                        "ramp": UNCERTAIN, "states": [stored] + [stored] * count})
     if np.ptp(values["solved"]) > 0:
         stored = pack.numbers(values["solved"])
@@ -340,7 +340,7 @@ def region_columns(plans):
         apart = np.linalg.norm(matched(*plans) - skin.after, axis=1)
         columns.append(("difference", by_part(skin, first.parts, apart), 3))
     elif first.result.uncertainty is not None:
-        columns.append(("sure to", by_part(skin, first.parts, first.result.uncertainty), 3))
+        columns.append(("uncertain by", by_part(skin, first.parts, first.result.uncertainty), 3))
     return columns
 
 

@@ -161,7 +161,7 @@ class Sheet {
       : `moves ${Math.hypot(...shift).toFixed(1)} mm: ${inWords(shift)}`;
     const unsure = this.fields.get("uncertainty")?.states[after];
     return plan + place + moves +
-      (surface === this.skin && unsure ? `; sure to ${at(unsure)[0].toFixed(1)} mm` : "");
+      (surface === this.skin && unsure ? `; uncertain by ${at(unsure)[0].toFixed(1)} mm` : "");
   }
 
   // Two clicks measure a distance; a third begins again.
