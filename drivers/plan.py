@@ -1,0 +1,288 @@
+#!/usr/bin/python3
+"""From voxels to a face: plan.py VOLUME [LABELS] -operation TEXT
+
+    drivers/plan.py head.mhd labels.nii.gz -operation "Le Fort I, 5 mm forward, 2 up" -output plan
+    drivers/plan.py head.seg.nrrd -operation "genioplasty, 8 mm forward" -output plan
+    drivers/plan.py ct.nii.gz -apart skull.mrk.json jaw.mrk.json -operation "open the jaw by 8 degrees"
+
+VOLUME is a CT or a segmentation of 3D Slicer (.seg.nrrd), whose segments' names decide what is skin,
+skull, maxilla and mandible; LABELS a label map or segmentation of the bones of a CT. Writes into the
+folder plan: surfaces, landmarks with a picture, scene.yaml to edit, and the solved face with a
+picture. Operations: Le Fort I, sagittal split, genioplasty, jaw; each with movements in mm (forward,
+back, up, down, left, right) and degrees (open, close, yaw, roll).
+
+  -level HU    of the skin in a CT (-300)
+  -apart SKULL JAW    points in the two bones of a CT without LABELS (docs/guide/touching_bones.md)
+  -bone HU     level of bone there (226)
+  -edge MM     of the mesh that is solved (4);  -ranks N  that solve it (2)
+  -propose     ends with the scene and the picture of the landmarks, before it is solved
+
+After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face."""
+
+import argparse
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROLES = {"skin": r"skin|soft|face", "mandible": r"mandib|lower.?jaw", "maxilla": r"maxill|upper.?jaw",
+         "skull": r"skull|crani|bone"}
+OPERATIONS = (r"le ?fort|maxill", r"genio|chin", r"split|bsso", r"jaw|mandib|open")
+NEEDED = ("skin", "skull", "mandible")
+DIRECTIONS = {"forward": (0, -1, 0), "advance": (0, -1, 0), "back": (0, 1, 0), "setback": (0, 1, 0),
+              "up": (0, 0, 1), "impact": (0, 0, 1), "down": (0, 0, -1), "left": (1, 0, 0),
+              "right": (-1, 0, 0)}
+TURNS = {"open": (1, 0, 0), "close": (-1, 0, 0), "yaw": (0, 0, 1), "roll": (0, 1, 0)}
+
+
+def refuse(message):
+    sys.exit(f"error: plan.py: {message}")
+
+
+def program(name):
+    """A program of the build folder beside this script, of REPOSE_BUILD, or on the path."""
+    folders = [os.environ.get("REPOSE_BUILD", ""), HERE.parent / "build"]
+    found = [pathlib.Path(folder) / "bin" / name for folder in folders if folder]
+    return next((str(path) for path in found if path.exists()), name)
+
+
+def run(*command):
+    """Runs one step, shows what it prints, and ends where it writes nothing. Returns its status."""
+    print("$", " ".join(map(str, command)), flush=True)
+    status = subprocess.run([str(word) for word in command]).returncode
+    if status not in (0, 2):
+        refuse(f"{pathlib.Path(str(command[0])).name} ended with status {status}")
+    return status
+
+
+class Landmarks(dict):
+    def __missing__(self, name):
+        refuse(f"landmark {name} was not found, and the operation needs it: place it in 3D Slicer, and give "
+               "it to repose-landmarks by -landmarks")
+
+
+def slicer_segments(file):
+    """Name and label of each segment of a .seg.nrrd, from its header."""
+    header = file.read_bytes()[:1 << 20].split(b"\n\n")[0].decode(errors="replace")
+    if re.search(r"^dimension:\s*4", header, re.M):
+        refuse(f"{file}: its segments overlap (several layers); export it from 3D Slicer as one label map")
+    key = dict(re.findall(r"^(Segment\d+_\w+):=(.*?)\s*$", header, re.M))
+    return {key[name]: int(key[name.replace("_Name", "_LabelValue")])
+            for name in key if name.endswith("_Name")}
+
+
+def roles_of(file):
+    """Role and label of the segments that a plan needs."""
+    segments = slicer_segments(file)
+    found = {}
+    for role, words in ROLES.items():
+        for name, label in segments.items():
+            if re.search(words, name.lower()) and label not in found.values():
+                found.setdefault(role, label)
+    return found
+
+
+def bounds(file):
+    """Lowest and highest corner, and the vertices, of a binary PLY of repose-isosurface."""
+    import numpy as np
+    data = file.read_bytes()
+    count = int(re.search(rb"element vertex (\d+)", data)[1])
+    kind = "<f8" if b"property double x" in data[:400] else "<f4"
+    start = data.index(b"end_header\n") + len(b"end_header\n")
+    points = np.frombuffer(data, kind, 3 * count, start).reshape(-1, 3)
+    return points.min(0), points.max(0), points
+
+
+def extract_labels(labels, folder):
+    """A mesh of each label; without names the largest is the skull, and that before and below its
+    middle the mandible."""
+    roles = roles_of(labels) if labels.name.endswith(".seg.nrrd") else {}
+    if roles:
+        for role, label in roles.items():
+            run(program("repose-isosurface"), labels, "-label", label, "-largest", "-voxel", 2,
+                "-output", folder / f"{role}.ply")
+        return
+    run(program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output",
+        folder / "label.ply")
+    meshes = {file: bounds(file) for file in folder.glob("label_*.ply")}
+    size = {file: (high - low).prod() for file, (low, high, _) in meshes.items()}
+    skull = max(size, key=size.get)
+    middle = (meshes[skull][0] + meshes[skull][1]) / 2
+    jaws = [file for file, (low, high, _) in meshes.items()
+            if (low + high)[1] / 2 < middle[1] and (low + high)[2] / 2 < middle[2]]
+    if not jaws:
+        refuse(f"{labels}: no label lies before and below the skull; name segments in a .seg.nrrd")
+    skull.rename(folder / "skull.ply")
+    max(jaws, key=size.get).rename(folder / "mandible.ply")
+
+
+def extract_bones(volume, options, folder):
+    """Skull and mandible of a CT, taken apart from points in each."""
+    run(program("repose-isosurface"), volume, "-level", options.bone, "-apart", *options.apart,
+        "-largest", "-voxel", 2, "-output", folder / "bone.ply")
+    (folder / "bone_1.ply").rename(folder / "skull.ply")
+    (folder / "bone_2.ply").rename(folder / "mandible.ply")
+
+
+def movements(text):
+    """(number, word) of each movement in the text, in its order."""
+    known = "|".join([*DIRECTIONS, *TURNS])
+    before = rf"({known})\w*\D{{0,20}}?([\d.]+)\s*(?:mm|°|deg\w*)"
+    after = rf"([\d.]+)\s*(?:mm|°|deg\w*)?\s*(?:of |to the )?({known})"
+    text = text.lower().replace("-", "")
+    found = [(float(n), word) for n, word in re.findall(after, text)]
+    return found or [(float(n), word) for word, n in re.findall(before, text)]
+
+
+def movements_or_refuse(operation):
+    if not any(re.search(words, operation.lower()) for words in OPERATIONS):
+        refuse(f"-operation {operation!r}: name Le Fort I, sagittal split, genioplasty or jaw")
+    found = movements(operation)
+    if not found:
+        refuse(f"-operation {operation!r}: give a movement, such as 5 mm forward or 8 degrees open")
+    return found
+
+
+def point(xyz):
+    return "[" + ", ".join(f"{x:.1f}" for x in xyz) + "]"
+
+
+def along(mark, share, ahead, behind):
+    """A height and depth between two landmarks."""
+    return [mark[behind][k] + share * (mark[ahead][k] - mark[behind][k]) for k in range(3)]
+
+
+def osteotomy(operation, mark, up):
+    """(bone, piece, planes, kerf) of the operation that the text names; piece None: no cut."""
+    le_fort, genioplasty, split, _ = (re.search(words, operation) for words in OPERATIONS)
+    if le_fort:
+        level = [mark["nasal_spine"][0], mark["nasal_spine"][1], mark["nasal_spine"][2] + 5]
+        joint = [sum(mark[f"condyle_{side}_center"][k] for side in ("left", "right")) / 2
+                 for k in range(3)]
+        back = [level[k] + 0.55 * (joint[k] - level[k]) for k in range(2)] + [level[2]]
+        return "skull", "maxilla", [(level, (0, 0, -1)), (back, (0, -1, 0))], max(0.5, up + 1)
+    if genioplasty:
+        b = mark["b_point"]
+        return "mandible", "chin", [([b[0], b[1], b[2] - 4], (0, -0.42, -0.91))], 0.5
+    if split:
+        low = along(mark, 0.13, "pogonion_bone", "gonion_left")
+        high = along(mark, 0.5, "pogonion_bone", "condyle_left_center")
+        y, z = high[1] - low[1], mark["condyle_left_center"][2] - mark["gonion_left"][2]
+        place = [mark["pogonion_bone"][0], low[1], mark["gonion_left"][2]]
+        length = (y * y + z * z)**0.5
+        return "mandible", "jaw", [(place, (0, -z / length, y / length))], 0.5
+    return "mandible", None, [], 0
+
+
+def move_lines(operation, bone, mark):
+    lines = []
+    joint = [mark["condyle_right_center"], mark["condyle_left_center"]]
+    for number, word in movements_or_refuse(operation):
+        if word in DIRECTIONS:
+            shift = [number * x for x in DIRECTIONS[word]]
+            lines.append(f"  - {{bone: {bone}, translate: {point(shift)}}}   # {word}")
+            continue
+        hinge = word in ("open", "close")
+        axis = [b - a for a, b in zip(*joint)] if hinge else TURNS[word]
+        center = [(a + b) / 2 for a, b in zip(*joint)] if hinge else mark["upper_incisor_edge"]
+        lines.append(f"  - {{bone: {bone}, rotate: {{axis: {point(axis)}, center: {point(center)}, "
+                     f"angle: {-number if word == 'close' else number:g}}}}}   # {word}")
+    return lines
+
+
+def scene_text(options, mark, bones):
+    operation = options.operation.lower()
+    up = sum(n for n, word in movements(operation) if word in ("up", "impact"))
+    bone, piece, planes, kerf = osteotomy(operation, mark, up)
+    if piece in bones:  # segmented already
+        bone, piece, planes = piece, None, []
+    lines = [f"# {options.operation}. Proposed by drivers/plan.py: look at landmarks.svg, edit, and",
+             "# solve again: repose-solve scene.yaml. LPS, mm: +x patient left, +y back, +z up.",
+             "skin: skin.ply", "bones:"]
+    lines += [f"  - {{name: {name}, file: {name}.ply}}" for name in bones]
+    lines += ["landmarks: landmarks.mrk.json", f"tissue: {{layers: 4, edge: {options.edge:g}, release: 5}}"]
+    if planes:
+        lines += ["osteotomies:", f"  - bone: {bone}", f"    piece: {piece}", "    planes:"]
+        lines += [f"      - {{point: {point(at)}, normal: [{n[0]:g}, {n[1]:.3g}, {n[2]:.3g}]}}"
+                  for at, n in planes]
+        lines += [f"    kerf: {kerf:g}   # mm, the saw, and bone taken out"]
+    lips = [mark[name] for name in ("mouth_right", "stomion", "mouth_left") if name in mark]
+    if len(lips) == 3:
+        lines += ["mouth:   # the lips are parted from corner to corner",
+                  "  path: [" + ", ".join(map(point, lips)) + "]"]
+    return "\n".join(lines + ["moves:"] + move_lines(operation, piece or bone, mark)) + "\n"
+
+
+def read_landmarks(file):
+    points = json.loads(file.read_text())["markups"][0]["controlPoints"]
+    return Landmarks((entry["label"], entry["position"]) for entry in points)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="plan.py", description=__doc__, add_help=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-help", action="help")
+    parser.add_argument("volumes", nargs="+", type=pathlib.Path)
+    parser.add_argument("-operation", required=True)
+    parser.add_argument("-output", default="plan", type=pathlib.Path)
+    parser.add_argument("-level", type=float, default=-300)
+    parser.add_argument("-bone", type=float, default=226)
+    parser.add_argument("-apart", nargs=2, type=pathlib.Path)
+    parser.add_argument("-edge", type=float, default=4)
+    parser.add_argument("-ranks", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("-propose", action="store_true")
+    return parser.parse_args()
+
+
+def mpi_environment():
+    """Lets mpirun work as root, as in a container, and libraries leave the cores to the ranks."""
+    for name in ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMP_NUM_THREADS",
+                 "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def main():
+    mpi_environment()
+    options, begin = arguments(), time.monotonic()
+    folder, volume, labels = options.output, options.volumes[0], options.volumes[-1]
+    for file in options.volumes:
+        if not file.exists():
+            refuse(f"{file}: no such file or folder")
+    alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
+    if alone and not options.apart:
+        refuse(f"{volume}: a CT does not tell skull from jaw: add a label map, or -apart SKULL JAW with "
+               "points in each (docs/guide/touching_bones.md)")
+    movements_or_refuse(options.operation)
+    folder.mkdir(parents=True, exist_ok=True)
+    segmented = volume.name.endswith(".seg.nrrd")
+    if alone:
+        extract_bones(volume, options, folder)
+    else:
+        extract_labels(labels, folder)
+    if not segmented:
+        run(program("repose-isosurface"), volume, "-level", options.level, "-largest", "-output",
+            folder / "skin.ply")
+    missing = [part for part in NEEDED if not (folder / f"{part}.ply").exists()]
+    if missing:
+        refuse(f"{labels}: no segment is named as {' or '.join(missing)}")
+    run(program("repose-landmarks"), folder / "skin.ply", "-skull", folder / "skull.ply", "-mandible",
+        folder / "mandible.ply", "-output", folder / "landmarks")
+    bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
+    scene = folder / "scene.yaml"
+    scene.write_text(scene_text(options, read_landmarks(folder / "landmarks.mrk.json"), bones))
+    print(f"proposed: {scene}, {folder / 'landmarks.svg'} ({time.monotonic() - begin:.0f} s)", flush=True)
+    if options.propose:
+        return
+    status = run("mpirun", "-n", options.ranks, program("repose-solve"), scene, "-output",
+                 folder / "face")
+    run(sys.executable, HERE / "render.py", folder / "face")
+    print(f"solved: {folder / 'face.h5'}, {folder / 'face.png'} ({time.monotonic() - begin:.0f} s)")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
