@@ -11,8 +11,8 @@
 namespace repose::model {
 namespace {
 
-constexpr double gap = 1.5;            // mm
-constexpr double gap_per_depth = 0.5;  // of the column's thickness
+constexpr double farthest = 1.5;            // mm
+constexpr double farthest_per_depth = 0.5;  // of the column's thickness
 
 /// Returns the requested attachment of each column, by region.
 std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& scene,
@@ -22,7 +22,8 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& sc
   constexpr std::array words = {"hold to it", "slide along it", "touch it", "do not know of it"};
   std::vector<scene::Attach> wish(columns.deep.size(), tissue.attach);
   for (size_t k = 0; k < tissue.attach_regions.size(); ++k) {
-    const auto& [where, how] = tissue.attach_regions[k];
+    const scene::Region& where = tissue.attach_regions[k].where;
+    const scene::Attach how = tissue.attach_regions[k].attach;
     const bool segmented = std::holds_alternative<scene::MeshRegion>(where) ||
                            std::holds_alternative<scene::LabelRegion>(where);
     const Contains inside = contains_of(where, segmented ? near : 0);
@@ -47,6 +48,24 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& sc
 
 }  // namespace
 
+void open_gaps(const std::vector<Vec3>& skin, const scene::Scene& scene, Columns& columns) {
+  constexpr double most = 1.0 / 3;  // of a column
+  const auto& regions = scene.tissue.attach_regions;
+  if (std::ranges::none_of(regions, [](const auto& region) { return region.gap > 0; })) return;
+  std::vector<double> gaps(columns.deep.size(), 0);
+  for (const scene::AttachRegion& region : regions) {
+    const Contains inside = contains_of(region.where, 0);
+    for (size_t v = 0; v < gaps.size(); ++v)
+      if (columns.holds[v] && inside(columns.deep[v])) gaps[v] = region.gap;
+  }
+  for (size_t v = 0; v < gaps.size(); ++v) {
+    const double shorter = std::min(gaps[v], most * columns.thickness[v]);
+    if (!(shorter > 0)) continue;
+    columns.deep[v] += shorter / columns.thickness[v] * (skin[v] - columns.deep[v]);
+    columns.thickness[v] -= shorter;
+  }
+}
+
 void Attachment::settle(size_t column, scene::Attach how) {
   if (how == scene::Attach::fixed) return;
   if (how == scene::Attach::slide) slides_on[column] = bone[column];
@@ -64,7 +83,7 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     if (!columns.holds[v]) continue;
     const BoneField::Nearest nearest = bones.nearest(columns.deep[v]);
-    if (nearest.distance > std::max(gap, gap_per_depth * columns.thickness[v])) continue;
+    if (nearest.distance > std::max(farthest, farthest_per_depth * columns.thickness[v])) continue;
     attachment.bone[v] = nearest.bone;
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];

@@ -22,6 +22,10 @@ struct Attachment {
   void settle(size_t column, scene::Attach how);
 };
 
+/// Shortens columns that end at bone in a region with a gap, by the gap but no more than a third of
+/// their length. `skin` [V] is where they begin, mm.
+void open_gaps(const std::vector<Vec3>& skin, const scene::Scene& scene, Columns& columns);
+
 /// Ties a column that ends at bone, or short of it by no more than 1.5 mm or half its thickness, to
 /// the bone nearest to its deepest point; then all do what the scene's tissue is to, by region (a
 /// mesh or a label holds what is up to 2 mm from it). Throws InputError where a region holds no

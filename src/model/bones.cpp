@@ -16,6 +16,7 @@ meshtools::Osteotomy plan_of(const scene::Osteotomy& cut, const std::string& pie
     if (plane.radius) plan.planes.back().radius = *plane.radius;
   }
   if (cut.surface) plan.surface = meshtools::load_cutter(*cut.surface);
+  if (cut.sheet) plan.surface = surface::Surface{"sheet", cut.sheet->points, cut.sheet->triangles};
   return plan;
 }
 

@@ -6,6 +6,7 @@
 #include "load_entry.h"
 #include "loads.h"
 #include "point_sets.h"
+#include "repose/anatomy/complete.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
 #include "repose/model/collision.h"
@@ -76,6 +77,7 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   anatomy.bones = std::move(bones.surfaces);
   anatomy.remarks = std::move(bones.remarks);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
+  anatomy::complete(anatomy.skin, anatomy.bones, anatomy.scene, anatomy.remarks);
   heed_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
   if (scene.tissue.edge) solve_remeshed(anatomy);
   return anatomy;

@@ -79,6 +79,7 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
+  open_gaps(mesh.points, scene, columns);
   Attachment attachment = attach_columns(columns, field, scene);
   std::vector<char> rim = settle_rim(scene, range, mesh, columns, field, attachment);
   if (const std::string border = describe_near_border(scene, range, bones, mesh, field);

@@ -76,7 +76,11 @@ std::vector<Key> attach_keys() {
            .kind = choice,
            .standard = "required",
            .sentence = "As tissue.attach.",
-           .choices = {"fixed", "slide", "contact", "free"}}};
+           .choices = {"fixed", "slide", "contact", "free"}},
+          {"tissue.attach_regions[].gap", number, "0",
+           "How far short of bone tissue ends there, at most a third of its thickness; not with "
+           "fixed or slide.",
+           "mm", Range::between(0, 10)}};
 }
 
 std::vector<Key> tissue_keys() {
@@ -323,6 +327,38 @@ std::vector<Key> form_keys(const std::string& above) {
            Range::between(-180, 180)}};
 }
 
+/// The form clinical, below an entry of moves.
+std::vector<Key> clinical_keys() {
+  const std::string above = "moves[].clinical";
+  const auto length = [&](const char* name, const char* sentence) {
+    return Key{above + "." + name, number, "", sentence, "mm", Range::between(-30, 30)};
+  };
+  const auto angle = [&](const char* name, const char* sentence) {
+    return Key{above + "." + name, number, "0", sentence, "degrees", Range::between(-45, 45)};
+  };
+  return {{above, map, "",
+           "Form: a move in the words of surgery, in the axes of the head; rotations are about the "
+           "pivot and made first."},
+          length("advance", "Forward."),
+          length("set_back", "Backward."),
+          length("impaction", "Upward."),
+          length("lower", "Downward."),
+          length("left", "To the patient's left."),
+          angle("yaw", "The front turns to the patient's left."),
+          angle("roll", "The patient's left side goes up, which corrects a cant."),
+          angle("pitch", "The front goes down."),
+          angle("open", "As pitch, about the hinge axis through the condyles."),
+          length("overjet",
+                 "Target: upper incisors this far in front of the lower; excludes "
+                 "advance and set_back."),
+          length("overbite",
+                 "Target: upper incisors this far below the edge of the lower; excludes "
+                 "impaction and lower."),
+          {above + ".pivot", place, "",
+           "Point of the axes of yaw, roll and pitch; by default the incisors of the jaw, or "
+           "pogonion of a chin."}};
+}
+
 std::vector<Key> move_keys() {
   std::vector<Key> rows{{"moves", list, "",
                          "Rigid motions of bones. Each entry has one form, or a list of that "
@@ -332,6 +368,8 @@ std::vector<Key> move_keys() {
                          "The name of a bone or a piece, or several, which all make the move."}};
   const std::vector<Key> forms = form_keys("moves[]"), listed = form_keys("moves[].transform[]");
   rows.insert(rows.end(), forms.begin(), forms.end());
+  const std::vector<Key> clinical = clinical_keys();
+  rows.insert(rows.end(), clinical.begin(), clinical.end());
   rows.push_back(
       {"moves[].transform", transform, "",
        "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four rows "
@@ -395,6 +433,29 @@ std::vector<Key> solve_keys() {
        .choices = {"auto"}}};
 }
 
+std::vector<Key> anatomy_keys() {
+  return {
+      {"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
+      {"anatomy.landmarks", file, "required",
+       "Landmarks under their standard names: .mrk.json, .fcsv, .csv or JSON; moves may name "
+       "them."},
+      {.path = "anatomy.lips",
+       .kind = choice,
+       .standard = "parted",
+       .sentence =
+           "Lips are parted along their crease, between the corners of the mouth, or joined "
+           "as in the scan; the key mouth overrides it.",
+       .choices = {"parted", "joined"}},
+      {.path = "anatomy.vestibule",
+       .kind = choice,
+       .standard = "on",
+       .sentence = "Lips and cheeks in front of the teeth, from sulcus to sulcus, touch bone and "
+                   "are not attached to it; tissue.attach_regions override it.",
+       .choices = {"on", "off"}},
+      {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
+       Range::between(0, 10)}};
+}
+
 std::vector<Key> osteotomy_keys() {
   return {
       {"landmarks", file, "",
@@ -403,6 +464,15 @@ std::vector<Key> osteotomy_keys() {
       {"osteotomies[].bone", text, "required",
        "The bone, or an earlier piece, that is cut; what is left keeps its name."},
       {"osteotomies[].piece", text, "required", "Name of the piece, from here on a bone."},
+      {.path = "osteotomies[].template",
+       .kind = choice,
+       .standard = "",
+       .sentence = "In place of planes or a surface, cuts that the landmarks of anatomy place.",
+       .choices = {"le_fort_1", "sagittal_split", "genioplasty"}},
+      {"osteotomies[].level", number, "",
+       "With template: distance of the plane above the nasal spine (le_fort_1, default 5) or below "
+       "point B (genioplasty, default 4).",
+       "mm", Range::between(0, 30)},
       {"osteotomies[].planes", list, "",
        "Plane cuts. The piece is what lies in front of all of them."},
       {"osteotomies[].planes[].point", vector, "required", "A point of the plane.", "mm"},
@@ -483,8 +553,9 @@ const std::vector<Key>& all_keys() {
     std::vector<Key> rows;
     for (const auto& part :
          {surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(), load_keys(),
-          osteotomy_keys(), move_keys(), plan_keys(), collision_keys(), instrument_keys(),
-          contact_keys(), regions_keys(), incision_keys(), tearing_keys(), solve_keys()})
+          anatomy_keys(), osteotomy_keys(), move_keys(), plan_keys(), collision_keys(),
+          instrument_keys(), contact_keys(), regions_keys(), incision_keys(), tearing_keys(),
+          solve_keys()})
       rows.insert(rows.end(), part.begin(), part.end());
     return rows;
   }();

@@ -8,14 +8,21 @@ std::vector<AttachRegion> read_attach_regions(const Value& list) {
   std::vector<AttachRegion> regions;
   for (const Value& item : list.items()) {
     const Map map(item);
-    regions.push_back({read_region(map), static_cast<Attach>(map.at("attach").choice())});
+    AttachRegion& region = regions.emplace_back(
+        AttachRegion{read_region(map), static_cast<Attach>(map.at("attach").choice())});
+    const auto gap = map.find("gap");
+    if (!gap) continue;
+    region.gap = gap->number();
+    if (region.gap > 0 && (region.attach == Attach::fixed || region.attach == Attach::slide))
+      gap->refuse("goes with attach: contact or free, tissue that is not held; remove it");
   }
   return regions;
 }
 
 std::vector<AttachRegion> read_teeth(const Value& list) {
   std::vector<AttachRegion> regions;
-  for (const Value& item : list.items()) regions.push_back({read_region(Map(item)), Attach::slide});
+  for (const Value& item : list.items())
+    regions.push_back({read_region(Map(item)), Attach::slide, 0});
   return regions;
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "bone_names.h"
+#include "clinical_move.h"
 #include "landmark_fit.h"
 #include "repose/base/text.h"
 #include "repose/scene/transform_file.h"
@@ -56,12 +57,16 @@ class Forms {
   Forms(const std::map<std::string, Vec3>& landmarks, std::vector<std::string>& remarks)
       : landmarks_(landmarks), remarks_(remarks) {}
 
-  /// Returns the motion of an entry that follows the motion `before` of its bone.
-  RigidMotion read_entry(const Map& entry, const RigidMotion& before) {
-    const Value form = only_form(entry, {"translate", "rotate", "landmark", "transform"});
+  /// Returns the motion of an entry that follows the motion `before` of its bone; `clinical` reads
+  /// that form.
+  template <class Clinical>
+  RigidMotion read_entry(const Map& entry, const RigidMotion& before, const Clinical& clinical) {
+    const Value form =
+        only_form(entry, {"translate", "rotate", "landmark", "transform", "clinical"});
     if (const auto list = entry.find("translate")) return read_translations(*list);
     if (const auto list = entry.find("rotate")) return read_rotations(*list);
     if (entry.find("landmark")) return read_landmark(form, before);
+    if (entry.find("clinical")) return clinical(form);
     const bool several = form.is_list() && !is_matrix(form);
     if (!several) return read_matrix_or_file(form);
     return in_order(form, form.items(), [&](const Value& one, const RigidMotion& so_far) {
@@ -171,8 +176,11 @@ void read_moves(const Value& list, const std::map<std::string, Vec3>& landmarks,
   for (const Value& item : list.items()) {
     const Map entry(item);
     for (const auto& [name, value] : entry.at("bone").texts()) {
-      RigidMotion& motion = scene.moves[find_bone(name, value, scene.bones)];
-      motion = forms.read_entry(entry, motion).after(motion);
+      const std::size_t bone = find_bone(name, value, scene.bones);
+      RigidMotion& motion = scene.moves[bone];
+      const RigidMotion next = forms.read_entry(
+          entry, motion, [&](const Value& form) { return read_clinical_move(form, scene, bone); });
+      motion = next.after(motion);
     }
   }
 }

@@ -2,6 +2,7 @@
 #include <map>
 
 #include "bone_names.h"
+#include "read_anatomy.h"
 #include "read_contact.h"
 #include "read_incisions.h"
 #include "read_instruments.h"
@@ -206,7 +207,7 @@ Tissue read_tissue(const Value& value) {
   set_choice<Attach>(tissue.released, map, "released");
   if (const auto regions = map.find("unattached"))
     for (const Value& item : regions->items())
-      tissue.attach_regions.push_back({read_region(Map(item)), Attach::contact});
+      tissue.attach_regions.push_back({read_region(Map(item)), Attach::contact, 0});
   if (const auto regions = map.find("attach_regions"))
     for (AttachRegion& region : read_attach_regions(*regions))
       tissue.attach_regions.push_back(std::move(region));
@@ -341,10 +342,13 @@ Scene read_scene(const std::filesystem::path& file) {
   scene.bones = read_bones(map.at("bones"));
   scene.tissue = read_tissue(map.at("tissue"));
   read_surroundings(scene, map);
+  if (const auto anatomy = map.find("anatomy")) scene.anatomy = read_anatomy(*anatomy);
   if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
   std::map<std::string, Vec3> landmarks;
-  if (const auto named = map.find("landmarks")) landmarks = landmarks_by_name(named->file());
+  if (scene.anatomy) landmarks = scene.anatomy->landmarks;
+  if (const auto named = map.find("landmarks"))
+    for (const auto& [name, place] : landmarks_by_name(named->file())) landmarks[name] = place;
   if (const auto moves = map.find("moves")) read_moves(*moves, landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto plan = map.find("plan")) scene.plan = read_plan(*plan, scene);

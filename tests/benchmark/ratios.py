@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
-"""Ratios of soft to hard tissue of four operations on a real head, against published ones.
+"""Ratios of soft to hard tissue of five operations on a real head, against published ones. Landmarks are
+those that repose-landmarks proposes, cuts are templates, moves are in the words of surgery.
 
-    tests/benchmark/ratios.py [-bin build/bin] [-output docs/measurements/ratios.md] [-edge 6]
-                              [-ways "default,release 5"]
+    tests/benchmark/ratios.py [-bin build/bin] [-output docs/measurements/ratios.md] [-edge 4]
+                              [-head ../shared/data/head] [-ways "default,bonded lips"]
+                              [-operations "advance,set-back"] [-keep FOLDER]
 
-Needs the head in ../shared/data/head, and
+The folder of the head holds skin.ply, skull.ply and mandible.ply. Needs
 apt-get install --no-install-recommends python3-h5py python3-meshio python3-scipy
 """
 
+import json
 import pathlib
 import tempfile
 
@@ -18,80 +21,115 @@ from page import option_parser, print_table
 from heads import BONES, DATA  # page knows where it is
 from tissue import last, model_of
 
-# Soft landmarks of this head on its midline, mm.
-POINTS = {"pronasale": (2.4, -324.3, 412), "subnasale": (2.4, -309.2, 395),
-          "labrale superius": (2.4, -313.8, 380), "labrale inferius": (2.4, -310.1, 364),
-          "B′": (2.4, -304.0, 351), "pogonion′": (2.4, -303.7, 338)}
-# Pieces, the way they go (+ forward), mm, and the landmarks that are told of.
-JAW = ("{bone: mandible, piece: part, "
-       "planes: [{point: [2.4, -248, 385], normal: [0, -0.947, -0.322]}]}")
-CHIN = ("{bone: mandible, piece: part, kerf: 0.5, "
-        "planes: [{point: [2, -297, 347], normal: [0, -0.42, -0.91]}]}")
-MAXILLA = ("{bone: skull, piece: part, kerf: 3, "
-           "planes: [{point: [0, -280, 392], normal: [0, 0, -1]}, "
-           "{point: [0, -250, 392], normal: [0, -1, 0]}]}")
-LOWER, UPPER = ["labrale inferius", "B′", "pogonion′"], list(POINTS)[:3]
-OPERATIONS = {"mandible forward 8": (JAW, 8, LOWER), "mandible back 5": (JAW, -5, LOWER),
-              "chin forward 8": (CHIN, 8, LOWER[1:]), "Le Fort I forward 5": (MAXILLA, 5, UPPER)}
-LIP, CHIN_OF_TWO = "0.66 [2]", "0.90–1.00 [5]"  # of both directions
-PUBLISHED = {("mandible forward 8", "labrale inferius"): LIP,
-             ("mandible forward 8", "B′"): "1.00 [5]",
-             ("mandible forward 8", "pogonion′"): f"0.80–1.33 [1], {CHIN_OF_TWO}",
-             ("mandible back 5", "labrale inferius"): LIP, ("mandible back 5", "B′"): "1.00 [5]",
-             ("mandible back 5", "pogonion′"): CHIN_OF_TWO,
-             ("chin forward 8", "pogonion′"): "0.77–0.91 [3]",
-             ("Le Fort I forward 5", "pronasale"): "0.24–0.35 [4], 0.17 [2]",
-             ("Le Fort I forward 5", "subnasale"): "0.60–0.90 [5]",
-             ("Le Fort I forward 5", "labrale superius"): "0.36–1.43 [4], 0.60–1.00 [5]"}
-MOUTH = ("mouth: {path: [[-23, -299, 366], [-12, -306, 368], [2, -310, 369], [14, -308, 369], "
-         "[26, -301, 366]]}\n")
-# Tissue and mouth of each way.
-WAYS = {"default": ("", MOUTH), "release 5": (", release: 5", MOUTH),
-        "lips joined": ("", "")}
+# Operation → bone, template, clinical move, direction (LPS) and mm.
+FORWARD, BACK, UP = (0, -1, 0), (0, 1, 0), (0, 0, 1)
+OPERATIONS = {
+    "advance": ("mandible", "sagittal_split", "advance: 5", FORWARD, 5),
+    "set-back": ("mandible", "sagittal_split", "set_back: 5", BACK, 5),
+    "chin": ("mandible", "genioplasty", "advance: 8", FORWARD, 8),
+    "Le Fort I": ("skull", "le_fort_1", "advance: 5", FORWARD, 5),
+    "impaction": ("skull", "le_fort_1", "impaction: 4", UP, 4)}
+NAMES = {"pronasale": "pronasale", "subnasale": "subnasale", "upper_lip": "labrale superius",
+         "lower_lip": "labrale inferius", "b_soft": "B′", "pogonion_soft": "pogonion′"}
+# (operation, landmark) → what is published, and the lowest and highest ratio within it: one standard
+# deviation about the mean where it is published, else the range.
+PUBLISHED = {
+    ("advance", "lower_lip"): ("0.66 [2]; about 0.5 ± 0.3 [8]", 0.2, 0.8),
+    ("advance", "b_soft"): ("1.00 [5]", 0.9, 1.1),
+    ("advance", "pogonion_soft"): ("0.80–1.33 [1], 0.90–1.00 [5]", 0.8, 1.33),
+    ("set-back", "upper_lip"): ("about 0.15 [7]", 0.0, 0.3),
+    ("set-back", "lower_lip"): ("0.66 [2] … about 1.0 [7]", 0.66, 1.0),
+    ("set-back", "b_soft"): ("1.00 [5]", 0.9, 1.1),
+    ("set-back", "pogonion_soft"): ("0.90–1.00 [5]", 0.9, 1.0),
+    ("chin", "pogonion_soft"): ("0.77–0.91 [3]", 0.77, 0.91),
+    ("Le Fort I", "pronasale"): ("0.24–0.35 [4], 0.17 [2]", 0.17, 0.35),
+    ("Le Fort I", "subnasale"): ("0.51 ± 0.13 [6], 0.60–0.90 [5]", 0.38, 0.9),
+    ("Le Fort I", "upper_lip"): ("0.82 ± 0.13 [6], 0.60–1.00 [5]", 0.6, 1.0),
+    ("impaction", "upper_lip"): ("0.2–0.5 [6]", 0.2, 0.5)}
+# Way → anatomy and tissue.
+WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
+        "release 5": ("", ", release: 5"),
+        "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
+        "joined lips": (", lips: joined", "")}
 
 
-def scene_of(piece, forward, way, edge):
-    tissue, mouth = WAYS[way]
-    bones = ", ".join(f"{{name: {name}, file: {DATA / name}.ply}}" for name in BONES)
-    return (f"skin: {DATA / 'face.ply'}\nbones: [{bones}]\n"
-            f"tissue: {{layers: 4, edge: {edge:g}{tissue}}}\nosteotomies: [{piece}]\n"
-            f"moves: [{{bone: part, translate: [0, {-forward}, 0]}}]\n{mouth}")
-
-
-def ratios_of(options, folder, operation, way):
-    """Landmark → forward way of the skin over that of the bone, or nothing where it is refused."""
-    piece, forward, landmarks = OPERATIONS[operation]
-    (folder / "scene.yaml").write_text(scene_of(piece, forward, way, options.edge))
-    done = run([options.bin / "repose-solve", "scene.yaml"], folder, ends=None)
+def landmarks_of(options, folder):
+    """The landmarks of the head, proposed, in a folder; name → mm."""
+    done = run([options.bin / "repose-landmarks", options.head / "skin.ply", "-skull",
+                options.head / "skull.ply", "-mandible", options.head / "mandible.ply", "-output",
+                folder / "head"], folder, ends=None)
     if done.status != 0:
-        print(done.error + "".join(done.text.splitlines(True)[:1]))
+        raise SystemExit(done.error or done.text)
+    markup, = json.loads((folder / "head.mrk.json").read_text())["markups"]
+    return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
+
+
+def scene_of(options, operation, way):
+    bone, template, move, _, _ = OPERATIONS[operation]
+    anatomy, tissue = WAYS[way]
+    bones = ", ".join(f"{{name: {name}, file: {options.head / name}.ply}}" for name in BONES)
+    kerf = ", kerf: 4.5" if operation == "impaction" else ", kerf: 0.5"
+    return (f"skin: {options.head / 'skin.ply'}\nbones: [{bones}]\n"
+            f"tissue: {{layers: 4, edge: {options.edge:g}{tissue}}}\n"
+            f"anatomy: {{landmarks: head.mrk.json{anatomy}}}\n"
+            f"osteotomies: [{{bone: {bone}, piece: part, template: {template}{kerf}}}]\n"
+            f"moves: [{{bone: part, clinical: {{{move}}}}}]\n")
+
+
+def ratios_of(options, folder, operation, way, landmarks):
+    """Landmark → way of the skin over that of the bone; empty where the scene is refused."""
+    _, _, _, direction, length = OPERATIONS[operation]
+    name = f"{operation}_{way}".replace(" ", "_")
+    (folder / f"{name}.yaml").write_text(scene_of(options, operation, way))
+    done = run([options.bin / "repose-solve", f"{name}.yaml", "-skip_other_rest"], folder, ends=None)
+    (folder / f"{name}.log").write_text(done.text + done.error)
+    if done.status not in (0, 2):
+        print(done.error)
         return {}
-    model, rest = model_of(folder / "scene.h5"), last(folder / "scene.h5")["point/position"]
+    model, rest = model_of(folder / f"{name}.h5"), last(folder / f"{name}.h5")["point/position"]
     skin = np.flatnonzero(model["point/layer"] == 0)
     initial = model["point/position"][skin]
-    way_of = (rest[skin] - initial)[:, 1] / -forward
-    found = {}
-    for name in landmarks:
-        nearest = np.argsort(np.linalg.norm(initial - POINTS[name], axis=1))[:3]
-        found[name] = way_of[nearest].mean()
-    return found
+    ratio = (rest[skin] - initial) @ direction / length
+    return {mark: ratio[np.argsort(np.linalg.norm(initial - landmarks[mark], axis=1))[:3]].mean()
+            for mark in NAMES if mark in landmarks}
+
+
+def cell(found, key):
+    """A ratio, bold where it lies outside what is published."""
+    if key[1] not in found:
+        return "–"
+    _, low, high = PUBLISHED[key]
+    number = f"{found[key[1]]:.2f}"
+    return number if low <= float(number) <= high else f"**{number}**"
 
 
 def rows(options, folder):
-    for operation, (_, _, landmarks) in OPERATIONS.items():
-        found = [ratios_of(options, folder, operation, way) for way in options.ways.split(",")]
-        for name in landmarks:
-            cells = " | ".join(f"{one[name]:.2f}" if one else "–" for one in found)
-            yield f"| {operation} | {name} | {PUBLISHED.get((operation, name), '')} | {cells} |"
+    ways, outside, count = options.ways.split(","), dict.fromkeys(options.ways.split(","), 0), 0
+    landmarks = landmarks_of(options, folder)
+    for operation in options.operations.split(",") if options.operations else OPERATIONS:
+        found = {way: ratios_of(options, folder, operation, way, landmarks) for way in ways}
+        for key, (published, _, _) in PUBLISHED.items():
+            if key[0] != operation:
+                continue
+            cells = [cell(found[way], key) for way in ways]
+            for way, text in zip(ways, cells):
+                outside[way] += text.startswith("**")
+            count += 1
+            yield (f"| {operation} {OPERATIONS[operation][4]} | {NAMES[key[1]]} | {published} | "
+                   + " | ".join(cells) + " |")
+    yield (f"| **outside**, of {count} | | | " + " | ".join(str(outside[way]) for way in ways) + " |")
 
 
 def main():
-    options = option_parser(__doc__, edge=6.0, ways="default").parse_args()
-    ways = options.ways.split(",")
-    head = ("| operation, mm | landmark | published | " + " | ".join(ways) + " |\n|---|---|---|"
-            + "--:|" * len(ways))
+    options = option_parser(__doc__, edge=4.0, ways="default,bonded lips", head="", operations="",
+                            keep="").parse_args()
+    options.head = pathlib.Path(options.head).resolve() if options.head else DATA
+    head = ("| operation, mm | landmark | published | " + " | ".join(options.ways.split(","))
+            + " |\n|---|---|---|" + "--:|" * len(options.ways.split(",")))
     with tempfile.TemporaryDirectory() as name:
-        print_table(head, rows(options, pathlib.Path(name)), options.output)
+        folder = pathlib.Path(options.keep or name)
+        folder.mkdir(exist_ok=True)
+        print_table(head, rows(options, folder), options.output)
 
 
 if __name__ == "__main__":

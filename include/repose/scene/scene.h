@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "repose/base/geometry.h"
+#include "repose/scene/landmark_names.h"
 #include "repose/scene/rigid_motion.h"
 
 /// The scene file as data: what a person wrote, checked, with defaults filled in, units as in the
@@ -45,6 +46,15 @@ struct CutPlane {
   std::optional<double> radius;  ///< mm: cuts within this disc only
 };
 
+/// An open cutting surface that faces the piece.
+struct CutSheet {
+  std::vector<Vec3> points;  ///< mm
+  std::vector<Triangle> triangles;
+};
+
+/// Osteotomies that landmarks place.
+enum class OsteotomyTemplate { le_fort_1, sagittal_split, genioplasty };
+
 /// Cuts that take a piece off a bone, which keeps its name.
 struct Osteotomy {
   std::size_t bone, piece;  ///< rows of Scene::bones
@@ -52,6 +62,8 @@ struct Osteotomy {
   std::optional<std::filesystem::path> surface;  ///< absolute
   double kerf = 0;                               ///< mm
   std::optional<Vec3> seed;                      ///< mm
+  std::optional<CutSheet> sheet;                 ///< as surface, made by a template
+  std::optional<OsteotomyTemplate> made_by;      ///< unset: by the scene's own planes or surface
 };
 
 enum class Law { linear = 0, quadratic = 1, quartic = 2 };  ///< value = exponent p of the law
@@ -122,6 +134,7 @@ enum class Attach { fixed, slide, contact, free };
 struct AttachRegion {
   Region where;
   Attach attach;
+  double gap = 0;  ///< mm short of bone at which columns of tissue end
 };
 
 struct MaterialRegion {
@@ -254,6 +267,15 @@ struct Collision {
   double tolerance = 0.05;  ///< mm: how much sooner than at contact a clamped motion may end
 };
 
+/// What a scene takes from the landmarks of its head.
+struct AnatomyPlan {
+  std::filesystem::path file;  ///< absolute, of the landmarks
+  Landmarks landmarks;
+  bool part_lips = true;  ///< where the scene has no mouth of its own
+  bool vestibule = true;  ///< tissue in front of teeth touches them and is not attached
+  double gap = 1;         ///< mm, of the vestibule, between mucosa and teeth
+};
+
 struct Scene {
   std::filesystem::path file;
   SurfaceEntry skin;
@@ -266,6 +288,7 @@ struct Scene {
   std::vector<RigidMotion> moves;  ///< [bones] the whole motion of each bone
   std::optional<Plan> plan;        ///< unset: the moves alone
   std::optional<Collision> collision;
+  std::optional<AnatomyPlan> anatomy;
   std::optional<Contact> contact;  ///< unset: what is free is not kept out of bones
   std::vector<Instrument> instruments;
   std::vector<Incision> incisions;

@@ -1,0 +1,151 @@
+#include "repose/anatomy/complete.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lip_crease.h"
+#include "repose/anatomy/propose.h"
+#include "repose/base/error.h"
+#include "repose/surface/triangle_tree.h"
+
+namespace repose::anatomy {
+namespace {
+
+constexpr double off_surface = 15;  // mm, farther than a landmark is ever placed beside its surface
+
+/// Refuses landmarks far from the surface that they are said to be on.
+void require_same_head(const scene::AnatomyPlan& plan, const surface::Surface& skin,
+                       const std::vector<surface::Surface>& bones) {
+  surface::Surface bone;
+  for (const surface::Surface& part : bones) {
+    const auto first = static_cast<int64_t>(bone.points.size());
+    bone.points.insert(bone.points.end(), part.points.begin(), part.points.end());
+    for (const Triangle& t : part.triangles)
+      bone.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  const surface::TriangleTree on_skin(skin), on_bone(bone);
+  for (const scene::LandmarkName& name : scene::landmark_names()) {
+    const auto found = plan.landmarks.find(name.name);
+    if (found == plan.landmarks.end()) continue;
+    const double off = std::sqrt((name.on_skin ? on_skin : on_bone).nearest(found->second).squared);
+    if (off > off_surface)
+      base::refuse(
+          "{}: landmark {} lies {:.0f} mm from the {}; the landmarks are those of another head or "
+          "in "
+          "another frame",
+          plan.file.string(), name.name, off, name.on_skin ? "skin" : "bones");
+  }
+}
+
+const Vec3* find(const scene::AnatomyPlan& plan, const char* name) {
+  const auto found = plan.landmarks.find(name);
+  return found == plan.landmarks.end() ? nullptr : &found->second;
+}
+
+/// The frame of the condyles, or that of the scan.
+HeadFrame frame_of(const scene::AnatomyPlan& plan) {
+  HeadFrame frame;
+  const Vec3 *right = find(plan, "condyle_right_center"), *left = find(plan, "condyle_left_center");
+  const Vec3 *mouth_right = find(plan, "mouth_right"), *mouth_left = find(plan, "mouth_left");
+  const Vec3* edge = find(plan, "upper_incisor_edge");
+  if (mouth_right && mouth_left)
+    frame.origin = (*mouth_right + *mouth_left) / 2;
+  else if (edge)
+    frame.origin = *edge;
+  if (!right || !left) return frame;
+  const Vec3 side = (*left - *right).normalized();
+  const Vec3 back = (Vec3::UnitY() - side.y() * side).normalized();
+  frame.axes.row(0) = side.transpose();
+  frame.axes.row(1) = back.transpose();
+  frame.axes.row(2) = side.cross(back).transpose();
+  return frame;
+}
+
+bool has_mouth(const scene::Scene& scene) {
+  return std::any_of(scene.incisions.begin(), scene.incisions.end(),
+                     [](const scene::Incision& cut) { return cut.name == "mouth"; });
+}
+
+void part_lips(const surface::Surface& skin, scene::Scene& scene,
+               std::vector<std::string>& remarks) {
+  const scene::AnatomyPlan& plan = *scene.anatomy;
+  if (!plan.part_lips || has_mouth(scene)) return;
+  const HeadFrame frame = frame_of(plan);
+  const Vec3* edge = find(plan, "upper_incisor_edge");
+  const Vec3* stomion = find(plan, "stomion");
+  const Vec3* height = stomion ? stomion : edge;
+  if (height && open_mouth(FrontMap(skin, frame), frame.to_frame(*height).z())) {
+    remarks.push_back(
+        "the mouth is open in the scan: the lips are apart already and are not parted");
+    return;
+  }
+  const std::vector<Vec3> path = find_lip_crease(skin, frame, plan.landmarks);
+  if (path.size() < 2)
+    base::refuse(
+        "{}: no crease between the lips was found on the skin by stomion, mouth_right and "
+        "mouth_left "
+        "or upper_incisor_edge; place these, give mouth: {{path: ...}}, or set anatomy.lips: "
+        "joined",
+        plan.file.string());
+  scene.incisions.push_back({path, scene.tissue.layers, "mouth"});
+  remarks.push_back(fmt::format(
+      "lips are parted along their crease by landmarks: {} points from ({:.1f}, {:.1f}, {:.1f}) to "
+      "({:.1f}, {:.1f}, {:.1f})",
+      path.size(), path.front().x(), path.front().y(), path.front().z(), path.back().x(),
+      path.back().y(), path.back().z()));
+}
+
+void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
+  constexpr double beside = 12, before = 16, behind = 38;  // mm
+  const scene::AnatomyPlan& plan = *scene.anatomy;
+  if (!plan.vestibule) return;
+  const char* needed[] = {"b_point", "nasal_spine", "upper_incisor_edge", "mouth_right",
+                          "mouth_left"};
+  for (const char* name : needed)
+    if (!find(plan, name)) {
+      remarks.push_back(fmt::format(
+          "{}: landmark {} is missing, so the lips hold to teeth as to bone: no vestibule",
+          plan.file.string(), name));
+      return;
+    }
+  const Vec3 &edge = *find(plan, "upper_incisor_edge"), &right = *find(plan, "mouth_right"),
+             &left = *find(plan, "mouth_left");
+  const Vec3 low(right.x() - beside, edge.y() - before, find(plan, "b_point")->z()),
+      high(left.x() + beside, edge.y() + behind, find(plan, "nasal_spine")->z());
+  scene::Tissue& tissue = scene.tissue;
+  tissue.attach_regions.insert(tissue.attach_regions.begin(),
+                               scene::AttachRegion{scene::Box{(low + high) / 2, high - low},
+                                                   scene::Attach::contact, plan.gap});
+  remarks.push_back(fmt::format(
+      "vestibule by landmarks: x {:.0f} … {:.0f}, y {:.0f} … {:.0f}, z {:.0f} … {:.0f} mm (attach "
+      "region 0)",
+      low.x(), high.x(), low.y(), high.y(), low.z(), high.z()));
+}
+
+void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
+  constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
+  const Vec3 *spine = find(plan, "nasal_spine"), *upper = find(plan, "upper_incisor_edge"),
+             *lower = find(plan, "lower_incisor_edge"), *menton = find(plan, "menton_bone");
+  const auto remark = [&](const char* jaw, double height, double least) {
+    if (height < least)
+      remarks.push_back(fmt::format(
+          "the {} jaw is {:.0f} mm high at the midline, with teeth {:g} mm or more: it may be "
+          "edentulous, and lips without support of teeth are predicted with a larger error",
+          jaw, height, least));
+  };
+  if (spine && upper) remark("upper", spine->z() - upper->z(), upper_height);
+  if (lower && menton) remark("lower", lower->z() - menton->z(), lower_height);
+}
+
+}  // namespace
+
+void complete(const surface::Surface& skin, const std::vector<surface::Surface>& bones,
+              scene::Scene& scene, std::vector<std::string>& remarks) {
+  if (!scene.anatomy) return;
+  require_same_head(*scene.anatomy, skin, bones);
+  remark_teeth(*scene.anatomy, remarks);
+  part_lips(skin, scene, remarks);
+  add_vestibule(scene, remarks);
+}
+
+}  // namespace repose::anatomy

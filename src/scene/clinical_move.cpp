@@ -1,0 +1,163 @@
+#include "clinical_move.h"
+
+#include <algorithm>
+
+#include "head_axes.h"
+#include "repose/base/text.h"
+
+namespace repose::scene {
+namespace {
+
+enum class Jaw { upper, lower, chin, other };
+
+const Osteotomy* cut_of(const Scene& scene, std::size_t bone) {
+  for (const Osteotomy& cut : scene.osteotomies)
+    if (cut.piece == bone) return &cut;
+  return nullptr;
+}
+
+/// By the template that made the piece, or the name of a whole mandible.
+Jaw jaw_of(const Scene& scene, std::size_t bone) {
+  const Osteotomy* cut = cut_of(scene, bone);
+  if (!cut) return base::lower(scene.bones[bone].name) == "mandible" ? Jaw::lower : Jaw::other;
+  if (!cut->made_by) return Jaw::other;
+  switch (*cut->made_by) {
+    case OsteotomyTemplate::le_fort_1:
+      return Jaw::upper;
+    case OsteotomyTemplate::sagittal_split:
+      return Jaw::lower;
+    case OsteotomyTemplate::genioplasty:
+      return Jaw::chin;
+  }
+  return Jaw::other;
+}
+
+/// One clinical move, read with what it needs of the head.
+class ClinicalMove {
+ public:
+  ClinicalMove(const Value& value, const Scene& scene, std::size_t bone)
+      : map_(value), scene_(scene), bone_(bone), jaw_(jaw_of(scene, bone)) {
+    if (!scene.anatomy)
+      value.refuse("needs the axes of the head; give anatomy: {{landmarks: FILE}}");
+    try {
+      axes_ = head_axes(scene.anatomy->landmarks, scene.anatomy->file.string());
+    } catch (const base::InputError& error) {
+      value.refuse("needs the axes of the head: {}", error.what());
+    }
+  }
+
+  RigidMotion read() const {
+    const RigidMotion turned = rotation();
+    return RigidMotion::translation(translation(turned)).after(turned);
+  }
+
+ private:
+  double number(const char* name) const {
+    const auto value = map_.find(name);
+    return value ? value->number() : 0.0;
+  }
+
+  /// Where a landmark of the head is now, on the bone in row `bone`.
+  Vec3 now(const char* name, std::size_t bone) const {
+    try {
+      return scene_.moves[bone].apply(
+          require_landmark(scene_.anatomy->landmarks, name, scene_.anatomy->file.string()));
+    } catch (const base::InputError& error) {
+      map_.itself().refuse("needs a landmark: {}", error.what());
+    }
+  }
+
+  Vec3 pivot() const {
+    if (const auto place = map_.find("pivot")) {
+      if (place->is_list()) return place->vector();
+      const std::string name = standard_name(place->text());
+      return now((name.empty() ? place->text() : name).c_str(), bone_);
+    }
+    switch (jaw_) {
+      case Jaw::upper:
+        return now("upper_incisor_edge", bone_);
+      case Jaw::lower:
+        return now("lower_incisor_edge", bone_);
+      case Jaw::chin:
+        return now("pogonion_bone", bone_);
+      case Jaw::other:
+        break;
+    }
+    map_.itself().refuse(
+        "turns a bone that no template made and that is not called mandible; give pivot");
+  }
+
+  RigidMotion rotation() const {
+    RigidMotion whole;
+    if (const double angle = number("open"); angle != 0) {
+      const Vec3 right = now("condyle_right_center", bone_),
+                 left = now("condyle_left_center", bone_);
+      whole = RigidMotion::rotation(left - right, (right + left) / 2, angle);
+    }
+    const double yaw = number("yaw"), roll = number("roll"), pitch = number("pitch");
+    if (yaw == 0 && roll == 0 && pitch == 0) return whole;
+    const Vec3 center = whole.apply(pivot());
+    whole = RigidMotion::rotation(axes_.left, center, pitch).after(whole);
+    whole = RigidMotion::rotation(-axes_.back, center, roll).after(whole);
+    return RigidMotion::rotation(axes_.up, center, yaw).after(whole);
+  }
+
+  /// The row of the bone that carries the other jaw's teeth: a piece of a template, or the whole.
+  std::size_t opposite() const {
+    const Jaw wanted = jaw_ == Jaw::upper ? Jaw::lower : Jaw::upper;
+    for (const Osteotomy& cut : scene_.osteotomies)
+      if (jaw_of(scene_, cut.piece) == wanted) return cut.piece;
+    for (std::size_t b = 0; b < scene_.bones.size(); ++b)
+      if (jaw_of(scene_, b) == wanted) return b;
+    for (std::size_t b = 0; b < scene_.bones.size(); ++b)
+      if (!cut_of(scene_, b) && b != bone_) return b;
+    return bone_;
+  }
+
+  /// mm, the move along `direction` (a unit vector) that brings the distance of the upper incisors
+  /// from the lower ones along it to `target`.
+  double to_target(const char* name, const Vec3& direction, const RigidMotion& turned) const {
+    const auto target = map_.find(name);
+    if (jaw_ != Jaw::upper && jaw_ != Jaw::lower)
+      target->refuse(
+          "needs a jaw with incisors: a piece of le_fort_1 or sagittal_split, or a bone called "
+          "mandible");
+    const bool upper = jaw_ == Jaw::upper;
+    const std::size_t other = opposite();
+    const Vec3 own = turned.apply(now(upper ? "upper_incisor_edge" : "lower_incisor_edge", bone_));
+    const Vec3 fixed = now(upper ? "lower_incisor_edge" : "upper_incisor_edge", other);
+    const double distance = (upper ? own - fixed : fixed - own).dot(direction);
+    return upper ? target->number() - distance : distance - target->number();
+  }
+
+  Vec3 translation(const RigidMotion& turned) const {
+    exclude("overjet", {"advance", "set_back"});
+    exclude("overbite", {"impaction", "lower"});
+    double forward = number("advance") - number("set_back"),
+           upward = number("impaction") - number("lower");
+    if (map_.find("overjet")) forward = to_target("overjet", -axes_.back, turned);
+    if (map_.find("overbite")) upward = -to_target("overbite", -axes_.up, turned);
+    return -forward * axes_.back + upward * axes_.up + number("left") * axes_.left;
+  }
+
+  void exclude(const char* target, const std::vector<const char*>& others) const {
+    if (!map_.find(target)) return;
+    for (const char* other : others)
+      if (const auto value = map_.find(other))
+        value->refuse("and {} exclude each other; remove one of them", target);
+  }
+
+  Map map_;
+  const Scene& scene_;
+  std::size_t bone_;
+  Jaw jaw_;
+  HeadAxes axes_{};
+};
+
+}  // namespace
+
+RigidMotion read_clinical_move(const Value& value, const Scene& scene, std::size_t bone) {
+  return ClinicalMove(value, scene, bone).read();
+}
+
+}  // namespace repose::scene

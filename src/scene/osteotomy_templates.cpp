@@ -1,0 +1,164 @@
+#include "osteotomy_templates.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "head_axes.h"
+
+namespace repose::scene {
+namespace {
+
+/// Landmarks of a plan that a template needs.
+class TemplatePlacement {
+ public:
+  explicit TemplatePlacement(const AnatomyPlan& anatomy)
+      : anatomy_(anatomy), axes_(head_axes(anatomy.landmarks, anatomy.file.string())) {}
+
+  Vec3 at(const char* name) const {
+    return require_landmark(anatomy_.landmarks, name, anatomy_.file.string());
+  }
+  Vec3 hinge() const { return (at("condyle_right_center") + at("condyle_left_center")) / 2; }
+  const HeadAxes& axes() const { return axes_; }
+
+ private:
+  const AnatomyPlan& anatomy_;
+  HeadAxes axes_;
+};
+
+void place_le_fort(const TemplatePlacement& head, double level, Osteotomy& cut) {
+  constexpr double behind = 0.57;  // of the way from the incisors to the condyles
+  const Vec3 point = head.at("nasal_spine") + level * head.axes().up;
+  const Vec3 edge = head.at("upper_incisor_edge");
+  const double way = behind * (head.hinge() - edge).dot(head.axes().back);
+  cut.planes = {{point, -head.axes().up, {}},
+                {edge + way * head.axes().back, -head.axes().back, {}}};
+}
+
+void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& cut) {
+  constexpr double falls = 0.42, down = 0.91;  // sine and cosine of 25°
+  cut.planes = {{head.at("b_point") - level * head.axes().up,
+                 -falls * head.axes().back - down * head.axes().up,
+                 {}}};
+}
+
+/// A corner of a sheet: fractions of the half width between the condyles and of the length from the
+/// incisors to them, and which height.
+struct SheetCorner {
+  double width, length;
+  bool high;
+};
+
+void place_sagittal_split(const TemplatePlacement& head, Osteotomy& cut) {
+  constexpr double below_condyle = 0.255, below_menton = 10;  // of the height; mm
+  constexpr std::array<SheetCorner, 8> corners{{{0.70, 0.425, false},
+                                                {0.70, 0.425, true},
+                                                {1.02, 1.05, true},
+                                                {1.02, 1.05, false},
+                                                {1.22, 0.30, false},
+                                                {1.22, 0.30, true},
+                                                {0.22, 0.525, true},
+                                                {0.56, 1.12, true}}};
+  constexpr std::array<Triangle, 6> right{
+      {{0, 3, 2}, {0, 2, 1}, {0, 1, 5}, {0, 5, 4}, {1, 2, 7}, {1, 7, 6}}};
+  const auto& [left, back, up] = head.axes();
+  const Vec3 hinge = head.hinge(), edge = head.at("lower_incisor_edge");
+  const double half = (head.at("condyle_left_center") - hinge).norm();
+  const double length = (hinge - edge).dot(back), menton = (head.at("menton_bone") - hinge).dot(up);
+  CutSheet sheet;
+  for (const int side : {-1, 1}) {
+    const auto first = static_cast<int64_t>(sheet.points.size());
+    for (const SheetCorner& c : corners)
+      sheet.points.push_back(hinge + side * c.width * half * left + (c.length - 1) * length * back +
+                             (c.high ? below_condyle * menton : menton - below_menton) * up);
+    for (const Triangle& t : right)
+      sheet.triangles.push_back(side < 0 ? Triangle{first + t[0], first + t[1], first + t[2]}
+                                         : Triangle{first + t[0], first + t[2], first + t[1]});
+  }
+  cut.sheet = std::move(sheet);
+}
+
+/// mm, how far a plane lies above a point along `up`.
+double height_above(const CutPlane& plane, const Vec3& point, const Vec3& up) {
+  return (plane.point - point).dot(plane.normal) / up.dot(plane.normal);
+}
+
+std::vector<std::string> check_upper(const CutPlane& plane, const TemplatePlacement& head) {
+  constexpr double floor = 3, roots = 27;  // mm above the spine, above the edge
+  std::vector<std::string> lines;
+  const double above = height_above(plane, head.at("nasal_spine"), head.axes().up);
+  const double edge = height_above(plane, head.at("upper_incisor_edge"), head.axes().up);
+  if (above < 0)
+    lines.push_back(
+        fmt::format("its plane passes {:.1f} mm below the nasal spine, through the hard palate; "
+                    "place it 5 mm above the spine (template: le_fort_1)",
+                    -above));
+  else if (above < floor)
+    lines.push_back(fmt::format(
+        "its plane passes {:.1f} mm above the nasal spine; with less than {:g} mm it may open the "
+        "hard palate",
+        above, floor));
+  if (edge < roots)
+    lines.push_back(fmt::format(
+        "its plane passes {:.1f} mm above the edge of the upper incisors; by rule roots "
+        "end {:g} mm above it",
+        edge, roots));
+  return lines;
+}
+
+std::vector<std::string> check_lower(const CutPlane& plane, const TemplatePlacement& head) {
+  constexpr double roots = 25, canal = 5;        // mm
+  constexpr double along = 0.25, upward = 0.36;  // of length and height: the mental foramen
+  std::vector<std::string> lines;
+  const auto& [left, back, up] = head.axes();
+  const Vec3 edge = head.at("lower_incisor_edge"), menton = head.at("menton_bone");
+  const double below = -height_above(plane, edge, up);
+  if (below < roots)
+    lines.push_back(fmt::format(
+        "its plane passes {:.1f} mm below the edge of the lower incisors; by rule roots "
+        "end {:g} mm below it",
+        below, roots));
+  const Vec3 foramen = edge + along * (head.hinge() - edge).dot(back) * back +
+                       ((menton - edge).dot(up) + upward * (edge - menton).dot(up)) * up;
+  const double clear = -height_above(plane, foramen, up);
+  if (clear < canal)
+    lines.push_back(fmt::format(
+        "its plane passes {:.1f} mm {} the mental foramen's place by rule; the mandibular canal "
+        "reaches {:g} mm below it: place the plane lower or steeper",
+        std::abs(clear), clear < 0 ? "above" : "below", canal));
+  return lines;
+}
+
+}  // namespace
+
+void place_template(const AnatomyPlan& anatomy, std::optional<double> level, Osteotomy& cut) {
+  const TemplatePlacement head(anatomy);
+  switch (*cut.made_by) {
+    case OsteotomyTemplate::le_fort_1:
+      return place_le_fort(head, level.value_or(5), cut);
+    case OsteotomyTemplate::sagittal_split:
+      return place_sagittal_split(head, cut);
+    case OsteotomyTemplate::genioplasty:
+      return place_genioplasty(head, level.value_or(4), cut);
+  }
+}
+
+std::vector<std::string> check_cut(const AnatomyPlan& anatomy, const Osteotomy& cut) {
+  constexpr double level = 0.7;  // cosine of the angle to the vertical: planes that are level
+  for (const char* name : {"condyle_right_center", "condyle_left_center", "nasal_spine",
+                           "upper_incisor_edge", "lower_incisor_edge", "menton_bone"})
+    if (!anatomy.landmarks.contains(name)) return {};
+  const TemplatePlacement head(anatomy);
+  std::vector<std::string> lines;
+  for (const CutPlane& plane : cut.planes) {
+    const double up = plane.normal.normalized().dot(head.axes().up);
+    if (std::abs(up) < level || plane.radius) continue;
+    const double above_teeth = height_above(plane, head.at("upper_incisor_edge"), head.axes().up);
+    const auto found = above_teeth > 0 ? check_upper(plane, head) : check_lower(plane, head);
+    lines.insert(lines.end(), found.begin(), found.end());
+  }
+  return lines;
+}
+
+}  // namespace repose::scene

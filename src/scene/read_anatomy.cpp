@@ -1,0 +1,79 @@
+#include "read_anatomy.h"
+
+#include <array>
+
+#include "repose/scene/landmarks.h"
+
+namespace repose::scene {
+namespace {
+
+/// Landmarks of the two sides.
+constexpr std::array<std::array<const char*, 2>, 3> pairs{
+    {{"condyle_right_center", "condyle_left_center"},
+     {"gonion_right", "gonion_left"},
+     {"mouth_right", "mouth_left"}}};
+
+/// Landmarks that lie one below the other, on bone and on skin.
+constexpr std::array<std::array<const char*, 2>, 8> order{{{"nasion_bone", "nasal_spine"},
+                                                           {"nasal_spine", "upper_incisor_edge"},
+                                                           {"lower_incisor_edge", "b_point"},
+                                                           {"b_point", "menton_bone"},
+                                                           {"pronasale", "upper_lip"},
+                                                           {"subnasale", "stomion"},
+                                                           {"stomion", "lower_lip"},
+                                                           {"lower_lip", "pogonion_soft"}}};
+
+const Vec3* find(const Landmarks& landmarks, const char* name) {
+  const auto found = landmarks.find(name);
+  return found == landmarks.end() ? nullptr : &found->second;
+}
+
+void check_front(const Value& file, const Landmarks& landmarks) {
+  const Vec3* condyle = find(landmarks, "condyle_right_center");
+  for (const char* name : {"lower_incisor_edge", "upper_incisor_edge", "pronasale", "stomion"})
+    if (const Vec3* front = find(landmarks, name); front && condyle && front->y() > condyle->y())
+      file.refuse(
+          "has {} {:.0f} mm behind the condyles along +y, as in RAS; landmarks must be in LPS: "
+          "change the signs of x and y, or have the file say its coordinate system",
+          name, front->y() - condyle->y());
+}
+
+void check_sides(const Value& file, const Landmarks& landmarks) {
+  for (const auto& [right, left] : pairs) {
+    const Vec3 *a = find(landmarks, right), *b = find(landmarks, left);
+    if (!a != !b) file.refuse("has {} without {}; place both", a ? right : left, a ? left : right);
+    if (a && b && a->x() >= b->x())
+      file.refuse(
+          "has {} at x = {:.1f} mm and {} at x = {:.1f} mm, but +x is the patient's left: they are "
+          "exchanged",
+          right, a->x(), left, b->x());
+  }
+}
+
+void check_order(const Value& file, const Landmarks& landmarks) {
+  for (const auto& [upper, lower] : order) {
+    const Vec3 *a = find(landmarks, upper), *b = find(landmarks, lower);
+    if (a && b && a->z() <= b->z())
+      file.refuse("has {} at z = {:.1f} mm, not above {} at z = {:.1f} mm; place them again", upper,
+                  a->z(), lower, b->z());
+  }
+}
+
+}  // namespace
+
+AnatomyPlan read_anatomy(const Value& value) {
+  const Map map(value);
+  const Value file = map.at("landmarks");
+  AnatomyPlan plan;
+  plan.file = file.file();
+  plan.landmarks = with_standard_names(landmarks_by_name(plan.file), plan.file.string());
+  check_front(file, plan.landmarks);
+  check_sides(file, plan.landmarks);
+  check_order(file, plan.landmarks);
+  if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;
+  if (const auto vestibule = map.find("vestibule")) plan.vestibule = vestibule->choice() == 0;
+  if (const auto gap = map.find("gap")) plan.gap = gap->number();
+  return plan;
+}
+
+}  // namespace repose::scene

@@ -1,0 +1,104 @@
+"""Scenes by landmarks from outside: proposed landmarks place cuts, part lips and move jaws of heads."""
+
+import json
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+
+from conftest import PROJECT
+from tissue import last, model_of
+
+MESHES = PROJECT / "meshes"
+DATA = PROJECT.parent / "shared/data/head"
+REAL = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+HEADS = [pytest.param("head"), pytest.param("real_head", marks=REAL)]
+TEMPLATES = {"le_fort_1": "skull", "genioplasty": "mandible", "sagittal_split": "mandible"}
+
+
+@pytest.fixture
+def head(request, run, tmp_path):
+    """Skin and bones of a head in a folder, with its proposed landmarks."""
+    name = request.param
+    for part in ("skin", "skull", "mandible"):
+        source = DATA / f"{part}.ply" if name == "real_head" else MESHES / f"head_{part}.ply"
+        (tmp_path / f"{part}.ply").symlink_to(source)
+    result = run("repose-landmarks", "skin.ply", "-skull", "skull.ply", "-mandible", "mandible.ply",
+                 "-output", "head")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    markup, = json.loads((tmp_path / "head.mrk.json").read_text())["markups"]
+    return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
+
+
+def write_scene(folder, more, tissue="layers: 4, edge: 6", anatomy="landmarks: head.mrk.json"):
+    (folder / "scene.yaml").write_text(
+        "skin: skin.ply\nbones:\n  - {name: skull, file: skull.ply}\n"
+        "  - {name: mandible, file: mandible.ply}\n"
+        f"tissue: {{{tissue}}}\nanatomy: {{{anatomy}}}\n{more}")
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("head", HEADS, indirect=True)
+def test_templates_cut_any_head(run, tmp_path, head, template):
+    write_scene(tmp_path, f"osteotomies: [{{bone: {TEMPLATES[template]}, piece: part, "
+                          f"template: {template}, kerf: 0.5}}]\n")
+    result = run("repose-osteotomy", "scene.yaml", "-output", "plan")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    piece = meshio.read(tmp_path / "plan_part.ply").points
+    edge = head["upper_incisor_edge" if template == "le_fort_1" else "lower_incisor_edge"]
+    near = np.linalg.norm(piece - edge, axis=1).min()
+    assert (near > 15) if template == "genioplasty" else (near < 4)
+    if template == "le_fort_1":
+        assert piece[:, 2].max() > head["nasal_spine"][2]
+    if template == "sagittal_split":
+        condyles = np.array([head["condyle_left_center"], head["condyle_right_center"]])
+        assert np.linalg.norm(piece[:, None] - condyles, axis=2).min() > 5
+
+
+@REAL
+@pytest.mark.parametrize("head", ["real_head"], indirect=True)
+def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
+    write_scene(tmp_path, "osteotomies: [{bone: mandible, piece: jaw, template: sagittal_split, "
+                          "kerf: 0.5}]\nmoves: [{bone: jaw, clinical: {set_back: 5}}]\n")
+    result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "lips are parted along their crease by landmarks" in result.stdout
+    assert "vestibule by landmarks" in result.stdout
+    model, rest = model_of(tmp_path / "face.h5"), last(tmp_path / "face.h5")["point/position"]
+    skin = np.flatnonzero(model["point/layer"] == 0)
+    way = (rest[skin] - model["point/position"][skin])[:, 1] / 5
+
+    def ratio(name):
+        off = np.linalg.norm(model["point/position"][skin] - head[name], axis=1)
+        return way[np.argsort(off)[:3]].mean()
+
+    assert ratio("pogonion_soft") > 0.9
+    assert ratio("lower_lip") < 0.93 and ratio("upper_lip") < 0.3
+    assert run("repose-check", "face.h5").returncode == 0
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_landmarks_of_another_head_are_refused_in_one_line(run, tmp_path, head):
+    for name, place in head.items():
+        head[name] = (place + [0, 60, 0]).tolist()
+    (tmp_path / "far.json").write_text(json.dumps(head))
+    write_scene(tmp_path, "moves: [{bone: mandible, clinical: {advance: 3}}]\n",
+                anatomy="landmarks: far.json")
+    result = run("repose-solve", "scene.yaml")
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "the landmarks are those of another head or in another frame" in result.stderr
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_a_plane_through_the_palate_is_reported(run, tmp_path, head):
+    below = head["nasal_spine"][2] - 4
+    write_scene(tmp_path, f"osteotomies: [{{bone: skull, piece: part, planes: [{{point: [0, -60, "
+                          f"{below}], normal: [0, 0, -1]}}, {{point: [0, -20, 0], normal: [0, -1, "
+                          "0]}]}]\nmoves: [{bone: part, translate: [0, -2, 0]}]\n")
+    result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
+    assert result.returncode == 0, result
+    assert "osteotomies[0]: its plane passes 4.0 mm below the nasal spine" in result.stdout
+    assert "the mouth is open in the scan" in result.stdout
+    with h5py.File(tmp_path / "face.h5") as file:
+        assert len(file["model"]) > 0

@@ -1,0 +1,101 @@
+#include "repose/anatomy/complete.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "../../folder.h"
+#include "repose/anatomy/propose.h"
+#include "repose/surface/read.h"
+#include "repose/surface/triangle_tree.h"
+
+namespace repose::anatomy {
+namespace {
+
+using test::refusal;
+
+struct Completed {
+  scene::Scene scene;
+  std::vector<std::string> remarks;
+};
+
+/// A head completed by those landmarks that are proposed for it, but for `without`.
+Completed complete_head(const std::string& skin_file, const std::string& skull_file,
+                        const std::string& mandible_file, const std::vector<std::string>& without,
+                        const Vec3& shift = Vec3::Zero()) {
+  const surface::Surface skin = surface::read_surface(skin_file),
+                         skull = surface::read_surface(skull_file),
+                         mandible = surface::read_surface(mandible_file);
+  Completed done;
+  scene::AnatomyPlan plan;
+  plan.file = "head.mrk.json";
+  plan.landmarks = propose_landmarks(skin, skull, mandible, {}).found;
+  for (const std::string& name : without) plan.landmarks.erase(name);
+  for (auto& [name, place] : plan.landmarks) place += shift;
+  done.scene.anatomy = plan;
+  done.scene.tissue.attach_regions.push_back(
+      {scene::SphereRegion{Vec3::Zero(), 1}, scene::Attach::slide, 0});
+  complete(skin, {skull, mandible}, done.scene, done.remarks);
+  return done;
+}
+
+Completed complete_shipped(const std::vector<std::string>& without = {},
+                           const Vec3& shift = Vec3::Zero()) {
+  const std::string head = REPOSE_MESHES "/head_";
+  return complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply", without,
+                       shift);
+}
+
+bool says(const Completed& done, const std::string& part) {
+  return std::any_of(done.remarks.begin(), done.remarks.end(),
+                     [&](const std::string& line) { return line.find(part) != std::string::npos; });
+}
+
+TEST(CompleteScene, AnOpenMouthIsNotParted) {
+  const Completed done = complete_shipped();
+  EXPECT_TRUE(done.scene.incisions.empty());
+  EXPECT_TRUE(says(done, "the mouth is open in the scan"));
+}
+
+TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
+  const Completed done = complete_shipped();
+  ASSERT_EQ(done.scene.tissue.attach_regions.size(), 2u);
+  EXPECT_EQ(done.scene.tissue.attach_regions[0].attach, scene::Attach::contact);
+  EXPECT_EQ(done.scene.tissue.attach_regions[1].attach, scene::Attach::slide);
+  const auto& box = std::get<scene::Box>(done.scene.tissue.attach_regions[0].where);
+  const scene::Landmarks& marks = done.scene.anatomy->landmarks;
+  EXPECT_NEAR(box.center.z() + box.size.z() / 2, marks.at("nasal_spine").z(), 1e-9);
+  EXPECT_NEAR(box.center.z() - box.size.z() / 2, marks.at("b_point").z(), 1e-9);
+}
+
+TEST(CompleteScene, AMissingSulcusLeavesTheVestibuleOut) {
+  const Completed done = complete_shipped({"b_point"});
+  EXPECT_EQ(done.scene.tissue.attach_regions.size(), 1u);
+  EXPECT_TRUE(says(done, "landmark b_point is missing"));
+}
+
+TEST(CompleteScene, LandmarksOfAnotherHeadAreRefused) {
+  EXPECT_NE(refusal([] { complete_shipped({}, Vec3(0, 40, 0)); }).find("another head"),
+            std::string::npos);
+}
+
+TEST(CompleteScene, TheCreaseIsFoundByTheCornersAlone) {
+  const std::string head = REPOSE_HEAD_DATA "/";
+  if (!std::filesystem::exists(head + "skin.ply")) GTEST_SKIP() << "no real head";
+  const surface::Surface skin = surface::read_surface(head + "skin.ply");
+  const surface::TriangleTree tree(skin);
+  const Completed done = complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply",
+                                       {"stomion", "upper_incisor_edge"});
+  ASSERT_EQ(done.scene.incisions.size(), 1u);
+  const scene::Incision& mouth = done.scene.incisions[0];
+  EXPECT_EQ(mouth.name, "mouth");
+  ASSERT_GT(mouth.path.size(), 15u);
+  for (const Vec3& point : mouth.path) {
+    EXPECT_LT(std::sqrt(tree.nearest(point).squared), 1.5);
+    EXPECT_NEAR(point.z(), 367, 5);  // placed by hand: 366 to 369
+  }
+  EXPECT_GT(mouth.path.back().x() - mouth.path.front().x(), 45);
+}
+
+}  // namespace
+}  // namespace repose::anatomy

@@ -1,0 +1,188 @@
+#include <gtest/gtest.h>
+
+#include "folder.h"
+#include "repose/scene/landmarks.h"
+#include "repose/scene/scene.h"
+
+namespace repose::scene::by_landmarks {
+namespace {
+
+/// A head whose axes are those of the scan: upper incisors 5 mm in front of the lower and 2 mm
+/// below their edge.
+Landmarks head() {
+  return {{"nasion_bone", {0, -85, 50}},
+          {"nasal_spine", {0, -88, 0}},
+          {"upper_incisor_edge", {0, -90, -26}},
+          {"lower_incisor_edge", {0, -85, -24}},
+          {"b_point", {0, -84, -44}},
+          {"pogonion_bone", {0, -86, -60}},
+          {"menton_bone", {0, -80, -66}},
+          {"condyle_right_center", {-50, 0, 0}},
+          {"condyle_left_center", {50, 0, 0}},
+          {"mouth_right", {-25, -90, -24}},
+          {"mouth_left", {25, -90, -24}}};
+}
+
+Scene read(const Landmarks& landmarks, const std::string& more) {
+  static const Folder folder;
+  folder.write("head.mrk.json", markups_text(landmarks));
+  return read_scene(folder.write("scene.yaml",
+                                 "skin: face.ply\n"
+                                 "bones:\n"
+                                 "  - {name: skull, file: skull.ply}\n"
+                                 "  - {name: mandible, file: mandible.ply}\n"
+                                 "tissue: {layers: 4}\n"
+                                 "anatomy: {landmarks: head.mrk.json}\n" +
+                                     more));
+}
+
+const std::string le_fort = "osteotomies: [{bone: skull, piece: maxilla, template: le_fort_1}]\n";
+const std::string split = "osteotomies: [{bone: mandible, piece: jaw, template: sagittal_split}]\n";
+const std::string chin = "osteotomies: [{bone: mandible, piece: chin, template: genioplasty}]\n";
+
+std::string refused(Landmarks landmarks, const std::string& more = "") {
+  return refusal([&] { read(landmarks, more); });
+}
+
+void expect_near(const Vec3& a, const Vec3& b) {
+  EXPECT_LT((a - b).norm(), 1e-9) << a.transpose() << " against " << b.transpose();
+}
+
+TEST(Anatomy, LandmarksHaveStandardNamesAndServeMoves) {
+  Landmarks spelled = head();
+  spelled.erase("b_point");
+  spelled["Point B"] = {0, -84, -44};
+  const Scene scene =
+      read(spelled, "moves: [{bone: mandible, landmark: {from: b_point, to: [0, -90, -44]}}]\n");
+  EXPECT_TRUE(scene.anatomy->part_lips && scene.anatomy->vestibule);
+  expect_near(scene.moves[1].apply({0, 0, 0}), {0, -6, 0});
+}
+
+TEST(Anatomy, RefusesLandmarksOfNoHead) {
+  const auto has = [](const std::string& text, const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  Landmarks exchanged = head();
+  std::swap(exchanged["mouth_right"], exchanged["mouth_left"]);
+  has(refused(exchanged), "they are exchanged");
+  Landmarks ras = head();
+  for (auto& [name, place] : ras) place = Vec3(-place.x(), -place.y(), place.z());
+  has(refused(ras), "as in RAS");
+  Landmarks lone = head();
+  lone.erase("condyle_left_center");
+  has(refused(lone), "has condyle_right_center without condyle_left_center");
+  Landmarks low = head();
+  low["b_point"].z() = -10;
+  has(refused(low), "lower_incisor_edge at z = -24.0 mm, not above b_point");
+}
+
+TEST(OsteotomyTemplate, LeFortLiesAboveTheNasalFloor) {
+  const Scene scene = read(head(), le_fort);
+  ASSERT_EQ(scene.osteotomies[0].planes.size(), 2u);
+  expect_near(scene.osteotomies[0].planes[0].point, {0, -88, 5});
+  expect_near(scene.osteotomies[0].planes[0].normal, {0, 0, -1});
+  expect_near(scene.osteotomies[0].planes[1].normal, {0, -1, 0});
+  EXPECT_TRUE(scene.remarks.empty()) << scene.remarks[0];
+}
+
+TEST(OsteotomyTemplate, ChinIsCutBelowPointB) {
+  const Scene scene = read(head(), chin);
+  expect_near(scene.osteotomies[0].planes[0].point, {0, -84, -48});
+  EXPECT_LT(scene.osteotomies[0].planes[0].normal.z(), -0.9);
+}
+
+TEST(OsteotomyTemplate, SplitIsAlikeOnBothSides) {
+  const CutSheet sheet = *read(head(), split).osteotomies[0].sheet;
+  ASSERT_EQ(sheet.points.size(), 16u);
+  for (size_t i = 0; i < 8; ++i)
+    expect_near(sheet.points[i + 8], sheet.points[i].cwiseProduct(Vec3(-1, 1, 1)));
+}
+
+TEST(OsteotomyTemplate, ExcludesCutsOfOnesOwn) {
+  const std::string both =
+      "osteotomies: [{bone: skull, piece: a, template: le_fort_1, planes: [{point: [0, 0, 0], "
+      "normal: [0, 0, 1]}]}]\n";
+  EXPECT_NE(refused(head(), both).find("exclude each other"), std::string::npos);
+  Landmarks bare = head();
+  bare.erase("nasal_spine");
+  EXPECT_NE(refused(bare, le_fort).find("landmark nasal_spine is missing"), std::string::npos);
+}
+
+std::vector<std::string> warnings(const std::string& bone, double z) {
+  return read(head(), fmt::format("osteotomies: [{{bone: {}, piece: a, planes: [{{point: [0, -80, "
+                                  "{}], normal: [0, 0, -1]}}]}}]\n",
+                                  bone, z))
+      .remarks;
+}
+
+TEST(OsteotomyWarnings, NamePalateRootsAndCanal) {
+  EXPECT_TRUE(warnings("skull", 5).empty());
+  const auto palate = warnings("skull", -4);
+  ASSERT_EQ(palate.size(), 2u);
+  EXPECT_EQ(palate[0].find("osteotomies[0]: its plane passes 4.0 mm below the nasal spine, through "
+                           "the hard palate"),
+            0u);
+  EXPECT_NE(palate[1].find("22.0 mm above the edge of the upper incisors"), std::string::npos);
+  const auto roots = warnings("mandible", -45);
+  ASSERT_EQ(roots.size(), 2u);
+  EXPECT_NE(roots[0].find("by rule roots end 25 mm below it"), std::string::npos);
+  EXPECT_NE(roots[1].find("mental foramen"), std::string::npos);
+}
+
+Vec3 moved(const std::string& cut, const std::string& bone, const std::string& clinical,
+           const Vec3& point, size_t row = 2) {
+  return read(head(),
+              cut + fmt::format("moves: [{{bone: {}, clinical: {{{}}}}}]\n", bone, clinical))
+      .moves[row]
+      .apply(point);
+}
+
+TEST(ClinicalMove, GoesAlongTheHeadsAxes) {
+  expect_near(moved(le_fort, "maxilla", "advance: 5, impaction: 2, left: 1", {0, 0, 0}),
+              {1, -5, 2});
+  expect_near(moved(split, "jaw", "set_back: 4, lower: 1", {0, 0, 0}), {0, 4, -1});
+}
+
+TEST(ClinicalMove, TurnsAboutTheIncisors) {
+  const Vec3 edge = head()["upper_incisor_edge"];
+  for (const char* turn : {"yaw: 5", "roll: 5", "pitch: 5"})
+    expect_near(moved(le_fort, "maxilla", turn, edge), edge);
+  EXPECT_GT(moved(le_fort, "maxilla", "roll: 5", edge + Vec3(30, 0, 0)).z(), edge.z() + 2);
+  EXPECT_GT(moved(le_fort, "maxilla", "yaw: 5, pivot: [0, 0, 0]", edge).x(), 5);
+  EXPECT_LT(moved(le_fort, "maxilla", "pitch: 5, pivot: [0, 0, 0]", edge).z(), edge.z() - 5);
+}
+
+TEST(ClinicalMove, OpensAboutTheHinge) {
+  const Vec3 menton = head()["menton_bone"];
+  const Vec3 opened = moved("", "mandible", "open: 8", menton, 1);
+  EXPECT_LT(opened.z(), menton.z() - 5);
+  expect_near(moved("", "mandible", "open: 8", {50, 0, 0}, 1), {50, 0, 0});
+}
+
+TEST(ClinicalMove, ReachesTargetsFromWhereTheOtherJawIs) {
+  const Vec3 upper = head()["upper_incisor_edge"], lower = head()["lower_incisor_edge"];
+  expect_near(moved(split, "jaw", "overjet: 2, overbite: 1", lower), upper + Vec3(0, 2, 1));
+  expect_near(moved(le_fort, "maxilla", "overjet: 2, overbite: 1", upper), lower - Vec3(0, 2, 1));
+  const Scene both = read(head(),
+                          "osteotomies:\n"
+                          "  - {bone: skull, piece: maxilla, template: le_fort_1}\n"
+                          "  - {bone: mandible, piece: jaw, template: sagittal_split}\n"
+                          "moves:\n"
+                          "  - {bone: maxilla, clinical: {advance: 4, impaction: 3}}\n"
+                          "  - {bone: jaw, clinical: {overjet: 2, overbite: 2}}\n");
+  expect_near(both.moves[3].apply(lower), both.moves[2].apply(upper) + Vec3(0, 2, 2));
+}
+
+TEST(ClinicalMove, RefusesWhatHasNoMeaning) {
+  const auto says = [](const std::string& more) { return refused(head(), more); };
+  EXPECT_NE(says(split + "moves: [{bone: jaw, clinical: {overjet: 2, advance: 3}}]\n")
+                .find("exclude each other"),
+            std::string::npos);
+  EXPECT_NE(says("moves: [{bone: skull, clinical: {overjet: 2}}]\n").find("needs a jaw"),
+            std::string::npos);
+  EXPECT_NE(says("moves: [{bone: skull, clinical: {yaw: 2}}]\n").find("give pivot"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace repose::scene::by_landmarks
