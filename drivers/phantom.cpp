@@ -38,6 +38,10 @@ void write_head(const base::Options& options) {
   tools::phantom::PhantomOptions wanted;
   wanted.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
+  std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)
+",
+              options.text("output").c_str());
+  std::fflush(stdout);
   const tools::phantom::Phantom head = tools::phantom::make_phantom(wanted);
   for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
     std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),

@@ -15,12 +15,14 @@ namespace {
 
 /// A model or its ground, from an anatomy.
 template <class Made>
-Made make(const model::Anatomy& anatomy, const std::filesystem::path& input) {
+Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
   try {
-    if constexpr (std::is_same_v<Made, model::Ground>)
-      return model::Ground(anatomy);
-    else
-      return model::build_model(anatomy);
+    return model::build_on_solvable_skin(anatomy, [](const model::Anatomy& on) {
+      if constexpr (std::is_same_v<Made, model::Ground>)
+        return model::Ground(on);
+      else
+        return model::build_model(on);
+    });
   } catch (const model::RefusedPlaces& refused) {
     const std::string file = input.stem().string() + "_refused.ply";
     surface::write_ply(file, refused.places());
@@ -40,7 +42,6 @@ std::string why_whole(MPI_Comm comm, const model::Anatomy& anatomy, const std::s
 /// Takes over what a scene states before its model is built. On rank 0.
 void read_scene(const scene::Scene& scene, Job& job) {
   job.anatomy = model::load_anatomy(scene);
-  job.remeshed = job.anatomy->given_skin.has_value();
   job.tearing = scene.tearing;
   job.wanted = scene.solve;
   job.recording = recording_of(scene);
@@ -54,6 +55,7 @@ void build(const std::filesystem::path& input, Job& job) {
   job.held = std::move(built.held);
   job.cuts = std::move(built.cuts);
   job.building = describe_build(built.report);
+  job.warnings = std::move(built.report.warnings);
 }
 
 /// Every rank makes its part. Collective.
@@ -70,6 +72,7 @@ void raise(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
     report.effective_modulus = job.raised->effective_modulus;
     job.building = describe_build(report) +
                    report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
+    job.warnings = std::move(report.warnings);
     job.model = std::move(job.raised->frame);
   });
 }
@@ -120,6 +123,7 @@ void bring_into_equilibrium(MPI_Comm comm, Job& job) {
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
   job.solid = job.raised || model::is_solid(job.model);
+  job.remeshed = job.anatomy && job.anatomy->given_skin;
   job.touches = job.raised ? job.raised->part.contact : !job.model.contact.empty();
   for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
   MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);

@@ -25,7 +25,8 @@ base::Option from_key(const char* name, const char* path) {
           .range = key.range,
           .unit = key.unit,
           .choices = key.choices,
-          .removed = key.removed};
+          .removed = key.removed,
+          .default_note = key.standard.empty() ? "" : "the scene's, or " + key.standard};
 }
 
 /// Options of the objective and the accuracy.
@@ -33,7 +34,8 @@ std::vector<base::Option> method_options() {
   return {{.name = "output",
            .kind = OptionKind::path,
            .default_text = "",
-           .help = "Path of the result without ending; default: the input's name here."},
+           .help = "Path of the result without ending.",
+           .default_note = "the input's name, here"},
           from_key("accuracy", "solve.accuracy"),
           from_key("functional", "solve.functional"),
           from_key("volume", "solve.volume.form"),
@@ -79,7 +81,8 @@ std::vector<base::Option> run_options() {
        .default_text = "",
        .help = "End all searches after this, keep the state and say how far it is.",
        .range = {0, 1e9},
-       .unit = "s"},
+       .unit = "s",
+       .default_note = "none"},
       {"allow_folded", OptionKind::flag, "",
        "Take a rest position with tissue inside out (else exit status 2)."},
       {"dry_run", OptionKind::flag, "",
@@ -91,7 +94,8 @@ std::vector<base::Option> run_options() {
        .default_text = "",
        .help = "Seconds between NAME_checkpoint.h5.",
        .range = {0, 1e9},
-       .unit = "s"},
+       .unit = "s",
+       .default_note = "no checkpoints"},
   };
 }
 

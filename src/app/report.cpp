@@ -107,6 +107,12 @@ std::string describe_build(const model::BuildReport& r) {
   return text;
 }
 
+std::string describe_warnings(const std::vector<std::string>& warnings) {
+  std::string text;
+  for (const std::string& warning : warnings) text += report_row("warning", warning);
+  return text;
+}
+
 std::string describe_cut(const model::Cut& cut, int64_t doubled) {
   return report_row("incision",
                     fmt::format("along {} edges of the skin, {} points doubled in {} layers",

@@ -18,6 +18,8 @@ std::string describe_model(const model::Counts& counts);
 
 /// Describes the built model: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
+/// What of the anatomy is implausible, a row each.
+std::string describe_warnings(const std::vector<std::string>& warnings);
 /// An incision and how many points it doubled.
 std::string describe_cut(const model::Cut& cut, int64_t doubled);
 

@@ -12,6 +12,8 @@
 #include <limits>
 #include <optional>
 
+#include "movement.h"
+#include "phase.h"
 #include "plan_pieces.h"
 #include "report.h"
 #include "repose/adapt/discretisation.h"
@@ -120,6 +122,8 @@ class Run {
   std::string describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
                                     const Writer& writer) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
+  std::string describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
+                              const Writer& writer) const;
 
   Job& job_;
   Strategy strategy_;
@@ -251,6 +255,7 @@ std::string Run::describe_folds(const model::StepNumbers& last, const Writer& wr
 /// Solves what came to rest again, in twice the load steps, where that is requested. Collective.
 std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.verifies_path || !summary.path.complete()) return {};
+  const Phase phase(comm, "verifying the path");
   PathCheck check = verify_path(comm, job_.model, strategy_.settings, summary, writer.positions());
   stages_.end("verify path");
   return check;
@@ -295,9 +300,26 @@ std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summ
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
   const solve::RestState rest{writer.positions(), writer.contact_pressures()};
+  const Phase phase(comm, "estimating sensitivities");
   const auto found = sensitivities(comm, job_, strategy_.settings.weights, rest);
   stages_.end("sensitivity");
   return describe_sensitivities(found);
+}
+
+/// What the closing summary begins with: how the face moved, how far to trust it, and the warnings.
+/// Collective.
+std::string Run::describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
+                                 const Writer& writer) const {
+  const std::vector<Vec3> position = positions(writer);
+  std::string text;
+  base::on_first_rank(comm, [&] {
+    std::vector<model::FacePlace> places;
+    if (job_.anatomy) places = model::face_places(*job_.anatomy);
+    text = describe_movement(places, skin.initial_points(), skin.points_at(position)) + " " +
+           describe_trust(summary, writer.discretisation_error()) + "\n" +
+           describe_warnings(job_.warnings);
+  });
+  return text;
 }
 
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
@@ -311,12 +333,13 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
-  say(folded ? describe_folds(summary.last, writer) : "");
+  const std::string folds = folded ? describe_folds(summary.last, writer) : "";
   const std::string given = write_given_skin(positions(writer));
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
-  say(describe_failure(summary, job_.recording.has_value()));
+  say(describe_answer(skin, summary, writer));
+  say(folds + describe_failure(summary, job_.recording.has_value()));
   say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing) +
       describe_tangents(writer.point_fields()));
@@ -338,11 +361,14 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
   base::on_first_rank(comm, [&] {
     if (!dry) lock.emplace(name);
   });
+  Phase building(comm, "building the model");
   Job job = read_job(comm, input, needs_whole(options));
   Strategy strategy = make_strategy(comm, options, job);
+  building.end();
   stages.end("build");
   if (base::rank(comm) == 0)
-    say(job.building + describe_model(counts_of(job)) + strategy.explanation);
+    say(job.building + describe_model(counts_of(job)) + describe_warnings(job.warnings) +
+        strategy.explanation);
   if (dry) {
     say(describe_stages(stages));
     return base::Exit::done;

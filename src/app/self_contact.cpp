@@ -6,6 +6,7 @@
 #include <set>
 
 #include "report.h"
+#include "repose/base/geometry.h"
 #include "repose/surface/intersections.h"
 
 namespace repose::app {
@@ -31,9 +32,13 @@ SolvedSkin::SolvedSkin(const Job& job) {
   for (const int64_t row : row_) on_a_side_.push_back(sides.contains(row));
 }
 
+std::vector<Vec3> SolvedSkin::points_at(const std::vector<Vec3>& position) const {
+  return base::pick(position, row_);
+}
+
 std::string SolvedSkin::describe_self_contact(const std::vector<Vec3>& position) const {
   surface::Surface now = initial_;
-  for (size_t i = 0; i < row_.size(); ++i) now.points[i] = position[row_[i]];
+  now.points = points_at(position);
   const auto beside_cut = [&](int64_t triangle) {
     return std::ranges::any_of(now.triangles[triangle],
                                [&](int64_t point) { return on_a_side_[point] != 0; });

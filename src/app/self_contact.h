@@ -17,6 +17,10 @@ class SolvedSkin {
   /// distributed. Pairs beside the same cut are left out if contact keeps its sides apart.
   std::string describe_self_contact(const std::vector<Vec3>& position) const;
 
+  /// Where its points were, and where they are.
+  const std::vector<Vec3>& initial_points() const { return initial_.points; }
+  std::vector<Vec3> points_at(const std::vector<Vec3>& position) const;
+
  private:
   surface::Surface initial_;
   std::vector<int64_t> row_;     // [points] of the model

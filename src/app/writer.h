@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -43,6 +44,11 @@ class Writer {
   const std::string& unsettled() const { return unsettled_; }
   /// Returns the estimated discretization error of the skin, on rank 0.
   const std::string& comparison() const { return comparison_; }
+  /// mm, estimate of the last step; negative without one. On rank 0.
+  double discretisation_error() const {
+    const double error = last_.numbers.discretisation_error;
+    return std::isnan(error) ? -1 : error;
+  }
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
   /// Returns every `layers`-th point: in a model of layers, the skin.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
@@ -116,8 +117,10 @@ std::string help_line(const Option& option) {
   for (int i = 0; i < option.values; ++i)
     if (option.kind != OptionKind::flag) left.append(" ").append(placeholder(option));
   std::string notes = option.range.text();
-  if (!option.default_text.empty() && option.kind != OptionKind::flag)
-    notes += fmt::format("{}default {}", notes.empty() ? "" : "; ", option.default_text);
+  const std::string& otherwise =
+      option.default_text.empty() ? option.default_note : option.default_text;
+  if (!otherwise.empty() && option.kind != OptionKind::flag)
+    notes += fmt::format("{}default {}", notes.empty() ? "" : "; ", otherwise);
   return fmt::format("  {:<34} {}{}\n", left, option.help,
                      notes.empty() ? "" : fmt::format(" [{}]", notes));
 }
@@ -136,6 +139,15 @@ std::vector<std::string> left_in_database() {
   std::vector<std::string> result(names, names + count);
   base::check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
   return result;
+}
+
+/// Whether PETSC_OPTIONS, which is meant for any program that uses PETSc, holds the option.
+bool is_in_environment(const std::string& name) {
+  const char* text = std::getenv("PETSC_OPTIONS");
+  std::istringstream words(text ? text : "");
+  for (std::string word; words >> word;)
+    if (name_of(word) == name) return true;
+  return false;
 }
 
 /// Refuses a viewer, `type:file:format`, that PETSc could not open: it would say so at the end of a
@@ -203,6 +215,10 @@ int Options::sort_option(int position, const std::vector<std::string>& tokens) {
     help_wanted_ = true;
     return next;
   }
+  if (name == "version") {
+    version_wanted_ = true;
+    return next;
+  }
   if (!help && !begins_as_petsc(name)) {
     unknown_.push_back(name);
     return is_value(tokens, next) ? next + 1 : next;
@@ -233,6 +249,8 @@ std::string Options::help() const {
   for (const Argument& argument : arguments_)
     text += fmt::format("  {:<34} {}\n", argument.name, argument.help);
   for (const Option& option : table_) text += help_line(option);
+  text +=
+      fmt::format("  {:<34} {}\n", "-version", "Print the versions of Repose and its libraries.");
   text += fmt::format("  {:<34} {}\n", "-help", "This page; -help petsc lists PETSc's options.");
   return text +
          "\nEvery PETSc option (-tao_type, -ksp_type, -log_view, -options_file ...) works too.\n";
@@ -266,7 +284,8 @@ void Options::read_database() {
                                    value.empty() ? "" : " ", value);
   }
   for (const std::string& name : left_in_database())
-    if (!begins_as_petsc(name) && name != "help") unknown_.push_back(name);
+    if (!begins_as_petsc(name) && name != "help")
+      (is_in_environment(name) ? ignored_ : unknown_).push_back(name);
 }
 
 void Options::refuse_unknown(const std::string& name) const {
@@ -348,6 +367,7 @@ std::vector<std::string> Options::unused() const {
   std::vector<std::string> result;
   for (const std::string& token : petsc_tokens_)
     if (std::find(left.begin(), left.end(), name_of(token)) != left.end()) result.push_back(token);
+  for (const std::string& name : ignored_) result.push_back("-" + name + " of PETSC_OPTIONS");
   return result;
 }
 

@@ -84,6 +84,12 @@ int run_program(Options& options, const std::function<Exit()>& work) {
     say(stdout, options.help());
     return static_cast<int>(Exit::done);
   }
+  if (options.version_wanted()) {
+    const auto run = this_run(MPI_COMM_WORLD);
+    say(stdout, run.front().second);
+    say(stdout, run.back().second);
+    return static_cast<int>(Exit::done);
+  }
   return guarded(options, work);
 }
 

@@ -18,13 +18,14 @@ namespace {
 
 constexpr double most_voxels = 3e7;
 constexpr double open_end = 150;   // mm, length of the border loop where a head is cut off
+constexpr double open_mouth = 60;  // mm, least length of the border loop of an open mouth
 constexpr double cap_area = 3000;  // mm²
 constexpr double on_cone = 1.05;   // of the ball's radius
 
 /// Triangles from the middle of every border loop to its edges: of those that a ball would pass,
-/// and of those so long that the head ends there.
+/// of those so long that the head ends there, and of those of an open mouth.
 struct Cones {
-  Surface all, ends;
+  Surface all, ends, openings;
 };
 
 Cones cones_of(const Surface& surface, double passes) {
@@ -57,7 +58,10 @@ Cones cones_of(const Surface& surface, double passes) {
   };
   for (const auto& [vertex, loop] : of_vertex) {
     if (loop.length > passes) add(loop, cones.all);
-    if (loop.length > open_end) add(loop, cones.ends);
+    if (loop.length > open_end)
+      add(loop, cones.ends);
+    else if (loop.length > open_mouth)
+      add(loop, cones.openings);
   }
   return cones;
 }
@@ -172,7 +176,7 @@ OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
   for (float& value : field.values) value = -value;
   if (stride > 1) field = thinned(field, stride);
   return {largest_component(isosurface(field, -rolling.inside)),
-          caps_of(outside, cones.ends, rolling.outside), rolling.outside};
+          caps_of(outside, cones.ends, rolling.outside), rolling.outside, welded(cones.openings)};
 }
 
 }  // namespace repose::imaging

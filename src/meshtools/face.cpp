@@ -12,6 +12,7 @@
 #include "repose/imaging/taubin.h"
 #include "repose/meshtools/remesh.h"
 #include "repose/surface/component.h"
+#include "repose/surface/defects.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 
@@ -116,8 +117,22 @@ bool in_any(const std::vector<std::function<bool(const Vec3&)>>& regions, const 
                      [&](const auto& contains) { return contains(point); });
 }
 
+/// Makes negative what spans an opening of the given skin: there the opening is nearer than the
+/// given triangles. The border of the opening lies where both are equally far.
+void leave_open(const OuterSkin& outer, const Surface& given, std::vector<double>& inside) {
+  constexpr double beside_opening = 20;  // mm
+  if (outer.openings.triangles.empty()) return;
+  const TriangleTree openings(outer.openings), skin(given);
+  for (size_t v = 0; v < inside.size(); ++v) {
+    const Vec3& point = outer.skin.points[v];
+    const double opening = openings.nearest(point, beside_opening * beside_opening).squared;
+    if (!std::isfinite(opening)) continue;
+    inside[v] = std::min(inside[v], std::sqrt(opening) - std::sqrt(skin.nearest(point).squared));
+  }
+}
+
 /// The part of the outer skin that is solved.
-Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
+Surface region_of(const OuterSkin& outer, const Surface& given, const FaceRequest& request) {
   const VertexNeighbours neighbours = neighbours_of(outer.skin);
   const std::vector<char> end = ends_of(outer);
   std::vector<double> inside(end.size(), request.margin);
@@ -133,6 +148,7 @@ Surface region_of(const OuterSkin& outer, const FaceRequest& request) {
   const double edge = even_edge(outer.skin);
   smooth(neighbours, static_cast<int>(std::lround(border_smoothing / (edge * edge))), inside);
   fill(neighbours, end, inside);
+  leave_open(outer, given, inside);
   const Surface part = cut_at_zero(outer.skin, inside);
   if (part.triangles.empty() && !request.regions.empty())
     base::refuse("{}: nothing of it lies in the regions of tissue.face; move or enlarge them",
@@ -292,13 +308,27 @@ void measure(const Surface& near, Face& face) {
   face.least_angle = std::acos(std::min(greatest, 1.0)) * 180 / std::numbers::pi;
 }
 
+/// Openings of the given skin beside the face, and how many of them its border has.
+void count_openings(const OuterSkin& outer, Face& face) {
+  face.borders = inspect(face.skin, false).border_loops;
+  if (outer.openings.triangles.empty()) return;
+  const double reach = 3 * coarsest_sampling;
+  const TriangleTree skin(face.skin);
+  for (const Surface& opening : components(outer.openings))
+    face.openings += std::ranges::any_of(opening.points, [&](const Vec3& point) {
+      return skin.any_within(point, reach * reach) >= 0;
+    });
+}
+
 }  // namespace
 
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
   Rolling rolling = request.rolling;
   rolling.sampling = std::min(coarsest_sampling, sampling_per_edge * request.edge);
-  face.skin = remesh(region_of(outer_skin(given, rolling), request), request.edge);
+  const OuterSkin outer = outer_skin(given, rolling);
+  face.skin = remesh(region_of(outer, given, request), request.edge);
+  count_openings(outer, face);
   const VertexNeighbours neighbours = neighbours_of(face.skin);
   widen_angles(neighbours, face.skin);
   const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);

@@ -36,10 +36,18 @@ void make(const scene::Scene& scene, const scene::Osteotomy& cut, Bones& bones) 
 }  // namespace
 
 Bones read_bones(const scene::Scene& scene) {
+  scene::require_bones(scene);
   Bones bones;
   const size_t whole = scene.bones.size() - scene.osteotomies.size();
-  for (size_t b = 0; b < whole; ++b)
-    bones.surfaces.push_back(load_entry(scene.bones[b].surface, surface::Role::bone));
+  for (size_t b = 0; b < whole; ++b) {
+    const surface::Surface raw = load_entry(scene.bones[b].surface, surface::Role::raw);
+    bones.surfaces.push_back(surface::accept_surface(raw, surface::Role::bone));
+    if (surface::volume_of(raw) < 0)
+      bones.warnings.push_back(fmt::format(
+          "{}: its triangles face inward, as after changing the sign of one axis: make sure that "
+          "left is left, and export the mesh again",
+          raw.name));
+  }
   for (size_t k = 0; k < scene.osteotomies.size(); ++k) {
     try {
       make(scene, scene.osteotomies[k], bones);

@@ -71,15 +71,20 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
 Anatomy load_anatomy(const scene::Scene& scene) {
   static const PetscLogEvent event = base::log_event("RpSurfaces");
   const base::Logged logged(event);
-  const auto role = scene.tissue.edge ? surface::Role::raw : surface::Role::skin;
-  Anatomy anatomy{scene, load_entry(scene.skin, role), {}, {}, {}};
+  GivenSkin given = load_skin(scene);
+  Anatomy anatomy{scene, std::move(given.surface), {}, {}, {}, {}};
   Bones bones = read_bones(scene);
   anatomy.bones = std::move(bones.surfaces);
   anatomy.remarks = std::move(bones.remarks);
+  anatomy.warnings = std::move(bones.warnings);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
   anatomy::complete(anatomy.skin, anatomy.bones, anatomy.scene, anatomy.remarks);
   heed_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
-  if (scene.tissue.edge) solve_remeshed(anatomy);
+  report_initial_overlaps(anatomy.bones, scene, anatomy.warnings);
+  if (scene.tissue.edge)
+    solve_remeshed(anatomy);
+  else if (!given.obstacle.empty() && !replace_given_skin(anatomy, given.obstacle))
+    anatomy.skin = surface::accept_surface(anatomy.skin, surface::Role::skin);
   return anatomy;
 }
 
@@ -87,11 +92,13 @@ BuiltModel build_model(const Anatomy& anatomy) {
   static const PetscLogEvent event = base::log_event("RpBuild");
   const base::Logged logged(event);
   BuiltModel built = build_model(anatomy.scene, anatomy.skin, anatomy.bones);
-  built.report.remarks.insert(built.report.remarks.begin(), anatomy.remarks.begin(),
-                              anatomy.remarks.end());
+  prepend_messages(anatomy, built.report);
   return built;
 }
 
-BuiltModel build_model(const scene::Scene& scene) { return build_model(load_anatomy(scene)); }
+BuiltModel build_model(const scene::Scene& scene) {
+  Anatomy anatomy = load_anatomy(scene);
+  return build_on_solvable_skin(anatomy, [](const Anatomy& on) { return build_model(on); });
+}
 
 }  // namespace repose::model

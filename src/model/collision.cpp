@@ -146,6 +146,24 @@ bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same;
 }
 
+void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
+                             std::vector<std::string>& warnings) {
+  constexpr double worth_saying = 2;  // mm: segmented teeth overlap by some tenths
+  std::vector<Mover> movers = movers_of(bones, scene.moves);
+  const Mat4 as_they_are = Mat4::Identity();
+  for (size_t i = 0; i < bones.size(); ++i)
+    for (size_t j = i + 1; j < bones.size(); ++j) {
+      if (!surface::touch(movers[i].tree, movers[j].tree, as_they_are)) continue;
+      const double depth = std::max(movers[i].depth_of(bones[j].points, as_they_are),
+                                    movers[j].depth_of(bones[i].points, as_they_are));
+      if (depth > worth_saying)
+        warnings.push_back(fmt::format(
+            "bones '{}' and '{}' lie {:.1f} mm inside one another before they move: check that "
+            "both come from one scan and in one frame, or separate their segmentations",
+            scene.bones[i].name, scene.bones[j].name, depth));
+    }
+}
+
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
                              const scene::Collision& wanted) {

@@ -83,7 +83,7 @@ std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_nam
   if (!folded.empty())
     refuse_places(skin_name, mesh, folded,
                   "the skin is folded (no direction is inward of all triangles around a vertex)",
-                  "set tissue.edge to have it remeshed, or smooth it there");
+                  "leave tissue.edge to the program, or smooth it there");
   return cones;
 }
 

@@ -103,7 +103,7 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
                   fmt::format("no sound column of tissue fits (neighbouring ones cross even where "
                               "they are only {:g} mm long)",
                               thinnest),
-                  "set tissue.edge to have the skin remeshed, or smooth or coarsen it there");
+                  "leave tissue.edge to the program, or smooth or coarsen the skin there");
 }
 
 }  // namespace repose::model

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "anatomy_check.h"
 #include "border.h"
 #include "orientation.h"
 #include "point_sets.h"
@@ -78,13 +79,14 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
   if (face_outwards(nearest, mesh))
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
+  report.warnings = check_anatomy(scene, range, mesh, bones);
   Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
   open_gaps(mesh.points, scene, columns);
   Attachment attachment = attach_columns(columns, field, scene);
   std::vector<char> rim = settle_rim(scene, range, mesh, columns, field, attachment);
   if (const std::string border = describe_near_border(scene, range, bones, mesh, field);
       !border.empty())
-    report.remarks.push_back(border);
+    (scene.rim == scene::Rim::fixed ? report.warnings : report.remarks).push_back(border);
   release_near_rim(columns.deep, rim, range, {scene.tissue.release, scene.tissue.released},
                    attachment);
   return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),
@@ -99,6 +101,11 @@ void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& b
     model.bone_surfaces[b].name = scene.bones[b].name;
     model.bone_transform.push_back(scene.moves[b].matrix());
   }
+}
+
+void prepend_messages(const Anatomy& anatomy, BuildReport& report) {
+  report.remarks.insert(report.remarks.begin(), anatomy.remarks.begin(), anatomy.remarks.end());
+  report.warnings.insert(report.warnings.begin(), anatomy.warnings.begin(), anatomy.warnings.end());
 }
 
 void report_columns(const Foundation& on, int64_t attached, BuildReport& report) {

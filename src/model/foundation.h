@@ -29,6 +29,9 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
 /// Gives a model of make_layers the scene's bones, as they are and go.
 void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& bones, Model& model);
 
+/// Puts an anatomy's remarks and warnings before those of the report.
+void prepend_messages(const Anatomy& anatomy, BuildReport& report);
+
 /// Into the report: what became of the columns, and how many points and bones they hold to.
 void report_columns(const Foundation& on, int64_t attached, BuildReport& report);
 

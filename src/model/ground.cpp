@@ -53,8 +53,7 @@ Ground::Ground(const Anatomy& anatomy) {
   Foundation& on = state_->on;
   const Counts counts = count(on, layers);
   require_held(anatomy.scene, on.mesh, on.field, counts, on.attachment);
-  std::vector<std::string>& remarks = on.report.remarks;
-  remarks.insert(remarks.begin(), anatomy.remarks.begin(), anatomy.remarks.end());
+  prepend_messages(anatomy, on.report);
   report_columns(on, counts.bone, on.report);
 }
 

@@ -52,7 +52,7 @@ void require_same_place(const SkinMesh& mesh, const std::string& skin_name,
         fmt::format("{} of {} vertices lie inside bone (the first in {})", inside.size(),
                     mesh.points.size(), bones[field.containing(mesh.points[inside.front()])].name),
         "the skin must be outside all bone: check that both come from one scan and in one "
-        "frame; set tissue.edge where the skin has inner walls");
+        "frame");
 }
 
 bool face_outwards(const std::vector<BoneField::Nearest>& nearest, SkinMesh& mesh) {

@@ -51,7 +51,7 @@ void refuse_places(const std::string& skin_name, const SkinMesh& mesh,
   }
   throw RefusedPlaces(fmt::format("{}: {} in {} place{}, skin {}; {}", skin_name, what,
                                   groups.size(), groups.size() == 1 ? "" : "s", list, remedy),
-                      triangles_at(mesh, vertices));
+                      what, triangles_at(mesh, vertices));
 }
 
 }  // namespace repose::model

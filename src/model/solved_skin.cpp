@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include "bone_field.h"
+#include "load_entry.h"
 #include "motion_range.h"
 #include "region.h"
+#include "repose/base/error.h"
 #include "repose/meshtools/face.h"
+#include "repose/surface/defects.h"
 
 namespace repose::model {
 namespace {
 
+constexpr size_t most_solved_triangles = 100'000;            // of a skin solved as it is given
 constexpr double deepest_lifted = 3, thinnest_tissue = 0.3;  // mm
 
 meshtools::FaceRequest request_of(const Anatomy& anatomy) {
@@ -44,22 +48,73 @@ int64_t lift_off(const std::vector<surface::Surface>& bones, surface::Surface& s
   return lifted;
 }
 
+/// Returns what of a refusal says what is wrong: "FILE: what; remedy" without file and remedy.
+std::string clause_of(const std::string& refusal, const std::string& file) {
+  std::string text = refusal.substr(0, refusal.find(';'));
+  if (text.starts_with(file + ": ")) text.erase(0, file.size() + 2);
+  return text;
+}
+
+std::string describe_remeshing(const meshtools::Face& face, const Anatomy& anatomy, double edge) {
+  return fmt::format(
+      "the skin that is solved has {} vertices with edges of {:.3g} mm, no angle below {:.0f}°; of "
+      "them 95 % lie within {:.2f} mm of the given skin ({} triangles), all within {:.2f} mm",
+      face.skin.points.size(), edge, face.least_angle, face.off_95, anatomy.skin.triangles.size(),
+      face.off_most);
+}
+
 }  // namespace
+
+GivenSkin load_skin(const scene::Scene& scene) {
+  if (scene.tissue.edge) return {load_entry(scene.skin, surface::Role::raw), ""};
+  if (scene.tissue.keeps_given_skin) return {load_entry(scene.skin, surface::Role::skin), ""};
+  surface::Surface raw = load_entry(scene.skin, surface::Role::raw);
+  if (raw.triangles.size() > most_solved_triangles)
+    return {std::move(raw), fmt::format("it has more than {} triangles", most_solved_triangles)};
+  try {
+    surface::Surface skin = surface::accept_surface(raw, surface::Role::skin);
+    if (surface::inspect(skin, false).border_edges > 0) return {std::move(skin), ""};
+    return {std::move(skin), "it is closed, as that of a whole head"};
+  } catch (const base::InputError& refusal) {
+    std::string obstacle = clause_of(refusal.what(), raw.name);
+    return {std::move(raw), std::move(obstacle)};
+  }
+}
 
 void solve_remeshed(Anatomy& anatomy) {
   const meshtools::FaceRequest request = request_of(anatomy);
   meshtools::Face face = meshtools::solvable_face(anatomy.skin, request);
-  anatomy.remarks.push_back(fmt::format(
-      "the skin that is solved has {} vertices with edges of {:.3g} mm, no angle below {:.0f}°; of "
-      "them 95 % lie within {:.2f} mm of the given skin ({} triangles), all within {:.2f} mm",
-      face.skin.points.size(), request.edge, face.least_angle, face.off_95,
-      anatomy.skin.triangles.size(), face.off_most));
+  anatomy.remarks.push_back(describe_remeshing(face, anatomy, request.edge));
+  if (face.openings >= face.borders && face.borders > 0 && face.openings > 0)
+    anatomy.warnings.push_back(fmt::format(
+        "remeshing closed {} of {} openings of the given skin, such as its mouth: give a smaller "
+        "tissue.edge, or part the lips by mouth.path",
+        face.openings - face.borders + 1, face.openings));
   if (const int64_t lifted = lift_off(anatomy.bones, face.skin); lifted > 0)
     anatomy.remarks.push_back(
         fmt::format("{} vertices of it lay up to {:g} mm inside bone and were moved out", lifted,
                     deepest_lifted));
   anatomy.given_skin = std::move(anatomy.skin);
   anatomy.skin = std::move(face.skin);
+}
+
+bool replace_given_skin(Anatomy& anatomy, const std::string& obstacle) {
+  scene::Tissue& tissue = anatomy.scene.tissue;
+  if (tissue.edge || tissue.keeps_given_skin) return false;
+  tissue.edge = 0;
+  const size_t first = anatomy.remarks.size();
+  try {
+    solve_remeshed(anatomy);
+  } catch (const base::InputError&) {
+    tissue.edge.reset();
+    return false;
+  }
+  std::string& remark = anatomy.remarks[first];
+  remark = fmt::format(
+      "the given skin was remeshed: {}; {}; tissue.edge sets the length, and tissue.edge: given "
+      "keeps the given mesh",
+      obstacle, remark);
+  return true;
 }
 
 }  // namespace repose::model

@@ -22,7 +22,6 @@ std::size_t find_bone(const std::string& name, const Value& value,
   const auto found = std::find_if(bones.begin(), bones.end(),
                                   [&](const BoneEntry& bone) { return bone.name == name; });
   if (found != bones.end()) return static_cast<std::size_t>(found - bones.begin());
-  if (bones.empty()) value.refuse("{} is no bone; the scene has none", base::shown(name));
   std::vector<std::string> names;
   for (const BoneEntry& bone : bones) names.push_back(bone.name);
   value.refuse("{} is no bone of the scene; the nearest is '{}'", base::shown(name),

@@ -11,7 +11,8 @@ namespace repose::scene {
 /// A name that no bone has yet: printable ASCII, 64 characters at most.
 std::string read_new_name(const Value& value, const std::vector<BoneEntry>& bones);
 
-/// The row of the bone named so; `value` is refused, with the nearest name, where there is none.
+/// The row of the bone named so among at least one; `value` is refused, with the nearest name,
+/// where there is none.
 std::size_t find_bone(const std::string& name, const Value& value,
                       const std::vector<BoneEntry>& bones);
 

@@ -101,11 +101,13 @@ std::vector<Key> tissue_keys() {
        .kind = number,
        .standard = "",
        .sentence =
-           "Solve not the given skin but its outside over the bones that move, remeshed with edges "
-           "this long; auto: a seventieth of the head.",
+           "Edge length of the mesh that is solved in place of the given skin: its outside over "
+           "the "
+           "bones that move, remeshed; auto: a seventieth of the head; given: the given skin is "
+           "solved or refused. Unset: the given skin where it can be solved, else auto.",
        .unit = "mm",
        .range = Range::between(1, 20),
-       .choices = {"auto"}},
+       .choices = {"auto", "given"}},
       {"tissue.margin", number, "35",
        "With edge: how far the skin that is solved reaches along it beyond what lies within 25 mm "
        "of a moving bone, a force or an incision.",

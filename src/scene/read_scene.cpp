@@ -79,6 +79,7 @@ SurfaceEntry read_bone_surface(const Map& map) {
 
 std::vector<BoneEntry> read_bones(const Value& value) {
   std::vector<BoneEntry> bones;
+  if (value.is_empty()) return bones;  // require_bones()
   for (const Value& item : value.items()) {
     const Map map(item);
     bones.push_back({read_new_name(map.at("name"), bones), read_bone_surface(map)});
@@ -197,8 +198,10 @@ Tissue read_tissue(const Value& value) {
   if (depths) tissue.depths = read_depths(*depths, tissue.layers);
   if (depths && depths_mm) depths_mm->refuse("and tissue.depths exclude each other; remove one");
   if (depths_mm) tissue.depths_mm = read_depths_mm(*depths_mm, tissue.layers);
-  if (const auto edge = map.find("edge"))
-    tissue.edge = edge->is_word("auto") ? 0.0 : edge->number();
+  if (const auto edge = map.find("edge")) {
+    tissue.keeps_given_skin = edge->is_word("given");
+    if (!tissue.keeps_given_skin) tissue.edge = edge->is_word("auto") ? 0.0 : edge->number();
+  }
   read_face(map, tissue);
   set(tissue.attach_within, map, "attach_within", &Value::number);
   set(tissue.free_thickness, map, "free_thickness", &Value::number);
@@ -334,22 +337,29 @@ void read_surroundings(Scene& scene, const Map& map) {
 
 }  // namespace
 
+void require_bones(const Scene& scene) {
+  if (scene.bones.empty())
+    base::refuse("{}: bones lists no bone; give at least one: - {{name: skull, file: skull.ply}}",
+                 scene.file.string());
+}
+
 Scene read_scene(const std::filesystem::path& file) {
   const Map map(Value(file, read_yaml(file)));
   Scene scene;
   scene.file = file;
   scene.skin = read_skin(map.at("skin"));
   scene.bones = read_bones(map.at("bones"));
+  if (map.find("moves") || map.find("osteotomies")) require_bones(scene);
   scene.tissue = read_tissue(map.at("tissue"));
   read_surroundings(scene, map);
   if (const auto anatomy = map.find("anatomy")) scene.anatomy = read_anatomy(*anatomy);
   if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
-  std::map<std::string, Vec3> landmarks;
-  if (scene.anatomy) landmarks = scene.anatomy->landmarks;
+  if (scene.anatomy) scene.landmarks = scene.anatomy->landmarks;
   if (const auto named = map.find("landmarks"))
-    for (const auto& [name, place] : landmarks_by_name(named->file())) landmarks[name] = place;
-  if (const auto moves = map.find("moves")) read_moves(*moves, landmarks, scene);
+    for (const auto& [name, place] : landmarks_by_name(named->file()))
+      scene.landmarks[name] = place;
+  if (const auto moves = map.find("moves")) read_moves(*moves, scene.landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto plan = map.find("plan")) scene.plan = read_plan(*plan, scene);
   if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);

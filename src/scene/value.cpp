@@ -43,8 +43,14 @@ void Value::refuse_kind() const {
 
 double Value::number_as(const std::string& wanted) const {
   const auto value = node_.IsScalar() ? base::parse_number(node_.Scalar()) : std::nullopt;
-  if (!value || !find_key(path_).range.contains(*value))
-    refuse("must be {}, it is {}", wanted, shown());
+  const Key& key = find_key(path_);
+  if (!value || !key.range.contains(*value)) {
+    const bool turns = value && key.unit == "degrees" && std::isfinite(*value);
+    refuse("must be {}, it is {}{}", wanted, shown(),
+           turns ? fmt::format("; write {:g}, which ends in the same place",
+                               std::remainder(*value, 360.0))
+                 : "");
+  }
   return *value;
 }
 
@@ -150,9 +156,19 @@ std::vector<std::pair<std::string, Value>> Value::named() const {
   return result;
 }
 
+/// The map that a word seems to stand for: that of the key among whose choices the word is.
+std::string Value::hint_of_map() const {
+  if (!node_.IsScalar()) return "";
+  for (const Key* key : keys_below(path_))
+    if (std::ranges::find(key->choices, node_.Scalar()) != key->choices.end())
+      return fmt::format("; write {}: {{{}: {}}}", last_word(path_), last_word(key->path),
+                         node_.Scalar());
+  return "";
+}
+
 std::vector<Value::Entry> Value::entries() const {
   std::vector<Entry> found;
-  if (!is_map()) refuse("must be a map, it is {}", shown());
+  if (!is_map()) refuse("must be a map, it is {}{}", shown(), hint_of_map());
   add_entries(node_, false, 0, found);
   return found;
 }
@@ -201,7 +217,7 @@ Map::Map(const Value& value) : itself_(value), entries_(value.entries()) {
 void Map::check_known(const Value::Entry& entry) const {
   for (const Key* key : keys_below(itself_.path_)) {
     if (last_word(key->path) != entry.name) continue;
-    if (!entry.value.IsNull()) return;
+    if (!entry.value.IsNull() || key->path == "bones") return;
     itself_.refuse_at(entry.mark, fmt::format("has no value for '{}': give {}, or remove the key",
                                               entry.name, wanted(*key)));
   }

@@ -32,6 +32,7 @@ class Value {
 
   bool is_map() const { return node_.IsMap(); }
   bool is_list() const { return node_.IsSequence(); }
+  bool is_empty() const { return node_.IsNull(); }
   bool is_word(const std::string& word) const { return node_.IsScalar() && node_.Scalar() == word; }
 
   double number() const;
@@ -78,6 +79,7 @@ class Value {
   [[noreturn]] void refuse_kind() const;
   std::filesystem::path absolute_path() const;
   std::string shown() const;
+  std::string hint_of_map() const;
   double number_as(const std::string& wanted) const;
 
   std::shared_ptr<const std::filesystem::path> file_;

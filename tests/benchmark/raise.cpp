@@ -34,7 +34,7 @@ scene::Scene jaw_advance() {
 
 /// The surfaces, on rank 0.
 model::Anatomy anatomy_of(int64_t skin_vertices) {
-  model::Anatomy anatomy{jaw_advance(), {}, {}, {}, {}};
+  model::Anatomy anatomy{jaw_advance(), {}, {}, {}, {}, {}};
   if (base::rank(comm) > 0) return anatomy;
   anatomy.skin = tools::phantom::make_phantom_skin(skin_vertices);
   anatomy.bones = {tools::phantom::make_phantom_skull(bone_edge),

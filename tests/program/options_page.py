@@ -9,8 +9,7 @@ import sys
 
 HEAD = """# Command-line options
 
-Printed by `-help` of each program; a test holds this page equal to it. `[…]` gives range and default. The
-defaults of `repose-solve` that are not shown are those of the scene.
+Printed by `-help` of each program; a test holds this page equal to it. `[…]` gives range and default.
 """
 
 

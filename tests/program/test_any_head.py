@@ -75,11 +75,26 @@ def test_a_painted_face_is_solved_in_place_of_that_over_the_jaw(folder, environm
     assert outer.sum() < 0.05 * solved.sum()
 
 
-def test_without_an_edge_all_places_are_listed_and_written(folder, environment):
-    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace(", edge: 4", ""))
+@pytest.mark.parametrize("variant, why", [
+    ("raw", "more than 100000 triangles"), ("decimated", "closed, as that of a whole head"),
+    ("soup", "more than 100000 triangles"), ("folded", "inside bone")])
+def test_a_skin_without_a_key_is_remeshed_where_it_must_be(folder, environment, variant, why):
+    if variant == "folded":  # open at the neck, and a wall of its own inside the skull
+        mesh, wall = meshio.read(DATA / "face.ply"), meshio.read(DATA / "face.ply")
+        points = np.where(mesh.points[:, 2:] > 470, mesh.points + [0, 60, 0], mesh.points)
+        write(folder / "folded.ply", points, wall.cells_dict["triangle"])
+    (folder / "keyless.yaml").write_text(scene_of(f"{variant}.ply").replace(", edge: 4", ""))
+    result = runner(folder, environment)("repose-solve", "keyless.yaml", "-dry_run")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    remarks = [line for line in result.stdout.splitlines() if "was remeshed" in line]
+    assert len(remarks) == 1 and why in remarks[0] and "tissue.edge: given" in remarks[0]
+
+
+def test_an_insisted_edge_lists_and_writes_all_places(folder, environment):
+    (folder / "as_it_is.yaml").write_text(scene_of("raw.ply").replace(", edge: 4", ", edge: given"))
     result = runner(folder, environment)("repose-solve", "as_it_is.yaml")
     assert result.returncode == 1 and result.stderr.count("\n") == 1
-    assert "in 2 places" in result.stderr and "tissue.edge" in result.stderr
+    assert "in 2 places" in result.stderr and "inside bone" in result.stderr
     places = meshio.read(folder / "as_it_is_refused.ply")
     assert 300 < len(places.points) < 1000
 

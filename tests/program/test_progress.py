@@ -54,6 +54,13 @@ def test_a_search_of_one_load_step_tells_the_time_left(environment, tmp_path):
     assert " s left" in text
 
 
+def test_a_model_that_takes_long_shows_that_it_is_built(environment, tmp_path):
+    subprocess.run([programs() / "repose-phantom", "-skin_vertices", "40000", "-output", "head"],
+                   cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
+    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-dry_run"], tmp_path, environment)
+    assert "building the model  " in text and text.endswith("\r\x1b[K")
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_log_stays_quiet(run, ranks):
     result = run("repose-solve", PROJECT / "meshes/paper_jaw_advance.yaml", ranks=ranks)

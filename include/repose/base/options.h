@@ -30,8 +30,9 @@ struct Option {
   /// choice: the words allowed; number, integer: words that may stand in place of the number.
   std::vector<std::string> choices{};
   std::map<std::string, std::string>
-      removed{};   ///< words of earlier versions: what to give instead
-  int values = 1;  ///< how many values follow the name
+      removed{};               ///< words of earlier versions: what to give instead
+  int values = 1;              ///< how many values follow the name
+  std::string default_note{};  ///< for the help, what holds without a default_text
 };
 
 /// Command-line options, checked against one table; the program's own are read from the command
@@ -57,6 +58,8 @@ class Options {
   /// -help was given. With `-help petsc` or `-help intro` it goes to PETSc instead, and this is
   /// false.
   bool help_wanted() const { return help_wanted_; }
+  /// Returns true where -version was given.
+  bool version_wanted() const { return version_wanted_; }
   /// Returns the help page: description, arguments and options, from the table.
   std::string help() const;
 
@@ -67,8 +70,9 @@ class Options {
 
   /// Reads PETSc's database (where PETSc is initialised; what is ours is marked as used) and checks
   /// everything. InputError, one line, for a name that is neither ours nor begins as PETSc's do
-  /// (with the nearest of ours), a missing value, a value of the wrong kind or out of range, a
-  /// missing or unexpected argument. Call once, before any of the functions below.
+  /// (with the nearest of ours) and does not come from PETSC_OPTIONS, a missing value, a value of
+  /// the wrong kind or out of range, a missing or unexpected argument. Call once, before any of the
+  /// functions below.
   void check();
 
   /// One value per Argument, in order.
@@ -83,7 +87,8 @@ class Options {
   std::string text(std::string_view name) const;  ///< text, path, choice; a number as typed
   std::vector<std::string> texts(std::string_view name) const;  ///< all values; empty if none
 
-  /// The PETSc options of the command line that PETSc never requested. PETSc must be initialised.
+  /// The PETSc options of the command line, and the unknown ones of PETSC_OPTIONS, that nobody
+  /// requested. PETSc must be initialised.
   std::vector<std::string> unused() const;
   /// The options by which the user changes what PETSc computes, as typed, or empty. After check().
   const std::string& petsc_settings() const { return petsc_settings_; }
@@ -103,8 +108,9 @@ class Options {
   std::vector<Option> table_;
   std::map<std::string, std::vector<std::string>, std::less<>> given_;
   std::vector<std::string> positional_, unknown_, petsc_tokens_;
+  std::vector<std::string> ignored_;  // names in PETSC_OPTIONS that are neither ours nor PETSc's
   mutable std::vector<char*> petsc_pointers_;
-  bool help_wanted_ = false;
+  bool help_wanted_ = false, version_wanted_ = false;
 };
 
 /// All options in PETSc's database, as (name without its dash, value); the value is empty where

@@ -19,6 +19,7 @@ struct OuterSkin {
   Surface skin;  ///< closed, manifold, one component; smooth to about a voxel
   Surface caps;  ///< flat ends of the scan (as parts of the skin, cap_height mm outside of them)
   double cap_height;
+  Surface openings;  ///< cones over border loops as long as that of an open mouth
 };
 
 /// Distances d to the given triangles on a grid; the outside is what a ball reaches from beyond the

@@ -24,13 +24,16 @@ struct Face {
   Surface skin;                     ///< manifold, one component, its triangles nearly equilateral
   double off_95 = 0, off_most = 0;  ///< mm from its vertices to the given skin
   double least_angle = 0;           ///< degrees, of its triangles
+  int64_t openings = 0;             ///< of the given skin beside it, as large as an open mouth
+  int64_t borders = 0;              ///< loops of its own border
 };
 
 /// A skin fit to be solved, from any triangles: the outer skin (outer_skin.h) in the regions, or
-/// over the bones that move and a margin, without the scan's ends and with no hole in it, remeshed,
-/// its angles below 22° widened where that can be, and then drawn along its normals to the given
-/// triangles, whose offsets within the tolerance are averaged over an edge, so that noise is not
-/// followed. Throws InputError if no outer skin is in the regions or near the bones.
+/// over the bones that move and a margin, without the scan's ends, with no hole in it but the
+/// openings of the given skin that are as large as a mouth, remeshed, its angles below 22° widened
+/// where that can be, and then drawn along its normals to the given triangles, whose offsets within
+/// the tolerance are averaged over an edge, so that noise is not followed. Throws InputError if no
+/// outer skin is in the regions or near the bones.
 Face solvable_face(const Surface& given, const FaceRequest& request);
 
 /// An edge for a head of this size, mm: a seventieth of the surface's bounding diagonal, 2 to 8.

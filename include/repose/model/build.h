@@ -21,8 +21,9 @@ struct BuildReport {
   int64_t released = 0;   ///< of those, released near a piece that moves differently
   int64_t shortened = 0;  ///< columns made shorter so that neighbours do not cross
   double thickness_min = 0, thickness_median = 0, thickness_max = 0;  ///< mm
-  double effective_modulus = 0;      ///< N/mm², as the function below
-  std::vector<std::string> remarks;  ///< lines for a person, each complete
+  double effective_modulus = 0;       ///< N/mm², as the function below
+  std::vector<std::string> remarks;   ///< lines for a person, each complete
+  std::vector<std::string> warnings;  ///< likewise: what is implausible and should be changed
 };
 
 struct BuiltModel {
@@ -45,12 +46,40 @@ struct Anatomy {
   std::optional<surface::Surface> given_skin;
   std::vector<surface::Surface> bones;  ///< [scene.bones]
   std::vector<std::string> remarks;     ///< lines for a person, each complete
+  std::vector<std::string> warnings;    ///< likewise, of what is implausible
 };
 
 /// Reads the scene's surfaces, cuts its bones and resolves collisions. Serial.
 Anatomy load_anatomy(const scene::Scene& scene);
 
 BuiltModel build_model(const Anatomy& anatomy);
+
+/// A place of the face by which its movement is described.
+struct FacePlace {
+  std::string name;
+  Vec3 at;  ///< mm, on the skin that is solved, before the bones move
+};
+
+/// Returns nose tip, upper lip, lower lip and chin, as far as they are known: from the scene's
+/// landmarks (pronasale, upper_lip, lower_lip, pogonion_soft), else the skin in front of the teeth
+/// and the chin of the bones that the names tell to be a lower and an upper jaw.
+std::vector<FacePlace> face_places(const Anatomy& anatomy);
+
+/// Puts a remeshed skin in the place of the given one because of `obstacle`, a clause. Returns
+/// false, and leaves the anatomy as it is, where the scene says how its skin is meshed
+/// (tissue.edge) or where the given skin cannot be remeshed.
+bool replace_given_skin(Anatomy& anatomy, const std::string& obstacle);
+
+/// Returns build(anatomy), on a remeshed skin where no tissue fits the given one.
+template <class Build>
+auto build_on_solvable_skin(Anatomy& anatomy, const Build& build) {
+  try {
+    return build(anatomy);
+  } catch (const RefusedPlaces& refused) {
+    if (!replace_given_skin(anatomy, refused.reason())) throw;
+  }
+  return build(anatomy);
+}
 
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
@@ -131,6 +160,7 @@ double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& sol
 struct Bones {
   std::vector<surface::Surface> surfaces;  ///< [scene.bones], pieces cut off, kerfs taken out
   std::vector<std::string> remarks;        ///< lines for a person: what was cut
+  std::vector<std::string> warnings;       ///< likewise: what is implausible
 };
 
 /// Reads the files of the scene's bones and makes its osteotomies in their order. Throws

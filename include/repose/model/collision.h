@@ -45,6 +45,10 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
 void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
                      std::vector<std::string>& remarks);
 
+/// Adds a warning for every two bones that lie more than 2 mm inside one another before all moves.
+void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
+                             std::vector<std::string>& warnings);
+
 /// One line a pair, for a person.
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
                                   const scene::Collision& wanted);

@@ -54,11 +54,13 @@ void flip(SkinMesh& mesh);
 /// A skin that no tissue fits, with the triangles where it does not.
 class RefusedPlaces : public base::InputError {
  public:
-  RefusedPlaces(const std::string& message, surface::Surface places)
-      : InputError(message), places_(std::move(places)) {}
+  RefusedPlaces(const std::string& message, std::string reason, surface::Surface places)
+      : InputError(message), reason_(std::move(reason)), places_(std::move(places)) {}
+  const std::string& reason() const { return reason_; }  ///< what is wrong there, a clause
   const surface::Surface& places() const { return places_; }
 
  private:
+  std::string reason_;
   surface::Surface places_;
 };
 

@@ -154,11 +154,14 @@ struct Material {
 };
 
 struct Tissue {
-  int layers = 4;                ///< 2 … 64
-  std::optional<double> edge;    ///< mm, of the skin's triangles; 0: by its size; unset: as given
-  std::vector<SkinRegion> face;  ///< the skin that is solved; empty: that over bones that move,
-  double margin = 35;            ///< and mm further along it
-  std::vector<double> depths;    ///< [layers] fractions 0 … 1, increasing; empty: even
+  int layers = 4;  ///< 2 … 64
+  /// mm, edges of the mesh solved in place of the given skin; 0: by its size; unset: the given skin
+  /// is solved where it can be, else one with edges by its size.
+  std::optional<double> edge;
+  bool keeps_given_skin = false;  ///< the given skin is solved or refused, never remeshed
+  std::vector<SkinRegion> face;   ///< the skin that is solved; empty: that over bones that move,
+  double margin = 35;             ///< and mm further along it
+  std::vector<double> depths;     ///< [layers] fractions 0 … 1, increasing; empty: even
   /// mm below the skin of the upper layers, the skin's 0 first, increasing; empty: by `depths`.
   std::vector<double> depths_mm;
   double attach_within = 30;                 ///< mm
@@ -294,9 +297,13 @@ struct Scene {
   std::vector<Incision> incisions;
   std::vector<Force> forces;
   Solve solve;
-  std::vector<std::string> remarks;  ///< lines for a person
-  std::optional<double> tearing;     ///< N, tension above which springs tear; unset: none does
+  std::map<std::string, Vec3> landmarks;  ///< mm, by name; of the file `landmarks`
+  std::vector<std::string> remarks;       ///< lines for a person
+  std::optional<double> tearing;          ///< N, tension above which springs tear; unset: none does
 };
+
+/// Throws InputError if a scene lists no bone.
+void require_bones(const Scene& scene);
 
 /// Reads and checks a scene file. Every refusal is an InputError whose message starts with
 /// file:line:column and names the key, the value, the allowed range and, for an unknown key, the

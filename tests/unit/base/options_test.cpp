@@ -142,6 +142,7 @@ TEST(Options, HelpIsOursUnlessPetscsIsAskedFor) {
   EXPECT_FALSE(petscs->help_wanted());
   EXPECT_STREQ(petscs->petsc_argv()[1], "-help");
   EXPECT_EQ(petscs->petsc_argc(), 2);
+  EXPECT_TRUE(Line({"-version"})->version_wanted());
   Line intro({"-help", "intro"});
   EXPECT_EQ(intro->petsc_argc(), 3);
 }
@@ -211,6 +212,13 @@ TEST(Options, ReadsPetscsDatabase) {
   EXPECT_EQ(again->texts("load_steps"), std::vector<std::string>{"9"}) << "the command line wins";
   EXPECT_TRUE(again->flag("dry_run"));
   EXPECT_EQ(again->unused(), std::vector<std::string>{"-pc_typo"});
+  setenv("PETSC_OPTIONS", "-of_another_program 3", 1);
+  ASSERT_EQ(PetscOptionsSetValue(nullptr, "-of_another_program", "3"), 0);
+  Line shared({"head.yaml"});
+  shared->check();
+  EXPECT_EQ(shared->unused(), std::vector<std::string>{"-of_another_program of PETSC_OPTIONS"});
+  unsetenv("PETSC_OPTIONS");
+  ASSERT_EQ(PetscOptionsClearValue(nullptr, "-of_another_program"), 0);
   ASSERT_EQ(PetscOptionsSetValue(nullptr, "-accuracy", "-1"), 0);
   EXPECT_NE(Line({"head.yaml"}).refusal().find("-accuracy '-1' must be"), std::string::npos);
   ASSERT_EQ(PetscOptionsClear(nullptr), 0);

@@ -100,6 +100,26 @@ TEST(OuterSkin, refuses_what_is_no_solid) {
   EXPECT_NE(refusal([&] { outer_skin(sheets, {}); }).find("tissue.edge"), std::string::npos);
 }
 
+TEST(SolvableFace, keeps_an_open_mouth_open_and_closes_a_hole) {
+  for (const double opening : {12.0, 4.0}) {  // mm, radius
+    Surface given = solid(ball);
+    std::erase_if(given.triangles, [&](const Triangle& t) {
+      const Vec3& x = given.points[t[0]];
+      return x.y() < 0 && std::hypot(x.x(), x.z()) < opening;
+    });
+    FaceRequest request{4};
+    request.places = {Vec3(0, -radius, 0)};
+    const Face face = solvable_face(given, request);
+    const bool mouth = opening > 10;
+    EXPECT_EQ(inspect(face.skin, false).border_loops, mouth ? 2 : 1);
+    EXPECT_EQ(face.borders, mouth ? 2 : 1);
+    EXPECT_EQ(face.openings, mouth ? 1 : 0);
+    double nearest = radius;  // mm, of its points to the middle of the opening
+    for (const Vec3& x : face.skin.points) nearest = std::min(nearest, std::hypot(x.x(), x.z()));
+    EXPECT_NEAR(nearest, mouth ? opening : 0, 3);
+  }
+}
+
 TEST(SolvableFace, lies_on_the_given_skin_and_is_well_shaped) {
   for (const double noise : {0.0, 0.5}) {
     Surface given = dirty_ball();

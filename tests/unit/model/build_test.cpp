@@ -114,7 +114,7 @@ TEST(Build, an_automatic_rim_is_held_over_bone_that_rests_only) {
 }
 
 TEST(Build, a_remeshed_skin_is_lifted_off_bone_that_reaches_through_it) {
-  Anatomy anatomy{patches::scene_of(3, {"skull"}), patches::sphere(45, 5), {}, {}, {}};
+  Anatomy anatomy{patches::scene_of(3, {"skull"}), patches::sphere(45, 5), {}, {}, {}, {}};
   anatomy.scene.tissue.edge = 4;
   anatomy.bones = {patches::sphere(20, 4)};
   for (Vec3& x : anatomy.bones[0].points) x.z() += 25.6;  // 0.6 mm beyond the skin
@@ -126,6 +126,22 @@ TEST(Build, a_remeshed_skin_is_lifted_off_bone_that_reaches_through_it) {
   EXPECT_TRUE(remarked(built.report, "inside bone and were moved out"));
   EXPECT_TRUE(remarked(built.report, "edges of 4 mm"));
   for (const double volume : built.model.prisms.rest_volume) EXPECT_GT(volume, 0);
+}
+
+TEST(Build, a_refused_skin_is_replaced_unless_the_scene_says_how_it_is_meshed) {
+  Anatomy anatomy{patches::scene_of(3, {"skull"}), patches::sphere(45, 5), {}, {}, {}, {}};
+  anatomy.bones = {patches::sphere(20, 4)};
+  for (Vec3& x : anatomy.bones[0].points) x.z() += 25.6;  // 0.6 mm beyond the skin
+  anatomy.bones[0].name = "skull";
+  const auto build = [](const Anatomy& on) { return build_model(on); };
+  Anatomy insisted = anatomy;
+  insisted.scene.tissue.keeps_given_skin = true;
+  EXPECT_THROW(build_on_solvable_skin(insisted, build), RefusedPlaces);
+  const BuiltModel built = build_on_solvable_skin(anatomy, build);
+  EXPECT_TRUE(anatomy.given_skin.has_value());
+  EXPECT_TRUE(remarked(built.report, "was remeshed"));
+  EXPECT_TRUE(remarked(built.report, "lie inside bone"));
+  EXPECT_TRUE(remarked(built.report, "tissue.edge: given"));
 }
 
 TEST(Build, columns_without_bone_beneath_end_free) {
@@ -287,8 +303,10 @@ TEST(Build, a_border_near_a_bone_that_moves_is_reported) {
   EXPECT_TRUE(remarked(remarks({30, 0, 0}), "the skin ends 14.1 mm from bone 'jaw'"));
   EXPECT_TRUE(remarked(remarks({30, 0, 0}), "0.2 to 0.3 mm"));
   scene.rim = scene::Rim::fixed;
-  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "1.7 to 3.5 mm"));
-  EXPECT_TRUE(remarked(remarks({30, 0, 0}), "rim: auto"));
+  const std::vector<std::string> warnings = remarks({30, 0, 0}).warnings;
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_NE(warnings.back().find("1.7 to 3.5 mm"), std::string::npos);
+  EXPECT_NE(warnings.back().find("rim: auto"), std::string::npos);
 }
 
 TEST(Build, nothing_is_released_at_distance_0_or_by_pieces_that_move_together) {

@@ -159,6 +159,8 @@ TEST(Scene, TheFaceThatIsSolvedIsChosenWhereTheSkinIsRemeshed) {
   };
   EXPECT_TRUE(read(with(", edge: 4")).tissue.face.empty());
   EXPECT_EQ(read(with(", edge: 4, margin: 20")).tissue.margin, 20);
+  EXPECT_TRUE(read(with(", edge: given")).tissue.keeps_given_skin);
+  EXPECT_FALSE(read(with(", edge: given")).tissue.edge.has_value());
   const auto face = read(with(", edge: auto, face: [{box: {center: [1, 2, 3], size: [4, 5, 6]}}, "
                               "{curve: [[0, 0, 0], [9, 0, 0]], radius: 8}]"))
                         .tissue.face;
@@ -429,6 +431,7 @@ TEST(SceneRefuses, NumbersOutOfRangeOrNone) {
        "tissue.layers must be a whole number, 2 … 64, it is '65'", true},
       {"skin: face.ply\nbones: []\ntissue: {layers: 1}\n", "it is '1'", true},
       {"skin: face.ply\nbones: []\ntissue: {layers: 2.5}\n", "it is '2.5'", true},
+      tissue("material: face", "must be a map, it is 'face'; write material: {preset: face}"),
       {"solve: {lambda: 1.5}\n", "solve.lambda must be a number, > 0 and ≤ 1, it is '1.5'"},
       {"solve: {accuracy: 0}\n", "solve.accuracy must be a number of mm, 1e-12 … 100, it is '0'"},
       {"solve: {load_steps: 0}\n",
@@ -527,6 +530,13 @@ TEST(SceneRefuses, BonesAndMoves) {
        "must be printable ASCII", true},
       {"moves: [{bone: mandibel, translate: [0, 0, 1]}]\n",
        "6:16: moves[0].bone 'mandibel' is no bone of the scene; the nearest is 'mandible'"},
+      {"skin: face.ply\nbones:\ntissue: {layers: 4}\nmoves: []\n", "bones lists no bone; give at",
+       true},
+      {"skin: face.ply\nbones: []\ntissue: {layers: 4}\nmoves: [{bone: jaw, translate: [1, 0, "
+       "0]}]\n",
+       "bones lists no bone; give at", true},
+      {"moves: [{bone: skull, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 270}}]\n",
+       "it is '270'; write -90, which ends in the same place"},
       {"moves: [{bone: skull}]\n",
        "6:9: moves[0] must hold exactly one of translate, rotate, landmark, transform"},
       {"moves: [{bone: skull, translate: [0, 0, 1], transform: face.ply}]\n",

@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "repose/model/build.h"
+#include "repose/solve/repose.h"
+
+namespace repose::app {
+
+/// Returns how the face moved, in one line for a person: places of the face in LPS directions, the
+/// largest movement and where it is. `initial` and `moved` [points] of the skin, mm.
+std::string describe_movement(const std::vector<model::FacePlace>& places,
+                              const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
+
+/// Returns how far the face is from rest and, where that was estimated (`discretisation`, mm; else
+/// negative), from the continuum.
+std::string describe_trust(const solve::Summary& summary, double discretisation);
+
+}  // namespace repose::app

@@ -1,0 +1,226 @@
+#include "anatomy_check.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "head_frame.h"
+#include "repose/surface/distance.h"
+
+namespace repose::model {
+namespace {
+
+constexpr double flat = 0.03;            // thickness of a skin over its width
+constexpr double out_of_middle = 10;     // mm, between the middles of jaw and skull
+constexpr double apart = 12;             // mm, between jaw and skull
+constexpr double turning = 1;            // degrees
+constexpr double joint_slide = 5;        // mm
+constexpr double joint_over_chin = 1.5;  // of their displacements
+constexpr double joint_up = 4;           // mm
+constexpr double opening = 3;            // mm, of the front teeth
+constexpr double at_mouth = 45;          // mm
+constexpr double along_axis = 0.5;       // cosine
+constexpr double resolution = 1e-9;
+
+/// A scene's anatomy with what the checks share.
+struct Anatomical {
+  const scene::Scene& scene;
+  const MotionRange& range;
+  const SkinMesh& mesh;
+  const std::vector<surface::Surface>& bones;
+  std::vector<BoneRole> roles;
+  BoneGroup upper, lower;
+  std::optional<HeadFrame> frame;
+};
+
+std::string names_of(const Anatomical& head, BoneRole role) {
+  std::vector<std::string> names;
+  for (size_t b = 0; b < head.roles.size(); ++b)
+    if (head.roles[b] == role) names.push_back("'" + head.scene.bones[b].name + "'");
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+bool moves(const Anatomical& head, size_t bone) {
+  return head.range.travel(head.bones[bone], static_cast<int32_t>(bone)) > negligible_travel;
+}
+
+std::string check_flatness(const Anatomical& head) {
+  Mat3 spread = Mat3::Zero();
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& x : head.mesh.points) mean += x;
+  mean /= static_cast<double>(head.mesh.points.size());
+  for (const Vec3& x : head.mesh.points) spread += (x - mean) * (x - mean).transpose();
+  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
+  if (squares[0] > flat * flat * squares[1] + resolution) return "";
+  return "the skin is flat: it seems to be the end of a scan, not a face; give the face, or the "
+         "skin of the whole head";
+}
+
+std::string check_rest(const Anatomical& head) {
+  bool any_moves = false, any_rests = false;
+  for (size_t b = 0; b < head.bones.size(); ++b) (moves(head, b) ? any_moves : any_rests) = true;
+  if (any_moves && !any_rests)
+    return "every bone moves, and tissue over the rest of the skull ends free: give the skull as "
+           "a bone that rests";
+  if (!head.lower.empty() && head.upper.empty() && head.bones.size() == 1)
+    return fmt::format(
+        "there is no bone besides {}: tissue over the skull ends free; give the "
+        "skull as a bone",
+        names_of(head, BoneRole::lower));
+  return "";
+}
+
+double volume_of_box(const BoneGroup& group) { return group.box.volume(); }
+
+/// Exchanged bones and axes other than LPS exclude each other: one line tells of the first found.
+std::string check_axes(const Anatomical& head) {
+  if (!head.frame) return "";
+  const double up = (head.upper.box.center() - head.lower.box.center()).z();
+  const Vec3& forward = head.frame->facing;
+  if (up < 0 && volume_of_box(head.lower) > volume_of_box(head.upper))
+    return fmt::format(
+        "{} lies above {} and is larger: their meshes seem to be exchanged; exchange the files",
+        names_of(head, BoneRole::lower), names_of(head, BoneRole::upper));
+  if (head.frame->upward.z() < -along_axis)
+    return fmt::format(
+        "the head is upside down: {} lies above {}; +z must point up (LPS: +x left, +y back, +z "
+        "up), turn all meshes",
+        names_of(head, BoneRole::lower), names_of(head, BoneRole::upper));
+  if (forward.y() > along_axis)
+    return "the face looks towards +y: these are RAS coordinates, and a scene is in LPS (+x left, "
+           "+y back, +z up); export the meshes in LPS, or change the signs of x and y in all of "
+           "them and in the scene";
+  if (forward.y() > -along_axis || head.frame->upward.z() < along_axis)
+    return fmt::format(
+        "the face looks along ({:.2f}, {:.2f}, {:.2f}) and not along −y: turn all meshes to LPS "
+        "(+x left, +y back, +z up), or give moves along the head's own directions",
+        forward.x(), forward.y(), forward.z());
+  return "";
+}
+
+/// Landmarks whose names differ in the side tell left from right.
+std::string check_sides(const Anatomical& head) {
+  if (!head.frame) return "";
+  for (const auto& [name, place] : head.scene.landmarks) {
+    const size_t at = name.find("left");
+    if (at == std::string::npos) continue;
+    std::string other = name;
+    const auto found = head.scene.landmarks.find(other.replace(at, 4, "right"));
+    if (found == head.scene.landmarks.end()) continue;
+    if (head.frame->left.dot(place - found->second) > 0) continue;
+    return fmt::format(
+        "landmark {} lies on the right of {}: the head or its landmarks are mirrored; change the "
+        "sign of x in one of them",
+        name, other);
+  }
+  return "";
+}
+
+double gap_between(const BoneGroup& lower, const Anatomical& head) {
+  double gap = std::numeric_limits<double>::infinity();
+  for (size_t b = 0; b < head.bones.size(); ++b) {
+    if (head.roles[b] != BoneRole::upper) continue;
+    const surface::DistanceTree tree(head.bones[b]);
+    for (const Vec3& x : lower.points) gap = std::min(gap, tree.nearest(x).distance);
+  }
+  return gap;
+}
+
+std::string check_fit(const Anatomical& head) {
+  if (!head.frame) return "";
+  const double aside = head.frame->left.dot(head.lower.box.center() - head.upper.box.center());
+  const std::string jaw = names_of(head, BoneRole::lower), skull = names_of(head, BoneRole::upper);
+  constexpr const char* remedy = "check that both come from one scan and in one frame";
+  if (std::abs(aside) > out_of_middle)
+    return fmt::format("the middle of {} lies {:.0f} mm beside that of {}; {}", jaw,
+                       std::abs(aside), skull, remedy);
+  const double gap = gap_between(head.lower, head);
+  if (gap > apart)
+    return fmt::format("{} comes no nearer to {} than {:.0f} mm; {}", jaw, skull, gap, remedy);
+  return "";
+}
+
+/// Whole jaws: lower bones that no osteotomy divides.
+std::vector<size_t> whole_jaws(const Anatomical& head) {
+  std::vector<size_t> whole;
+  for (size_t b = 0; b < head.bones.size(); ++b) {
+    const bool cut = std::ranges::any_of(head.scene.osteotomies, [&](const scene::Osteotomy& o) {
+      return o.bone == b || o.piece == b;
+    });
+    if (head.roles[b] == BoneRole::lower && !cut && moves(head, b)) whole.push_back(b);
+  }
+  return whole;
+}
+
+double degrees_of(const scene::RigidMotion& motion) {
+  const Mat3 rotation = motion.matrix().topLeftCorner<3, 3>();
+  return Eigen::AngleAxisd(rotation).angle() * 180 / std::numbers::pi;
+}
+
+std::string check_hinge(const Anatomical& head) {
+  if (!head.frame) return "";
+  const JawPoints jaw = jaw_points(head.lower, *head.frame);
+  const Vec3 joints = (jaw.left_joint + jaw.right_joint) / 2;
+  for (const size_t b : whole_jaws(head)) {
+    const scene::RigidMotion& move = head.scene.moves[b];
+    if (degrees_of(move) < turning) continue;
+    const Vec3 by = move.apply(joints) - joints;
+    const double chin = (move.apply(jaw.chin) - jaw.chin).norm();
+    const bool reversed = by.norm() > std::max(joint_slide, joint_over_chin * chin);
+    if (!reversed && head.frame->up.dot(by) < joint_up) continue;
+    return fmt::format(
+        "'{}' turns about an axis far from its joints: they move {:.1f} mm and the chin {:.1f} mm; "
+        "the hinge runs through both condyles, near ({:.0f}, {:.0f}, {:.0f}) and ({:.0f}, {:.0f}, "
+        "{:.0f})",
+        head.scene.bones[b].name, by.norm(), chin, jaw.right_joint.x(), jaw.right_joint.y(),
+        jaw.right_joint.z(), jaw.left_joint.x(), jaw.left_joint.y(), jaw.left_joint.z());
+  }
+  return "";
+}
+
+bool mouth_is_open(const Anatomical& head, const Vec3& incisor) {
+  const auto near = [&](const Vec3& x) { return (x - incisor).norm() < at_mouth; };
+  for (size_t k = 1; k < head.mesh.border_loops.size(); ++k)
+    for (const int64_t v : head.mesh.border_loops[k])
+      if (near(head.mesh.points[v])) return true;
+  return std::ranges::any_of(head.scene.incisions, [&](const scene::Incision& cut) {
+    return std::ranges::any_of(cut.path, near);
+  });
+}
+
+std::string check_lips(const Anatomical& head) {
+  if (!head.frame) return "";
+  const JawPoints jaw = jaw_points(head.lower, *head.frame);
+  if (mouth_is_open(head, jaw.incisor)) return "";
+  double drop = 0;
+  for (const size_t b : whole_jaws(head))
+    drop = std::max(drop, head.frame->up.dot(jaw.incisor - head.scene.moves[b].apply(jaw.incisor)));
+  if (drop < opening) return "";
+  return fmt::format(
+      "the lips are one skin, and the jaw opens by {:.0f} mm at its front teeth: the mouth stays "
+      "closed; part the lips (mouth: {{path: […]}}, points from one corner of the mouth to the "
+      "other), or give a skin with an open mouth",
+      drop);
+}
+
+}  // namespace
+
+std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRange& range,
+                                       const SkinMesh& mesh,
+                                       const std::vector<surface::Surface>& bones) {
+  Anatomical head{scene, range, mesh, bones, roles_of(scene), {}, {}, {}};
+  head.upper = bones_of(BoneRole::upper, head.roles, bones);
+  head.lower = bones_of(BoneRole::lower, head.roles, bones);
+  head.frame = head_frame(mesh, head.upper, head.lower);
+  std::vector<std::string> warnings;
+  for (const auto check :
+       {check_flatness, check_rest, check_axes, check_sides, check_fit, check_hinge, check_lips})
+    if (std::string warning = check(head); !warning.empty()) warnings.push_back(std::move(warning));
+  return warnings;
+}
+
+}  // namespace repose::model
