@@ -75,8 +75,12 @@ class Planner {
     this.reference = null;  // {plan, position, columns}: the latest solved with tangents
     this.exact = null;      // {plan, position, error}: the latest solved
     this.asked = 0;
-    this.initial = arrays.position;
-    this.triangles = arrays.triangles;
+    this.solved = arrays.position;  // initial positions of the skin that is solved
+    // It has no cuts: lips that part are shown on the skin that is solved.
+    this.own = !head.cuts && arrays.given_rows && {rows: arrays.given_rows, weights: arrays.given_weights,
+                                     position: arrays.given_position};
+    this.initial = this.own ? arrays.given_position : arrays.position;
+    this.triangles = this.own ? arrays.given_triangles : arrays.triangles;
     this.makeView(arrays);
     this.makePanel();
     this.choose(head.pieces[head.pieces.length - 1].name);
@@ -285,10 +289,23 @@ class Planner {
   }
 
   showFace(position) {
-    this.position = position;
-    this.skin.setPositions(NOW, position);
+    this.position = this.follow(position);
+    this.skin.setPositions(NOW, this.position);
     this.color();
     this.drawProfile();
+  }
+
+  // The positions that are shown: of the scene's own skin, carried along, where another is solved.
+  follow(position) {
+    if (!this.own) return position;
+    const {rows, weights, position: own} = this.own, moved = own.slice(), {solved} = this;
+    for (let i = 0, k = 0; i < moved.length; i += 3)
+      for (let n = 0; n < 16; ++n, ++k) {
+        const weight = weights[k], row = 3 * rows[k];
+        if (weight) for (let a = 0; a < 3; ++a)
+          moved[i + a] += weight * (position[row + a] - solved[row + a]);
+      }
+    return moved;
   }
 
   mark(kind, text) {

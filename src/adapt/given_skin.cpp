@@ -49,12 +49,11 @@ surface::Surface welded(const surface::Surface& skin) {
   return whole;
 }
 
-/// The solved skin and its displacement.
+/// The solved skin, by whose points places move.
 class SolvedSkin {
  public:
-  SolvedSkin(const surface::Surface& skin, const std::vector<Vec3>& displacement)
+  explicit SolvedSkin(const surface::Surface& skin)
       : skin_(skin),
-        displacement_(displacement),
         whole_(welded(skin)),
         distance_(whole_),
         tree_(whole_),
@@ -69,13 +68,13 @@ class SolvedSkin {
     const auto off = distance_.at(at);
     return off.beyond_rim ? std::clamp(1 - std::abs(off.distance) / fade, 0.0, 1.0) : 1.0;
   }
-  Vec3 motion_at(const Vec3& at) const;
+  /// The displacement of a place as a sum over points.
+  GivenSkinMap::Sum motion_at(const Vec3& at) const;
 
  private:
   std::vector<int64_t> points_near(const Vec3& at) const;
 
   const surface::Surface& skin_;
-  const std::vector<Vec3>& displacement_;
   surface::Surface whole_;
   meshtools::SignedDistance distance_;
   surface::TriangleTree tree_;
@@ -99,49 +98,59 @@ std::vector<int64_t> SolvedSkin::points_near(const Vec3& at) const {
 }
 
 /// The affine motion of the nearest points at `at`, weighted by (1 − d²/h²)².
-Vec3 SolvedSkin::motion_at(const Vec3& at) const {
+GivenSkinMap::Sum SolvedSkin::motion_at(const Vec3& at) const {
   const std::vector<int64_t> near = points_near(at);
   const double reach = beyond_farthest * (skin_.points[near.back()] - at).norm() + 1e-9;
   double sum = 0;
-  Vec3 middle = Vec3::Zero(), mean = Vec3::Zero();
-  std::vector<double> weight;
+  Vec3 middle = Vec3::Zero();
+  GivenSkinMap::Sum motion;
   for (const int64_t row : near) {
     const double share = (skin_.points[row] - at).norm() / reach;
-    weight.push_back(std::pow(1 - share * share, 2));
-    sum += weight.back();
-    middle += weight.back() * skin_.points[row];
-    mean += weight.back() * displacement_[row];
+    motion.emplace_back(row, std::pow(1 - share * share, 2));
+    sum += motion.back().second;
+    middle += motion.back().second * skin_.points[row];
   }
   middle /= sum;
-  mean /= sum;
-  Mat3 spread = Mat3::Zero(), change = Mat3::Zero();
-  for (size_t k = 0; k < near.size(); ++k) {
-    const Vec3 beside = skin_.points[near[k]] - middle;
-    spread += weight[k] * beside * beside.transpose();
-    change += weight[k] * (displacement_[near[k]] - mean) * beside.transpose();
+  Mat3 spread = Mat3::Zero();
+  for (const auto& [row, weight] : motion) {
+    const Vec3 beside = skin_.points[row] - middle;
+    spread += weight * beside * beside.transpose();
   }
   const double extent = spread.trace() / 3;
   spread += ridge * extent * Mat3::Identity();
   Vec3 step = at - middle;
   const double far = std::sqrt(3 * extent / sum);
   if (step.norm() > far) step *= far / step.norm();
-  return mean + change * spread.ldlt().solve(step);
+  const Vec3 slope = spread.ldlt().solve(step);
+  for (auto& [row, weight] : motion) weight *= 1 / sum + (skin_.points[row] - middle).dot(slope);
+  return motion;
 }
 
 }  // namespace
 
+GivenSkinMap map_to_given(const surface::Surface& given, const surface::Surface& skin) {
+  const SolvedSkin solved(skin);
+  GivenSkinMap map;
+  for (const Vec3& point : given.points) {
+    const double share = solved.share_at(point);
+    map.solved.push_back(share);
+    GivenSkinMap::Sum& sum = map.sum.emplace_back();
+    if (share > 0) sum = solved.motion_at(point);
+    for (auto& [row, weight] : sum) weight *= share;
+  }
+  return map;
+}
+
 surface::PointData displacement_of_given(const surface::Surface& given,
                                          const surface::Surface& skin,
                                          const std::vector<Vec3>& displacement) {
-  const SolvedSkin solved(skin, displacement);
+  const GivenSkinMap map = map_to_given(given, skin);
   surface::PointData data;
   data.vectors.push_back({"displacement", {}});
-  data.fields.push_back({"solved", {}});
-  for (const Vec3& point : given.points) {
-    const double share = solved.share_at(point);
-    data.fields[0].values.push_back(share);
-    data.vectors[0].values.push_back(share > 0 ? Vec3(share * solved.motion_at(point))
-                                               : Vec3::Zero());
+  data.fields.push_back({"solved", map.solved});
+  for (const GivenSkinMap::Sum& sum : map.sum) {
+    Vec3& moved = data.vectors[0].values.emplace_back(Vec3::Zero());
+    for (const auto& [row, weight] : sum) moved += weight * displacement[row];
   }
   return data;
 }

@@ -175,6 +175,13 @@ const model::Model& PlanSession::model() const { return state_->job.model; }
 const std::string& PlanSession::building() const { return state_->job.building; }
 int64_t PlanSession::layers() const { return state_->job.raised ? state_->job.layers : 0; }
 
+const surface::Surface* PlanSession::given_skin() const {
+  const auto& anatomy = state_->job.anatomy;
+  return anatomy && anatomy->given_skin ? &*anatomy->given_skin : nullptr;
+}
+
+bool PlanSession::has_cuts() const { return !state_->job.cuts.empty(); }
+
 std::vector<Vec3> PlanSession::initial() const {
   State& s = *state_;
   const discrete::NaturalRows natural(s.comm, s.part());

@@ -19,6 +19,13 @@ class Reply {
   void add(const std::string& name, const std::vector<Vec3>& rows);
   void add(const std::string& name, const std::vector<double>& values);
   void add(const std::string& name, const std::vector<Triangle>& triangles);  ///< int32
+  /// Adds rows of so many numbers.
+  template <class Number>
+  void add(const std::string& name, const std::vector<Number>& values, size_t columns) {
+    append(name, std::is_same_v<Number, float> ? "f4" : "i4",
+           {static_cast<int64_t>(values.size() / columns), static_cast<int64_t>(columns)},
+           values.data(), values.size() * sizeof(Number));
+  }
   /// Turns the answer into a refusal.
   void refuse(const std::string& error);
   std::string bytes() const;

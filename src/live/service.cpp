@@ -6,6 +6,7 @@
 
 #include "listener.h"
 #include "reply.h"
+#include "repose/adapt/given_skin.h"
 #include "repose/app/plan_session.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
@@ -141,6 +142,23 @@ std::vector<Row> Service::shown(const std::vector<Row>& rows) const {
   return picked;
 }
 
+/// Adds the given skin and how it follows the one that is solved.
+void add_given_skin(const surface::Surface& given, const surface::Surface& skin, Reply& reply) {
+  constexpr size_t most = 16;  // points that a vertex follows
+  const adapt::GivenSkinMap map = adapt::map_to_given(given, skin);
+  std::vector<int32_t> row;
+  std::vector<float> weight;
+  for (const auto& sum : map.sum)
+    for (size_t k = 0; k < most; ++k) {
+      row.push_back(k < sum.size() ? static_cast<int32_t>(sum[k].first) : 0);
+      weight.push_back(k < sum.size() ? static_cast<float>(sum[k].second) : 0);
+    }
+  reply.add("given_position", given.points);
+  reply.add("given_triangles", given.triangles);
+  reply.add("given_rows", row, most);
+  reply.add("given_weights", weight, most);
+}
+
 void Service::describe(Reply& reply) {
   find_shown();
   json& head = reply.head();
@@ -158,14 +176,16 @@ void Service::describe(Reply& reply) {
   const model::Model& model = session_.model();
   head["points"] = initial.size();
   head["bones"] = model.bones;
-  reply.add("position", shown(initial));
-  std::vector<Triangle> triangles;
+  head["cuts"] = session_.has_cuts();
+  surface::Surface skin{"skin", shown(initial), {}};
   for (const auto& triangle : model.skin) {
-    Triangle& corners = triangles.emplace_back();
+    Triangle& corners = skin.triangles.emplace_back();
     for (int k = 0; k < 3; ++k)
       corners[k] = std::ranges::lower_bound(skin_, triangle[k]) - skin_.begin();
   }
-  reply.add("triangles", triangles);
+  reply.add("position", skin.points);
+  reply.add("triangles", skin.triangles);
+  if (session_.given_skin()) add_given_skin(*session_.given_skin(), skin, reply);
   for (size_t b = 0; b < model.bone_surfaces.size(); ++b) {
     reply.add(fmt::format("bone_{}_points", b), model.bone_surfaces[b].points);
     reply.add(fmt::format("bone_{}_triangles", b), model.bone_surfaces[b].triangles);

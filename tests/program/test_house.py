@@ -23,7 +23,7 @@ ROOMS = {
     "results": {"base", "model"},
     "adapt": {"base", "scene", "surface", "meshtools", "model", "mechanics", "discrete", "linear",
               "solve"},
-    "live": {"base", "scene", "surface", "model", "solve", "app"},
+    "live": {"base", "scene", "surface", "model", "solve", "adapt", "app"},
     "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
             "results", "adapt"},
     "tools/bone_separation": {"base", "imaging"},

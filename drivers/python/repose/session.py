@@ -46,6 +46,19 @@ class Tangent:
 
 
 @dataclasses.dataclass
+class GivenSkin:
+    """The skin that a scene names, where another is solved in its place (tissue.edge)."""
+    position: np.ndarray   # [G, 3] mm, initial
+    triangles: np.ndarray
+    rows: np.ndarray       # [G, 16] points of the solved skin that a vertex follows
+    weights: np.ndarray    # [G, 16]
+
+    def follow(self, displacement):
+        """Where its vertices are when the solved skin is displaced."""
+        return self.position + np.einsum("gk,gka->ga", self.weights, displacement[self.rows])
+
+
+@dataclasses.dataclass
 class Face:
     """An answer: the skin at rest, mm."""
     plan: dict
@@ -58,9 +71,16 @@ class Face:
     tangent: object           # Tangent, or None
     info: dict                # the answer's head
 
+    given: object = None      # the scene's own skin where another is solved: GivenSkin
+
     @property
     def displacement(self):
         return self.position - self.initial
+
+    @property
+    def given_position(self):
+        """[G, 3] mm, the skin that the scene names (tissue.edge), carried along; None without."""
+        return self.given and self.given.follow(self.displacement)
 
     def mesh(self):
         """meshio mesh of the skin with displacement and fields."""
@@ -121,6 +141,10 @@ class Session:
         self.box, self.accuracy = head["box"], head["accuracy"]
         self.initial = arrays["position"].astype(float)
         self.triangles = arrays["triangles"]
+        self.given = None
+        if "given_position" in arrays:
+            self.given = GivenSkin(*(arrays[f"given_{name}"] for name in
+                                     ("position", "triangles", "rows", "weights")))
         self.bones = {name: (arrays[f"bone_{row}_points"], arrays[f"bone_{row}_triangles"])
                       for row, name in enumerate(head["bones"])}
 
@@ -144,7 +168,7 @@ class Session:
                 missing.append((names[int(bone)], component))
         position = fields.pop("position").astype(float)
         return Face(plan, position, self.initial, self.triangles, head["error"], head["converged"],
-                    fields, Tangent(columns, missing) if tangents else None, head)
+                    fields, Tangent(columns, missing) if tangents else None, head, self.given)
 
     def tangents(self, plan=None, accuracy=None):
         """The derivatives of the skin at a plan, by default the scene's own."""

@@ -1,8 +1,22 @@
 #pragma once
+#include <cstdint>
+#include <utility>
+#include <vector>
+
 #include "repose/model/model.h"
 #include "repose/surface/write.h"
 
 namespace repose::adapt {
+
+/// How the vertices of a given skin follow the points of the solved one.
+struct GivenSkinMap {
+  using Sum = std::vector<std::pair<int64_t, double>>;
+  std::vector<Sum> sum;        ///< [vertices] their displacement: rows of solved points, weights
+  std::vector<double> solved;  ///< [vertices] share of it that is left, 1 over the solved skin
+};
+
+/// The map that displacement_of_given() applies. Serial.
+GivenSkinMap map_to_given(const surface::Surface& given, const surface::Surface& skin);
 
 /// The displacement of the solved skin carried to the vertices of a given one, which may be dense,
 /// dirty and larger: an affine motion fitted to the 16 nearest skin points of the model around the

@@ -52,8 +52,10 @@ class PlanSession {
   const scene::Plan& box() const;
   double accuracy() const;            ///< mm, the scene's
   const model::Model& model() const;  ///< at most its skin and bones where ranks build their parts
-  std::vector<Vec3> initial() const;  ///< [N] mm
-  int64_t layers() const;             ///< points of a column where all have as many, else 0
+  const surface::Surface* given_skin() const;  ///< in whose place another is solved, or null
+  bool has_cuts() const;                       ///< incisions or parted lips
+  std::vector<Vec3> initial() const;           ///< [N] mm
+  int64_t layers() const;               ///< points of a column where all have as many, else 0
   const std::string& building() const;  ///< report of the build
 
   /// Throws InputError where the plan is outside the box.
