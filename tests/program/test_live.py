@@ -146,6 +146,18 @@ def test_two_ranks_give_the_same_face(session, environment):
         assert len(shared.tangents(A).columns) == 18
 
 
+def test_the_skin_that_a_scene_names_follows_the_one_that_is_solved(environment, tmp_path):
+    scene = tmp_path / "remeshed.yaml"
+    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text())
+    scene.write_text(text.replace("layers: 4", "layers: 3\n  edge: 8"))
+    with repose.Session(scene, program=programs() / "repose-live") as remeshed:
+        face = remeshed.solve(remeshed.scene_plan)
+        given = np.linalg.norm(face.given_position - remeshed.given.position, axis=1)
+    assert len(given) == 2000 and len(face.position) < 1500
+    assert abs(given.max() - np.linalg.norm(face.displacement, axis=1).max()) < 0.3
+    assert given.min() == 0, "far from what is solved, or over bone that stays"
+
+
 def test_a_scene_without_a_plan_is_refused(environment):
     with pytest.raises(repose.Refused, match="the scene has no plan"):
         repose.Session(PROJECT / "meshes/head_genioplasty.yaml", program=programs() / "repose-live")
