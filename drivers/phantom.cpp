@@ -38,8 +38,7 @@ void write_head(const base::Options& options) {
   tools::phantom::PhantomOptions wanted;
   wanted.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
-  std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)
-",
+  std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)\n",
               options.text("output").c_str());
   std::fflush(stdout);
   const tools::phantom::Phantom head = tools::phantom::make_phantom(wanted);
