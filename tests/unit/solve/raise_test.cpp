@@ -29,6 +29,7 @@ model::Anatomy jaws(int squares) {
           {},
           {patches::box({-20, -20, -25}, {51.2, 120, -10}),
            patches::box({51.3, -20, -25}, {120, 120, -10})},
+          {},
           {}};
 }
 
