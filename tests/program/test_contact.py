@@ -77,7 +77,7 @@ def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, e
         assert " to find another rest position" in done.stdout
     alone = run("repose-solve", *scene, "-skip_other_rest")
     assert alone.returncode == 0 and "other rest" not in alone.stdout
-    quiet = run("repose-solve", "real_head_le_fort.yaml", "-accuracy", ACCURACY, "-output", "quiet")
+    quiet = run("repose-solve", "real_head_mouth.yaml", "-accuracy", ACCURACY, "-output", "quiet")
     assert quiet.returncode == 0 and not OTHER.search(quiet.stdout)
 
 
