@@ -52,6 +52,7 @@ def skin(file):
 
 
 @real_head
+@pytest.mark.long
 @pytest.mark.parametrize("operation, apart", [("le_fort", 2 * ACCURACY), ("genioplasty", 0.55)])
 def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operation, apart):
     """The genioplasty has rest positions up to 0.5 mm apart, which the next test reads of."""
@@ -64,6 +65,7 @@ def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operat
 
 
 @real_head
+@pytest.mark.long
 def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, environment):
     """Tissue of the chin rests on either side of the edge of the cut."""
     run = runner(folder, environment)
