@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # run.sh [--all]: installs missing packages (apt), builds with warnings as errors, checks the formatting and
-# runs the tests; with --all also the long ones, half an hour more. Ends with ctest's summary and what was left out.
+# runs the tests; with --all also the long ones. Ends with ctest's summary and what was left out.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 case "${1-}" in
