@@ -37,22 +37,41 @@ double TouchLoop::least_gap(size_t c, const Vec3& beside) const {
   return distance_[c] - steepest * (beside - seen_[c]).norm() - touches_.offset[c];
 }
 
-void TouchLoop::measure(size_t c, const Vec3& beside) {
-  const surface::Distance d = bodies_[touches_.body[c]].distance(beside);
+/// True if the gap is at least `gap` mm: by the way since it was last evaluated, or else by a lower
+/// bound, which is kept.
+bool TouchLoop::stays_above(double gap, size_t c, const Vec3& beside) {
+  constexpr double margin = 0.5;  // mm, by which a rough bound exceeds what is needed
+  if (least_gap(c, beside) >= gap) return true;
+  const double needed = gap + touches_.offset[c];
+  const double bound = bodies_[touches_.body[c]].lower_bound(beside, needed + margin);
+  if (bound < needed) return false;
   seen_[c] = beside;
-  distance_[c] = d.value;
-  gap_[c] = d.value - touches_.offset[c];
-  normal_[c] = d.gradient;
-  curvature_[c] = d.curvature;
+  distance_[c] = bound;
+  return true;
+}
+
+void TouchLoop::set(size_t c, const Vec3& beside, const surface::Distance& distance) {
+  seen_[c] = beside;
+  distance_[c] = distance.value;
+  gap_[c] = distance.value - touches_.offset[c];
+  normal_[c] = distance.gradient;
+  curvature_[c] = distance.curvature;
+}
+
+void TouchLoop::measure(size_t c, const Vec3& beside) {
+  set(c, beside, bodies_[touches_.body[c]].distance(beside));
+}
+
+void TouchLoop::measure_outside(size_t c, const Vec3& beside) {
+  set(c, beside, bodies_[touches_.body[c]].outside(beside));
 }
 
 void TouchLoop::look(std::span<const Vec3> position) {
   acting_.clear();
   for (size_t c = 0; c < touches_.point.size(); ++c) {
     const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
-    if (const double least = least_gap(c, beside);
-        !slides(c) && !(multiplier_[c] - stiffness_ * least > 0)) {
-      gap_[c] = least;
+    if (!slides(c) && stays_above(multiplier_[c] / stiffness_, c, beside)) {
+      gap_[c] = least_gap(c, beside);
       continue;
     }
     measure(c, beside);
@@ -60,12 +79,17 @@ void TouchLoop::look(std::span<const Vec3> position) {
   }
 }
 
-std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, double reach) {
+std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, double reach,
+                                              double smoothed_to) {
   std::vector<LinearGap> gaps;
   for (size_t c = 0; c < touches_.point.size(); ++c) {
-    const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
-    if (!slides(c) && least_gap(c, beside) > reach) continue;
-    measure(c, beside);
+    const RigidBody& body = bodies_[touches_.body[c]];
+    const Vec3 beside = body.beside(position[touches_.point[c]]);
+    if (!slides(c) && stays_above(reach, c, beside)) continue;
+    if (!slides(c) && multiplier_[c] == 0 && stays_above(smoothed_to, c, beside))
+      measure_outside(c, beside);
+    else
+      measure(c, beside);
     if ((!slides(c) && gap_[c] > reach) || normal_[c].isZero(0)) continue;
     gaps.push_back({c,
                     slides(c),
@@ -77,30 +101,56 @@ std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, do
   return gaps;
 }
 
-std::vector<Vec3> TouchLoop::own_normals(std::span<const Vec3> position, double reach) const {
-  std::vector<Vec3> normals(touches_.point.size(), Vec3::Zero());
-  for (size_t c = 0; c < normals.size(); ++c) {
-    const RigidBody& body = bodies_[touches_.body[c]];
-    const Vec3 beside = body.beside(position[touches_.point[c]]);
-    if (!slides(c) && least_gap(c, beside) > reach) continue;
-    const surface::Distance d = body.distance(beside);
-    if (d.value <= reach) normals[c] = body.own_direction(d.gradient);
-  }
-  return normals;
+std::vector<Vec3> TouchLoop::places(std::span<const Vec3> position) const {
+  std::vector<Vec3> places;
+  for (size_t c = 0; c < touches_.point.size(); ++c)
+    places.push_back(bodies_[touches_.body[c]].beside(position[touches_.point[c]]));
+  return places;
 }
 
-void TouchLoop::carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const {
+namespace {
+
+/// The direction from a body to a point within `reach` mm of it, in space; 0 farther away.
+Vec3 direction_within(double reach, const RigidBody& body, const Vec3& beside) {
+  const double bound = body.lower_bound(beside, reach);
+  if (bound >= reach) return Vec3::Zero();
+  const surface::Distance d = bound > 0 ? body.outside(beside) : body.distance(beside);
+  return d.value < reach ? d.gradient : Vec3::Zero();
+}
+
+}  // namespace
+
+bool TouchLoop::changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const {
+  constexpr double pressing = 1, was_near = 6;  // mm
+  for (size_t c = 0; c < touches_.point.size(); ++c) {
+    const RigidBody& body = bodies_[touches_.body[c]];
+    const Vec3 now = direction_within(pressing, body, body.beside(position[touches_.point[c]]));
+    if (!now.isZero(0) && now.dot(direction_within(was_near, body, before[c])) < 0) return true;
+  }
+  return false;
+}
+
+void TouchLoop::carry(std::span<const Vec3> position, std::span<const RigidBody> before,
+                      std::vector<LinearGap>& gaps) const {
   for (LinearGap& g : gaps) {
-    const RigidBody& body = bodies_[touches_.body[g.constraint]];
+    const int32_t body = touches_.body[g.constraint];
     auto& [point, normal] = g.gradient.front();
-    normal = body.distance(seen_[g.constraint]).gradient;
-    g.gap += normal.dot(position[point] - body.in_space(seen_[g.constraint]));
+    normal = bodies_[body].turned(before[body].own_direction(normal));
+    g.gap += normal.dot(position[point] - bodies_[body].in_space(seen_[g.constraint]));
   }
 }
 
 void TouchLoop::look_at_all(std::span<const Vec3> position) {
-  std::fill(distance_.begin(), distance_.end(), -infinite);
+  constexpr double smoothed_to = 1;  // mm
   look(position);
+  for (size_t c = 0; c < touches_.point.size(); ++c) {
+    const RigidBody& body = bodies_[touches_.body[c]];
+    const Vec3 beside = body.beside(position[touches_.point[c]]);
+    if (slides(c) || !stays_above(smoothed_to, c, beside))
+      measure(c, beside);
+    else
+      measure_outside(c, beside);
+  }
 }
 
 double TouchLoop::add_gradient(std::span<const Vec3> position, double scale,

@@ -63,6 +63,19 @@ Distance RigidBody::distance(const Vec3& beside) const {
   return d;
 }
 
+double RigidBody::lower_bound(const Vec3& beside, double enough) const {
+  const auto* field = std::get_if<surface::DistanceField>(shape_.get());
+  return field ? field->lower_bound(beside, enough) : distance(beside).value;
+}
+
+Distance RigidBody::outside(const Vec3& beside) const {
+  const auto* field = std::get_if<surface::DistanceField>(shape_.get());
+  if (!field) return distance(beside);
+  Distance d = field->outside(beside);
+  d.gradient = rotation_ * d.gradient;
+  return d;
+}
+
 RigidBody RigidBody::rounded(double times) const {
   const auto* field = std::get_if<surface::DistanceField>(shape_.get());
   RigidBody body = *this;
@@ -111,9 +124,11 @@ std::vector<double> touch_offsets(const model::Model& model, const std::vector<R
   std::vector<double> offset(touches.point.size());
   for (size_t c = 0; c < offset.size(); ++c) {
     const RigidBody& body = bodies[touches.body[c]];
-    const double initial =
-        body.distance(body.beside(model.points.position[touches.point[c]])).value;
-    offset[c] = touches.binding[c] == model::Binding::slides ? initial : std::min(0.0, initial);
+    const Vec3 beside = body.beside(model.points.position[touches.point[c]]);
+    if (touches.binding[c] == model::Binding::slides)
+      offset[c] = body.distance(beside).value;
+    else if (body.lower_bound(beside, 0) < 0)
+      offset[c] = std::min(0.0, body.distance(beside).value);
   }
   return offset;
 }

@@ -13,7 +13,8 @@ using mechanics::LinearGap;
 
 namespace {
 
-constexpr double farthest = 8;  // mm, gaps beyond which no step closes
+// mm: gaps beyond the first do not close in a step; beyond the second the exact distance serves.
+constexpr double farthest = 5, smoothed_to = 1;
 
 double largest(MPI_Comm comm, double value) {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
@@ -37,7 +38,7 @@ ContactQp::ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
 void ContactQp::linearize(Vec displacement) {
   objective_.positions().update(displacement);
   objective_.place_bodies();
-  gaps_ = objective_.touches().linear_gaps(objective_.positions().local(), farthest);
+  gaps_ = objective_.touches().linear_gaps(objective_.positions().local(), farthest, smoothed_to);
   add_gaps();
 }
 
@@ -46,12 +47,13 @@ void ContactQp::linearize(Vec displacement, double load, std::span<const Vec3> w
   const double before = positions.load();
   positions.update(displacement);
   objective_.place_bodies();
-  gaps_ = objective_.touches().linear_gaps(positions.local(), farthest);
+  gaps_ = objective_.touches().linear_gaps(positions.local(), farthest, smoothed_to);
+  const std::vector<mechanics::RigidBody> bodies = objective_.touches().bodies();
   positions.set_load(load);
   objective_.place_bodies();
   positions.set_load(before);
   positions.update(displacement);
-  objective_.touches().carry(positions.local(), gaps_);
+  objective_.touches().carry(positions.local(), bodies, gaps_);
   objective_.place_bodies();
   add_gaps();
   for (size_t k = touching_; k < gaps_.size(); ++k)
@@ -183,8 +185,10 @@ double ContactQp::line_search(double slope, double curvature) {
 bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int most_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
+  bool full = false;  // the latest step was not shortened
   for (int set = 0; set < most_sets; ++set) {
     const bool changed = choose_active();
+    if (full && !changed) return true;
     if (changed) set_blocks();
     check(VecCopy(force_, left_));
     check(VecAXPY(left_, 1.0, slope));
@@ -207,6 +211,7 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
     check(VecDot(force_, direction_, &along));
     check(VecDot(slope, direction_, &held));
     const double share = line_search(along + held, curvature);
+    full = std::abs(share - 1) <= coarse;
     check(VecAXPY(step, share, direction_));
     check(VecAXPY(force_, share, left_));
     for (size_t k = 0; k < gaps_.size(); ++k) closed_[k] += share * closing_[k];

@@ -16,9 +16,6 @@ namespace {
 constexpr double missed = 0.25;       // of the accuracy, by contact
 constexpr double contact_safety = 2;  // the estimate is so many times what is left
 constexpr double predicted_to = 0.1;  // mm
-// mm, of points whose sides of bodies are compared: before a step, and where they may press after
-// it.
-constexpr double normals_to = 6, pressing_to = 1;
 // Bodies with rounded edges have one rest position where sharper ones catch single points on either
 // side: it decides the side.
 constexpr ContactSearch::Approach to_rounded{true, 0.1, 0.05, 0.3}, to_exact{false, 0.1, 0.05, 0.1};
@@ -102,7 +99,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   objective_.place_bodies();
-  normals_ = objective_.touches().own_normals(positions.local(), normals_to);
+  places_ = objective_.touches().places(positions.local());
   const discrete::Part& part = positions.part();
   std::vector<Vec3> way(positions.local().size(), Vec3::Zero());
   for (size_t i = 0; i < way.size(); ++i)
@@ -225,10 +222,7 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
 bool ContactSearch::gone_round(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  const std::vector<Vec3> now = objective_.touches().own_normals(positions.local(), pressing_to);
-  int found = 0;
-  for (size_t c = 0; c < now.size(); ++c)
-    if (now[c].dot(normals_[c]) < 0) found = 1;
+  int found = objective_.touches().changed_side(places_, positions.local());
   MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, positions.comm());
   return found;
 }
@@ -342,7 +336,7 @@ void ContactSearch::go_back(Vec) {
 double penetration(discrete::Objective& objective) {
   mechanics::TouchLoop& touches = objective.touches();
   const auto position = objective.positions().local();
-  touches.look_at_all(position);
+  touches.look(position);
   double deepest = 0;
   for (const double gap : touches.gaps()) deepest = std::max(deepest, -gap);
   mechanics::WallLoop& walls = objective.walls();

@@ -67,7 +67,7 @@ class ContactSearch : public RestSearch {
   bool predicted_ = false;     // the next search begins with a prediction
   Multipliers before_;         // the last search, …
   Multipliers at_prediction_;  // … and where it began
-  std::vector<Vec3> normals_;  // [touches] before the prediction, in bodies' axes
+  std::vector<Vec3> places_;   // [touches] of points beside bodies before the prediction
   base::VecHandle gradient_, slope_, step_, trial_, start_;
 };
 

@@ -34,14 +34,13 @@ double ExactPenetration::depth(size_t body, const mechanics::RigidBody& shape, c
 
 void ExactPenetration::measure_own(discrete::Objective& objective,
                                    std::vector<PenetrationDepth>& depths) {
-  const double near = 2 * part_.model.contact.spacing;  // mm, smoothing moves bodies by less
   const std::vector<mechanics::RigidBody>& bodies = objective.touches().bodies();
   const model::Touches& touches = part_.model.contact.touches;
   for (size_t c = 0; c < touches.point.size(); ++c) {
     const int32_t body = touches.body[c];
     const Vec3& now = objective.positions().local()[touches.point[c]];
     const Vec3 beside = bodies[body].beside(now);
-    if (bodies[body].distance(beside).value > near) continue;
+    if (bodies[body].lower_bound(beside, 0) > 0) continue;
     double deeper = depth(body, bodies[body], beside);
     if (deeper > 0)
       deeper -= depth(body, bodies[body], part_.model.points.position[touches.point[c]]);

@@ -16,15 +16,19 @@ struct Sample {
   Vec3 where = Vec3::Zero();
 };
 
-/// The deepest sample between two points, both left out.
+/// The deepest sample between two points, both left out; none if all are above the reported depth.
 Sample deepest_between(const Vec3& from, const Vec3& to, const mechanics::RigidBody& body) {
-  Sample deepest;
+  Sample deepest{reported_depth, Vec3::Zero()};
+  const double half = (to - from).norm() / 2, enough = half - reported_depth;
+  if (body.lower_bound(body.beside((from + to) / 2), enough) >= enough) return {};
   for (int k = 1; k <= samples; ++k) {
     const Vec3 x = from + (to - from) * (static_cast<double>(k) / (samples + 1));
-    const double depth = -body.distance(body.beside(x)).value;
+    const Vec3 beside = body.beside(x);
+    if (body.lower_bound(beside, -deepest.depth) >= -deepest.depth) continue;
+    const double depth = -body.distance(beside).value;
     if (depth > deepest.depth) deepest = {depth, x};
   }
-  return deepest;
+  return deepest.depth > reported_depth ? deepest : Sample{};
 }
 
 /// Owned points above a deepest one of their column, which is the next row.

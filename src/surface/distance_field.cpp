@@ -55,6 +55,13 @@ Vec3 DistanceField::Grid::point(const Index& at) const {
                                  static_cast<double>(at[2]));
 }
 
+DistanceField::Index DistanceField::Grid::nearest(const Vec3& at) const {
+  Index index;
+  for (int a = 0; a < 3; ++a)
+    index[a] = static_cast<int64_t>(std::floor((at[a] - origin[a]) / spacing + 0.5));
+  return index;
+}
+
 DistanceField::Index DistanceField::grid_points() const {
   return {b * grid_.blocks[0], b * grid_.blocks[1], b * grid_.blocks[2]};
 }
@@ -95,11 +102,46 @@ class DistanceField::Values {
     return any;
   }
 
+  /// A lower bound of the spline at a point of the grid: of grid points in order of what their
+  /// distances cost, that of the first which reaches `enough`, or else of the point itself.
+  double lower_bound(const Vec3& point, double enough) {
+    const Index nearest = grid_.nearest(point);
+    const Index block{nearest[0] / b, nearest[1] / b, nearest[2] / b};
+    const Index middle{b * block[0] + b / 2, b * block[1] + b / 2, b * block[2] + b / 2};
+    const int64_t begin = block_begin(block);
+    const auto bound = [&](const Index& at, double distance) {
+      return distance - (grid_.point(at) - point).norm() - smoothing();
+    };
+    if (begin < 0) return std::min(grid_.reach, bound(middle, enough_far()));
+    const double by_middle = bound(middle, cell_value(begin, middle));
+    if (by_middle >= enough) return by_middle;
+    const double value = cell_value(begin, nearest), by_nearest = bound(nearest, value);
+    if (by_nearest >= enough || value < 0) return by_nearest;
+    const double exact = outside(point).value;
+    // On the other side of the surface than the grid point, it is no farther from it than that.
+    const bool same_side = exact > (grid_.point(nearest) - point).norm();
+    return same_side ? exact - smoothing() : by_nearest;
+  }
+
+  /// Distance and direction from the closest triangle, `reach` and 0 beyond.
+  Distance outside(const Vec3& point) {
+    const TriangleTree::Nearest nearest = tree_.nearest(point, search_limit(point));
+    if (nearest.triangle >= 0) last_triangle_ = nearest.triangle;
+    const double distance = std::sqrt(nearest.squared);
+    if (nearest.triangle < 0 || distance >= grid_.reach)
+      return {grid_.reach, Vec3::Zero(), Mat3::Zero()};
+    return {distance, (point - nearest.point) / distance, Mat3::Zero()};
+  }
+
   int64_t count() const {
     return std::count_if(value_.begin(), value_.end(), [](float v) { return !std::isnan(v); });
   }
 
  private:
+  /// mm, by which the spline is less than the distance, at most: the largest sum over grid points
+  /// of the weight's size times the distance to them. Single precision is allowed for.
+  double smoothing() const { return (grid_.rounded ? 0.97 : 1.67) * grid_.spacing + 1e-5; }
+
   float farthest() const { return static_cast<float>(grid_.reach); }
 
   /// Where the values of a block begin, −1 where all are `reach`.
@@ -107,27 +149,34 @@ class DistanceField::Values {
     int32_t& place = place_[(block[2] * grid_.blocks[1] + block[1]) * grid_.blocks[0] + block[0]];
     if (place == unknown) {
       const Index middle{b * block[0] + b / 2, b * block[1] + b / 2, b * block[2] + b / 2};
-      if (signed_distance(middle) >= enough()) {
+      const double distance = signed_distance(middle);
+      if (distance >= enough_far()) {
         place = far;
       } else {
         place = static_cast<int32_t>(value_.size() / cells);
         value_.resize(value_.size() + cells, NAN);
         if (!grid_.rounded) coefficient_.resize(value_.size(), NAN);
+        value_[place * cells + cell_of(middle)] = kept(distance);
       }
     }
     return place == far ? -1 : place * cells;
   }
 
+  /// The number of a grid point in its block.
+  static int64_t cell_of(const Index& at) { return ((at[2] % b) * b + at[1] % b) * b + at[0] % b; }
+
+  float kept(double distance) const { return static_cast<float>(std::min(distance, grid_.reach)); }
+
   float cell_value(int64_t begin, const Index& at) {
-    float& value = value_[begin + ((at[2] % b) * b + at[1] % b) * b + at[0] % b];
-    if (std::isnan(value)) value = static_cast<float>(std::min(signed_distance(at), grid_.reach));
+    float& value = value_[begin + cell_of(at)];
+    if (std::isnan(value)) value = kept(signed_distance(at));
     return value;
   }
 
   /// The value, less a sixth of its second differences unless the field is rounded.
   float coefficient(int64_t begin, const Index& at) {
     if (grid_.rounded) return cell_value(begin, at);
-    const auto cell = begin + ((at[2] % b) * b + at[1] % b) * b + at[0] % b;
+    const int64_t cell = begin + cell_of(at);
     if (!std::isnan(coefficient_[cell])) return coefficient_[cell];
     double sum = 0;
     for (int a = 0; a < 3; ++a)
@@ -142,7 +191,7 @@ class DistanceField::Values {
 
   /// mm. Where the middle of a block or a point of a stencil is as far outside, the others are
   /// farther than `reach`.
-  double enough() const { return grid_.reach + b * grid_.spacing; }
+  double enough_far() const { return grid_.reach + b * grid_.spacing; }
 
   /// Exact up to rounding where it is below `reach`, otherwise `reach` or more. The surface is not
   /// nearer to the last point than the last distance, from which much follows without a search.
@@ -155,15 +204,15 @@ class DistanceField::Values {
     const bool inside = same_side ? last_distance_ < 0 : is_inside(at, point);
     if (nearest.triangle < 0 && inside) nearest = tree_.nearest(point);
     if (nearest.triangle >= 0) last_triangle_ = nearest.triangle;
-    const double distance = nearest.triangle < 0 ? enough() : std::sqrt(nearest.squared);
+    const double distance = nearest.triangle < 0 ? enough_far() : std::sqrt(nearest.squared);
     last_point_ = point;
     last_distance_ = inside ? -distance : distance;
     return last_distance_;
   }
 
-  /// mm², above that of the closest triangle, or that of enough().
+  /// mm², above that of the closest triangle, or that of enough_far().
   double search_limit(const Vec3& point) const {
-    const double largest = enough() * enough();
+    const double largest = enough_far() * enough_far();
     if (last_triangle_ < 0) return largest;
     const double squared = squared_distance(point, tree_.corners_of(last_triangle_));
     return std::fmin(largest, (1 + 1e-9) * squared + 1e-12 * grid_.spacing * grid_.spacing);
@@ -215,6 +264,17 @@ bool DistanceField::locate(const Vec3& point, Stencil& stencil) const {
     stencil.bend[a] = {u, 3 * t - 2, 3 * u - 2, t};
   }
   return true;
+}
+
+double DistanceField::lower_bound(const Vec3& point, double enough) const {
+  Stencil at;
+  return locate(point, at) ? values().lower_bound(point, enough) : grid_.reach;
+}
+
+Distance DistanceField::outside(const Vec3& point) const {
+  Stencil at;
+  if (!locate(point, at)) return {grid_.reach, Vec3::Zero(), Mat3::Zero()};
+  return values().outside(point);
 }
 
 double DistanceField::value(const Vec3& point) const { return sample(point).value; }

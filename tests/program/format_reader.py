@@ -336,6 +336,23 @@ class Contact:
             slope[rows] = gradient @ turn.T
         return value, slope
 
+    def stated_gaps(self, position, load, value):
+        """The gaps as contact_gap has them: away from a mesh by the distance to its triangles."""
+        moved, gap = motions(self.file, load), value - self.offset
+        for d, body in enumerate(self.bodies):
+            if not isinstance(body, Mesh):
+                continue
+            bone, grid = self.file.model["contact/body_bone"][d], self.file.contact["grid"]
+            rows = np.flatnonzero((self.body == d) & ~self.slides & (gap > 0.5))
+            turn, shift = moved[bone] if bone >= 0 else \
+                (np.eye(3), load * self.file.model["contact/body_push"][d])
+            rows = rows[body.lower_bound((position[self.point[rows]] - shift) @ turn) < GAP_LIMIT]
+            exact = body.exact((position[self.point[rows]] - shift) @ turn)
+            exact = np.minimum(exact, body.reach) - self.offset[rows]
+            away = exact >= 1 + 1.67 * grid + 1e-5
+            gap[rows[away]] = exact[away]
+        return gap
+
     def exact_penetration(self, position, load):
         """Largest depth inside the bodies' own triangles, less that at the start."""
         moved, deepest = motions(self.file, load), 0.0
@@ -358,7 +375,7 @@ class Contact:
         value, slope = self.distances(position, load)
         gap = value - self.offset
         of_point, acting = np.full(len(position), GAP_LIMIT), []
-        np.minimum.at(of_point, self.point, gap)
+        np.minimum.at(of_point, self.point, self.stated_gaps(position, load, value))
         for c in np.flatnonzero((gap < pressing) | self.slides):
             acting.append((self.point[c], gap[c], self.area[c],
                            {self.point[c]: self.area[c] * slope[c]}))

@@ -92,6 +92,34 @@ def test_a_result_that_is_wrong_about_contact_is_refused(good, tmp_path, environ
     assert any(words in line for line in wrong), wrong
 
 
+@pytest.fixture(scope="module")
+def parted(tmp_path_factory, environment):
+    """A result with a cut through the skin."""
+    top = tmp_path_factory.mktemp("parted")
+    done = runner(top, environment)("repose-solve", PROJECT / "meshes/head_incision.yaml", "-output",
+                                    "parted", "-load_steps", 1)
+    assert (done.returncode, done.stderr) == (0, ""), done
+    return top / "parted.h5"
+
+
+def test_a_wrong_gap_between_the_sides_of_a_cut_is_refused(parted, tmp_path, environment):
+    run = runner(tmp_path, environment)
+    good = run("repose-check", parted)
+    assert (good.returncode, good.stderr) == (0, ""), good
+    file = tmp_path / "spoiled.h5"
+    shutil.copyfile(parted, file)
+    with h5py.File(file, "r+") as h5:
+        wall = h5["model/contact/wall"]
+        columns, rows = wall["net"][0]
+        touching = np.flatnonzero(wall["area"][:columns * rows] > 0)
+        point = wall["point"][wall["begin"][touching[len(touching) // 2]]]
+        gap = last_step(h5)["point/contact_gap"]
+        gap[point] = gap[point] + 1e-3
+    result = run("repose-check", file)
+    assert result.returncode == 1, result.stdout
+    assert any("contact_gap" in line for line in result.stdout.splitlines() if "DISAGREE" in line)
+
+
 def test_a_good_result_is_accepted_with_its_exact_penetration_and_without(good, tmp_path,
                                                                           environment):
     """Results of earlier versions do not state it."""

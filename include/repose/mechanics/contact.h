@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -43,7 +44,7 @@ void visit_products(const LinearGap::Gradient& g, double weight, Visit&& visit) 
 }
 
 /// Points against rigid bodies. A distance changes by no more than its point moves, so that a
-/// constraint is looked at again only where that can make it act.
+/// constraint is evaluated only where a lower bound of its gap lets it act.
 class TouchLoop {
  public:
   TouchLoop() = default;
@@ -60,23 +61,28 @@ class TouchLoop {
 
   /// Adds scale · gradient; returns the value, N·mm, unscaled.
   double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
-  /// Takes the distances where the points are, for all functions below.
+  /// Evaluates the gaps that may act, for all functions below.
   void look(std::span<const Vec3> position);
-  /// The same for all, even those that cannot act.
+  /// Evaluates all gaps, those beyond 1 mm by the exact distance (RigidBody::outside).
   void look_at_all(std::span<const Vec3> position);
   /// Calls visit(point, block): the Hessian at the latest look, or a semidefinite relative.
   template <class Visit>
   void for_each_block(bool exact, Visit&& visit) const {
     for (const size_t c : acting_) visit(touches_.point[c], block(c, exact, now(c)));
   }
-  /// The gaps below `reach` mm, to first order about the positions.
-  std::vector<LinearGap> linear_gaps(std::span<const Vec3> position, double reach);
-  /// Takes gaps made by linear_gaps to where the bodies have moved since: each point stays beside
-  /// the place of its body that it was beside.
-  void carry(std::span<const Vec3> position, std::vector<LinearGap>& gaps) const;
-  /// [C] The normals, in the bodies' own axes, of points that are nearer than `reach` mm; 0 for the
-  /// others.
-  std::vector<Vec3> own_normals(std::span<const Vec3> position, double reach) const;
+  /// The gaps below `reach` mm, to first order about the positions; those above `smoothed_to` mm,
+  /// without multipliers, may be those of the exact distance (RigidBody::outside).
+  std::vector<LinearGap> linear_gaps(std::span<const Vec3> position, double reach,
+                                     double smoothed_to = std::numeric_limits<double>::infinity());
+  /// Takes gaps made by linear_gaps to where the bodies have moved since they were at `before`:
+  /// each point stays beside the place of its body that it was beside.
+  void carry(std::span<const Vec3> position, std::span<const RigidBody> before,
+             std::vector<LinearGap>& gaps) const;
+  /// [C] Where points are beside their bodies (RigidBody::beside).
+  std::vector<Vec3> places(std::span<const Vec3> position) const;
+  /// True if a point within 1 mm of a body was within 6 mm of it at `before`, which places()
+  /// returned, on another side: the normals, in the body's axes, are more than 90° apart.
+  bool changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
   template <class Visit>
   void for_each_curvature(std::span<const LinearGap> gaps, bool exact, Visit&& visit) const {
@@ -93,19 +99,22 @@ class TouchLoop {
  private:
   bool slides(size_t c) const { return touches_.binding[c] == model::Binding::slides; }
   double least_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
+  bool stays_above(double gap, size_t c, const Vec3& beside);
   Pressing now(size_t c) const { return press(gap_[c], multiplier_[c], stiffness_, slides(c)); }
   void measure(size_t c, const Vec3& beside);
+  void measure_outside(size_t c, const Vec3& beside);
+  void set(size_t c, const Vec3& beside, const surface::Distance& distance);
   Mat3 block(size_t c, bool exact, const Pressing& pressing) const;
 
   model::Touches touches_;
   double stiffness_ = 1;
   std::vector<RigidBody> bodies_;
   std::vector<double> multiplier_;  // [C] N/mm²
-  std::vector<Vec3> seen_;          // [C] where the point was beside its body when last looked at
-  std::vector<double> distance_;    // [C] mm, then
+  std::vector<Vec3> seen_;          // [C] where the point was beside its body when last evaluated
+  std::vector<double> distance_;    // [C] mm, then, or a lower bound
   std::vector<double> gap_;         // [C] at the latest look
-  std::vector<Vec3> normal_;        // [C] when last looked at
-  std::vector<Mat3> curvature_;     // [C] likewise
+  std::vector<Vec3> normal_;        // [C] when last measured
+  std::vector<Mat3> curvature_;     // [C] when last measured
   std::vector<size_t> acting_;      // at the latest look
 };
 

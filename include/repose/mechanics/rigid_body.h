@@ -42,8 +42,14 @@ class RigidBody {
   Vec3 in_space(const Vec3& beside) const { return rotation_ * beside + shift_; }
   /// Distance to a point given by beside(); the derivatives are those in space.
   surface::Distance distance(const Vec3& beside) const;
-  /// A direction in space in the body's own axes.
+  /// Lower bound of the distance, which costs less than the distance to a mesh
+  /// (surface::DistanceField::lower_bound).
+  double lower_bound(const Vec3& beside, double enough) const;
+  /// The exact distance of a point outside, without smoothing and without curvature.
+  surface::Distance outside(const Vec3& beside) const;
+  /// A direction in space in the body's own axes, and its inverse.
   Vec3 own_direction(const Vec3& direction) const { return rotation_.transpose() * direction; }
+  Vec3 turned(const Vec3& own) const { return rotation_ * own; }
   /// Up to this the distance is known, mm.
   double reach() const;
 

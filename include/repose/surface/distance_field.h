@@ -40,6 +40,12 @@ class DistanceField {
   /// With derivatives; these are 0 beyond `reach`.
   Distance sample(const Vec3& point) const;
   double reach() const { return grid_.reach; }
+  /// A lower bound of value(point), mm, that costs one exact distance or none: a rough one where it
+  /// is at least `enough`.
+  double lower_bound(const Vec3& point, double enough) const;
+  /// Exact distance and direction from the surface to a point outside, in place of those of the
+  /// spline: curvature 0; `reach` and a gradient of 0 beyond.
+  Distance outside(const Vec3& point) const;
 
   Vec3 grid_point(const Index& at) const { return grid_.point(at); }  ///< mm
   Index grid_points() const;                                          ///< along each axis
@@ -61,6 +67,7 @@ class DistanceField {
     Index blocks{};                 // along each axis
     bool rounded = false;           // coefficients are the values
     Vec3 point(const Index& at) const;
+    Index nearest(const Vec3& point) const;
   };
   class Values;
   struct Stencil;

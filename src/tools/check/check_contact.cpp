@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cut_faces.h"
 #include "obstacle.h"
-#include "repose/mechanics/wall_contact.h"
 
 namespace repose::tools::check {
 
@@ -32,8 +32,8 @@ double slack_of(const model::StepNumbers& numbers) {
 
 /// Recomputed contact of one point.
 struct AtPoint {
-  double gap = considered;  // mm, the smallest
-  double wall_gap = considered;
+  double gap = considered;  // mm, the smaller of the next two
+  double body_gap = considered, wall_gap = considered;
   int32_t body = -1;      // that it is to; −1: the side of a cut
   int near = 0;           // bodies that may press, …
   int32_t pressing = -1;  // … the last one of them
@@ -142,23 +142,20 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
       point.pressing = body;
     }
     if (gap <= point.gap) {
-      point.gap = gap;
+      point.gap = point.body_gap = gap;
       point.body = body;
     }
     truth.offer(std::min(initial, 0.0) - now, row, body);
   }
 }
 
-/// The sides of cuts, as the solver sees them.
-void add_walls(const model::Model& model, const std::vector<Vec3>& position, Truth& truth) {
+void add_cut_faces(const model::Model& model, const std::vector<Vec3>& position, Truth& truth) {
   for (const int64_t p : model.contact.walls.point) truth.points[p].wall = true;
-  mechanics::WallLoop walls(model.contact.walls, model.contact.stiffness);
-  walls.look(position);
-  for (size_t w = 0; w < walls.size(); ++w) {
-    AtPoint& point = truth.points[walls.point(w)];
-    if (walls.gap(w) < point.gap) point.body = -1;
-    point.gap = std::min(point.gap, walls.gap(w));
-    point.wall_gap = std::min(point.wall_gap, walls.gap(w));
+  for (const CutGap& at : cut_gaps(model.contact.walls, position)) {
+    AtPoint& point = truth.points[at.point];
+    if (at.gap < point.gap) point.body = -1;
+    point.gap = std::min(point.gap, at.gap);
+    point.wall_gap = std::min(point.wall_gap, at.gap);
   }
 }
 
@@ -167,7 +164,7 @@ Truth find_truth(const model::Model& model, const Bodies& bodies, const std::vec
   Truth truth;
   truth.points.resize(position.size());
   add_bodies(model, bodies, position, slack, truth);
-  add_walls(model, position, truth);
+  add_cut_faces(model, position, truth);
   return truth;
 }
 
@@ -268,7 +265,8 @@ void Claims::check_gaps(const std::vector<double>& stated) {
   Worst worst;
   for (size_t i = 0; i < stated.size(); ++i) {
     const AtPoint& point = truth_.points[i];
-    if (!point.mesh) {
+    const bool at_cut = point.wall_gap < point.body_gap - 2 * allowed(point.body_gap);
+    if (!point.mesh || at_cut) {
       gaps.push_back(stated[i]);
       again.push_back(point.gap);
     } else if (!explained(static_cast<int64_t>(i), stated[i])) {

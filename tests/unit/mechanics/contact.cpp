@@ -113,6 +113,64 @@ TEST(TouchLoop, PressesWithoutAJumpOfEnergy) {
   EXPECT_NEAR(value[0], value[1], 1e-9);
 }
 
+/// A box of 12 triangles.
+surface::Surface box(const Vec3& half) {
+  surface::Surface s{"box", {}, {}};
+  for (int k = 0; k < 8; ++k)
+    s.points.push_back(half.cwiseProduct(Vec3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)));
+  s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                 {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return s;
+}
+
+TEST(TouchLoop, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
+  constexpr double stiffness = 0.7;
+  const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
+  std::vector<Vec3> position = random_points(300, 9, 11);
+  const auto count = static_cast<int64_t>(position.size());
+  model::Touches touches;
+  for (int64_t p = 0; p < count; ++p) touches.point.push_back(p);
+  touches.body.assign(count, 0);
+  touches.binding.assign(count, model::Binding::touches);
+  touches.area.assign(count, 1);
+  touches.offset.assign(count, 0);
+  std::vector<double> multiplier;
+  for (const Vec3& p : random_points(static_cast<int>(count), 0.3, 2))
+    multiplier.push_back(std::max(0.0, p.x()));
+  TouchLoop loop(touches, stiffness, {body});
+  loop.set_multipliers(multiplier);
+  for (int step = 0; step < 8; ++step) {
+    std::vector<Vec3> gradient(count, Vec3::Zero());
+    loop.add_gradient(position, 1, gradient);
+    int acting = 0;
+    for (int64_t p = 0; p < count; ++p) {
+      const surface::Distance d = body.distance(position[p]);
+      const double pressure = std::max(0.0, multiplier[p] - stiffness * d.value);
+      acting += pressure > 0;
+      ASSERT_LT((gradient[p] + pressure * d.gradient).norm(), 1e-12) << step << " " << p;
+    }
+    EXPECT_GT(acting, 20);
+    const std::vector<Vec3> way = random_points(static_cast<int>(count), 1, 20 + step);
+    for (int64_t p = 0; p < count; ++p) position[p] += 0.6 * way[p];
+  }
+}
+
+TEST(TouchLoop, StatesDistancesBeyondAMillimeterExactly) {
+  const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
+  model::Touches touches;
+  touches.point = {0, 1, 2};
+  touches.body = {0, 0, 0};
+  touches.binding.assign(3, model::Binding::touches);
+  touches.area = {1, 1, 1};
+  touches.offset = {0, 0, 0};
+  const std::vector<Vec3> position = {{7, 6, 0}, {5.2, 0, 0}, {40, 0, 0}};
+  TouchLoop loop(touches, 0.7, {body});
+  loop.look_at_all(position);
+  EXPECT_NEAR(loop.gaps()[0], std::sqrt(8.0), 1e-12);
+  EXPECT_NEAR(loop.gaps()[1], 0.2, 1e-6);
+  EXPECT_EQ(loop.gaps()[2], 6);
+}
+
 /// Two sides of a bent cut, 5 × 4 controls of which the first and the last of a column are means of
 /// two points, the first side `distance` mm from the second and slid along it by more than a patch.
 struct Facing {
@@ -200,8 +258,9 @@ TEST(LinearGap, GoesWithABodyThatMoves) {
   Touching made = touching(0.4, model::Binding::touches);
   std::vector<LinearGap> gaps = made.loop.linear_gaps(made.position, 5);
   const Mat3 further = Eigen::AngleAxisd(0.3, Vec3(0, 1, 1).normalized()).toRotationMatrix();
+  const std::vector<RigidBody> before = made.loop.bodies();
   for (RigidBody& body : made.loop.bodies()) body.place(further * turn, further * shift);
-  made.loop.carry(made.position, gaps);
+  made.loop.carry(made.position, before, gaps);
   for (const LinearGap& gap : gaps) {
     const auto& [p, normal] = gap.gradient.front();
     const Vec3 beside =

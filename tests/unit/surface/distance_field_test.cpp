@@ -150,6 +150,45 @@ TEST(DistanceField, computes_only_values_that_are_needed) {
   EXPECT_EQ(field.computed_values(), 64 + 6 * 16);
 }
 
+TEST(DistanceField, lower_bounds_hold_and_are_close_where_closeness_is_requested) {
+  const Surface jaw = mandible();
+  const DistanceTree tree(jaw);
+  const DistanceField sharp(jaw, 0.8, reach), rounded = sharp.rounded(2.5);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> off(-3, 3);
+  double largest_excess = 0, largest_shortfall = 0;
+  for (size_t n = 0; n < jaw.points.size(); n += 3) {
+    const Vec3 point = jaw.points[n] + Vec3(off(random), off(random), off(random));
+    for (const DistanceField* field : {&sharp, &rounded})
+      for (const double enough : {0.0, 0.5, 2.0, 20.0}) {
+        const double value = field->value(point), bound = field->lower_bound(point, enough);
+        largest_excess = std::max(largest_excess, bound - value);
+        if (enough < 20 || tree.contains(point)) continue;
+        const double exact = std::min(tree.nearest(point).distance, reach);
+        largest_shortfall = std::max(largest_shortfall, exact - bound);
+      }
+  }
+  EXPECT_LE(largest_excess, 1e-5);
+  EXPECT_LT(largest_shortfall, (3 * 0.87 + 0.97) * 2);  // where the grid point is inside
+}
+
+TEST(DistanceField, distances_outside_are_exact) {
+  const Surface jaw = mandible();
+  const DistanceTree tree(jaw);
+  const DistanceField field(jaw, 0.8, reach);
+  int compared = 0;
+  for (const Vec3& at : jaw.points) {
+    const Vec3 point = at + Vec3(2, -1, 1.5);
+    const DistanceTree::Nearest nearest = tree.nearest(point);
+    if (tree.contains(point) || nearest.distance >= reach) continue;
+    const Distance d = field.outside(point);
+    ASSERT_NEAR(d.value, nearest.distance, 1e-9);
+    ASSERT_LT((d.gradient - (point - nearest.point) / nearest.distance).norm(), 1e-6);
+    ++compared;
+  }
+  EXPECT_GT(compared, 100);
+}
+
 TEST(DistanceField, refuses_a_grid_that_is_too_fine) {
   const std::string message = refusal([] {
     DistanceField(box({-20, -20, -20}, {20, 20, 20}), 1e-3, reach);

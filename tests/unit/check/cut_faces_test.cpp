@@ -1,0 +1,81 @@
+#include "check/cut_faces.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "repose/mechanics/wall_contact.h"
+
+namespace repose::check {
+namespace {
+
+constexpr int columns = 6, rows = 5;
+
+/// Two sides of a cut, of which the place of a control is `first` and `second` of (column, row).
+template <class First, class Second>
+std::vector<Vec3> lay(model::Walls& cuts, First&& first, Second&& second) {
+  std::vector<Vec3> position;
+  cuts.size = {{columns, rows}};
+  cuts.begin = {0};
+  for (int side = 0; side < 2; ++side)
+    for (int i = 0; i < columns; ++i)
+      for (int j = 0; j < rows; ++j) {
+        cuts.point.push_back(static_cast<int64_t>(position.size()));
+        cuts.weight.push_back(1);
+        cuts.begin.push_back(static_cast<int64_t>(cuts.point.size()));
+        position.push_back(side == 0 ? first(i, j) : second(i, j));
+        if (side == 0) cuts.area.push_back(j == 0 ? 0 : 1.5);
+      }
+  return position;
+}
+
+TEST(CutGaps, AreSignedDistancesBetweenPlaneSides) {
+  for (const double distance : {0.8, 0.0, -0.6}) {
+    model::Walls cuts;
+    const auto position = lay(
+        cuts, [&](int i, int j) { return Vec3(2 * i + 0.4, 3 * j - 0.3, distance); },
+        [](int i, int j) { return Vec3(2 * i, 3 * j, 0); });
+    const std::vector<CutGap> gaps = cut_gaps(cuts, position);
+    ASSERT_EQ(gaps.size(), columns * (rows - 1));
+    for (const CutGap& at : gaps) EXPECT_NEAR(at.gap, distance, 1e-9);
+    EXPECT_EQ(gaps.front().point, 1);
+  }
+}
+
+TEST(CutGaps, AreDistancesWhereNothingIsOpposite) {
+  model::Walls cuts;
+  const auto position = lay(
+      cuts, [](int i, int j) { return Vec3(i + 20, j, 1); },
+      [](int i, int j) { return Vec3(i, j, 0); });
+  for (const CutGap& at : cut_gaps(cuts, position))
+    EXPECT_NEAR(at.gap, std::hypot(position[at.point].x() - columns, 1), 1e-9);
+}
+
+TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> off(-0.3, 0.3);
+  const auto bent = [&](double i, double j, double z) {
+    const double x = 2.5 * i, y = 2 * j;
+    return Vec3(x, y, z + 0.04 * x * x - 0.05 * y * y) +
+           Vec3(off(random), off(random), off(random));
+  };
+  model::Walls cuts;
+  const auto position = lay(
+      cuts, [&](int i, int j) { return bent(i + 0.4, j - 0.2, 0.2); },
+      [&](int i, int j) { return bent(i, j, 0); });
+  mechanics::WallLoop solver(cuts, 1);
+  solver.look(position);
+  const std::vector<CutGap> gaps = cut_gaps(cuts, position);
+  ASSERT_EQ(gaps.size(), solver.size());
+  int behind = 0;
+  for (size_t w = 0; w < gaps.size(); ++w) {
+    EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-8) << w;
+    behind += gaps[w].gap < 0;
+  }
+  EXPECT_GT(behind, 0);
+}
+
+}  // namespace
+}  // namespace repose::check
