@@ -9,7 +9,7 @@
 #include "repose/mechanics/wall_contact.h"
 
 namespace repose::check {
-namespace {
+namespace cut_faces_test {
 
 constexpr int columns = 6, rows = 5;
 
@@ -77,5 +77,5 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   EXPECT_GT(behind, 0);
 }
 
-}  // namespace
+}  // namespace cut_faces_test
 }  // namespace repose::check
