@@ -62,10 +62,6 @@ void TouchLoop::measure(size_t c, const Vec3& beside) {
   set(c, beside, bodies_[touches_.body[c]].distance(beside));
 }
 
-void TouchLoop::measure_outside(size_t c, const Vec3& beside) {
-  set(c, beside, bodies_[touches_.body[c]].outside(beside));
-}
-
 void TouchLoop::look(std::span<const Vec3> position) {
   acting_.clear();
   for (size_t c = 0; c < touches_.point.size(); ++c) {
@@ -79,18 +75,31 @@ void TouchLoop::look(std::span<const Vec3> position) {
   }
 }
 
+/// False if the gap is at least `reach` mm; evaluates it otherwise.
+bool TouchLoop::measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside) {
+  if (least_gap(c, beside) > reach) return false;
+  const RigidBody& body = bodies_[touches_.body[c]];
+  const double bound = body.lower_bound(beside, reach + touches_.offset[c]);
+  if (bound - touches_.offset[c] >= reach) {
+    seen_[c] = beside;
+    distance_[c] = bound;
+    return false;
+  }
+  const bool smoothed = multiplier_[c] != 0 || bound - touches_.offset[c] < smoothed_to;
+  set(c, beside, smoothed ? body.distance(beside) : body.outside(beside));
+  return gap_[c] <= reach;
+}
+
 std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, double reach,
                                               double smoothed_to) {
   std::vector<LinearGap> gaps;
   for (size_t c = 0; c < touches_.point.size(); ++c) {
-    const RigidBody& body = bodies_[touches_.body[c]];
-    const Vec3 beside = body.beside(position[touches_.point[c]]);
-    if (!slides(c) && stays_above(reach, c, beside)) continue;
-    if (!slides(c) && multiplier_[c] == 0 && stays_above(smoothed_to, c, beside))
-      measure_outside(c, beside);
-    else
+    const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
+    if (slides(c))
       measure(c, beside);
-    if ((!slides(c) && gap_[c] > reach) || normal_[c].isZero(0)) continue;
+    else if (!measure_within(reach, smoothed_to, c, beside))
+      continue;
+    if (normal_[c].isZero(0)) continue;
     gaps.push_back({c,
                     slides(c),
                     touches_.area[c],
@@ -146,10 +155,9 @@ void TouchLoop::look_at_all(std::span<const Vec3> position) {
   for (size_t c = 0; c < touches_.point.size(); ++c) {
     const RigidBody& body = bodies_[touches_.body[c]];
     const Vec3 beside = body.beside(position[touches_.point[c]]);
-    if (slides(c) || !stays_above(smoothed_to, c, beside))
-      measure(c, beside);
-    else
-      measure_outside(c, beside);
+    const double needed = smoothed_to + touches_.offset[c];
+    const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
+    set(c, beside, away ? body.outside(beside) : body.distance(beside));
   }
 }
 

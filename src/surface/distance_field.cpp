@@ -113,7 +113,7 @@ class DistanceField::Values {
       return distance - (grid_.point(at) - point).norm() - smoothing();
     };
     if (begin < 0) return std::min(grid_.reach, bound(middle, enough_far()));
-    const double by_middle = bound(middle, cell_value(begin, middle));
+    const double by_middle = bound(middle, middle_[begin / cells]);
     if (by_middle >= enough) return by_middle;
     const double value = cell_value(begin, nearest), by_nearest = bound(nearest, value);
     if (by_nearest >= enough || value < 0) return by_nearest;
@@ -156,7 +156,7 @@ class DistanceField::Values {
         place = static_cast<int32_t>(value_.size() / cells);
         value_.resize(value_.size() + cells, NAN);
         if (!grid_.rounded) coefficient_.resize(value_.size(), NAN);
-        value_[place * cells + cell_of(middle)] = kept(distance);
+        middle_.push_back(kept(distance));
       }
     }
     return place == far ? -1 : place * cells;
@@ -229,6 +229,7 @@ class DistanceField::Values {
   std::vector<int32_t> place_;      // [blocks] which of the kept ones, or unknown or far
   std::vector<float> value_;        // [kept blocks][8³] mm, not a number where it is not known
   std::vector<float> coefficient_;  // the same
+  std::vector<float> middle_;       // [kept blocks] mm, a value in the middle
   TriangleTree tree_;
   std::unordered_map<int64_t, std::vector<LineCrossing>> lines_;  // by (j, k)
   Vec3 last_point_ = Vec3::Zero();

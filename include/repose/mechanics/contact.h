@@ -63,7 +63,8 @@ class TouchLoop {
   double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
   /// Evaluates the gaps that may act, for all functions below.
   void look(std::span<const Vec3> position);
-  /// Evaluates all gaps, those beyond 1 mm by the exact distance (RigidBody::outside).
+  /// Evaluates all gaps: by the exact distance (RigidBody::outside) where RigidBody::lower_bound
+  /// shows them to be above 1 mm.
   void look_at_all(std::span<const Vec3> position);
   /// Calls visit(point, block): the Hessian at the latest look, or a semidefinite relative.
   template <class Visit>
@@ -102,7 +103,7 @@ class TouchLoop {
   bool stays_above(double gap, size_t c, const Vec3& beside);
   Pressing now(size_t c) const { return press(gap_[c], multiplier_[c], stiffness_, slides(c)); }
   void measure(size_t c, const Vec3& beside);
-  void measure_outside(size_t c, const Vec3& beside);
+  bool measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside);
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);
   Mat3 block(size_t c, bool exact, const Pressing& pressing) const;
 
