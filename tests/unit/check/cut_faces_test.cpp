@@ -63,7 +63,7 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   };
   model::Walls cuts;
   const auto position = lay(
-      cuts, [&](int i, int j) { return bent(i + 0.4, j - 0.2, 0.2); },
+      cuts, [&](int i, int j) { return bent(i + 0.4, j - 0.2, -0.8); },
       [&](int i, int j) { return bent(i, j, 0); });
   mechanics::WallLoop solver(cuts, 1);
   solver.look(position);
