@@ -185,7 +185,7 @@ double ContactQp::line_search(double slope, double curvature) {
 bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int most_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
-  bool full = false;  // the latest step was not shortened
+  bool full = false;                                // the latest step was not shortened
   for (int set = 0; set < most_sets; ++set) {
     const bool changed = choose_active();
     if (full && !changed) return true;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace repose::check {
+namespace repose::tools::check {
 
 namespace {
 
@@ -145,4 +145,4 @@ std::vector<CutGap> cut_gaps(const model::Walls& cuts, std::span<const Vec3> pos
   return gaps;
 }
 
-}  // namespace repose::check
+}  // namespace repose::tools::check

@@ -4,7 +4,7 @@
 
 #include "repose/model/model.h"
 
-namespace repose::check {
+namespace repose::tools::check {
 
 /// Gap of one place on the first side of a cut to the second side.
 struct CutGap {
@@ -17,4 +17,4 @@ struct CutGap {
 /// one, and the nearest point is found by a search without derivatives.
 std::vector<CutGap> cut_gaps(const model::Walls& cuts, std::span<const Vec3> position);
 
-}  // namespace repose::check
+}  // namespace repose::tools::check

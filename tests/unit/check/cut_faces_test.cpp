@@ -1,4 +1,4 @@
-#include "check/cut_faces.h"
+#include "tools/check/cut_faces.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "repose/mechanics/wall_contact.h"
 
-namespace repose::check {
+namespace repose::tools::check {
 namespace cut_faces_test {
 
 constexpr int columns = 6, rows = 5;
@@ -56,7 +56,7 @@ TEST(CutGaps, AreDistancesWhereNothingIsOpposite) {
 TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> off(-0.3, 0.3);
-  const auto bent = [&](double i, double j, double z) {
+  const auto bent = [&](double i, double j, double z) -> Vec3 {
     const double x = 2.5 * i, y = 2 * j;
     return Vec3(x, y, z + 0.04 * x * x - 0.05 * y * y) +
            Vec3(off(random), off(random), off(random));
@@ -78,4 +78,4 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
 }
 
 }  // namespace cut_faces_test
-}  // namespace repose::check
+}  // namespace repose::tools::check
