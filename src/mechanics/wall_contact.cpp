@@ -132,6 +132,26 @@ void WallLoop::link(const Net& own, const Net& other) {
 
 namespace {
 
+/// Newton's step towards the place of a patch that is nearest to `way` beyond its point; parameters
+/// at an end, `least` or `most`, that the nearest place lies beyond stay.
+template <class Patch>
+Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& way, const Eigen::Vector2d& where,
+                                const Eigen::Vector2d& least, const Eigen::Vector2d& most) {
+  const Eigen::Vector2d slope(patch.first.dot(way), patch.second.dot(way));
+  Eigen::Matrix2d bend = patch.metric() - patch.bend(way);
+  const auto held = [&](int d) {
+    return slope[d] < 0 ? where[d] <= least[d] : where[d] >= most[d];
+  };
+  if (held(0) || held(1)) {
+    const int d = held(0) ? 1 : 0;
+    Eigen::Vector2d step = Eigen::Vector2d::Zero();
+    if (!held(d)) step[d] = slope[d] / (bend(d, d) > 0 ? bend(d, d) : patch.metric()(d, d));
+    return step;
+  }
+  if (!(bend(0, 0) > 0 && bend.determinant() > 0)) bend = patch.metric();
+  return bend.inverse() * slope;
+}
+
 /// Where on a surface of `columns` × `rows` controls `at` is nearest to, by Newton's method;
 /// whether that is not its end. `look` gives the surface at a place.
 template <class Look>
@@ -143,10 +163,7 @@ auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& most, const Vec
   auto patch = look(where);
   for (int n = 0; n < most_steps; ++n) {
     const Vec3 way = at - patch.point;
-    Eigen::Matrix2d bend = patch.metric() - patch.bend(way);
-    if (!(bend(0, 0) > 0 && bend.determinant() > 0)) bend = patch.metric();
-    Eigen::Vector2d step =
-        bend.inverse() * Eigen::Vector2d(patch.first.dot(way), patch.second.dot(way));
+    Eigen::Vector2d step = step_to_nearest(patch, way, where, least, most);
     if (!step.allFinite()) break;
     step *= std::min(1.0, longest / std::max(step.cwiseAbs().maxCoeff(), exact));
     Eigen::Vector2d next = (where + step).cwiseMax(least).cwiseMin(most);
