@@ -77,5 +77,21 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   EXPECT_GT(behind, 0);
 }
 
+TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
+  model::Walls cuts;
+  // Along the ends the nearest place is not at the same parameter as the nearest control.
+  const auto skew = [](double i, double j, double z) -> Vec3 {
+    return Vec3(2.5 * i + 1.4 * j, 2 * j + 0.6 * i, z + 0.02 * i * j);
+  };
+  const auto position = lay(
+      cuts, [&](int i, int j) { return skew(i + 3.3, j + 2.6, 1.5); },
+      [&](int i, int j) { return skew(i, j, 0); });
+  mechanics::WallLoop solver(cuts, 1);
+  solver.look(position);
+  const std::vector<CutGap> gaps = cut_gaps(cuts, position);
+  ASSERT_EQ(gaps.size(), solver.size());
+  for (size_t w = 0; w < gaps.size(); ++w) EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-7) << w;
+}
+
 }  // namespace cut_faces_test
 }  // namespace repose::tools::check
