@@ -36,7 +36,7 @@ def page(scene):
     web = HERE / "web"
     read = lambda name: (web / name).read_text(encoding="utf-8")
     scripts = "\n".join(read(name).replace("</script", "<\\/script")
-                        for name in ("three.js", "viewer.js", "live.js"))
+                        for name in ("three.js", "viewer.js", "plan.js", "live.js"))
     style = read("viewer.css") + read("live.css")
     return PAGE.format(title=scene.stem, style=style, body=read("live.html"),
                        scripts=scripts).encode()
@@ -149,10 +149,13 @@ def main():
     parser.add_argument("-port", type=int, default=0, help="port of 127.0.0.1; default: a free one")
     parser.add_argument("-no_browser", action="store_true", help="only print the address")
     options = parser.parse_args()
+    if not options.scene.is_file():
+        sys.exit(f"live.py: {options.scene}: no such file")
     try:
         import repose
     except ImportError as missing:
-        sys.exit(f"error: {missing.name} is missing; install python3-numpy")
+        sys.exit(f"live.py: {missing.name} is missing: apt-get install --no-install-recommends "
+                 "python3-numpy")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with repose.Session(options.scene, options.ranks) as session:
@@ -165,9 +168,9 @@ def main():
     except KeyboardInterrupt:
         print()
     except OSError as error:
-        sys.exit(f"error: {error}; if the port is taken, choose another -port")
+        sys.exit(f"live.py: {error}; if the port is taken, choose another -port")
     except repose.Refused as refusal:
-        sys.exit(f"error: {refusal}")
+        sys.exit(f"live.py: {refusal}")
 
 
 if __name__ == "__main__":

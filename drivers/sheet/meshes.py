@@ -1,5 +1,5 @@
 """Surfaces in text for a page: made coarser where they are fine, rounded, packed and compressed.
-`unpack` in drivers/web/sheet.js is the inverse."""
+`unpack` in drivers/web/pack.js is the inverse."""
 
 import base64
 import zlib

@@ -436,7 +436,7 @@ def style():
 
 def scripts():
     return "".join(f"<script>{(WEB / name).read_text(encoding='utf-8')}</script>"
-                   for name in ("three.js", "viewer.js", "sheet.js"))
+                   for name in ("three.js", "viewer.js", "pack.js", "sheet.js"))
 
 
 def write(plans, norms, scene, appearance):

@@ -5,14 +5,7 @@
 const byId = id => document.getElementById(id);
 const TOKEN = new URLSearchParams(location.search).get("token");
 const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
-// How numbers are shown: [label, of a placement, axis, sign, unit]. +x left, +y back, +z up.
-const NUMBERS = [
-  ["forward", "translate", 1, -1, "mm"], ["up", "translate", 2, 1, "mm"],
-  ["to the patient's left", "translate", 0, 1, "mm"], ["pitch, front down", "rotate", 0, 1, "°"],
-  ["yaw, front to the left", "rotate", 2, 1, "°"], ["roll, left side down", "rotate", 1, 1, "°"]];
 const BEFORE = 0, NOW = 1, KEPT = 2;
-const DEGREE = Math.PI / 180;
-
 async function ask(path, request) {
   const response = await fetch(path, request === undefined
     ? {headers: {"X-Token": TOKEN}}
@@ -33,34 +26,6 @@ function unpack(buffer) {
     at += size;
   }
   return {head, arrays};
-}
-
-const zero = () => ({translate: [0, 0, 0], rotate: [0, 0, 0]});
-const copyOf = plan => JSON.parse(JSON.stringify(plan));
-
-function quaternionOf({rotate}) {
-  const angle = Math.hypot(...rotate);
-  return angle > 0 ? new THREE.Quaternion().setFromAxisAngle(
-    new THREE.Vector3(...rotate).divideScalar(angle), angle * DEGREE) : new THREE.Quaternion();
-}
-
-function rotationOf(quaternion) {
-  const {x, y, z, w} = quaternion.w < 0 ? quaternion.clone().set(
-    -quaternion.x, -quaternion.y, -quaternion.z, -quaternion.w) : quaternion;
-  const sine = Math.hypot(x, y, z);
-  const scale = sine > 1e-12 ? 2 * Math.atan2(sine, w) / sine / DEGREE : 2 / DEGREE;
-  return [x * scale, y * scale, z * scale];
-}
-
-// The 4×4 matrix of a placement about a centroid, as rows.
-function matrixOf(placement, centroid) {
-  const shift = new THREE.Vector3(...centroid), turn = new THREE.Matrix4()
-    .makeRotationFromQuaternion(quaternionOf(placement));
-  const moved = shift.clone().add(new THREE.Vector3(...placement.translate))
-    .sub(shift.clone().applyMatrix4(turn));
-  turn.setPosition(moved);
-  const m = turn.elements;
-  return [0, 1, 2, 3].map(row => [0, 1, 2, 3].map(column => m[4 * column + row]));
 }
 
 class Planner {
@@ -350,13 +315,7 @@ class Planner {
     this.reference = {plan, position: arrays.position, columns};
   }
 
-  movement(position) {
-    const length = new Float32Array(position.length / 3), from = this.initial;
-    for (let i = 0; i < length.length; ++i) length[i] = Math.hypot(
-      position[3 * i] - from[3 * i], position[3 * i + 1] - from[3 * i + 1],
-      position[3 * i + 2] - from[3 * i + 2]);
-    return length;
-  }
+  movement(position) { return movementOf(position, this.initial); }
 
   color() {
     if (!this.position) return;
@@ -367,16 +326,8 @@ class Planner {
     this.viewer.setScale({low: 0, high});
     this.skin.setField(NOW, colored ? now : null);
     if (this.kept) this.skin.setField(KEPT, colored ? this.movement(this.kept) : null);
-    this.drawRamp();
+    drawRamp(byId("ramp"), this.viewer.scale.ramp);
     this.viewer.draw();
-  }
-
-  drawRamp() {
-    const context = byId("ramp").getContext("2d");
-    for (let i = 0; i < 160; ++i) {
-      context.fillStyle = `rgb(${rampColor(this.viewer.scale.ramp, i / 159).map(Math.round)})`;
-      context.fillRect(i, 0, 1, 10);
-    }
   }
 
   tell(hit) {
@@ -388,48 +339,14 @@ class Planner {
     const position = hit.state === KEPT ? this.kept : hit.state === NOW ? this.position
       : this.initial;
     const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
-    const [x, y, z] = shift, part = (value, plus, minus) =>
-      Math.abs(value) < 0.05 ? "" : `, ${Math.abs(value).toFixed(1)} ${value > 0 ? plus : minus}`;
-    return `${Math.hypot(...shift).toFixed(2)} mm` + part(-y, "forward", "back") +
-      part(z, "up", "down") + part(x, "to the left", "to the right");
-  }
-
-  // Segments of the skin in the plane through the middle of the head, as [y, z] pairs.
-  section(position) {
-    const middle = this.viewer.center.x, segments = [];
-    for (let t = 0; t < this.triangles.length; t += 3) {
-      const cut = [];
-      for (let k = 0; k < 3; ++k) {
-        const a = 3 * this.triangles[t + k], b = 3 * this.triangles[t + (k + 1) % 3];
-        const from = position[a] - middle, to = position[b] - middle;
-        if ((from < 0) === (to < 0)) continue;
-        const share = from / (from - to);
-        cut.push(position[a + 1] + share * (position[b + 1] - position[a + 1]),
-                 position[a + 2] + share * (position[b + 2] - position[a + 2]));
-      }
-      if (cut.length === 4) segments.push(cut);
-    }
-    return segments;
+    return shiftInWords(shift);
   }
 
   drawProfile() {
-    const before = this.profileBefore ??= this.section(this.initial);
-    const now = this.section(this.position), all = before.concat(now).flat();
-    if (!all.length) return;
-    const bound = parity => all.filter((_, i) => i % 2 === parity)
-      .reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
-    const [front, back] = bound(0), [bottom, top] = bound(1);
-    byId("profile").setAttribute("viewBox", `${-back - 4} ${-top - 4} ${back - front + 8} ` +
-      `${top - bottom + 8}`);
-    const path = segments => segments.map(([y, z, v, w]) =>
-      `M${(-y).toFixed(2)} ${(-z).toFixed(2)}L${(-v).toFixed(2)} ${(-w).toFixed(2)}`).join("");
-    byId("profile").innerHTML =
-      [["#9a9a9a", before], ["#1f6fb4", now]].map(([color, segments]) =>
-        `<path d="${path(segments)}" fill="none" stroke="${color}" stroke-width="0.9"/>`).join("");
-    const most = segments => segments.reduce((least, one) => Math.min(least, one[0], one[2]), Infinity);
-    const forward = most(before) - most(now);
-    byId("measured").textContent = `; the foremost point goes ${Math.abs(forward).toFixed(1)} mm ` +
-      (forward >= 0 ? "forward" : "back");
+    const profile = position => profileOf(position, this.triangles, this.viewer.center.x);
+    this.profileBefore ??= profile(this.initial);
+    const said = drawProfiles(byId("profile"), this.profileBefore, profile(this.position));
+    byId("measured").textContent = said && `; ${said}`;
   }
 
   keep() {

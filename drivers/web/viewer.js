@@ -27,7 +27,7 @@
 //   onHover, onClick, onLook     callbacks: (hit, event), (hit, event), ()
 // Of a surface:
 //   setPositions(state, positions)     new positions, for live updates; setField(state, values or
-//   null) colors it, NaN gray; setStyle({color, opacity, visible, plain, image}); object(state) is
+//   null, gray) colors it, NaN and where gray is true gray; setStyle({color, opacity, visible, plain, image}); object(state) is
 //   the THREE.Mesh, to be moved or given to a gizmo.
 "use strict";
 
@@ -56,7 +56,8 @@ function darkenInside(material) {
 class FaceSurface {
   constructor(viewer, {name, kind = "skin", triangles, states, colors = null, uv = null,
                        oriented = false}) {
-    Object.assign(this, {viewer, name, kind, triangles, positions: [], meshes: [], fields: []});
+    Object.assign(this, {viewer, name, kind, triangles, positions: [], meshes: [], fields: [],
+                         grays: []});
     this.index = new THREE.BufferAttribute(triangles, 1);
     this.shared = {};
     if (colors) this.shared.color = new THREE.BufferAttribute(colors, 3, true);
@@ -95,9 +96,10 @@ class FaceSurface {
     this.viewer.three.scene.add(mesh);
   }
 
-  // Colors a state by a value a vertex, or no longer (null).
-  setField(state, values) {
+  // Colors a state by a value a vertex, or no longer (null); gray where `gray` is true.
+  setField(state, values, gray = null) {
     this.fields[state] = values;
+    this.grays[state] = gray;
     const mesh = this.meshes[state];
     if (!mesh) return;
     mesh.material = values ? this.colored : this.plain;
@@ -105,7 +107,7 @@ class FaceSurface {
     const {low, high} = this.viewer.scale, uv = new Float32Array(2 * values.length);
     values.forEach((value, i) => {
       uv[2 * i] = Math.min(Math.max((value - low) / (high - low || 1), 0.002), 0.998) || 0;
-      uv[2 * i + 1] = Number.isFinite(value) ? 0.25 : 0.75;
+      uv[2 * i + 1] = Number.isFinite(value) && !gray?.[i] ? 0.25 : 0.75;
     });
     mesh.geometry.setAttribute("uv1", new THREE.BufferAttribute(uv, 2));
   }
@@ -190,7 +192,8 @@ class FaceViewer {
     }
     this.rampTexture.needsUpdate = true;
     for (const surface of this.surfaces)
-      surface.fields.forEach((values, state) => values && surface.setField(state, values));
+      surface.fields.forEach((values, state) =>
+        values && surface.setField(state, values, surface.grays[state]));
   }
 
   makeHandle() {
