@@ -118,14 +118,15 @@ class Session:
     piece's centroid); a piece that is not named stays. Answers do not depend on their order.
     Threads may share a session; a newer `solve` abandons the one under way, which raises Refused."""
 
-    def __init__(self, scene, ranks=1, program=None):
+    def __init__(self, scene, ranks=1, program=None, environment=None):
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
         command = [program or find_program(), str(path)]
         if ranks > 1:
             command = ["mpirun", "-n", str(ranks), *command]
         self._errors = []
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                         stderr=subprocess.PIPE, cwd=path.parent)
+                                         stderr=subprocess.PIPE, cwd=path.parent,
+                                         env=without_mpi(environment or os.environ))
         threading.Thread(target=self._listen, daemon=True).start()
         self._writing, self._waiting, self._last = threading.Lock(), {}, 0
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -264,6 +265,18 @@ class Session:
             status = "unknown"
         said = next((line for line in self._errors if line.startswith("error:")), "")
         return said[7:] or f"repose-live has ended (status {status}): {' '.join(self._errors[-3:])}"
+
+
+# What mpirun gives the processes that it starts; its settings (OMPI_MCA_…) of users are others.
+OF_MPIRUN = ("OMPI_COMM", "OMPI_UNIVERSE", "OMPI_FILE", "OMPI_APP", "OMPI_ARGV", "OMPI_COMMAND",
+             "OMPI_FIRST", "OMPI_NUM", "OMPI_MCA_ess", "OMPI_MCA_orte", "OMPI_MCA_pmix",
+             "OMPI_MCA_initial", "PMIX_", "PMI_", "PRTE_JOB")
+
+
+def without_mpi(environment):
+    """The environment without that by which a program takes itself for a rank of the mpirun that
+    started this process."""
+    return {name: value for name, value in environment.items() if not name.startswith(OF_MPIRUN)}
 
 
 def _plain(plan):

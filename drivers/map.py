@@ -1,0 +1,240 @@
+#!/usr/bin/env python3
+"""drivers/map.py SCENE: one HTML page that shows the face of every plan of a scene's box, without a
+server. Solves some plans with their derivatives, fits the others, and bounds the error
+(docs/guide/map.md).
+
+    drivers/map.py meshes/head_live.yaml -processes 2
+    mpirun -n 8 drivers/map.py meshes/head_live.yaml       # a plan a rank
+    drivers/map.py meshes/head_live.yaml -plan '{"chin": {"translate": [0, -4, 0]}}'
+
+Solved plans are kept in a folder beside the page; a run that was ended goes on. -plan solves one plan
+exactly, writes the result, and says how far the map is from it. Needs: apt-get install
+--no-install-recommends python3-numpy python3-scipy"""
+
+import argparse
+import html
+import json
+import pathlib
+import shlex
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "python"))
+LARGEST_PAGE = 5_000_000  # bytes
+BONE_TRIANGLES = 16_000
+CLOSE = 0.005             # mm: what rounding a mode may change
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,"><title>{title}</title><style>{style}</style></head>
+<body>{body}<script type="application/json" id="described">{described}</script>
+<script type="text/plain" id="packed">{packed}</script><script>{scripts}</script></body></html>
+"""
+
+
+def refuse(message):
+    print(f"map.py: {message}", file=sys.stderr)
+    sys.exit(1)
+
+
+try:
+    import numpy as np
+    import scipy.stats  # noqa: F401  here, so that it is missed at once
+    import repose
+    from repose.map import MOST_MODES, PlanMap
+    from repose.kriging import REACH, SPREAD_NUGGET
+    from repose.samples import PlanBox, SampleStore, fingerprint, solve_all
+    from sheet.meshes import Pack, coarser
+except ImportError as missing:
+    refuse(f"{missing.name} is missing: apt-get install --no-install-recommends python3-numpy "
+           "python3-scipy")
+
+
+# ----- the page
+
+
+def doubles(pack, values):
+    """Adds numbers in full precision."""
+    values = np.ascontiguousarray(values, "<f8")
+    begin = len(pack.bytes)
+    pack.bytes += values.tobytes()
+    return {"at": begin, "count": int(values.size)}
+
+
+def packed_kriging(pack, kriging):
+    count, dimensions = kriging.u.shape
+    return {"samples": count, "dimensions": dimensions, "modes": kriging.weights.shape[1],
+            "length": kriging.length.tolist(), "reach": REACH, "spread_nugget": SPREAD_NUGGET,
+            "u": doubles(pack, kriging.u), "rows": pack.add(kriging.used, 32),
+            "weights": doubles(pack, kriging.weights), "trend": doubles(pack, kriging.trend_weights),
+            "precision": doubles(pack, kriging.precision)}
+
+
+def packed_shape(pack, shape, coefficients):
+    """A mode in as few bits as its largest contribution to the samples needs."""
+    contribution = (shape.max() - shape.min()) * np.abs(coefficients).max()
+    return pack.numbers(shape, 8 if contribution / 510 < CLOSE else 16)
+
+
+def packed_bones(pack, session):
+    share = BONE_TRIANGLES / max(sum(len(one) for _, one in session.bones.values()), 1)
+    for name, (points, triangles) in session.bones.items():
+        points, triangles, _ = coarser(points.astype(float), triangles, [],
+                                       max(int(share * len(triangles)), 200))
+        yield {"name": name, "points": pack.numbers(points), "triangles": pack.add(triangles, 32)}
+
+
+def described(session, plan_map, command, about):
+    """What map.js needs, and the packed arrays."""
+    pack, box = Pack(), plan_map.box
+    coefficients = np.abs(plan_map.kriging.predict(plan_map.u)).max(axis=0)
+    said = {
+        "pieces": [piece.name for piece in session.pieces], "least_bound": plan_map.least_bound,
+        "coordinates": box.coordinates, "half": box.half.tolist(),
+        "scene_plan": session.scene_plan, "command": command, "about": about,
+        "centroids": {piece.name: piece.centroid.tolist() for piece in session.pieces},
+        "kriging": packed_kriging(pack, plan_map.kriging), "failed": doubles(pack, plan_map.failed),
+        "bones": list(packed_bones(pack, session)),
+        "skin": {"points": pack.numbers(session.initial), "triangles": pack.add(session.triangles, 32),
+                 "mean": pack.numbers(plan_map.modes.mean), "factor": pack.numbers(plan_map.bound_factor),
+                 "shapes": [packed_shape(pack, *one) for one in zip(plan_map.modes.shapes, coefficients)]}}
+    return said, pack.text()
+
+
+def page(scene, session, plan_map, accuracy):
+    """The page as text."""
+    web = HERE / "web"
+    read = lambda names: "\n".join((web / name).read_text(encoding="utf-8") for name in names)
+    scripts = read(("three.js", "viewer.js", "pack.js", "plan.js", "map.js"))
+    command = f"drivers/map.py {shlex.quote(str(scene))}"
+    said, packed = described(session, plan_map, command, summary(plan_map, accuracy))
+    return PAGE.format(title=html.escape(scene.stem), body=read(["map.html"]), packed=packed,
+                       style=read(("viewer.css", "live.css", "map.css")),
+                       scripts=scripts.replace("</script", "<\\/script"),
+                       described=json.dumps(said).replace("<", "\\u003c"))
+
+
+def summary(plan_map, accuracy):
+    """What the page rests on, in words."""
+    errors = plan_map.errors
+    failed = len(plan_map.failed)
+    return (f"Fitted to {len(errors)} plans solved to {accuracy:g} mm" +
+            (f"; {failed} did not converge" if failed else "") +
+            f". Plans left out of the fit are off by {np.median(np.percentile(errors, 95, axis=1)):.2f} mm "
+            f"on 95 % of the skin (median of plans), at most by {errors.max():.2f} mm. The error bound "
+            "holds for 95 % of plans at each point, against this model; it says nothing of how well the "
+            "model fits a patient. For planning and teaching.")
+
+
+def fitted_page(scene, session, box, samples, accuracy):
+    """The map and its page, with as many modes as fit into it."""
+    modes = MOST_MODES
+    while True:
+        plan_map = PlanMap(box, samples, modes, accuracy)
+        text = page(scene, session, plan_map, accuracy)
+        if len(text) < LARGEST_PAGE:
+            return plan_map, text
+        modes = len(plan_map.modes.shapes) * 3 // 4
+        if modes < 4:
+            raise repose.Refused(f"a page of {len(text) / 1e6:.1f} MB, at most {LARGEST_PAGE / 1e6:g} are "
+                                 f"allowed: solve a coarser skin ({len(session.initial)} points; tissue.edge)")
+
+
+# ----- the program
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="map.py", description=__doc__, allow_abbrev=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.error = refuse
+    parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
+    parser.add_argument("-samples", type=int, help="plans to solve; default: 1 + 2 d and at least 24 or "
+                        "4 d more for d coordinates")
+    parser.add_argument("-accuracy", type=float, default=0.02, help="mm, of each (default: 0.02)")
+    parser.add_argument("-processes", type=int, default=1, help="solvers at a time (default: 1)")
+    parser.add_argument("-output", type=pathlib.Path, help="page (default: SCENE_map.html) or, with "
+                        "-plan, result without ending (default: SCENE_plan)")
+    parser.add_argument("-cache", type=pathlib.Path, help="folder of solved plans (default: SCENE_map)")
+    parser.add_argument("-plan", help="solve this plan, as JSON, in place of making the page")
+    chosen = parser.parse_args()
+    if not chosen.scene.is_file():
+        refuse(f"{chosen.scene}: no such file")
+    for name, least, most in (("samples", 3, 10000), ("processes", 1, 64), ("accuracy", 1e-4, 1)):
+        value = getattr(chosen, name)
+        if value is not None and not least <= value <= most:
+            refuse(f"-{name} {value}: must be {least:g} … {most:g}")
+    stem = chosen.scene.with_suffix("")
+    chosen.cache = chosen.cache or pathlib.Path(f"{stem}_map")
+    chosen.output = chosen.output or pathlib.Path(f"{stem}_plan" if chosen.plan else f"{stem}_map.html")
+    if not chosen.output.resolve().parent.is_dir():
+        refuse(f"-output {chosen.output}: make its folder first")
+    return chosen
+
+
+def read_plan(text):
+    try:
+        plan = json.loads(text)
+    except ValueError as reason:
+        refuse(f"-plan: not JSON: {reason}")
+    motions = plan.values() if isinstance(plan, dict) else [None]
+    for motion in motions:
+        numbers = list(motion.items()) if isinstance(motion, dict) else [("", None)]
+        if not all(key in ("translate", "rotate") and isinstance(value, list) and len(value) == 3 and
+                   all(isinstance(x, (int, float)) for x in value) for key, value in numbers):
+            refuse("-plan: give {PIECE: {\"translate\": [x, y, z], \"rotate\": [x, y, z]}}, mm and degrees")
+    return plan
+
+
+def default_samples(box):
+    count = len(box.half)
+    return 1 + 2 * count + max(24, 4 * count)
+
+
+def solve_plan(chosen, session, box, store):
+    """Solves one plan, writes it, and compares the map with it."""
+    plan = read_plan(chosen.plan)
+    box.vector(plan)
+    face = session.solve(plan, chosen.accuracy)
+    if not face.converged:
+        refuse(f"-plan: not converged: {face.info['reason']}")
+    session.write(chosen.output)
+    print(f"{chosen.output}.h5: within {face.error:.3f} mm of rest")
+    known = [store.load(u) for u in box.points(chosen.samples or default_samples(box))]
+    if all(known):
+        plan_map = PlanMap(box, known, least_bound=chosen.accuracy)
+        off = np.linalg.norm(plan_map.displacement(plan) - face.displacement, axis=1)
+        print(f"the map is off by {np.percentile(off, 95):.3f} mm on 95 % of the skin, at most by "
+              f"{off.max():.2f} mm; its bound holds on {100 * np.mean(off <= plan_map.bound(plan)):.0f} %")
+
+
+def make_page(chosen, session, box, store):
+    points = box.points(chosen.samples or default_samples(box))
+    tell = lambda text: print(text, file=sys.stderr, flush=True)
+    samples = solve_all(chosen.scene, box, points, store, chosen.accuracy, session, chosen.processes,
+                        report=tell)
+    if samples is None:
+        return  # another rank makes the page
+    plan_map, text = fitted_page(chosen.scene, session, box, samples, chosen.accuracy)
+    part = pathlib.Path(f"{chosen.output}.part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(chosen.output)
+    print(f"{chosen.output}: {len(text) / 1e6:.2f} MB, {len(plan_map.u)} plans, "
+          f"{len(plan_map.modes.shapes)} modes\n{summary(plan_map, chosen.accuracy)}")
+
+
+def main():
+    chosen = arguments()
+    try:
+        with repose.Session(chosen.scene) as session:
+            box = PlanBox([piece.name for piece in session.pieces], session.box)
+            key = f"{fingerprint(chosen.scene, repose.session.find_program())}_{chosen.accuracy:g}"
+            store = SampleStore(chosen.cache, key)
+            (solve_plan if chosen.plan else make_page)(chosen, session, box, store)
+    except KeyboardInterrupt:
+        refuse("ended; the plans solved so far are kept, and the same command goes on")
+    except (repose.Refused, ValueError, OSError) as reason:
+        refuse(reason)
+
+
+if __name__ == "__main__":
+    main()

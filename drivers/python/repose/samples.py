@@ -1,0 +1,193 @@
+"""Plans of a box, solved with their derivatives and kept in a folder."""
+
+import dataclasses
+import hashlib
+import json
+import os
+import pathlib
+import queue
+import re
+import sys
+import threading
+import time
+
+import numpy as np
+
+from .session import COMPONENTS, Refused, Session
+
+
+class PlanBox:
+    """The coordinates of a plan, those of width 0 left out, scaled to [-1, 1]."""
+
+    def __init__(self, pieces, box):
+        half = {"translate": box["translate"], "rotate": box["rotate"]}
+        self.coordinates = [(piece, key, axis) for piece in pieces for key in ("translate", "rotate")
+                            for axis in range(3) if half[key][axis] > 0]
+        self.half = np.array([half[key][axis] for _, key, axis in self.coordinates], float)
+
+    def plan(self, u):
+        """The plan at u [d]."""
+        plan = {}
+        for (piece, key, axis), value in zip(self.coordinates, np.asarray(u) * self.half):
+            motion = plan.setdefault(piece, {"translate": [0.0] * 3, "rotate": [0.0] * 3})
+            motion[key][axis] = round(float(value), 9)
+        return plan
+
+    def vector(self, plan):
+        """u [d] of a plan; a piece that is not named stays."""
+        known = {piece for piece, _, _ in self.coordinates}
+        if unknown := plan.keys() - known:
+            raise Refused(f"plan: '{min(unknown)}' is no piece of the plan; its pieces are "
+                          f"{', '.join(sorted(known))}")
+        return np.array([plan.get(piece, {}).get(key, (0, 0, 0))[axis]
+                         for piece, key, axis in self.coordinates]) / self.half
+
+    def points(self, count):
+        """[count, d] the center, the ends of the axes, then Sobol points."""
+        from scipy.stats import qmc
+        dimensions = len(self.half)
+        ends = np.concatenate([np.eye(dimensions), -np.eye(dimensions)])
+        first = np.concatenate([np.zeros((1, dimensions)), ends])[:count]
+        more = count - len(first)
+        if more == 0:
+            return first
+        sobol = qmc.Sobol(dimensions, scramble=True, seed=1).random_base2(int(np.ceil(np.log2(more + 1))))
+        return np.concatenate([first, 2 * sobol[:more] - 1])
+
+    def held_out(self, count):
+        """[count, d] random points that are no samples."""
+        return np.random.default_rng(20).uniform(-1, 1, (count, len(self.half)))
+
+
+@dataclasses.dataclass
+class Sample:
+    """A solved plan: displacement [N, 3] and its derivatives by u [d, N, 3], NaN where not finished."""
+    u: np.ndarray
+    displacement: np.ndarray
+    slopes: np.ndarray
+    converged: bool
+
+
+def fingerprint(scene, program=None):
+    """A hash of the scene, of the files that it names, and of the solver."""
+    digest = hashlib.sha256()
+    scene = pathlib.Path(scene)
+    text = scene.read_text(encoding="utf-8")
+    digest.update(re.sub(r"\s+#.*|^#.*", "", text, flags=re.M).encode())
+    for word in sorted(set(re.findall(r"[^\s:,\[\]{}\"'#]+", text))):
+        file = scene.parent / word
+        if file.is_file():
+            digest.update(word.encode() + file.read_bytes())
+    if program:
+        status = os.stat(program)
+        digest.update(f"{status.st_size} {status.st_mtime_ns}".encode())
+    return digest.hexdigest()[:16]
+
+
+def to_slopes(tangent, box, points):
+    """Derivatives by u of an answer's tangents; NaN for those that are not finished."""
+    slopes = np.full((len(box.half), points, 3), np.nan)
+    for row, (piece, key, axis) in enumerate(box.coordinates):
+        column = piece, COMPONENTS[3 * (key == "rotate") + axis]
+        if column in tangent.columns and column not in tangent.missing:
+            slopes[row] = tangent.columns[column] * box.half[row]
+    return slopes
+
+
+class SampleStore:
+    """A folder of solved plans of one scene and accuracy: a run that was ended goes on."""
+
+    def __init__(self, folder, key):
+        self.folder = pathlib.Path(folder) / key
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    def path(self, u):
+        return self.folder / (hashlib.sha256(np.round(u, 9).tobytes()).hexdigest()[:16] + ".npz")
+
+    def load(self, u):
+        """The sample at u, or None where it is not solved, or its file is damaged."""
+        try:
+            with np.load(self.path(u)) as stored:
+                return Sample(stored["u"], stored["displacement"].astype(float),
+                              stored["slopes"].astype(float), bool(stored["converged"]))
+        except (OSError, ValueError, KeyError, EOFError):
+            return None
+
+    def save(self, sample):
+        path = self.path(sample.u)
+        part = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.part")
+        with part.open("wb") as file:
+            np.savez(file, u=sample.u, displacement=sample.displacement.astype("f4"),
+                     slopes=sample.slopes.astype("f4"), converged=sample.converged)
+        part.replace(path)
+
+
+def solve_sample(session, box, u, accuracy, tangents=True):
+    """The sample at u. Where the search from the scene's plan fails, from the initial state."""
+    for base in ("scene", "rest"):
+        face = session.solve(box.plan(u), accuracy, tangents, base)
+        if face.converged:
+            break
+    slopes = to_slopes(face.tangent, box, len(face.position)) if tangents and face.converged else \
+        np.full((len(box.half), *face.position.shape), np.nan)
+    return Sample(np.asarray(u), face.displacement, slopes, face.converged)
+
+
+def rank_and_size():
+    """This process among those that mpirun or srun has started."""
+    for rank, size in (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"),
+                       ("SLURM_PROCID", "SLURM_NTASKS")):
+        if rank in os.environ and size in os.environ:
+            return int(os.environ[rank]), int(os.environ[size])
+    return 0, 1
+
+
+def solve_all(scene, box, points, store, accuracy, session, processes=1, program=None,
+              report=lambda text: None, tangents=True):
+    """Samples at points [N, d], those of the store not solved again. Each of `processes` solvers takes
+    the next plan; under mpirun a rank solves every size-th plan and the first returns all."""
+    rank, size = rank_and_size()
+    mine = [u for k, u in enumerate(points) if k % size == rank and store.load(u) is None]
+    waiting, failures = queue.SimpleQueue(), []
+    for u in mine:
+        waiting.put(u)
+    began, done = time.monotonic(), [0]
+
+    def work(opened):
+        try:
+            while not failures:
+                u = waiting.get_nowait()
+                sample = solve_sample(opened, box, u, accuracy, tangents)
+                store.save(sample)
+                done[0] += 1
+                left = (time.monotonic() - began) / done[0] * (len(mine) - done[0])
+                report(f"{done[0]} of {len(mine)} plans solved, {left:.0f} s left" +
+                       ("" if sample.converged else "; the last one did not converge"))
+        except queue.Empty:
+            pass
+        except (Refused, OSError) as failure:
+            failures.append(failure)
+
+    def work_alone():
+        with Session(scene, program=program) as opened:
+            work(opened)
+
+    threads = [threading.Thread(target=work_alone) for _ in range(min(processes, len(mine)) - 1)]
+    for thread in threads:
+        thread.start()
+    work(session)
+    for thread in threads:
+        thread.join()
+    if failures:
+        raise failures[0]
+    return None if rank else _await_all(points, store)
+
+
+def _await_all(points, store):
+    """All samples, when the other ranks have solved theirs."""
+    samples = []
+    for u in points:
+        while (sample := store.load(u)) is None:
+            time.sleep(0.2)
+        samples.append(sample)
+    return samples

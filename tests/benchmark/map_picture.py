@@ -1,0 +1,41 @@
+#!/usr/bin/env python3
+"""The page of drivers/map.py in headless Chromium, as a picture of the guide.
+
+    tests/benchmark/map_picture.py PAGE [-size 1280,800] [-output docs/images/map.png]
+
+Needs: apt-get install --no-install-recommends chromium
+"""
+
+import pathlib
+import subprocess
+import tempfile
+
+from page import PROJECT, option_parser
+
+VIEW = """<script>(async () => {
+  while (!document.documentElement.dataset.ready) await new Promise(end => setTimeout(end, 30));
+  const {coordinates, half} = mapPage.described, plan = copyOf(mapPage.plan);
+  coordinates.forEach(([piece, key, axis], k) => {
+    plan[piece][key][axis] = half[k] * [-0.35, 0.25, 0.15][k % 3];
+  });
+  mapPage.change(plan);
+})();</script></body>"""
+
+
+def main():
+    parser = option_parser(__doc__, PROJECT / "docs/images/map.png", size="1280,800")
+    parser.add_argument("page", type=pathlib.Path)
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder) / "page.html"
+        copy.write_text(chosen.page.read_text(encoding="utf-8").replace("</body>", VIEW), encoding="utf-8")
+        subprocess.run(
+            ["chromium", "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
+             "--enable-unsafe-swiftshader", "--hide-scrollbars", "--disable-background-networking",
+             f"--user-data-dir={folder}/profile", f"--window-size={chosen.size}",
+             "--virtual-time-budget=6000", f"--screenshot={chosen.output.resolve()}", copy.as_uri()],
+            check=True, capture_output=True, timeout=300)
+
+
+if __name__ == "__main__":
+    main()
