@@ -28,6 +28,11 @@ import subprocess
 import sys
 import time
 
+try:
+    import numpy as np
+except ImportError as missing:
+    sys.exit(f"plan.py: {missing.name} is missing: apt-get install python3-numpy")
+
 HERE = pathlib.Path(__file__).resolve().parent
 ROLES = {"skin": r"skin|soft|face", "mandible": r"mandib|lower.?jaw", "maxilla": r"maxill|upper.?jaw",
          "skull": r"skull|crani|bone"}
@@ -39,8 +44,13 @@ DIRECTIONS = {"forward": (0, -1, 0), "advance": (0, -1, 0), "back": (0, 1, 0), "
 TURNS = {"open": (1, 0, 0), "close": (-1, 0, 0), "yaw": (0, 0, 1), "roll": (0, 1, 0)}
 
 
+class Arguments(argparse.ArgumentParser):
+    def error(self, message):
+        refuse(message)
+
+
 def refuse(message):
-    sys.exit(f"error: plan.py: {message}")
+    sys.exit(f"plan.py: {message}")
 
 
 def program(name):
@@ -88,7 +98,6 @@ def roles_of(file):
 
 def bounds(file):
     """Lowest and highest corner, and the vertices, of a binary PLY of repose-isosurface."""
-    import numpy as np
     data = file.read_bytes()
     count = int(re.search(rb"element vertex (\d+)", data)[1])
     kind = "<f8" if b"property double x" in data[:400] else "<f4"
@@ -223,8 +232,8 @@ def read_landmarks(file):
 
 
 def arguments():
-    parser = argparse.ArgumentParser(prog="plan.py", description=__doc__, add_help=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Arguments(prog="plan.py", description=__doc__, add_help=False, allow_abbrev=False,
+                       formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-help", action="help")
     parser.add_argument("volumes", nargs="+", type=pathlib.Path)
     parser.add_argument("-operation", required=True)

@@ -128,8 +128,9 @@ def find_screen():
                     os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = window
                     return
             refuse("neither a display nor libEGL: apt-get install libegl1 libgl1-mesa-dri")
+    inside = "REPOSE_RENDER" in os.environ
     for program in ("xvfb-run",) if own else ("pvbatch", "xvfb-run"):
-        if not shutil.which(program):
+        if not shutil.which(program) or (inside and not own):
             refuse("VTK is missing: pip install vtk h5py, or apt-get install "
                    "--no-install-recommends python3-paraview python3-h5py xvfb xauth")
     os.environ["REPOSE_RENDER"] = json.dumps(sys.argv[1:])

@@ -6,14 +6,16 @@ import sys
 
 import pytest
 
-from conftest import PROJECT, TIME_LIMIT, finish
+from conftest import PROJECT, TIME_LIMIT, finish, programs
 
 SCRIPTS = {path.name: path for path in sorted((PROJECT / "drivers").glob("*.py"))}
 SCRIPTS["Repose"] = PROJECT / "drivers/slicer/lib/run.py"
 MODULES = ("h5py", "numpy", "matplotlib", "vtkmodules", "paraview")
 ARGUMENTS = {"plot_incision.py": ["picture.png", "{}"], "plot_equilibrium.py": ["{}", "picture.png"],
-             "weights.py": ["-bin", "."], "Repose": ["--skin", "skin.ply"]}
-OPTIONAL = {("report.py", "matplotlib")}  # a page without pictures says what is missing
+             "plan.py": ["{}", "-operation", "jaw, 5 mm forward"], "weights.py": ["-bin", "."],
+             "Repose": ["--skin", "skin.ply"]}
+OPTIONAL = {("report.py", "matplotlib"),  # a page without pictures says what is missing
+            ("paraview_repose.py", "h5py")}  # bones without names have numbers
 
 
 def imported():
@@ -32,7 +34,9 @@ def script(tmp_path, environment):
         stubs.mkdir(exist_ok=True)
         (stubs / "sitecustomize.py").write_text(
             f"import sys\nsys.modules.update(dict.fromkeys({list(without)}))\n")
-        surroundings = environment | {"PYTHONPATH": str(stubs)} | (settings or {})
+        surroundings = environment | {"PYTHONPATH": str(stubs),
+                                      "REPOSE_LIVE": str(programs() / "repose-live")}
+        surroundings |= settings or {}
         return finish([sys.executable, "-B", str(SCRIPTS[name]), *map(str, arguments)], tmp_path,
                       surroundings, TIME_LIMIT)
 
