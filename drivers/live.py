@@ -29,6 +29,7 @@ PAGE = """<!doctype html>
 <body>{body}<script>{scripts}</script></body></html>
 """
 LONGEST_REQUEST = 1 << 20
+VERIFY_EVERY = 20  # answers, of which one is solved again from a cold start
 
 
 def page(scene):
@@ -63,7 +64,7 @@ def scene_with_moves(path, moves):
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
-    """Answers GET / (the page), GET /scene, POST /solve, /scene_file and /result."""
+    """Answers GET / (the page), /scene and /notice, POST /solve, /scene_file and /result."""
     protocol_version = "HTTP/1.1"
 
     def allowed(self, token):
@@ -96,6 +97,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.reply(200, self.server.page, "text/html; charset=utf-8")
         elif address.path == "/scene":
             self.reply(200, packed(*self.server.session.describe()))
+        elif address.path == "/notice":
+            self.reply(200, self.notice(), "application/json")
         else:
             self.reply(404, b"there is no such page\n", "text/plain")
 
@@ -118,7 +121,21 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
 
     def solve(self, request):
-        return packed(*self.server.session.ask({**request, "do": "solve"}))
+        session = self.server.session
+        head, arrays = session.ask({**request, "do": "solve"})
+        if request.get("points", "skin") == "skin":
+            session.count_answer(request["plan"], head, arrays["position"], request.get("accuracy"))
+        return packed(head, arrays)
+
+    def notice(self):
+        """What the page says beside its mark: the latest verification, and a scene that has changed."""
+        session = self.server.session
+        latest = session.verifications[-1:]
+        said = {"text": latest[0].message if latest else "", "good": all(one.agrees for one in latest)}
+        if session.scene_changed:
+            said = {"text": "the scene or one of its files has changed on disk: the faces are those of the "
+                            "scene as it was; start live.py again", "good": False}
+        return json.dumps(said).encode()
 
     def scene_file(self, request):
         return scene_with_moves(self.server.scene, request["moves"]).encode()
@@ -158,7 +175,7 @@ def main():
                  "python3-numpy")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
-        with repose.Session(options.scene, options.ranks) as session:
+        with repose.Session(options.scene, options.ranks, verify_every=VERIFY_EVERY) as session:
             server, address = make_server(session, options.scene, options.port)
             print(f"{options.scene}: {address}\nCtrl-C ends it.", flush=True)
             if not options.no_browser:

@@ -43,7 +43,7 @@ try:
     import repose
     from repose.map import MOST_MODES, PlanMap
     from repose.kriging import REACH, SPREAD_NUGGET
-    from repose.samples import PlanBox, SampleStore, fingerprint, solve_all
+    from repose.samples import PlanBox, SampleStore, solve_all
     from sheet.meshes import Pack, coarser
 except ImportError as missing:
     refuse(f"{missing.name} is missing: apt-get install --no-install-recommends python3-numpy "
@@ -227,7 +227,7 @@ def main():
     try:
         with repose.Session(chosen.scene) as session:
             box = PlanBox([piece.name for piece in session.pieces], session.box)
-            key = f"{fingerprint(chosen.scene, repose.session.find_program())}_{chosen.accuracy:g}"
+            key = f"{repose.Scene(chosen.scene).fingerprint(repose.session.find_program())}_{chosen.accuracy:g}"
             store = SampleStore(chosen.cache, key)
             (solve_plan if chosen.plan else make_page)(chosen, session, box, store)
     except KeyboardInterrupt:

@@ -6,6 +6,7 @@ const byId = id => document.getElementById(id);
 const TOKEN = new URLSearchParams(location.search).get("token");
 const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
 const BEFORE = 0, NOW = 1, KEPT = 2;
+const NOTICE_TIME = 5000;  // ms
 async function ask(path, request) {
   const response = await fetch(path, request === undefined
     ? {headers: {"X-Token": TOKEN}}
@@ -406,11 +407,24 @@ class Planner {
   }
 }
 
+// Shows the outcome of the latest verification from a cold start, or that the scene has changed.
+async function showNotice() {
+  try {
+    const {text, good} = JSON.parse(new TextDecoder().decode(await ask("/notice")));
+    byId("notice").textContent = text;
+    byId("notice").className = good ? "" : "bad";
+  } catch (error) {
+    byId("notice").textContent = `the server of this page does not answer: ${error.message}`;
+    byId("notice").className = "bad";
+  }
+}
+
 async function main() {
   try {
     byId("title").textContent = document.title;
     window.planner = new Planner(unpack(await ask("/scene")));
     byId("mode").onchange();
+    setInterval(showNotice, NOTICE_TIME);
   } catch (error) {
     byId("mark").className = "failed";
     byId("mark").textContent = error.message;

@@ -92,6 +92,14 @@ def test_a_full_result_passes_the_check(session, run, tmp_path):
     assert mesh.points.shape == session.initial.shape
 
 
+def test_faces_are_meshes_of_pyvista(session):
+    pytest.importorskip("pyvista")
+    face = session.solve(B)
+    mesh = face.polydata()
+    assert mesh.n_points == len(face.position) and mesh.n_cells == len(face.triangles)
+    assert np.allclose(mesh.point_data["displacement"], face.displacement)
+
+
 def talk(environment, lines, ranks=1):
     """What repose-live writes for these lines, and its status."""
     command = [str(programs() / "repose-live"), str(SCENE)]

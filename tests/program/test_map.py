@@ -1,9 +1,7 @@
 """drivers/map.py: a page without a server, the fit behind it, and its folder of solved plans."""
 
-import json
 import os
 import re
-import subprocess
 import sys
 
 import numpy as np
@@ -13,9 +11,10 @@ from conftest import PROJECT, finish, programs
 
 sys.path[:0] = [str(PROJECT / "drivers/python"), str(PROJECT / "drivers")]
 pytest.importorskip("scipy")
+import repose  # noqa: E402
 from repose.kriging import Kriging, covariance  # noqa: E402
 from repose.map import PlanMap, bound_quantile  # noqa: E402
-from repose.samples import PlanBox, SampleStore, Sample, fingerprint  # noqa: E402
+from repose.samples import PlanBox, SampleStore, Sample  # noqa: E402
 
 PLAN = '{"mandible": {"translate": [0.5, -2, 0], "rotate": [1, 0, 0]}}'
 SAMPLES = 9
@@ -154,11 +153,11 @@ def test_a_changed_mesh_has_other_plans(tmp_path):
     mesh, scene = tmp_path / "skin.ply", tmp_path / "scene.yaml"
     mesh.write_text("a")
     scene.write_text("skin: skin.ply # the face\n")
-    first = fingerprint(scene)
+    first = repose.Scene(scene).fingerprint()
     scene.write_text("skin: skin.ply   # another comment\n")
-    assert fingerprint(scene) == first
+    assert repose.Scene(scene).fingerprint() == first
     mesh.write_text("b")
-    assert fingerprint(scene) != first
+    assert repose.Scene(scene).fingerprint() != first
 
 
 # ----- the fit

@@ -2,12 +2,9 @@
 
 import dataclasses
 import hashlib
-import json
 import os
 import pathlib
 import queue
-import re
-import sys
 import threading
 import time
 
@@ -66,22 +63,6 @@ class Sample:
     displacement: np.ndarray
     slopes: np.ndarray
     converged: bool
-
-
-def fingerprint(scene, program=None):
-    """A hash of the scene, of the files that it names, and of the solver."""
-    digest = hashlib.sha256()
-    scene = pathlib.Path(scene)
-    text = scene.read_text(encoding="utf-8")
-    digest.update(re.sub(r"\s+#.*|^#.*", "", text, flags=re.M).encode())
-    for word in sorted(set(re.findall(r"[^\s:,\[\]{}\"'#]+", text))):
-        file = scene.parent / word
-        if file.is_file():
-            digest.update(word.encode() + file.read_bytes())
-    if program:
-        status = os.stat(program)
-        digest.update(f"{status.st_size} {status.st_mtime_ns}".encode())
-    return digest.hexdigest()[:16]
 
 
 def to_slopes(tangent, box, points):

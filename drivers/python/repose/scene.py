@@ -1,6 +1,9 @@
 """A scene file."""
 
+import hashlib
+import os
 import pathlib
+import re
 
 
 class Scene:
@@ -10,6 +13,26 @@ class Scene:
         self.path = pathlib.Path(path).resolve()
         if not self.path.is_file():
             raise FileNotFoundError(f"{path}: there is no such scene")
+
+    def _text(self):
+        return self.path.read_text(encoding="utf-8", errors="replace")
+
+    def files(self):
+        """The scene file, then the files that it names."""
+        words = set(re.findall(r"[^\s:,\[\]{}\"'#]+", self._text()))
+        named = sorted(self.path.parent / word for word in words if len(word) < 256)
+        return [self.path, *(file for file in named if file.is_file())]
+
+    def fingerprint(self, program=None):
+        """A hash of the scene without its comments, of the files that it names, and of the solver."""
+        text = self._text()
+        digest = hashlib.sha256(re.sub(r"\s+#.*|^#.*", "", text, flags=re.M).encode())
+        for file in self.files()[1:]:
+            digest.update(os.path.relpath(file, self.path.parent).encode() + file.read_bytes())
+        if program:
+            status = os.stat(program)
+            digest.update(f"{status.st_size} {status.st_mtime_ns}".encode())
+        return digest.hexdigest()[:16]
 
     def with_plan(self, pieces, path, translate=(10, 10, 10), rotate=(10, 10, 10)):
         """Writes the scene with a plan of these pieces to `path` and returns it. `path` must lie in
@@ -25,3 +48,27 @@ class Scene:
                         f"  box: {{translate: [{numbers[0]}], rotate: [{numbers[1]}]}}\n",
                         encoding="utf-8")
         return Scene(path)
+
+
+class SceneWatch:
+    """Says whether a scene or a file that it names has changed since."""
+
+    def __init__(self, scene):
+        self.scene = scene
+        self.first, self.stamps = scene.fingerprint(), self._stamps()
+
+    def _stamps(self):
+        return [(file, file.stat().st_size, file.stat().st_mtime_ns) for file in self.scene.files()]
+
+    def changed(self):
+        """Returns whether the content differs; files that are gone count as changed."""
+        try:
+            stamps = self._stamps()
+            if stamps == self.stamps:
+                return False
+            if self.scene.fingerprint() != self.first:
+                return True
+        except OSError:
+            return True
+        self.stamps = stamps
+        return False

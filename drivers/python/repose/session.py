@@ -10,6 +10,9 @@ import threading
 
 import numpy as np
 
+from .scene import Scene, SceneWatch
+from .verify import Verifier
+
 COMPONENTS = ("tx", "ty", "tz", "rx", "ry", "rz")  # mm, then degrees
 
 
@@ -116,13 +119,25 @@ class Session:
     """A scene that is built once and solved for many plans. A plan is a dictionary
     {piece: {"translate": [x, y, z], "rotate": [x, y, z]}}, mm and degrees (rotation vector about the
     piece's centroid); a piece that is not named stays. Answers do not depend on their order.
-    Threads may share a session; a newer `solve` abandons the one under way, which raises Refused."""
+    Threads may share a session; a newer `solve` abandons the one under way, which raises Refused.
 
-    def __init__(self, scene, ranks=1, program=None, environment=None):
+    With `verify_every` n, each n-th answer is solved again from a cold start by a second process at low
+    priority; `on_verified(verification)` is called with the outcome, on a thread of its own, and
+    `verifications` lists them."""
+
+    def __init__(self, scene, ranks=1, program=None, environment=None, verify_every=0, on_verified=None,
+                 niceness=0):
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
-        command = [program or find_program(), str(path)]
+        command = [str(program or find_program()), str(path)]
         if ranks > 1:
             command = ["mpirun", "-n", str(ranks), *command]
+        if niceness:
+            command = ["nice", "-n", str(niceness), *command]
+        self._watch = SceneWatch(Scene(path)) if path.is_file() else None
+        self._verifier = None
+        if verify_every:
+            self._verifier = Verifier(lambda: Session(path, 1, program, environment, niceness=19),
+                                      verify_every, on_verified)
         self._errors = []
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                          stderr=subprocess.PIPE, cwd=path.parent,
@@ -168,8 +183,30 @@ class Session:
             if not all(head["flags"][name].values()):
                 missing.append((names[int(bone)], component))
         position = fields.pop("position").astype(float)
+        self.count_answer(plan, head, position, accuracy)
         return Face(plan, position, self.initial, self.triangles, head["error"], head["converged"],
                     fields, Tangent(columns, missing) if tangents else None, head, self.given)
+
+    def count_answer(self, plan, head, position, accuracy=None):
+        """Counts an answer for verification; `solve` does so itself."""
+        if self._verifier and head["converged"]:
+            self._verifier.add(_plain(plan), np.array(position), accuracy or self.accuracy)
+
+    @property
+    def verifications(self):
+        """The answers that were solved again from a cold start: repose.verify.Verification."""
+        return list(self._verifier.outcomes) if self._verifier else []
+
+    def wait_for_verification(self):
+        """Waits until no verification is under way."""
+        if self._verifier:
+            self._verifier.wait()
+
+    @property
+    def scene_changed(self):
+        """Whether the scene or a file that it names has changed on disk since the session was started.
+        Its answers are those of the scene as it was."""
+        return bool(self._watch and self._watch.changed())
 
     def tangents(self, plan=None, accuracy=None):
         """The derivatives of the skin at a plan, by default the scene's own."""
@@ -190,7 +227,9 @@ class Session:
         self.ask({"do": "write", "output": str(pathlib.Path(output).resolve())})
 
     def close(self):
-        """Ends repose-live."""
+        """Ends repose-live, and a verification under way."""
+        if self._verifier:
+            self._verifier.close()
         process = self._process
         if process.poll() is None:
             try:

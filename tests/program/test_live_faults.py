@@ -1,0 +1,304 @@
+"""What may go wrong with a resident solver: nothing is lost, and one line says what happened."""
+
+import json
+import os
+import pathlib
+import random
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import PROJECT, programs
+
+sys.path.insert(0, str(PROJECT / "drivers/python"))
+import repose  # noqa: E402
+from repose.verify import Verifier  # noqa: E402
+
+PLAN = {"mandible": {"translate": [0, -3, 0]}}
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory, environment):
+    """A scene that is built in a moment: the shipped head on two layers, with its files."""
+    os.environ.update(environment)
+    folder = tmp_path_factory.mktemp("small")
+    for mesh in ("skin", "skull", "mandible"):
+        shutil.copy(PROJECT / f"meshes/head_{mesh}.ply", folder)
+    scene = folder / "small.yaml"
+    text = re.sub("osteotomies:.*", "", (PROJECT / "meshes/head_live.yaml").read_text(), flags=re.S)
+    scene.write_text(text.replace("layers: 4", "layers: 2") +
+                     "plan:\n  pieces: [mandible]\n  box: {translate: [5, 5, 5], rotate: [5, 5, 5]}\n")
+    return scene
+
+
+def opened(scene, **settings):
+    return repose.Session(scene, program=programs() / "repose-live", **settings)
+
+
+def processes():
+    """Ids of the solvers of this user that run."""
+    found = set()
+    for entry in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if (entry / "comm").read_text().startswith("repose-live") and \
+                    (entry / "status").read_text().split("State:")[1].split()[0] != "Z":
+                found.add(int(entry.name))
+        except OSError:
+            pass
+    return found
+
+
+def children():
+    """Ids of the solvers that this test has started."""
+    own = set()
+    for process in processes():
+        try:
+            if os.getpgid(process) == os.getpgid(0):
+                own.add(process)
+        except OSError:
+            pass
+    return own
+
+
+# ----- verification from a cold start
+
+
+def test_every_nth_answer_is_solved_again_from_a_cold_start(small):
+    told = []
+    with opened(small, verify_every=2, on_verified=told.append) as session:
+        session.solve({})
+        assert not told
+        session.solve(PLAN, accuracy=0.01)
+        session.wait_for_verification()
+        (one,) = session.verifications
+    assert told == [one] and one.plan == PLAN
+    assert one.agrees and one.distance < 0.03
+    assert re.match(r"verified from a cold start: the same face within 0\.0\d\d mm$", one.message)
+    assert not children()
+
+
+class Cold:
+    """A solver whose face is given."""
+
+    def __init__(self, position, converged=True):
+        self.face = repose.Face({}, position, position, None, 0.001, converged, {}, None,
+                                {"reason": "the limit of iterations"})
+        self.closed = False
+
+    def solve(self, plan, accuracy, base):
+        assert base == "rest"
+        return self.face
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.mark.parametrize("shift, converged, words", [
+    (0.0, True, "the same face within 0.000 mm"),
+    (0.9, True, "NOT verified: a search from a cold start ends 0.90 mm away, at [7, 8, 9] mm"),
+    (0.0, False, "not verified: the search from a cold start ended with the limit of iterations")])
+def test_a_face_that_differs_is_reported(shift, converged, words):
+    position, cold = np.array([[1.0, 2, 3], [7, 8, 9]]), []
+    other = position + [[0, 0, 0], [0, shift, 0]]
+
+    def start():
+        cold.append(Cold(other, converged))
+        return cold[-1]
+    verifier = Verifier(start, 1)
+    verifier.add(PLAN, position, 0.1)
+    verifier.wait()
+    (one,) = verifier.outcomes
+    assert words in one.message and one.agrees == (not shift and converged) and cold[0].closed
+
+
+def test_a_verification_under_way_is_abandoned_at_the_end(small):
+    session = opened(small, verify_every=1)
+    session.solve(PLAN, accuracy=1e-5)
+    session.close()
+    assert not children() and len(session.verifications) <= 1
+
+
+# ----- the scene on disk
+
+
+def test_a_scene_that_changes_on_disk_is_noticed(small, tmp_path):
+    for file in small.parent.glob("*.*"):
+        shutil.copy(file, tmp_path)
+    scene = tmp_path / small.name
+    with opened(scene) as session:
+        assert not session.scene_changed
+        os.utime(scene)
+        assert not session.scene_changed, "the content is the same"
+        before = session.solve(PLAN)
+        mesh = tmp_path / "head_skin.ply"
+        content = mesh.read_bytes()
+        mesh.write_bytes(content[:-7])
+        assert session.scene_changed
+        assert np.array_equal(session.solve(PLAN).position, before.position), "it solves what it was given"
+        mesh.write_bytes(content)
+        assert not session.scene_changed
+        mesh.unlink()
+        assert session.scene_changed
+
+
+# ----- processes
+
+
+def test_a_solver_that_is_killed_is_one_line_and_the_next_works(small):
+    session = opened(small)
+    said = []
+
+    def solve():
+        try:
+            session.solve(PLAN, accuracy=1e-6, base="rest")
+        except repose.Refused as refusal:
+            said.append(str(refusal))
+    thread = threading.Thread(target=solve)
+    thread.start()
+    time.sleep(0.05)
+    session._process.kill()
+    thread.join(timeout=30)
+    assert len(said) == 1 and "repose-live has ended" in said[0] and "\n" not in said[0]
+    with pytest.raises(repose.Refused, match="repose-live has ended"):
+        session.solve(PLAN)
+    session.close()
+    with opened(small) as again:
+        assert again.solve(PLAN).converged
+
+
+def starts_and_stops(scene, count):
+    """Starts and stops solvers; resident memory of this process (MB) and open files after each."""
+    memory, files = [], []
+    for _ in range(count):
+        with opened(scene) as session:
+            session.solve({})
+        memory.append(int(re.search(r"VmRSS:\s+(\d+)", pathlib.Path("/proc/self/status").read_text())[1]) / 1e3)
+        files.append(len(os.listdir("/proc/self/fd")))
+    return memory, files
+
+
+def leftovers():
+    """What Open MPI and PETSc may leave in memory and temporary folders."""
+    return {str(path) for folder in ("/dev/shm", "/tmp") for path in pathlib.Path(folder).glob("*")
+            if re.search("ompi|vader|pmix|prte|petsc", path.name)}
+
+
+@pytest.mark.parametrize("count", [6, pytest.param(100, marks=pytest.mark.long)])
+def test_starts_and_stops_leave_nothing(small, count):
+    with opened(small):
+        assert children()
+        before = leftovers()  # what the first start of a machine makes, stays
+    memory, files = starts_and_stops(small, count)
+    assert not children()
+    assert files[-1] <= files[1] and memory[-1] < memory[1] + 3, (files, memory)
+    threads = [one for one in threading.enumerate() if one is not threading.main_thread()]
+    assert len(threads) < 6
+    assert leftovers() <= before
+
+
+# ----- clients
+
+
+@pytest.fixture
+def listening(small, environment):
+    """(port, token) of a solver that answers on a socket."""
+    process = subprocess.Popen([programs() / "repose-live", small, "-port", "0"], stdout=subprocess.PIPE,
+                               stderr=subprocess.DEVNULL, env={**os.environ, **environment})
+    address = json.loads(process.stdout.readline())
+    yield address["port"], address["token"]
+    if process.poll() is None:
+        process.terminate()
+    process.wait(timeout=30)
+    process.stdout.close()
+
+
+def greeted(port, token):
+    connection = socket.create_connection(("127.0.0.1", port), timeout=60)
+    connection.sendall(json.dumps({"token": token}).encode() + b"\n")
+    return connection, connection.makefile("rb")
+
+
+def ask(connection, stream, request):
+    connection.sendall(json.dumps(request).encode() + b"\n")
+    head = json.loads(stream.readline())
+    for one in head["arrays"]:
+        stream.read(4 * int(np.prod(one["shape"])))
+    return head
+
+
+def test_two_clients_are_served_one_after_the_other(listening):
+    port, token = listening
+    first, first_stream = greeted(port, token)
+    assert ask(first, first_stream, {"do": "solve", "plan": PLAN, "id": 1})["converged"]
+    second, second_stream = greeted(port, token)  # waits
+    second.settimeout(0.5)
+    second.sendall(b'{"do": "solve", "id": 2}\n')
+    with pytest.raises(TimeoutError):
+        second.recv(1)
+    assert ask(first, first_stream, {"do": "solve", "id": 3})["id"] == 3, "the first one is still served"
+    first_stream.close()
+    first.close()
+    second.settimeout(60)
+    assert json.loads(second.makefile("rb").readline())["id"] == 2
+    second_stream.close()
+    second.close()
+
+
+def test_a_client_that_vanishes_leaves_the_solver_to_others(listening):
+    port, token = listening
+    gone, stream = greeted(port, token)
+    gone.sendall(b'{"do": "solve", "accuracy": 1e-6, "base": "rest"}\n{"do": "so')
+    stream.close()
+    gone.close()
+    stranger = socket.create_connection(("127.0.0.1", port), timeout=60)
+    stranger.sendall(b"GET / HTTP/1.1\n")
+    assert "the first line must be" in json.loads(stranger.makefile("rb").readline())["error"]
+    stranger.close()
+    third, stream = greeted(port, token)
+    assert ask(third, stream, {"do": "solve", "plan": PLAN})["converged"]
+    stream.close()
+    third.close()
+
+
+def damaged(random_numbers):
+    """A request, damaged at random."""
+    line = bytearray(json.dumps(random_numbers.choice([
+        {"do": "solve", "plan": PLAN, "accuracy": 0.1, "tangents": False, "base": "rest"},
+        {"do": "solve", "plan": {"mandible": {"rotate": [1, 2, 1e400]}}}, {"do": "describe"},
+        {"do": "write", "output": "/nowhere/at/all"}, {"do": "solve", "points": 3, "base": PLAN}])).encode())
+    for _ in range(random_numbers.randrange(4)):
+        place = random_numbers.randrange(len(line))
+        kind = random_numbers.randrange(3)
+        if kind == 0:
+            line[place] = random_numbers.randrange(256)
+        elif kind == 1:
+            del line[place:place + random_numbers.randrange(1, 6)]
+        else:
+            line[place:place] = random_numbers.choice([b'"', b"{", b"]", b"1e308", b"\x00", b"-", b"null"])
+        if not line:
+            break
+    return bytes(line).replace(b"\n", b" ")
+
+
+def test_fuzzed_messages_are_answered_or_refused_in_a_line(small, environment, tmp_path):
+    random_numbers = random.Random(11)
+    lines = [damaged(random_numbers) for _ in range(300)]
+    expected = [line for line in lines if line.strip(b" \t\r")]
+    done = subprocess.run([programs() / "repose-live", small], input=b"\n".join(lines) +
+                          b'\n{"do": "quit", "id": "last"}\n', stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          timeout=100, env={**os.environ, **environment}, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr[-500:]
+    heads, rest = [], done.stdout
+    while rest:
+        line, _, rest = rest.partition(b"\n")
+        heads.append(json.loads(line))
+        rest = rest[sum(4 * int(np.prod(one["shape"])) for one in heads[-1]["arrays"]):]
+    assert len(heads) == len(expected) + 1 and heads[-1]["id"] == "last"
+    refusals = [head["error"] for head in heads if not head["ok"]]
+    assert len(refusals) > 100 and all("\n" not in one and one for one in refusals)
