@@ -186,7 +186,7 @@ std::string describe_other_rest(const solve::Outcome& last) {
   return report_row("other rest position",
                     fmt::format("the skin is up to {:.2g} mm away there, most at ({:.1f}, {:.1f}, "
                                 "{:.1f}) mm: tissue rests on either side of an edge of bone, and "
-                                "this result is where rounded edges lead to",
+                                "this result has less energy",
                                 distance, place[0], place[1], place[2]));
 }
 

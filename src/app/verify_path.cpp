@@ -35,6 +35,7 @@ PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings 
   check.objective = first.last.objective;
   if (check.steps == 0) return check;
   settings.path.load_steps = static_cast<int>(2 * check.steps);
+  settings.path.ends_along = true;
   settings.stability = false;
   settings.finds_other_rest = false;
   settings.stages = nullptr;

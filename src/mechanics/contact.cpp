@@ -132,6 +132,7 @@ Vec3 direction_within(double reach, const RigidBody& body, const Vec3& beside) {
 bool TouchLoop::changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const {
   constexpr double pressing = 1, was_near = 6;  // mm
   for (size_t c = 0; c < touches_.point.size(); ++c) {
+    if (multiplier_[c] <= 0) continue;
     const RigidBody& body = bodies_[touches_.body[c]];
     const Vec3 now = direction_within(pressing, body, body.beside(position[touches_.point[c]]));
     if (!now.isZero(0) && now.dot(direction_within(was_near, body, before[c])) < 0) return true;

@@ -42,14 +42,14 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
       trial_(objective.positions().make_vector()),
       start_(objective.positions().make_vector()) {}
 
-ContactSearch::Multipliers ContactSearch::multipliers() const {
+ContactPressures ContactSearch::pressures() const {
   const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
   return {{p.begin(), p.end()}, {q.begin(), q.end()}};
 }
 
-void ContactSearch::set_multipliers(const Multipliers& to) {
-  objective_.touches().set_multipliers(to.touches);
-  objective_.walls().set_multipliers(to.walls);
+void ContactSearch::set_pressures(const ContactPressures& to) {
+  objective_.touches().set_multipliers(to.bodies);
+  objective_.walls().set_multipliers(to.cut_faces);
   tangent_.forget_contact();
 }
 
@@ -94,12 +94,12 @@ void ContactSearch::move_multipliers() {
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
-  before_ = multipliers();
+  before_ = pressures();
   predicted_ = true;
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   objective_.place_bodies();
-  places_ = objective_.touches().places(positions.local());
+  if (places_.empty()) places_ = objective_.touches().places(positions.local());
   const discrete::Part& part = positions.part();
   std::vector<Vec3> way(positions.local().size(), Vec3::Zero());
   for (size_t i = 0; i < way.size(); ++i)
@@ -218,7 +218,7 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   return outcome;
 }
 
-/// True if a point is on another side of a body than before the prediction. Collective.
+/// True if a point is on another side of a body than before the first prediction. Collective.
 bool ContactSearch::gone_round(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
@@ -251,35 +251,54 @@ OtherRest ContactSearch::compare_skins(Vec displacement, Vec other) {
   return found;
 }
 
-/// The rest position that the sharp bodies lead to from the prediction directly, where that is
-/// another one.
-std::optional<OtherRest> ContactSearch::search_other(Vec displacement, double accuracy) {
-  const Multipliers here = multipliers();
+/// Energy of the tissue and its loads without contact, N mm.
+double ContactSearch::energy(Vec displacement) {
+  const double value = objective_.evaluate(displacement, gradient_);
+  return value - objective_.weights().elastic * objective_.contact_value();
+}
+
+/// Searches for the rest position that the sharp bodies lead to from the prediction directly. Where
+/// it is another one, `displacement` becomes that of less energy, and `outcome` states the distance
+/// to the other.
+void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& outcome) {
+  const ContactPressures here = pressures();
   const int64_t evaluated = objective_.evaluations();
-  set_multipliers(at_prediction_);
-  std::optional<OtherRest> other;
+  const double energy_here = energy(displacement);
+  set_pressures(at_prediction_);
   int64_t iterations = 0;
   const Outcome near =
       approach(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
-  if (!near.stopped && newton(start_, accuracy, iterations) == End::reached)
-    other = compare_skins(displacement, start_);
-  set_multipliers(here);
+  bool taken = false;
+  if (!near.stopped && newton(start_, accuracy, iterations) == End::reached) {
+    const OtherRest other = compare_skins(displacement, start_);
+    if (other.distance > 2 * accuracy) outcome.other = other;
+    if (outcome.other && energy(start_) < energy_here) {
+      Outcome there = finish(start_, accuracy);
+      taken = there.converged;
+      there.iterations += outcome.iterations + near.iterations + iterations;
+      there.other = other;
+      if (taken) outcome = there;
+    }
+  }
+  if (taken)
+    check(VecCopy(start_, displacement));
+  else
+    set_pressures(here);
   objective_.evaluate(displacement, gradient_);
   evaluations_for_other_ += objective_.evaluations() - evaluated;
-  return other && other->distance > 2 * accuracy ? other : std::nullopt;
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int most_rounds = 8, stiffest = 16;
   Outcome outcome;
   if (!predicted_) {
-    before_ = multipliers();
+    before_ = pressures();
     outcome = finish(displacement, accuracy);
     if (outcome.converged) return outcome;
   }
   const bool may_have_other =
       std::exchange(predicted_, false) && finds_other_ && objective_.positions().load() == 1;
-  at_prediction_ = multipliers();
+  at_prediction_ = pressures();
   check(VecCopy(displacement, start_));
   stiffen(1);
   int64_t iterations = 0;
@@ -303,7 +322,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
   if (outcome.converged && may_have_other && gone_round(displacement))
-    outcome.other = search_other(displacement, accuracy);
+    consider_other(displacement, accuracy, outcome);
   return outcome;
 }
 
@@ -321,7 +340,7 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
     outcome.iterations += iterations;
     if (outcome.converged) return outcome;
   }
-  set_multipliers(before_);
+  set_pressures(before_);
   check(VecCopy(guess, displacement));
   Outcome outcome = run(displacement, accuracy);
   outcome.iterations += iterations;
@@ -330,7 +349,7 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
 
 void ContactSearch::go_back(Vec) {
   objective_.round_bodies(false);
-  set_multipliers(before_);
+  set_pressures(before_);
 }
 
 double penetration(discrete::Objective& objective) {

@@ -11,7 +11,7 @@ namespace repose::solve {
 /// Where these fail, both are repeated with a finer search and a stiffer penalty. The multipliers
 /// of a load are where the next begins. At load 1, where points have gone round an edge of a body,
 /// the sharp bodies are approached directly from the prediction, too: where this ends elsewhere,
-/// the outcome says so.
+/// the rest position of less energy is taken, and the outcome states the distance of the other.
 class ContactSearch : public RestSearch {
  public:
   struct Approach {
@@ -33,13 +33,10 @@ class ContactSearch : public RestSearch {
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
   void go_back(Vec displacement) override;
+  ContactPressures pressures() const override;
+  void set_pressures(const ContactPressures& to) override;
 
  private:
-  struct Multipliers {
-    std::vector<double> touches, walls;  // N/mm²
-  };
-  Multipliers multipliers() const;
-  void set_multipliers(const Multipliers& to);
   void set_stiffness(double stiffness);
   void stiffen(int times);
   double violation();
@@ -52,7 +49,8 @@ class ContactSearch : public RestSearch {
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   bool gone_round(Vec displacement);
-  std::optional<OtherRest> search_other(Vec displacement, double accuracy);
+  double energy(Vec displacement);
+  void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, Vec other);
 
   discrete::Objective& objective_;
@@ -64,10 +62,10 @@ class ContactSearch : public RestSearch {
   int times_ = 1;     // it is so many times the model's
   bool finds_other_ = true;
   int64_t evaluations_for_other_ = 0;
-  bool predicted_ = false;     // the next search begins with a prediction
-  Multipliers before_;         // the last search, …
-  Multipliers at_prediction_;  // … and where it began
-  std::vector<Vec3> places_;   // [touches] of points beside bodies before the prediction
+  bool predicted_ = false;          // the next search begins with a prediction
+  ContactPressures before_;         // the last search, …
+  ContactPressures at_prediction_;  // … and where it began
+  std::vector<Vec3> places_;        // [touches] of points beside bodies before the first prediction
   base::VecHandle gradient_, slope_, step_, trial_, start_;
 };
 

@@ -54,11 +54,19 @@ LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& set
       trial_(objective_.positions().make_vector()),
       increment_(objective_.positions().make_vector()) {}
 
-double LoadPath::longest_step() const {
-  if (settings_.load_steps > 0) return 1.0 / settings_.load_steps;
+double LoadPath::automatic_step() const {
   const discrete::Positions& positions = objective_.positions();
   const double stride = positions.part().solid ? solid_stride : spring_stride;
   return 1.0 / std::clamp(std::ceil(positions.largest_travel() / stride), 1.0, most_steps);
+}
+
+double LoadPath::requested_step() const {
+  return settings_.load_steps > 0 ? 1.0 / settings_.load_steps : automatic_step();
+}
+
+bool LoadPath::ends_in_automatic_steps() const {
+  return objective_.positions().part().contact && !settings_.ends_along && result_.load == 0 &&
+         requested_step() != automatic_step();
 }
 
 int64_t LoadPath::inverted(Vec displacement) {
@@ -174,14 +182,29 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
       result_.load < 1)
     leap(displacement, guess, on_step);
-  const double longest = longest_step();
+  if (!ends_in_automatic_steps()) {
+    follow(displacement, requested_step(), 1, on_step);
+    return result_;
+  }
+  const base::VecHandle start = positions.make_vector();
+  check(VecCopy(displacement, start));
+  const ContactPressures at_start = search_.pressures();
+  follow(displacement, requested_step(), 1 - requested_step(), on_step);
+  if (result_.last.converged && !result_.last.stopped && result_.load < 1)
+    follow_again(start, at_start, displacement, on_step);
+  return result_;
+}
+
+/// Takes steps of at most `longest` until the load is `end`.
+void LoadPath::follow(Vec displacement, double longest, double end, const OnStep& on_step) {
+  const double nearly = 1e-3 * longest;
   double step = longest;
   int halvings = 0;
   std::optional<Attempt> coarser;
-  while (result_.last.converged && !result_.last.stopped && result_.load < 1) {
+  while (result_.last.converged && !result_.last.stopped && result_.load < end - nearly) {
     const Stopwatch watch;
     const double target = result_.load + step;
-    const double load = target > 1 - 1e-3 * longest ? 1 : target;
+    const double load = target > 1 - nearly ? 1 : target;
     const Attempt tried = attempt(displacement, load);
     const bool last = halvings == most_halvings || in_vain(tried);
     if (tried.outcome.stopped || last || follows(tried, coarser)) {
@@ -198,7 +221,37 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
       coarser = tried;
     }
   }
-  return result_;
+}
+
+/// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported.
+/// Where these fail, the path continues from `displacement`, which the requested steps have
+/// reached.
+void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
+                            const OnStep& on_step) {
+  const Stopwatch watch;
+  const ContactPressures reached_pressures = search_.pressures();
+  const PathOutcome reached = result_;
+  discrete::Positions& positions = objective_.positions();
+  result_.load = 0;
+  positions.set_load(0);
+  positions.update(start);
+  search_.set_pressures(at_start);
+  follow(start, automatic_step(), 1, [](const Outcome&, double, double) {});
+  if (result_.complete()) {
+    check(VecCopy(start, displacement));
+    result_.steps = reached.steps + 1;
+    on_step(result_.last, result_.load, watch.seconds());
+    return;
+  }
+  const bool stopped = result_.last.stopped;
+  const int64_t iterations = result_.iterations;
+  result_ = reached;
+  result_.iterations = iterations;
+  result_.last.stopped = stopped;
+  positions.set_load(result_.load);
+  positions.update(displacement);
+  search_.set_pressures(reached_pressures);
+  follow(displacement, requested_step(), 1, on_step);
 }
 
 using base::check;

@@ -173,7 +173,7 @@ def compare_cost(chosen, folder):
 
 def compare_runs(chosen, folder):
     def skin_of(text, ranks, steps):
-        done, file = solve(text, chosen, folder, ranks, steps, ["-skip_other_rest"])
+        done, file = solve(text, chosen, folder, ranks, steps)
         return done, skin(file)[1]
 
     with concurrent.futures.ThreadPoolExecutor(2) as pool:

@@ -53,15 +53,15 @@ def skin(file):
 
 @real_head
 @pytest.mark.long
-@pytest.mark.parametrize("operation, apart", [("le_fort", 2 * ACCURACY), ("genioplasty", 0.55)])
-def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operation, apart):
-    """The genioplasty has rest positions up to 0.5 mm apart, which the next test reads of."""
+@pytest.mark.parametrize("operation", ["le_fort", "genioplasty"])
+def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operation):
+    """The genioplasty has rest positions up to 0.5 mm apart: that of less energy is taken."""
     scene = f"real_head_{operation}"
     first = skin(solve(scene))[1]
     assert np.linalg.norm(first, axis=1).max() > 3
     for options, ranks in (((), 2), ((), 3), (("-load_steps", 2), 1)):
         other = skin(solve(scene, *options, ranks=ranks))[1]
-        assert np.linalg.norm(other - first, axis=1).max() < apart
+        assert np.linalg.norm(other - first, axis=1).max() < 2 * ACCURACY
 
 
 @real_head

@@ -81,7 +81,7 @@ class TouchLoop {
              std::vector<LinearGap>& gaps) const;
   /// [C] Where points are beside their bodies (RigidBody::beside).
   std::vector<Vec3> places(std::span<const Vec3> position) const;
-  /// True if a point within 1 mm of a body was within 6 mm of it at `before`, which places()
+  /// True if a point that presses on a body was within 6 mm of it at `before`, which places()
   /// returned, on another side: the normals, in the body's axes, are more than 90° apart.
   bool changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.

@@ -31,6 +31,7 @@ struct PathSettings {
   int load_steps = 0;       ///< equal steps; 0: as many as the motion needs
   double start_load = 0;    ///< of a restarted run
   bool near_guess = false;  ///< the guess is tried before anything else, as near to rest
+  bool ends_along = false;  ///< the last of `load_steps` steps ends the path with contact, too
 };
 
 /// Load steps that were made again in two parts, by the reason.
@@ -56,7 +57,9 @@ struct PathOutcome {
 /// Continuation along the bones' motion, with one step controller: predict to first order, solve,
 /// accept, or halve where the search fails, folds tissue or ends far from the prediction. It gives
 /// up where steps have been halved to the end, or where most evaluations go into steps that are
-/// made again. All members collective.
+/// made again. With contact, load 1 is reached from load 0 in automatic steps, whatever steps are
+/// requested in between: where several rest positions exist, the requested steps do not choose.
+/// All members collective.
 class LoadPath {
  public:
   using OnStep = std::function<void(const Outcome&, double load, double seconds)>;
@@ -77,11 +80,16 @@ class LoadPath {
     double miss = 0;      // largest distance of the end from the prediction, mm
     int64_t evaluations = 0;
   };
-  double longest_step() const;
+  double automatic_step() const;
+  double requested_step() const;
+  bool ends_in_automatic_steps() const;
   int64_t inverted(Vec displacement);
   Attempt attempt(Vec displacement, double load);
   bool follows(const Attempt& now, const std::optional<Attempt>& coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
+  void follow(Vec displacement, double longest, double end, const OnStep& on_step);
+  void follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
+                    const OnStep& on_step);
   void leap(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
   void take_back(const Attempt& tried, Vec displacement);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace repose::solve {
 
@@ -21,10 +22,15 @@ struct Iteration {
 inline constexpr const char* stopped_reason =
     "stopped before it was done, by a signal or the time limit";
 
-/// Another rest position of the same load.
+/// Another rest position of the same load, of more energy.
 struct OtherRest {
   double distance = 0;   ///< mm, the largest of the skin from the one that was chosen
   double place[3] = {};  ///< mm, where on the initial skin
+};
+
+/// Multipliers of contact between two searches, N/mm².
+struct ContactPressures {
+  std::vector<double> bodies, cut_faces;  ///< this rank's points at bodies and of cut faces
 };
 
 /// Outcome of a search for the rest position at one load.
@@ -59,6 +65,10 @@ class RestSearch {
   /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
   /// `displacement`, from which the path continues. Collective.
   virtual void go_back(Vec /*displacement*/) {}
+  /// What the next search begins with, besides a displacement.
+  virtual ContactPressures pressures() const { return {}; }
+  /// Sets what the next search begins with. Collective.
+  virtual void set_pressures(const ContactPressures& /*to*/) {}
 };
 
 }  // namespace repose::solve
