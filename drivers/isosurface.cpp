@@ -14,13 +14,16 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
+#include "repose/base/whole_file.h"
 #include "repose/imaging/extract.h"
 #include "repose/imaging/volume_filter.h"
+#include "repose/scene/landmark_names.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/write.h"
 #include "repose/tools/bone_separation/part_bones.h"
+#include "repose/tools/bone_separation/propose_points.h"
 
 namespace {
 
@@ -49,6 +52,8 @@ std::vector<base::Option> option_table() {
            .default_text = "",
            .help = "Points in one bone, and in another that touches it: NAME_1.ply, NAME_2.ply.",
            .values = 2},
+          {"jaw", OptionKind::flag, "",
+           "Skull and jaw of a head in LPS: points for -apart proposed, and written beside."},
           {.name = "box",
            .kind = OptionKind::number,
            .default_text = "",
@@ -158,7 +163,24 @@ std::vector<Vec3> points_in(const std::string& file) {
   return points;
 }
 
-/// A surface of each of two bones that touch.
+/// Points in skull and jaw, written beside the meshes so that a person may correct them.
+std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, double level,
+                                              const std::string& output) {
+  auto points = tools::bone_separation::propose_points(volume, level);
+  for (int part = 0; part < 2; ++part) {
+    scene::Landmarks named;
+    for (size_t n = 0; n < points[part].size(); ++n)
+      named[fmt::format("{}-{:03}", part == 0 ? "skull" : "jaw", n + 1)] = points[part][n];
+    const std::filesystem::path file =
+        std::filesystem::path(numbered(output, part + 1)).replace_extension(".mrk.json");
+    base::write_whole_file(file, scene::markups_text(named));
+    std::printf("%s: %zu points proposed in the %s\n", file.c_str(), points[part].size(),
+                part == 0 ? "skull" : "jaw");
+  }
+  return points;
+}
+
+/// A surface of each of two bones that touch; `files` of points may be empty.
 void write_apart(const imaging::Volume& volume, imaging::Extraction wanted,
                  const std::vector<std::string>& files, const std::string& output) {
   if (wanted.otsu) wanted.level = imaging::otsu_level(volume);
@@ -166,7 +188,9 @@ void write_apart(const imaging::Volume& volume, imaging::Extraction wanted,
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("parting the bones", -1);
   const tools::bone_separation::PartedBones bones = tools::bone_separation::part_bones(
-      volume, *wanted.level, {points_in(files[0]), points_in(files[1])});
+      volume, *wanted.level,
+      files.empty() ? write_points(volume, *wanted.level, output)
+                    : std::array{points_in(files[0]), points_in(files[1])});
   progress.clear();
   std::printf("  parted where voxels share %.0f mm²\n", bones.cut_area);
   for (int part = 0; part < 2; ++part)
@@ -177,18 +201,24 @@ void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
   imaging::Extraction wanted = wanted_of(options);
-  const bool all = options.flag("labels"), apart = options.has("apart");
+  const bool all = options.flag("labels"), apart = options.has("apart") || options.flag("jaw");
   if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
     base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
+  if (options.has("apart") && options.flag("jaw"))
+    base::refuse("repose-isosurface: give one of -apart and -jaw");
   if (apart && (all || wanted.label))
-    base::refuse("repose-isosurface: -apart goes with -level or -otsu: labels are apart already");
+    base::refuse(
+        "repose-isosurface: -apart and -jaw go with -level or -otsu: labels are apart already");
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("reading", -1);
   const imaging::Volume volume = imaging::read_volume(
       options.arguments()[0], [&](double done) { progress.show("reading slices", done); });
   progress.clear();
   print_volume(volume);
-  if (apart) return write_apart(volume, wanted, options.texts("apart"), output);
+  if (apart)
+    return write_apart(volume, wanted,
+                       options.flag("jaw") ? std::vector<std::string>{} : options.texts("apart"),
+                       output);
   if (!all) return write_one(volume, wanted, output);
   const auto labels = imaging::labels_of(volume);
   if (labels.empty()) base::refuse("{}: holds no label, only 0", volume.name);

@@ -3,19 +3,20 @@
 
     drivers/plan.py head.mhd labels.nii.gz -operation "Le Fort I, 5 mm forward, 2 up" -output plan
     drivers/plan.py head.seg.nrrd -operation "genioplasty, 8 mm forward" -output plan
-    drivers/plan.py ct.nii.gz -apart skull.mrk.json jaw.mrk.json -operation "open the jaw by 8 degrees"
+    drivers/plan.py ct.nii.gz -operation "open the jaw by 8 degrees" -output plan
 
 VOLUME is a CT or a segmentation of 3D Slicer (.seg.nrrd), whose segments' names decide what is skin,
-skull, maxilla and mandible; LABELS a label map or segmentation of the bones of a CT. Writes into the
-folder plan: surfaces, landmarks with a picture, scene.yaml to edit, and the solved face with a
-picture. Operations: Le Fort I, sagittal split, genioplasty, jaw; each with movements in mm (forward,
+skull, maxilla and mandible; LABELS a label map or segmentation of the bones of a CT. Without it skull
+and jaw are taken apart where they touch least. Writes into the folder plan: surfaces, landmarks,
+scene.yaml to edit, pictures of both (landmarks.svg, proposal.png), and the solved face with a picture. Operations: Le Fort I, sagittal split, genioplasty, jaw; each with movements in mm (forward,
 back, up, down, left, right) and degrees (open, close, yaw, roll).
 
   -level HU    of the skin in a CT (-300)
-  -apart SKULL JAW    points in the two bones of a CT without LABELS (docs/guide/touching_bones.md)
+  -apart SKULL JAW    points in the two bones of a CT without LABELS, in the place of those that are
+                      proposed (docs/guide/touching_bones.md)
   -bone HU     level of bone there (226)
   -edge MM     of the mesh that is solved (4);  -ranks N  that solve it (2)
-  -propose     ends with the scene and the picture of the landmarks, before it is solved
+  -propose     ends with the scene and its pictures, before it is solved
 
 After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face."""
 
@@ -27,6 +28,7 @@ import re
 import subprocess
 import sys
 import time
+import zlib
 
 try:
     import numpy as np
@@ -34,8 +36,10 @@ except ImportError as missing:
     sys.exit(f"plan.py: {missing.name} is missing: apt-get install python3-numpy")
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROLES = {"skin": r"skin|soft|face", "mandible": r"mandib|lower.?jaw", "maxilla": r"maxill|upper.?jaw",
-         "skull": r"skull|crani|bone"}
+TEETH = r"(teeth|tooth|dent)"
+ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
+         "maxilla": r"maxill|upper.?jaw", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
+OUTSIDE = r"table|head.?rest|background|^air$"
 OPERATIONS = (r"le ?fort|maxill", r"genio|chin", r"split|bsso", r"jaw|mandib|open")
 NEEDED = ("skin", "skull", "mandible")
 DIRECTIONS = {"forward": (0, -1, 0), "advance": (0, -1, 0), "back": (0, 1, 0), "setback": (0, 1, 0),
@@ -69,31 +73,74 @@ def run(*command):
     return status
 
 
+def draw(script, *arguments):
+    """Name of the picture that a script of this folder draws, to follow others; where it cannot, says
+    why, and there is none."""
+    command = [sys.executable, script, *arguments]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if done.returncode == 0:
+        return f", {arguments[-1]}"
+    print(f"no picture: {done.stderr.strip()}", flush=True)
+    return ""
+
+
 class Landmarks(dict):
     def __missing__(self, name):
         refuse(f"landmark {name} was not found, and the operation needs it: place it in 3D Slicer, and give "
                "it to repose-landmarks by -landmarks")
 
 
-def slicer_segments(file):
-    """Name and label of each segment of a .seg.nrrd, from its header."""
-    header = file.read_bytes()[:1 << 20].split(b"\n\n")[0].decode(errors="replace")
-    if re.search(r"^dimension:\s*4", header, re.M):
-        refuse(f"{file}: its segments overlap (several layers); export it from 3D Slicer as one label map")
-    key = dict(re.findall(r"^(Segment\d+_\w+):=(.*?)\s*$", header, re.M))
-    return {key[name]: int(key[name.replace("_Name", "_LabelValue")])
-            for name in key if name.endswith("_Name")}
+class Segmentation:
+    """A segmentation of 3D Slicer (.seg.nrrd): labels in one or several layers, with names."""
 
+    def __init__(self, file):
+        self.file = file
+        begin, _, data = file.read_bytes().partition(b"\n\n")
+        self.header = begin.decode(errors="replace").replace("\r", "")
+        fields = dict(re.findall(r"^([a-z ]+): *(.*?) *$", self.header, re.M))
+        keys = dict(re.findall(r"^(Segment\d+_\w+):=(.*?)\s*$", self.header, re.M))
+        sizes = [int(n) for n in fields["sizes"].split()]
+        kinds = {"unsigned char": "u1", "uchar": "u1", "uint8": "u1", "short": "i2", "unsigned short": "u2",
+                 "int": "i4", "signed char": "i1"}
+        if "data file" in fields or fields.get("encoding") not in ("raw", "gzip", "gz") \
+                or fields["type"] not in kinds or len(sizes) not in (3, 4):
+            refuse(f"{file}: not as 3D Slicer writes it: save it again as .seg.nrrd")
+        order = ">" if fields.get("endian") == "big" else "<"
+        raw = data if fields["encoding"] == "raw" else zlib.decompressobj(31).decompress(data)
+        values = np.frombuffer(raw, order + kinds[fields["type"]], int(np.prod(sizes)))
+        self.layers = values.reshape(-1, sizes[0] if len(sizes) == 4 else 1)  # voxels, layers
+        self.sizes = sizes[-3:]
+        self.segments = {keys[key]: (int(keys.get(key.replace("_Name", "_Layer"), 0)),
+                                     int(keys[key.replace("_Name", "_LabelValue")]))
+                         for key in keys if key.endswith("_Name")}
 
-def roles_of(file):
-    """Role and label of the segments that a plan needs."""
-    segments = slicer_segments(file)
-    found = {}
-    for role, words in ROLES.items():
-        for name, label in segments.items():
-            if re.search(words, name.lower()) and label not in found.values():
-                found.setdefault(role, label)
-    return found
+    def roles(self):
+        """Names of the segments of each role that a plan needs; the skin holds all that it surrounds."""
+        found = {}
+        for name in self.segments:
+            role = next((role for role, words in ROLES.items() if re.search(words, name.lower())), None)
+            found.setdefault(role, []).append(name)
+        upper = found.pop("upper teeth", [])
+        if upper:
+            found.setdefault("maxilla" if "maxilla" in found else "skull", []).extend(upper)
+        if "skin" in found:
+            found["skin"] = [name for name in self.segments if not re.search(OUTSIDE, name.lower())]
+        found.pop(None, None)
+        return found
+
+    def write(self, names, file):
+        """A label map of the segments together, as label 1."""
+        mask = np.zeros(len(self.layers), "u1")
+        for name in names:
+            layer, label = self.segments[name]
+            mask |= self.layers[:, layer] == label
+        fields = {key: value for key, value in re.findall(r"^(space[a-z ]*): *(.*?) *$", self.header, re.M)}
+        fields["space directions"] = fields["space directions"].removeprefix("none").strip()
+        text = "NRRD0004\ntype: unsigned char\ndimension: 3\n"
+        text += "".join(f"{key}: {fields[key]}\n" for key in ("space",) if key in fields)
+        text += f"sizes: {' '.join(map(str, self.sizes))}\nencoding: raw\n"
+        text += "".join(f"{key}: {value}\n" for key, value in fields.items() if key != "space")
+        file.write_bytes(text.encode() + b"\n" + mask.tobytes())
 
 
 def bounds(file):
@@ -109,11 +156,15 @@ def bounds(file):
 def extract_labels(labels, folder):
     """A mesh of each label; without names the largest is the skull, and that before and below its
     middle the mandible."""
-    roles = roles_of(labels) if labels.name.endswith(".seg.nrrd") else {}
-    if roles:
-        for role, label in roles.items():
-            run(program("repose-isosurface"), labels, "-label", label, "-largest", "-voxel", 2,
-                "-output", folder / f"{role}.ply")
+    if labels.name.endswith(".seg.nrrd"):
+        segmentation = Segmentation(labels)
+        map_file = folder / "segment.nrrd"
+        for role, names in segmentation.roles().items():
+            print(f"{role}: {', '.join(names)}", flush=True)
+            segmentation.write(names, map_file)
+            run(program("repose-isosurface"), map_file, "-label", 1, "-largest", "-voxel", 2, "-output",
+                folder / f"{role}.ply")
+        map_file.unlink(missing_ok=True)
         return
     run(program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output",
         folder / "label.ply")
@@ -130,9 +181,10 @@ def extract_labels(labels, folder):
 
 
 def extract_bones(volume, options, folder):
-    """Skull and mandible of a CT, taken apart from points in each."""
-    run(program("repose-isosurface"), volume, "-level", options.bone, "-apart", *options.apart,
-        "-largest", "-voxel", 2, "-output", folder / "bone.ply")
+    """Skull and mandible of a CT, taken apart from points in each, proposed or given."""
+    points = ["-apart", *options.apart] if options.apart else ["-jaw"]
+    run(program("repose-isosurface"), volume, "-level", options.bone, *points, "-largest", "-voxel", 2,
+        "-output", folder / "bone.ply")
     (folder / "bone_1.ply").rename(folder / "skull.ply")
     (folder / "bone_2.ply").rename(folder / "mandible.ply")
 
@@ -262,9 +314,6 @@ def main():
         if not file.exists():
             refuse(f"{file}: no such file or folder")
     alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
-    if alone and not options.apart:
-        refuse(f"{volume}: a CT does not tell skull from jaw: add a label map, or -apart SKULL JAW with "
-               "points in each (docs/guide/touching_bones.md)")
     movements_or_refuse(options.operation)
     folder.mkdir(parents=True, exist_ok=True)
     segmented = volume.name.endswith(".seg.nrrd")
@@ -283,13 +332,15 @@ def main():
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
     scene.write_text(scene_text(options, read_landmarks(folder / "landmarks.mrk.json"), bones))
-    print(f"proposed: {scene}, {folder / 'landmarks.svg'} ({time.monotonic() - begin:.0f} s)", flush=True)
+    picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")
+    print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): look at "
+          "the pictures", flush=True)
     if options.propose:
         return
     status = run("mpirun", "-n", options.ranks, program("repose-solve"), scene, "-output",
                  folder / "face")
-    run(sys.executable, HERE / "render.py", folder / "face")
-    print(f"solved: {folder / 'face.h5'}, {folder / 'face.png'} ({time.monotonic() - begin:.0f} s)")
+    picture = draw(HERE / "render.py", folder / "face", "-output", folder / "face.png")
+    print(f"solved: {folder / 'face.h5'}{picture} ({time.monotonic() - begin:.0f} s)")
     return status
 
 

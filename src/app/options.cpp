@@ -86,7 +86,8 @@ std::vector<base::Option> run_options() {
       {"allow_folded", OptionKind::flag, "",
        "Take a rest position with tissue inside out (else exit status 2)."},
       {"dry_run", OptionKind::flag, "",
-       "Build and report the model and how it would be solved; solve nothing."},
+       "Build and report the model and how it would be solved; solve nothing. With -output, write "
+       "NAME_solved_skin.ply."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
       {.name = "checkpoint_interval",

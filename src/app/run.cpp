@@ -353,6 +353,16 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
 
+/// Writes the skin that a job solves, with its border, to NAME_solved_skin.ply. Collective.
+std::string write_solved_skin(const Job& job, const std::string& name) {
+  const std::string file = name + "_solved_skin.ply";
+  base::on_first_rank(comm, [&] {
+    if (!job.anatomy) base::refuse("-output: a model file has no skin to write with -dry_run");
+    surface::write_surface(file, job.anatomy->skin);
+  });
+  return report_row("solved skin", file);
+}
+
 base::Exit run_input(const base::Options& options, const std::filesystem::path& input) {
   base::Stages stages(comm);
   const bool dry = options.flag("dry_run");
@@ -370,6 +380,7 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
     say(job.building + describe_model(counts_of(job)) + describe_warnings(job.warnings) +
         strategy.explanation);
   if (dry) {
+    if (options.has("output")) say(write_solved_skin(job, options.text("output")));
     say(describe_stages(stages));
     return base::Exit::done;
   }

@@ -24,7 +24,8 @@ CHIN, BODY = [(2, -297, 338)], [(-25, -270, 345), (28, -270, 345)]
 RAMI, CONDYLES = [(-46, -215, 380), (51, -215, 380)], [(-50, -208, 399), (51, -203, 400)]
 JAWS = {"1 point in the jaw, in the chin": CHIN,
         "5 points, none in the condyles": CHIN + BODY + RAMI,
-        "7 points": CHIN + BODY + RAMI + CONDYLES}
+        "7 points": CHIN + BODY + RAMI + CONDYLES,
+        "points proposed by `-jaw`": []}
 SKULL = [(-6, -294, 418), (-37, -250, 424), (43, -249, 420), (0, -209, 430)]
 PLANES = [((2, -285, 371), 48), ((-50, -205, 402), 14), ((50, -205, 402), 14)]
 HEAD = ("| cut by | voxels share, mm² | jaw, cm³ | of the reference within, mm: 95 % "
@@ -59,9 +60,9 @@ def rows(chosen):
         write_points(folder / "skull.mrk.json", SKULL)
         for way, points in JAWS.items():
             write_points(folder / "jaw.mrk.json", points)
-            done = run([chosen.bin / "repose-isosurface", ct, "-level", 226, "-apart",
-                        "skull.mrk.json", "jaw.mrk.json", "-largest", "-output", "bone.ply"],
-                       folder, ends=(0,))
+            ends = ["-apart", "skull.mrk.json", "jaw.mrk.json"] if points else ["-jaw"]
+            done = run([chosen.bin / "repose-isosurface", ct, "-level", 226, *ends, "-largest", "-output",
+                        "bone.ply"], folder, ends=(0,))
             shared = re.search(r"voxels share (\d+) mm²", done.text)[1]
             volume = float(re.findall(r"volume (\S+) mm³", done.text)[1])
             off = cKDTree(meshio.read(folder / "bone_2.ply").points).query(reference)[0]

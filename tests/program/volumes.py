@@ -127,3 +127,42 @@ def write_dicom(folder, values, step=None, **options):
         name = f"{(37 * k) % 101:03}_{options.get('series', '')}.dcm"
         write_slice(folder / name, slice_values, ORIGIN + k * step, number=k + 1, **options)
     return folder
+
+
+def voxels_inside(points, triangles, origin, spacing, size):
+    """Which voxels [k, j, i] lie inside a closed surface: those behind an odd number of crossings of
+    their line along y."""
+    columns = [origin[a] + spacing * np.arange(size[a]) + 1.7e-4 for a in range(3)]
+    crossings = np.zeros((size[2], size[1] + 1, size[0]), int)
+    for a, b, c in points[triangles]:
+        (i0, k0), (i1, k1) = (np.clip(np.ceil((f([a, b, c], axis=0)[[0, 2]] - (origin[0], origin[2]) - 1.7e-4)
+                                              / spacing), 0, (size[0], size[2])).astype(int)
+                              for f in (np.min, np.max))
+        if i0 >= i1 or k0 >= k1:
+            continue
+        x, z = np.meshgrid(columns[0][i0:i1], columns[2][k0:k1])
+        area = (b[0] - a[0]) * (c[2] - a[2]) - (c[0] - a[0]) * (b[2] - a[2])
+        if area == 0:
+            continue
+        v = ((x - a[0]) * (c[2] - a[2]) - (c[0] - a[0]) * (z - a[2])) / area
+        w = ((b[0] - a[0]) * (z - a[2]) - (x - a[0]) * (b[2] - a[2])) / area
+        hit = (v >= 0) & (w >= 0) & (v + w <= 1)
+        y = (1 - v - w) * a[1] + v * b[1] + w * c[1]
+        j = np.clip(np.ceil((y - columns[1][0]) / spacing), 0, size[1]).astype(int)
+        k, i = np.nonzero(hit)
+        np.add.at(crossings, (k + k0, j[hit], i + i0), 1)
+    return np.cumsum(crossings, axis=1)[:, :-1] % 2 == 1
+
+
+def write_segmentation(file, labels, names, origin, spacing):
+    """A segmentation of 3D Slicer of one layer, LPS; label n + 1 has the n-th name."""
+    text = "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: left-posterior-superior\n"
+    text += f"sizes: {' '.join(map(str, labels.shape[::-1]))}\n"
+    text += f"space directions: ({spacing},0,0) (0,{spacing},0) (0,0,{spacing})\n"
+    text += "kinds: domain domain domain\nencoding: gzip\n"
+    text += f"space origin: ({','.join(map(str, origin))})\n"
+    for n, name in enumerate(names):
+        text += (f"Segment{n}_ID:=Segment_{n + 1}\nSegment{n}_LabelValue:={n + 1}\n"
+                 f"Segment{n}_Layer:=0\nSegment{n}_Name:={name}\n")
+    file.write_bytes(text.encode() + b"\n" + gzip.compress(labels.astype("u1").tobytes(), 1))
+    return file

@@ -1,0 +1,267 @@
+#!/usr/bin/env python3
+"""A picture of a scene before it is solved: what is cut, moved, solved and held.
+
+    drivers/proposal.py plan/scene.yaml [-output plan/proposal.png]
+
+Upper row: bones (ivory), the pieces that move where they are (gray) and where they go (orange), planes
+of cuts (blue), landmarks with their short names. Lower row: the skin, the part that is solved (green),
+its border (black), the parting of the lips (red), boxes (blue). Needs what drivers/render.py needs, and
+PyYAML; surfaces of a scene are files, not volumes.
+"""
+
+import argparse
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import plan  # noqa: E402
+import render  # noqa: E402
+
+ORANGE, BLUE, GREEN, RED = (0.93, 0.53, 0.18), (0.20, 0.45, 0.80), (0.30, 0.68, 0.55), (0.80, 0.12, 0.15)
+WIDE, MARGIN, PLANE = 620, 1.1, 42  # pixels; beside the head; mm, half the side of a plane's square
+SHORT = {"nasion_bone": "N", "nasal_spine": "ANS", "a_point": "A", "upper_incisor_edge": "U1",
+         "lower_incisor_edge": "L1", "b_point": "B", "pogonion_bone": "Pog", "menton_bone": "Me",
+         "condyle_right_center": "Co", "condyle_left_center": "Co", "gonion_right": "Go",
+         "gonion_left": "Go"}
+
+
+def refuse(message):
+    sys.exit(f"proposal.py: {message}")
+
+
+def read_mesh(file):
+    reader = {".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader, ".obj": vtk.vtkOBJReader,
+              ".vtp": vtk.vtkXMLPolyDataReader}[pathlib.Path(file).suffix.lower()]()
+    reader.SetFileName(str(file))
+    reader.Update()
+    return reader.GetOutput()
+
+
+def read_scene(file):
+    try:
+        import yaml
+    except ImportError:
+        refuse("PyYAML is missing: apt-get install python3-yaml, or pip install pyyaml")
+    try:
+        return yaml.safe_load(file.read_text())
+    except (OSError, yaml.YAMLError) as reason:
+        refuse(f"{file}: {' '.join(str(reason).split())}")
+
+
+def transform_of(moves, bone):
+    """All moves of a bone one after another, as repose-solve takes them."""
+    total = vtk.vtkTransform()
+    total.PostMultiply()
+    for move in moves:
+        if move.get("bone") != bone:
+            continue
+        if "translate" in move:
+            total.Translate(*move["translate"])
+        if "rotate" in move:
+            turn = move["rotate"]
+            total.Translate(*(-x for x in turn["center"]))
+            total.RotateWXYZ(turn["angle"], *turn["axis"])
+            total.Translate(*turn["center"])
+    return total
+
+
+def moved(mesh, transform):
+    made = vtk.vtkTransformFilter()
+    made.SetInputData(mesh)
+    made.SetTransform(transform)
+    made.Update()
+    return made.GetOutput()
+
+
+def run(*command):
+    try:
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    except OSError as reason:
+        refuse(f"{command[0]}: {reason.strerror}")
+    if done.returncode:
+        refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
+
+
+def parts_of(scene, file, work):
+    """Mesh of each bone and piece after the cuts, by name."""
+    names = {bone["name"]: file.parent / bone["file"] for bone in scene["bones"] if "file" in bone}
+    if scene.get("osteotomies"):
+        run(plan.program("repose-osteotomy"), file, "-output", work / "cut")
+        names |= {made.stem.removeprefix("cut_"): made for made in work.glob("cut_*.ply")}
+    return {name: read_mesh(path) for name, path in names.items()}
+
+
+def square(at, normal):
+    """A plane of a cut as a square about its point."""
+    normal = np.array(normal) / np.linalg.norm(normal)
+    side = np.cross(normal, (1, 0, 0) if abs(normal[0]) < 0.9 else (0, 1, 0))
+    side /= np.linalg.norm(side)
+    up = np.cross(normal, side)
+    source = vtk.vtkPlaneSource()
+    corner = np.array(at) - PLANE * (side + up)
+    source.SetOrigin(*corner)
+    source.SetPoint1(*(corner + 2 * PLANE * side))
+    source.SetPoint2(*(corner + 2 * PLANE * up))
+    source.Update()
+    return source.GetOutput()
+
+
+def tube(drawn, radius):
+    made = vtk.vtkTubeFilter()
+    made.SetInputData(drawn)
+    made.SetRadius(radius)
+    made.SetNumberOfSides(12)
+    made.Update()
+    return made.GetOutput()
+
+
+def polyline(points):
+    source = vtk.vtkLineSource()
+    line = vtk.vtkPoints()
+    for point in points:
+        line.InsertNextPoint(*point)
+    source.SetPoints(line)
+    source.Update()
+    return source.GetOutput()
+
+
+def border(mesh):
+    edges = vtk.vtkFeatureEdges()
+    edges.SetInputData(mesh)
+    edges.BoundaryEdgesOn()
+    edges.FeatureEdgesOff()
+    edges.NonManifoldEdgesOff()
+    edges.ManifoldEdgesOff()
+    edges.ColoringOff()
+    edges.Update()
+    return edges.GetOutput()
+
+
+def ball(at, radius):
+    source = vtk.vtkSphereSource()
+    source.SetCenter(*at)
+    source.SetRadius(radius)
+    source.SetThetaResolution(20)
+    source.SetPhiResolution(20)
+    source.Update()
+    return source.GetOutput()
+
+
+def name_tag(text, at):
+    shown = vtk.vtkBillboardTextActor3D()
+    shown.SetInput(text)
+    shown.SetPosition(*at)
+    shown.SetDisplayOffset(9 * render.SUPER, 2 * render.SUPER)
+    style = shown.GetTextProperty()
+    style.SetFontSize(16 * render.SUPER)
+    style.SetColor(RED)
+    style.BoldOn()
+    style.SetBackgroundColor(1, 1, 1)
+    style.SetBackgroundOpacity(0.6)
+    return shown
+
+
+def box_edges(box):
+    source = vtk.vtkOutlineSource()
+    source.SetBounds(*(box[side + axis] for axis in range(3) for side in (0, 3)))
+    source.Update()
+    return source.GetOutput()
+
+
+def boxes_of(scene):
+    entries = [scene.get("skin"), scene.get("tissue", {}).get("face"), *scene["bones"]]
+    boxes = [entry["box"] for entry in entries if isinstance(entry, dict) and "box" in entry]
+    return [box if len(box) == 6 else [*box[0], *box[1]] for box in boxes]
+
+
+def bones_drawn(scene, file, parts, marks):
+    """Bones, pieces before and after, planes; and before them the landmarks."""
+    drawn, moves = [], scene.get("moves") or []
+    for name, mesh in parts.items():
+        transform = transform_of(moves, name)
+        if transform.GetNumberOfConcatenatedTransforms() == 0:
+            drawn.append(render.actor(mesh, render.IVORY))
+            continue
+        drawn += [render.actor(mesh, render.GREY, opacity=0.35),
+                  render.actor(moved(mesh, transform), ORANGE)]
+    for cut in scene.get("osteotomies") or []:
+        for plane in cut.get("planes") or []:
+            side = square(plane["point"], plane["normal"])
+            drawn += [render.actor(side, BLUE, opacity=0.25), render.actor(tube(border(side), 0.5), BLUE)]
+    return drawn, [shown for name, at in marks.items() if name in SHORT
+                   for shown in (render.actor(ball(at, 1.6), RED), name_tag(SHORT[name], at))]
+
+
+def skin_drawn(scene, skin, solved):
+    """The skin, before it what of it is solved and its border, before that lips and boxes."""
+    drawn = [render.actor(solved, GREEN), render.actor(tube(border(solved), 0.8), render.INK)]
+    lines = [render.actor(tube(box_edges(box), 0.6), BLUE) for box in boxes_of(scene)]
+    mouth = scene.get("mouth")
+    if mouth and "path" in mouth:
+        lines.append(render.actor(tube(polyline(mouth["path"]), 1.0), RED))
+    return [render.actor(skin, render.SKIN)], drawn, lines
+
+
+def draw(rows, frame, legend, output):
+    views = list(render.VIEWS)
+    extents = [render.extent(frame, view) for view in views]
+    scale = WIDE / (2 * MARGIN * max(across for _, across, _ in extents))
+    high = 2 * MARGIN * max(up for _, _, up in extents) * scale
+    sheet = render.Sheet(WIDE * len(views), 2 * (render.TITLE + high))
+    sheet.window.SetNumberOfLayers(3)
+    for r, (make, title) in enumerate(zip(rows, legend)):
+        top = r * (render.TITLE + high)
+        sheet.put(render.label(title), 0, top, sheet.width, render.TITLE)
+        for i, (view, (middle, _, _)) in enumerate(zip(views, extents)):
+            for layer, shown in enumerate(make()):
+                scene = render.renderer(shown)
+                scene.SetLayer(layer)
+                sheet.put(scene, i * WIDE, top + render.TITLE, WIDE, high)
+                render.look(scene, view, middle, high / scale / 2)
+    render.write_picture(sheet.pixels(), str(output))
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="proposal.py", description=__doc__, add_help=False,
+                                     allow_abbrev=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.error = refuse
+    parser.add_argument("-help", action="help")
+    parser.add_argument("scene", type=pathlib.Path)
+    parser.add_argument("-output", type=pathlib.Path)
+    chosen = parser.parse_args()
+    if not chosen.scene.is_file():
+        refuse(f"{chosen.scene}: no such file")
+    chosen.output = (chosen.output or chosen.scene.with_name("proposal.png")).absolute()
+    return chosen
+
+
+def main():
+    global np, vtk
+    chosen = arguments()
+    render.find_screen()
+    render.load_modules()
+    np, vtk = render.np, render.vtk
+    file = chosen.scene
+    scene = read_scene(file)
+    if not isinstance(scene.get("skin"), str):
+        refuse(f"{file}: its skin is no file; make one with repose-isosurface")
+    marks = plan.read_landmarks(file.parent / scene["landmarks"]) if "landmarks" in scene else {}
+    with tempfile.TemporaryDirectory() as folder:
+        work = pathlib.Path(folder)
+        parts = parts_of(scene, file, work)
+        run(plan.program("repose-solve"), file, "-dry_run", "-output", work / "model")
+        solved = read_mesh(work / "model_solved_skin.ply")
+    skin = read_mesh(file.parent / scene["skin"])
+    frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
+                            for mesh in (*parts.values(), solved)])
+    draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved)),
+         frame, ("bones; moved pieces (orange), cuts (blue), landmarks",
+                 "solved skin (green), its border, lips (red)"), chosen.output)
+    print(chosen.output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,17 @@
+#pragma once
+#include "repose/imaging/volume.h"
+
+/// Points in the skull and in the jaw of a CT, found without a person.
+namespace repose::tools::bone_separation {
+
+using imaging::Volume;
+
+/// Proposes points in the skull and in the jaw, mm, LPS, as part_bones() takes them. The head is
+/// upright within some 25 degrees, in LPS. The chin is the lowest bone behind the front of the
+/// face, the occlusal plane that of the densest values above it. Without a slab at the teeth, the
+/// level of bone is raised until the chin's component leaves the skull: this is where the joints
+/// part. Points lie in that component, up to the condyles, and in what is left above the teeth.
+/// Throws InputError where the volume holds no chin, or the chin's component no condyle.
+std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level);
+
+}  // namespace repose::tools::bone_separation

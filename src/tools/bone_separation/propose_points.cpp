@@ -1,0 +1,230 @@
+#include "repose/tools/bone_separation/propose_points.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "repose/base/error.h"
+
+namespace repose::tools::bone_separation {
+namespace {
+
+// Sizes of heads, mm.
+constexpr double profile_width = 15;  // of the profile, on either side of the middle
+constexpr double chin_depth = 35;     // the chin lies at most this far behind the front
+constexpr double teeth_height[] = {25, 70}, teeth_depth = 45, teeth_width = 30;
+constexpr double slab_half = 6, slab_depth = 55, slab_width = 36;
+constexpr double jaw_height = 110;                    // above the lowest point of the chin
+constexpr double jaw_volume = 150000;                 // mm³
+constexpr double joint_height = 8, joint_width = 25;  // the least of a jaw beyond the teeth
+constexpr double level_step = 40, most_steps = 40;    // HU
+constexpr double spacing[] = {25, 10};                // of points in skull and jaw
+constexpr double apart = 14;                          // skull's points from the jaw
+
+using Cell = std::array<int64_t, 3>;
+
+Cell cell_of(const Vec3& point, double size) {
+  Cell cell;
+  for (int axis = 0; axis < 3; ++axis)
+    cell[axis] = static_cast<int64_t>(std::floor(point[axis] / size));
+  return cell;
+}
+
+/// Bone of a head: where its chin and teeth are, and what hangs together at higher levels.
+class Head {
+ public:
+  Head(const Volume& volume, double level) : volume_(volume), level_(level) {
+    for (size_t v = 0; v < volume.values.size(); ++v)
+      if (volume.values[v] >= level) bone_.push_back(static_cast<int64_t>(v));
+    if (bone_.empty())
+      base::refuse("{}: no value is {:g} or more; choose the level of bone", volume.name, level);
+    find_middle();
+    find_chin();
+    find_teeth();
+  }
+
+  /// The chin's component without the slab at the teeth, at the lowest level at which it is no part
+  /// of the skull; empty: there is none. Sets the level.
+  std::vector<int64_t> part_jaw() {
+    for (int step = 0; step < most_steps; ++step, level_ += level_step)
+      if (std::vector<int64_t> jaw = flood(); !jaw.empty()) return jaw;
+    return {};
+  }
+
+  bool has_joints(const std::vector<int64_t>& jaw) const {
+    std::array<bool, 2> found{};
+    for (const int64_t voxel : jaw) {
+      const Vec3 at = center(voxel);
+      if (above_teeth(at) > joint_height && std::abs(at.x() - middle_) > joint_width)
+        found[at.x() > middle_] = true;
+    }
+    return found[0] && found[1];
+  }
+
+  /// One voxel inside bone in each cell of a grid, of those in `voxels`.
+  std::vector<Vec3> thinned(const std::vector<int64_t>& voxels, double size) const {
+    std::map<Cell, Vec3> points;
+    for (const int64_t voxel : voxels)
+      if (is_inside(voxel)) points.try_emplace(cell_of(center(voxel), size), center(voxel));
+    std::vector<Vec3> result;
+    for (const auto& [cell, point] : points) result.push_back(point);
+    return result;
+  }
+
+  /// Bone above the teeth and not near the jaw.
+  std::vector<int64_t> skull(const std::vector<int64_t>& jaw) const {
+    std::set<Cell> near;
+    for (const int64_t voxel : jaw) {
+      const Cell cell = cell_of(center(voxel), apart);
+      for (int n = 0; n < 27; ++n)
+        near.insert({cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 - 1});
+    }
+    std::vector<int64_t> voxels;
+    for (const int64_t voxel : bone_) {
+      const Vec3 at = center(voxel);
+      if (volume_.values[voxel] >= level_ && above_teeth(at) > apart &&
+          !near.contains(cell_of(at, apart)))
+        voxels.push_back(voxel);
+    }
+    return voxels;
+  }
+
+ private:
+  Vec3 center(int64_t voxel) const {
+    const auto& [columns, rows, slices] = volume_.size;
+    return volume_.origin + volume_.axes * Vec3(static_cast<double>(voxel % columns),
+                                                static_cast<double>(voxel / columns % rows),
+                                                static_cast<double>(voxel / columns / rows));
+  }
+
+  double above_teeth(const Vec3& at) const {
+    return at.z() - teeth_[0] - teeth_[1] * (at.y() - front_);
+  }
+
+  bool in_slab(const Vec3& at) const {
+    return std::abs(above_teeth(at)) < slab_half && at.y() < front_ + slab_depth &&
+           std::abs(at.x() - middle_) < slab_width;
+  }
+
+  template <class Visit>
+  void visit_neighbors(int64_t voxel, const Visit& visit) const {
+    int64_t stride = 1, rest = voxel;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int64_t i = rest % volume_.size[axis];
+      if (i > 0) visit(voxel - stride);
+      if (i + 1 < volume_.size[axis]) visit(voxel + stride);
+      stride *= volume_.size[axis];
+      rest /= volume_.size[axis];
+    }
+  }
+
+  bool is_inside(int64_t voxel) const {
+    int count = 0;
+    visit_neighbors(voxel, [&](int64_t other) { count += volume_.values[other] >= level_; });
+    return count == 6;
+  }
+
+  void find_middle() {
+    std::vector<double> across;
+    for (const int64_t voxel : bone_) across.push_back(center(voxel).x());
+    const auto half = across.begin() + static_cast<int64_t>(across.size() / 2);
+    std::nth_element(across.begin(), half, across.end());
+    middle_ = *half;
+  }
+
+  void find_chin() {
+    std::map<int64_t, double> profile;  // every 2 mm of height
+    front_ = std::numeric_limits<double>::infinity();
+    for (const int64_t voxel : bone_) {
+      const Vec3 at = center(voxel);
+      if (std::abs(at.x() - middle_) > profile_width) continue;
+      double& least = profile.try_emplace(std::llround(at.z() / 2), at.y()).first->second;
+      least = std::min(least, at.y());
+      front_ = std::min(front_, at.y());
+    }
+    for (const auto& [height, y] : profile)
+      if (y < front_ + chin_depth) {
+        chin_ = 2 * static_cast<double>(height);
+        return;
+      }
+  }
+
+  /// Fits height over depth of the densest twentieth of the bone where teeth are.
+  void find_teeth() {
+    std::vector<std::pair<float, Vec3>> values;
+    for (const int64_t voxel : bone_) {
+      const Vec3 at = center(voxel);
+      const double height = at.z() - chin_;
+      if (height > teeth_height[0] && height < teeth_height[1] && at.y() < front_ + teeth_depth &&
+          std::abs(at.x() - middle_) < teeth_width)
+        values.emplace_back(volume_.values[voxel], at);
+    }
+    if (values.size() < 100)
+      base::refuse(
+          "{}: no teeth above the chin, at height {:.0f} mm; does the CT hold the jaw, in LPS?",
+          volume_.name, chin_);
+    const size_t dense = values.size() / 20;
+    std::nth_element(values.begin(), values.begin() + static_cast<int64_t>(dense), values.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    double y = 0, z = 0, yy = 0, yz = 0;
+    const auto count = static_cast<double>(dense);
+    for (size_t i = 0; i < dense; ++i) {
+      const double depth = values[i].second.y() - front_, height = values[i].second.z();
+      y += depth / count;
+      z += height / count;
+      yy += depth * depth / count;
+      yz += depth * height / count;
+    }
+    const double slope = std::clamp((yz - y * z) / std::max(yy - y * y, 1.0), -0.4, 0.4);
+    teeth_ = {z - slope * y, slope};
+  }
+
+  /// The chin's component at the level; empty where it is none of a jaw.
+  std::vector<int64_t> flood() const {
+    std::vector<int64_t> found;
+    std::vector<bool> seen(volume_.values.size());
+    const auto add = [&](int64_t voxel) {
+      if (seen[voxel] || volume_.values[voxel] < level_ || in_slab(center(voxel))) return;
+      seen[voxel] = true;
+      found.push_back(voxel);
+    };
+    for (const int64_t voxel : bone_) {
+      const Vec3 at = center(voxel);
+      if (at.z() < chin_ + 15 && at.y() < front_ + chin_depth &&
+          std::abs(at.x() - middle_) < profile_width)
+        add(voxel);
+    }
+    const double voxel_volume = std::abs(volume_.axes.determinant());
+    for (size_t next = 0; next < found.size(); ++next) {
+      if (center(found[next]).z() > chin_ + jaw_height ||
+          static_cast<double>(found.size()) * voxel_volume > jaw_volume)
+        return {};
+      visit_neighbors(found[next], add);
+    }
+    return found;
+  }
+
+  const Volume& volume_;
+  double level_;
+  std::vector<int64_t> bone_;
+  double middle_ = 0, front_ = 0, chin_ = 0;  // mm: x, y, z
+  std::array<double, 2> teeth_{};  // height at the front, and slope, of the occlusal plane
+};
+
+}  // namespace
+
+std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level) {
+  Head head(volume, level);
+  const std::vector<int64_t> jaw = head.part_jaw();
+  if (jaw.empty() || !head.has_joints(jaw))
+    base::refuse(
+        "{}: the jaw was not found, because it is part of the skull at every level or lacks its "
+        "condyles; give points in skull and jaw (-apart)",
+        volume.name);
+  return {head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])};
+}
+
+}  // namespace repose::tools::bone_separation
