@@ -26,8 +26,9 @@ PLAN = {"mandible": {"translate": [0, -3, 0]}}
 @pytest.fixture(scope="module")
 def small(tmp_path_factory, environment):
     """A scene that is built in a moment: the shipped head on two layers, with its files."""
-    os.environ.update(environment)
-    folder = tmp_path_factory.mktemp("small")
+    folder, temporary = tmp_path_factory.mktemp("small"), str(tmp_path_factory.mktemp("temporary"))
+    os.environ.update(environment, REPOSE_STARTED_BY=str(os.getpid()), TMPDIR=temporary,
+                      OMPI_MCA_btl_vader_backing_directory=temporary, OMPI_MCA_btl_sm_backing_directory=temporary)
     for mesh in ("skin", "skull", "mandible"):
         shutil.copy(PROJECT / f"meshes/head_{mesh}.ply", folder)
     scene = folder / "small.yaml"
@@ -41,29 +42,16 @@ def opened(scene, **settings):
     return repose.Session(scene, program=programs() / "repose-live", **settings)
 
 
-def processes():
-    """Ids of the solvers of this user that run."""
-    found = set()
+def children():
+    """Ids of the solvers that this test has started, also of those that outlived the process that started them."""
+    mark, found = f"REPOSE_STARTED_BY={os.getpid()}\0".encode(), set()
     for entry in pathlib.Path("/proc").glob("[0-9]*"):
         try:
-            if (entry / "comm").read_text().startswith("repose-live") and \
-                    (entry / "status").read_text().split("State:")[1].split()[0] != "Z":
+            if (entry / "comm").read_text().startswith("repose-live") and mark in (entry / "environ").read_bytes():
                 found.add(int(entry.name))
         except OSError:
-            pass
+            pass  # it has ended
     return found
-
-
-def children():
-    """Ids of the solvers that this test has started."""
-    own = set()
-    for process in processes():
-        try:
-            if os.getpgid(process) == os.getpgid(0):
-                own.add(process)
-        except OSError:
-            pass
-    return own
 
 
 # ----- verification from a cold start
@@ -184,9 +172,8 @@ def starts_and_stops(scene, count):
 
 
 def leftovers():
-    """What Open MPI and PETSc may leave in memory and temporary folders."""
-    return {str(path) for folder in ("/dev/shm", "/tmp") for path in pathlib.Path(folder).glob("*")
-            if re.search("ompi|vader|pmix|prte|petsc", path.name)}
+    """What Open MPI and PETSc leave in this test's temporary folder."""
+    return set(os.listdir(os.environ["TMPDIR"]))
 
 
 @pytest.mark.parametrize("count", [6, pytest.param(100, marks=pytest.mark.long)])
