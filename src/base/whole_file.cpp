@@ -3,24 +3,73 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <mutex>
+#include <set>
 
 #include "repose/base/error.h"
+#include "repose/base/text.h"
 
 namespace repose::base {
+
+namespace {
+
+/// Files of this process by their absolute paths without links.
+struct Files {
+  std::mutex mutex;
+  std::set<std::filesystem::path> read, written;
+};
+
+Files& files() {
+  static Files of_process;
+  return of_process;
+}
+
+std::filesystem::path real_path(const std::filesystem::path& file) {
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::weakly_canonical(file, error);
+  return error ? file : path;
+}
+
+void require_no_input(const std::filesystem::path& file) {
+  const std::lock_guard lock(files().mutex);
+  if (files().read.contains(real_path(file)))
+    refuse("{}: is an input of this run and would be replaced; choose another -output",
+           file.string());
+}
+
+}  // namespace
+
+void record_input(const std::filesystem::path& file) {
+  std::filesystem::path path = real_path(file);
+  const std::lock_guard lock(files().mutex);
+  if (!files().written.contains(path)) files().read.insert(std::move(path));
+}
+
+void require_name(const std::string& name) {
+  const auto is_control = [](unsigned char c) { return c < ' ' || c == 127; };
+  const std::string last = std::filesystem::path(name).filename().string();
+  if (last.empty() || last == "." || last == ".." || std::ranges::any_of(name, is_control))
+    refuse("-output {}: is no name of files; give a path without ending such as plans/first",
+           shown(name));
+}
 
 std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
 std::filesystem::path begin_part(const std::filesystem::path& file) {
+  require_no_input(file);
   for (int64_t number = getpid();; ++number) {
     std::filesystem::path part = fmt::format("{}.{}.part", file.string(), number);
     const int descriptor = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor >= 0) {
       close(descriptor);
+      const std::lock_guard lock(files().mutex);
+      files().written.insert(real_path(file));
       return part;
     }
     if (errno != EEXIST)
@@ -40,6 +89,7 @@ void require_writable(const std::filesystem::path& file) {
            folder.string(), std::strerror(errno));
   if (std::filesystem::is_directory(file, error))
     refuse("{}: is a folder; remove it or choose another -output", file.string());
+  require_no_input(file);
 }
 
 void write_whole_file(const std::filesystem::path& file, std::string_view bytes) {

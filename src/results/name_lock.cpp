@@ -79,6 +79,7 @@ bool may_live(const std::string& holder) {
 
 NameLock::NameLock(const std::filesystem::path& name)
     : name_(name), file_(name.string() + ".lock") {
+  base::require_name(name.string());
   base::require_writable(name.string() + ".h5");
   while (!acquire()) {
   }

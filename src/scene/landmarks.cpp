@@ -10,6 +10,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 
 namespace repose::scene {
 
@@ -46,6 +47,7 @@ std::string read_text(const std::filesystem::path& file) {
     base::refuse("{}: too large for a file of landmarks (16 MiB allowed)", name);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) base::refuse("{}: cannot be read; look at its permissions", name);
+  base::record_input(file);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 

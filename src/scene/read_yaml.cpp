@@ -10,6 +10,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 
 namespace repose::scene {
 
@@ -32,6 +33,7 @@ std::string read_scene_text(const std::filesystem::path& file) {
     base::refuse("{}: too large for a scene file (1 MiB allowed); give a scene file (.yaml)", name);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) base::refuse("{}: cannot be read; look at its permissions", name);
+  base::record_input(file);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   const auto control = std::find_if(text.begin(), text.end(), is_control);
   if (control != text.end())

@@ -87,6 +87,7 @@ RigidMotion read_transform(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     base::refuse("{}: no such file; give an ITK transform (.tfm or .h5)", name);
+  base::record_input(file);
   if (is_hdf5(file)) return inverse_motion(read_hdf5_transform(file), name);
   if (std::filesystem::file_size(file, error) > largest)
     base::refuse("{}: too large for an ITK text transform (1 MiB allowed)", name);

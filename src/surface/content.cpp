@@ -7,6 +7,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 #include "soup.h"
 #include "stl.h"
 
@@ -44,6 +45,7 @@ Content read_content(const std::filesystem::path& file) {
     base::refuse("{}: not a file; name a PLY, STL, OBJ or OFF file", file.string());
   std::ifstream in(file, std::ios::binary);
   if (!in) base::refuse("{}: cannot be opened: {}", file.string(), std::strerror(errno));
+  base::record_input(file);
   Content content{file, {std::istreambuf_iterator<char>(in), {}}};
   if (in.bad()) base::refuse("{}: cannot be read: {}", file.string(), std::strerror(errno));
   if (content.bytes.starts_with("\xEF\xBB\xBF")) content.bytes.erase(0, 3);

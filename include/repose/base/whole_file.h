@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace repose::base {
@@ -16,7 +17,16 @@ std::filesystem::path begin_part(const std::filesystem::path& file);
 std::filesystem::path folder_of(const std::filesystem::path& file);
 
 /// Refuses, in one line, a path that cannot become a file: folder missing or not writable, a folder
-/// in its place.
+/// in its place, a file that this process has read as an input.
 void require_writable(const std::filesystem::path& file);
+
+/// Refuses, in one line, a path without ending that names no files: empty, with control characters,
+/// or one that ends as a folder's.
+void require_name(const std::string& name);
+
+/// Records a file as an input of this process: begin_part and require_writable refuse it from now
+/// on. Files that the process itself has begun to write are no inputs. Every reader calls this. Not
+/// collective.
+void record_input(const std::filesystem::path& file);
 
 }  // namespace repose::base

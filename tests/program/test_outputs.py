@@ -1,0 +1,62 @@
+"""No program replaces a file that it reads: refused in one line, and the file stays as it was."""
+
+import shutil
+
+import h5py
+import pytest
+
+from conftest import PROJECT
+
+MESHES = PROJECT / "meshes"
+SCENE = """skin: skin.ply
+bones: [{name: skull, file: skull.ply}, {name: mandible, file: mandible.ply}]
+tissue: {layers: 2}
+moves: [{bone: mandible, transform: move.h5}]
+"""
+HEAD = ["skin.ply", "-skull", "skull.ply", "-mandible", "mandible.ply"]
+
+
+def write_transform(file):
+    """A translation by 1 mm along y as ITK stores it."""
+    with h5py.File(file, "w") as transform:
+        group = transform.create_group("TransformGroup/0")
+        group["TransformType"] = b"AffineTransform_double_3_3"
+        group["TransformParameters"] = [1.0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0]
+        group["TransformFixedParameters"] = [0.0, 0, 0]
+
+
+@pytest.fixture
+def inputs(tmp_path):
+    """Files of a head in the working folder, some behind links; returns their contents by name."""
+    for part in ("skin", "skull"):
+        shutil.copy(MESHES / f"head_{part}.ply", tmp_path / f"{part}.ply")
+    (tmp_path / "files").mkdir()
+    shutil.copy(MESHES / "head_mandible.ply", tmp_path / "files/jaw.ply")
+    (tmp_path / "mandible.ply").symlink_to("files/jaw.ply")
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    shutil.copy(MESHES / "head.mrk.json", tmp_path / "known.mrk.json")
+    write_transform(tmp_path / "move.h5")
+    return {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("program, arguments, file", [
+    ("repose-solve", ["scene.yaml", "-output", "move"], "move.h5"),
+    ("repose-solve", ["scene.yaml", "-output", "files/../move"], "files/../move.h5"),
+    ("repose-decimate", ["skin.ply", "-triangles", "1000", "-output", "skin.ply"], "skin.ply"),
+    ("repose-decimate", ["mandible.ply", "-triangles", "500", "-output", "files/jaw.ply"], "files/jaw.ply"),
+    ("repose-landmarks", [*HEAD, "-landmarks", "known.mrk.json", "-output", "known"], "known.mrk.json"),
+    ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json", "-output", "skin"],
+     "skin.ply")])
+def test_an_input_is_not_replaced(run, inputs, program, arguments, file):
+    result = run(program, *arguments)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1, result
+    assert f"{file}: is an input of this run and would be replaced; choose another -output" in result.stderr
+    assert all(path.read_bytes() == content for path, content in inputs.items())
+
+
+@pytest.mark.parametrize("name", ["folder/", ".", "a\tb"])
+def test_names_that_are_none_are_refused(run, inputs, tmp_path, name):
+    result = run("repose-solve", "scene.yaml", "-output", name)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "is no name of files" in result.stderr
+    assert {file for file in tmp_path.rglob("*") if file.is_file()} == set(inputs)

@@ -1,0 +1,41 @@
+#include "repose/base/whole_file.h"
+
+#include <gtest/gtest.h>
+
+#include "../../folder.h"
+
+namespace repose::base {
+namespace whole_file_test {
+
+TEST(WholeFile, DoesNotReplaceAnInput) {
+  const test::Folder folder;
+  folder.write("a", "input");
+  std::filesystem::create_symlink("a", folder.path("link"));
+  record_input(folder.path("link"));
+  for (const char* name : {"a", "link"}) {
+    EXPECT_NE(test::refusal([&] {
+                write_whole_file(folder.path(name), "output");
+              }).find("is an input of this run"),
+              std::string::npos);
+    EXPECT_NE(test::refusal([&] { require_writable(folder.path(name)); }), "accepted");
+  }
+  EXPECT_EQ(folder.content(), "a link");
+}
+
+TEST(WholeFile, WritesAgainWhatItHasWritten) {
+  const test::Folder folder;
+  write_whole_file(folder.path("b"), "first");
+  record_input(folder.path("b"));
+  EXPECT_EQ(test::refusal([&] { write_whole_file(folder.path("b"), "second"); }), "accepted");
+}
+
+TEST(WholeFile, ANameHasALastPartAndNoControlCharacters) {
+  for (const char* name : {"", "/", "folder/", ".", "..", "folder/..", "a\nb", "\x7f"})
+    EXPECT_NE(test::refusal([&] { require_name(name); }), "accepted") << name;
+  EXPECT_NE(test::refusal([&] { require_name(std::string("a\0b", 3)); }), "accepted");
+  for (const char* name : {"a", "folder/a.b", "../a", ".hidden", "Kopf größer"})
+    EXPECT_EQ(test::refusal([&] { require_name(name); }), "accepted") << name;
+}
+
+}  // namespace whole_file_test
+}  // namespace repose::base
