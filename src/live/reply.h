@@ -11,8 +11,7 @@ namespace repose::live {
 /// An answer: a line of JSON, then the bytes of the arrays that its member `arrays` lists.
 class Reply {
  public:
-  explicit Reply(const nlohmann::json& id)
-      : head_{{"id", id}, {"ok", true}, {"arrays", nlohmann::json::array()}} {}
+  Reply() : head_{{"id", nullptr}, {"ok", true}, {"arrays", nlohmann::json::array()}} {}
 
   nlohmann::json& head() { return head_; }
   /// Adds little-endian float32 rows of three.

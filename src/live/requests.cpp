@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <span>
+#include <utility>
 
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "request.h"
 
 namespace repose::live {
 
 namespace {
-
-constexpr size_t longest_line = 1 << 20;
 
 /// Rank 0's text on all ranks, which wait for it asleep.
 void share_asleep(MPI_Comm comm, std::string& text) {
@@ -55,9 +56,9 @@ void Requests::add(std::string line) {
   changed_.notify_one();
 }
 
-/// On the thread.
+/// On the thread. Of a line that is too long one byte more than allowed is kept.
 void Requests::read() {
-  std::string text;
+  std::string line;
   std::array<char, 1 << 16> buffer;
   while (true) {
     std::array<pollfd, 2> watched = {pollfd{input_, POLLIN, 0}, pollfd{stop_[0], POLLIN, 0}};
@@ -65,13 +66,13 @@ void Requests::read() {
     if (watched[1].revents != 0) break;
     const ssize_t count = ::read(input_, buffer.data(), buffer.size());
     if (count <= 0) break;
-    text.append(buffer.data(), count);
-    size_t begin = 0;
-    for (size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
-      add(text.substr(begin, end - begin));
-    text.erase(0, begin);
-    if (text.size() > longest_line) break;  // no request: nothing after it can be told apart
+    for (const char letter : std::span(buffer.data(), static_cast<size_t>(count)))
+      if (letter == '\n')
+        add(std::exchange(line, {}));
+      else if (line.size() <= longest_line)
+        line += letter;
   }
+  if (!line.empty()) add(std::move(line));
   const std::lock_guard lock(mutex_);
   ended_ = true;
   changed_.notify_one();

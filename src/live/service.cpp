@@ -10,7 +10,9 @@
 #include "repose/app/plan_session.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/text.h"
 #include "repose/live/serve.h"
+#include "request.h"
 #include "requests.h"
 
 namespace repose::live {
@@ -20,34 +22,15 @@ namespace {
 using app::PlanSession;
 using nlohmann::json;
 
-constexpr const char* all_verbs = "describe, solve, write, quit";
-
-/// Refuses members that a request does not have.
-void require_known(const json& map, const char* where, std::initializer_list<const char*> known) {
-  if (!map.is_object()) base::refuse("{} must be an object", where);
-  for (const auto& [name, value] : map.items())
-    if (std::ranges::none_of(known, [&](const char* k) { return name == k; }))
-      base::refuse("{} has no member '{}'; it has {}", where, name, fmt::join(known, ", "));
-}
-
-Vec3 read_vector(const json& map, const char* name) {
-  Vec3 vector = Vec3::Zero();
-  if (!map.contains(name)) return vector;
-  const json& value = map[name];
-  if (!value.is_array() || value.size() != 3 ||
-      !std::ranges::all_of(value, [](const json& v) { return v.is_number(); }))
-    base::refuse("{} must be three numbers", name);
-  for (int a = 0; a < 3; ++a) vector[a] = value[a].get<double>();
-  return vector;
-}
-
 json write_vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 bool ends_a_solve(const std::string& line) {
-  const json request = json::parse(line, nullptr, false);
-  if (!request.is_object()) return false;
-  const json verb = request.value("do", json());
-  return verb == "solve" || verb == "quit";
+  try {
+    const Verb verb = read_request(parse_line(line)).verb;
+    return verb == Verb::solve || verb == Verb::quit;
+  } catch (const base::InputError&) {
+    return false;
+  }
 }
 
 /// Answers the requests of one channel about one scene.
@@ -73,10 +56,10 @@ class Service {
 
  private:
   bool answer(const std::string& line, bool& quits);
-  void dispatch(const json& request, Reply& reply);
+  void dispatch(const Request& request, Reply& reply);
   void describe(Reply& reply);
-  void solve(const json& request, Reply& reply);
-  PlanSession::Placements read_plan(const json& value) const;
+  void solve(const Request& request, Reply& reply);
+  PlanSession::Placements place(const PlanMoves& plan) const;
   template <class Row>
   std::vector<Row> shown(const std::vector<Row>& rows) const;
   void find_shown();
@@ -90,39 +73,26 @@ class Service {
 
 /// Returns whether the answer could be sent. Errors are the same on all ranks, as the lines are.
 bool Service::answer(const std::string& line, bool& quits) {
-  const json request = json::parse(line, nullptr, false);
-  const bool good = request.is_object();
-  Reply reply(good && request.contains("id") ? request["id"] : json());
+  Reply reply;
   try {
-    if (!good) base::refuse("a request must be one JSON object on a line");
+    const json object = parse_line(line);
+    reply.head()["id"] = object.value("id", json());
+    const Request request = read_request(object);
+    quits = request.verb == Verb::quit;
     dispatch(request, reply);
   } catch (const base::InputError& error) {
-    reply.refuse(error.what());
-  } catch (const json::exception& error) {
     reply.refuse(error.what());
   }
   int sent = 1;
   if (base::rank(comm_) == 0) sent = send_all(output_, reply.bytes());
   MPI_Bcast(&sent, 1, MPI_INT, 0, comm_);
-  quits = good && request.value("do", json()) == "quit";
   return sent != 0;
 }
 
-void Service::dispatch(const json& request, Reply& reply) {
-  const json verb = request.value("do", json());
-  if (verb == "describe") {
-    require_known(request, "describe", {"id", "do"});
-    describe(reply);
-  } else if (verb == "solve") {
-    solve(request, reply);
-  } else if (verb == "write") {
-    require_known(request, "write", {"id", "do", "output"});
-    if (!request.contains("output") || !request["output"].is_string())
-      base::refuse("write needs output, the path of the result without ending");
-    session_.write(request["output"].get<std::string>());
-  } else if (verb != "quit") {
-    base::refuse("do must be one of {}", all_verbs);
-  }
+void Service::dispatch(const Request& request, Reply& reply) {
+  if (request.verb == Verb::describe) describe(reply);
+  if (request.verb == Verb::solve) solve(request, reply);
+  if (request.verb == Verb::write) session_.write(request.output);
 }
 
 /// The skin's points: those of layer 0 that its triangles have.
@@ -193,39 +163,31 @@ void Service::describe(Reply& reply) {
 }
 
 /// By the names of pieces; those that are not named stay.
-PlanSession::Placements Service::read_plan(const json& value) const {
-  if (!value.is_object()) base::refuse("plan must be an object: {{PIECE: {{translate, rotate}}}}");
-  PlanSession::Placements plan(session_.pieces().size());
-  for (const auto& [name, motion] : value.items()) {
+PlanSession::Placements Service::place(const PlanMoves& plan) const {
+  PlanSession::Placements placements(session_.pieces().size());
+  for (const auto& [name, placement] : plan) {
     const auto piece = std::ranges::find(session_.pieces(), name, &PlanSession::Piece::name);
     if (piece == session_.pieces().end()) {
       std::vector<std::string> names;
       for (const PlanSession::Piece& other : session_.pieces()) names.push_back(other.name);
-      base::refuse("plan: '{}' is no piece of the plan; its pieces are {}", name,
+      base::refuse("plan: {} is no piece of the plan; its pieces are {}", base::shown(name),
                    fmt::join(names, ", "));
     }
-    require_known(motion, "a piece's motion", {"translate", "rotate"});
-    plan[piece - session_.pieces().begin()] = {read_vector(motion, "translate"),
-                                               read_vector(motion, "rotate")};
+    placements[piece - session_.pieces().begin()] = placement;
   }
-  return plan;
+  return placements;
 }
 
-void Service::solve(const json& request, Reply& reply) {
-  require_known(request, "solve", {"id", "do", "plan", "accuracy", "tangents", "base", "points"});
+void Service::solve(const Request& request, Reply& reply) {
   find_shown();
   PlanSession::Request wanted;
-  wanted.plan = read_plan(request.value("plan", json::object()));
-  wanted.accuracy = request.value("accuracy", session_.accuracy());
-  if (!(wanted.accuracy >= 1e-6 && wanted.accuracy <= 10))
-    base::refuse("accuracy must be 1e-6 … 10 mm");
-  wanted.tangents = request.value("tangents", false);
+  wanted.plan = place(request.plan);
+  wanted.accuracy = request.accuracy.value_or(session_.accuracy());
+  wanted.tangents = request.tangents;
   PlanSession::Placements scenes;
   for (const PlanSession::Piece& piece : session_.pieces()) scenes.push_back(piece.scenes);
-  const json base = request.value("base", json("scene"));
-  const bool at_rest = base == "rest";
-  const PlanSession::Placements from = at_rest || base == "scene" ? scenes : read_plan(base);
-  if (!at_rest) wanted.base = &from;
+  const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
+  if (!request.from_rest) wanted.base = &from;
   wanted.abandoned = [this] { return requests_->overtaken(ends_a_solve); };
   const double before = base::cpu_seconds();
   const PlanSession::Answer answer = session_.solve(wanted);
@@ -239,7 +201,7 @@ void Service::solve(const json& request, Reply& reply) {
   head["from_base"] = answer.from_base;
   head["seconds"] = base::cpu_seconds() - before;
   if (base::rank(comm_) > 0) return;
-  const bool all = request.value("points", "skin") == "all";
+  const bool all = request.all_points;
   reply.add("position", all ? answer.position : shown(answer.position));
   for (const model::PointField& field : answer.field) {
     std::vector<Vec3> vectors;

@@ -175,6 +175,16 @@ inline std::string hdf5_transform(const std::filesystem::path& file, int parts) 
   return content_of(file);
 }
 
+/// Requests to repose-live, one of every verb.
+inline std::vector<std::string> requests() {
+  return {R"({"id": 1, "do": "describe"})",
+          R"({"id": "a", "do": "solve", "plan": {"mandible": {"translate": [0, -3.5, 1e-1], )"
+          R"("rotate": [1, 0, 2]}, "chin": {}}, "accuracy": 0.05, "tangents": true, )"
+          R"("base": "rest", "points": "all"})",
+          R"({"do": "solve", "base": {"mandible": {"rotate": [0, 0, 1]}}, "points": "skin"})",
+          R"({"id": null, "do": "write", "output": "plans/first"})", R"({"do": "quit"})"};
+}
+
 /// A model and a result; they are written with what writes them.
 inline std::vector<std::string> models(const std::filesystem::path& folder) {
   results::write_small_result(folder / "seed", results::small_model());

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <functional>
 
+#include "../../src/live/request.h"
 #include "repose/imaging/volume.h"
 #include "repose/results/model_file.h"
 #include "repose/scene/landmarks.h"
@@ -11,7 +12,7 @@
 #include "repose/surface/read.h"
 #include "seeds.h"
 
-/// Every reader of files, with valid files to begin with.
+/// Every reader of files and requests, with valid files to begin with.
 namespace repose::fuzz {
 
 struct Target {
@@ -37,6 +38,10 @@ inline void read_result(const std::filesystem::path& file) {
   const model::Model model = results::read_model(file);
   for (int64_t step = 0; step < results::step_count(file); ++step)
     results::read_step(file, step, model);
+}
+
+inline void read_line(const std::filesystem::path& file) {
+  live::read_request(live::parse_line(content_of(file)));
 }
 
 inline std::vector<Target> targets(const std::filesystem::path& folder) {
@@ -68,6 +73,7 @@ inline std::vector<Target> targets(const std::filesystem::path& folder) {
       {"dicom", "slices/2.dcm", {slice(2)}, slices, 0.2},
       {"hdf5", "x.h5", hdf5, transform, 0.2},
       {"painted", "x.ply", plies, painting},
+      {"requests", "x.json", requests(), read_line},
   };
 }
 

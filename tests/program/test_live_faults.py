@@ -15,6 +15,7 @@ import time
 import numpy as np
 import pytest
 from conftest import PROJECT, programs
+from test_outputs import write_transform
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
@@ -273,19 +274,66 @@ def damaged(random_numbers):
     return bytes(line).replace(b"\n", b" ")
 
 
-def test_fuzzed_messages_are_answered_or_refused_in_a_line(small, environment, tmp_path):
-    random_numbers = random.Random(11)
-    lines = [damaged(random_numbers) for _ in range(300)]
-    expected = [line for line in lines if line.strip(b" \t\r")]
-    done = subprocess.run([programs() / "repose-live", small], input=b"\n".join(lines) +
-                          b'\n{"do": "quit", "id": "last"}\n', stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                          timeout=100, env={**os.environ, **environment}, cwd=tmp_path)
+def answers(scene, lines, environment, folder):
+    """Heads of the answers to these lines, from a program of their own."""
+    done = subprocess.run([programs() / "repose-live", scene], input=b"\n".join(lines), stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, timeout=100, env={**os.environ, **environment}, cwd=folder)
     assert done.returncode == 0, done.stderr[-500:]
     heads, rest = [], done.stdout
     while rest:
         line, _, rest = rest.partition(b"\n")
         heads.append(json.loads(line))
         rest = rest[sum(4 * int(np.prod(one["shape"])) for one in heads[-1]["arrays"]):]
+    return heads
+
+
+def test_deep_long_and_odd_requests_are_refused_and_the_session_goes_on(small, environment, tmp_path):
+    deep, solve = 300000, b'{"do": "solve", '
+    expected = {
+        b"[" * deep + b"]" * deep: "a request nests at most 8 arrays and objects; this one nests 300000",
+        b'{"id": ' + b"[" * deep + b"]" * deep + b', "do": "quit"}': "this one nests 300001",
+        b'{"do": "describe", "id": "' + b"a" * (1 << 21) + b'"}': "a line of at most 1048576 bytes",
+        b'{"do": "dance"}': "do must be one of describe, solve, write, quit",
+        b'{"do": "quit", "id": {}}': "id must be a text or a number, not '{}'",
+        b'{"do": "quit", "now": 1}': "quit has no member 'now'; it has id, do",
+        solve + b'"accuracy": true}': "accuracy must be a number, 1e-6",
+        solve + b'"accuracy": 11}': "accuracy must be a number, 1e-6",
+        solve + b'"tangents": 1}': "tangents must be true or false, not '1'",
+        solve + b'"points": "bone"}': "points must be \"skin\" or \"all\"",
+        solve + b'"base": "best"}': "base must be \"rest\", \"scene\" or a plan",
+        solve + b'"base": {"jaw": {}}}': "'jaw' is no piece of the plan",
+        solve + b'"plan": {"mandible": [1]}}': "a piece's motion must be an object, not '[1]'",
+        solve + b'"plan": {"mandible": {"rotate": [1, 2, "3"]}}}': "rotate must be three numbers",
+        b'{"do": "write"}': "write needs the member output",
+        b'{"do": "write", "output": ""}': "is no name of files",
+        b'{"do": "write", "output": "folder/"}': "is no name of files",
+        b'{"do": "write", "output": "a\\u0000b"}': "is no name of files"}
+    heads = answers(small, [*expected, solve + b'"id": "after"}'], environment, tmp_path)
+    assert len(heads) == len(expected) + 1, "also the last line, which has no end"
+    for head, (line, words) in zip(heads, expected.items()):
+        assert not head["ok"] and words in head["error"] and "\n" not in head["error"], (line[:80], head)
+    assert heads[-1]["ok"] and heads[-1]["id"] == "after" and heads[-1]["converged"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_result_does_not_replace_a_file_of_its_scene(small, environment, tmp_path):
+    for file in small.parent.glob("*.*"):
+        shutil.copy(file, tmp_path)
+    (tmp_path / small.name).write_text(small.read_text() + "moves: [{bone: mandible, transform: move.h5}]\n")
+    write_transform(tmp_path / "move.h5")
+    before = (tmp_path / "move.h5").read_bytes()
+    heads = answers(small.name, [b'{"do": "solve"}', b'{"do": "write", "output": "move"}',
+                                 b'{"do": "write", "output": "plan"}'], environment, tmp_path)
+    assert [head["ok"] for head in heads] == [True, False, True]
+    assert "move.h5: is an input of this run and would be replaced" in heads[1]["error"]
+    assert (tmp_path / "move.h5").read_bytes() == before and (tmp_path / "plan.h5").is_file()
+
+
+def test_fuzzed_messages_are_answered_or_refused_in_a_line(small, environment, tmp_path):
+    random_numbers = random.Random(11)
+    lines = [damaged(random_numbers) for _ in range(300)]
+    expected = [line for line in lines if line.strip(b" \t\r")]
+    heads = answers(small, [*lines, b'{"do": "quit", "id": "last"}'], environment, tmp_path)
     assert len(heads) == len(expected) + 1 and heads[-1]["id"] == "last"
     refusals = [head["error"] for head in heads if not head["ok"]]
     assert len(refusals) > 100 and all("\n" not in one and one for one in refusals)

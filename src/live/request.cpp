@@ -1,0 +1,169 @@
+#include "request.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "repose/base/error.h"
+#include "repose/base/text.h"
+#include "repose/base/whole_file.h"
+
+namespace repose::live {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr base::Range accuracies = base::Range::between(1e-6, 10);  // mm
+
+/// A value as a message shows it.
+std::string shown(const json& value) {
+  return base::shown(value.dump(-1, ' ', true, json::error_handler_t::replace));
+}
+
+[[noreturn]] void refuse_value(const std::string& name, const char* wanted, const json& value) {
+  base::refuse("{} must be {}, not {}", name, wanted, shown(value));
+}
+
+void require_known(const json& map, const std::string& where,
+                   const std::vector<std::string>& known) {
+  if (!map.is_object()) base::refuse("{} must be an object, not {}", where, shown(map));
+  for (const auto& [name, value] : map.items())
+    if (std::ranges::find(known, name) == known.end())
+      base::refuse("{} has no member {}; it has {}", where, base::shown(name),
+                   fmt::join(known, ", "));
+}
+
+Vec3 read_vector(const json& motion, const std::string& piece, const char* name) {
+  Vec3 vector = Vec3::Zero();
+  if (!motion.contains(name)) return vector;
+  const json& value = motion[name];
+  const auto is_number = [](const json& v) { return v.is_number(); };
+  if (!value.is_array() || value.size() != 3 || !std::ranges::all_of(value, is_number))
+    refuse_value(fmt::format("{}: {}", base::shown(piece), name), "three numbers", value);
+  for (int a = 0; a < 3; ++a) vector[a] = value[a].get<double>();
+  return vector;
+}
+
+PlanMoves read_plan(const json& value, const std::string& where) {
+  if (!value.is_object()) refuse_value(where, "an object {PIECE: {translate, rotate}}", value);
+  PlanMoves plan;
+  for (const auto& [piece, motion] : value.items()) {
+    require_known(motion, "a piece's motion", {"translate", "rotate"});
+    plan[piece] = {read_vector(motion, piece, "translate"), read_vector(motion, piece, "rotate")};
+  }
+  return plan;
+}
+
+void read_accuracy(const json& value, Request& request) {
+  if (!value.is_number() || !accuracies.contains(value.get<double>()))
+    refuse_value("accuracy", "a number, 1e-6 … 10 mm", value);
+  request.accuracy = value.get<double>();
+}
+
+void read_tangents(const json& value, Request& request) {
+  if (!value.is_boolean()) refuse_value("tangents", "true or false", value);
+  request.tangents = value.get<bool>();
+}
+
+void read_base(const json& value, Request& request) {
+  request.from_rest = value == "rest";
+  if (value == "rest" || value == "scene") return;
+  if (!value.is_object()) refuse_value("base", "\"rest\", \"scene\" or a plan", value);
+  request.base = read_plan(value, "base");
+}
+
+void read_points(const json& value, Request& request) {
+  if (value != "skin" && value != "all") refuse_value("points", "\"skin\" or \"all\"", value);
+  request.all_points = value == "all";
+}
+
+void read_output(const json& value, Request& request) {
+  if (!value.is_string()) refuse_value("output", "the path of the result without ending", value);
+  request.output = value.get<std::string>();
+  base::require_name(request.output);
+}
+
+struct Member {
+  const char* name;
+  void (*read)(const json& value, Request& request);
+  bool required = false;
+};
+
+struct VerbMembers {
+  const char* name;
+  Verb verb;
+  std::vector<Member> members;  ///< beside id and do
+};
+
+const std::vector<VerbMembers>& verbs() {
+  static const std::vector<VerbMembers> table = {
+      {"describe", Verb::describe, {}},
+      {"solve",
+       Verb::solve,
+       {{"plan", [](const json& value, Request& r) { r.plan = read_plan(value, "plan"); }},
+        {"accuracy", read_accuracy},
+        {"tangents", read_tangents},
+        {"base", read_base},
+        {"points", read_points}}},
+      {"write", Verb::write, {{"output", read_output, true}}},
+      {"quit", Verb::quit, {}}};
+  return table;
+}
+
+/// Returns the depth of the deepest array or object outside of texts.
+int nesting(const std::string& line) {
+  int depth = 0, deepest = 0;
+  bool in_text = false;
+  for (size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (in_text && c == '\\')
+      ++i;
+    else if (c == '"')
+      in_text = !in_text;
+    else if (!in_text && (c == '{' || c == '['))
+      deepest = std::max(deepest, ++depth);
+    else if (!in_text && (c == '}' || c == ']'))
+      --depth;
+  }
+  return deepest;
+}
+
+}  // namespace
+
+json parse_line(const std::string& line) {
+  constexpr int deepest = 8;  // a plan's vector is at 4; JSON values are copied by recursion
+  if (line.size() > longest_line)
+    base::refuse("a request must be a line of at most {} bytes; this one is longer", longest_line);
+  if (const int depth = nesting(line); depth > deepest)
+    base::refuse("a request nests at most {} arrays and objects; this one nests {}", deepest,
+                 depth);
+  json object = json::parse(line, nullptr, false);
+  if (!object.is_object()) base::refuse("a request must be one JSON object on a line");
+  return object;
+}
+
+Request read_request(const json& object) {
+  const json verb = object.value("do", json());
+  const auto found =
+      std::ranges::find_if(verbs(), [&](const VerbMembers& other) { return verb == other.name; });
+  if (found == verbs().end()) {
+    std::vector<std::string> names;
+    for (const VerbMembers& other : verbs()) names.emplace_back(other.name);
+    base::refuse("do must be one of {}", fmt::join(names, ", "));
+  }
+  if (object.contains("id") && object["id"].is_structured())
+    refuse_value("id", "a text or a number", object["id"]);
+  std::vector<std::string> known = {"id", "do"};
+  for (const Member& member : found->members) known.emplace_back(member.name);
+  require_known(object, found->name, known);
+  Request request;
+  request.verb = found->verb;
+  for (const Member& member : found->members)
+    if (object.contains(member.name))
+      member.read(object[member.name], request);
+    else if (member.required)
+      base::refuse("{} needs the member {}", found->name, member.name);
+  return request;
+}
+
+}  // namespace repose::live

@@ -1,0 +1,40 @@
+#pragma once
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "repose/scene/placement.h"
+
+namespace repose::live {
+
+/// Longest line of a request, bytes.
+constexpr size_t longest_line = 1 << 20;
+
+enum class Verb { describe, solve, write, quit };
+
+/// Motions of pieces by name; those without an entry stay.
+using PlanMoves = std::map<std::string, scene::Placement>;
+
+/// A request (docs/guide/live.md) whose members have the right types and ranges. Names of pieces
+/// are not checked.
+struct Request {
+  Verb verb = Verb::quit;
+  PlanMoves plan;
+  std::optional<double> accuracy;  ///< mm
+  bool tangents = false;
+  bool from_rest = false;         ///< the search begins at the state before the bones move, …
+  std::optional<PlanMoves> base;  ///< … or at this plan, else at the scene's
+  bool all_points = false;        ///< the answer has all points, not those of the skin alone
+  std::string output;             ///< path of the result without ending
+};
+
+/// Returns the JSON object on a line. Throws InputError where the line is too long, nests deeper
+/// than a request can, or is no object.
+nlohmann::json parse_line(const std::string& line);
+
+/// Reads a request from its object by one table of members. Throws InputError, one line, for an
+/// unknown verb or member, a missing member, a wrong type or a value out of range.
+Request read_request(const nlohmann::json& object);
+
+}  // namespace repose::live
