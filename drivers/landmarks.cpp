@@ -4,14 +4,16 @@
 ///     repose-landmarks skin.ply -skull skull.ply -mandible mandible.ply -landmarks some.mrk.json
 ///
 /// Writes NAME.mrk.json for 3D Slicer (LPS, mm) and NAME.svg, a picture to confirm them by. The
-/// landmarks of -landmarks are kept, those that it lacks are proposed. Exit status: 0 done, 1 bad
-/// input (nothing written), 2 a landmark that scenes need was not found, 3 internal error.
+/// landmarks of -landmarks are kept, all of them, and those that it lacks are proposed. Exit
+/// status: 0 done, 1 bad input (nothing written), 2 a landmark that scenes need was not found, 3
+/// internal error.
 #include <cstdio>
 
 #include "repose/anatomy/picture.h"
 #include "repose/anatomy/propose.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/read.h"
@@ -69,6 +71,10 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
     std::printf("%-24s %10.2f %10.2f %10.2f   %s\n", landmark.name.c_str(), at.x(), at.y(), at.z(),
                 note.c_str());
   }
+  for (const auto& [name, at] : given)
+    if (scene::standard_name(name).empty())
+      std::printf("%-24s %10.2f %10.2f %10.2f   given\n", base::shown(name).c_str(), at.x(), at.y(),
+                  at.z());
   if (count > 0)
     std::printf(
         "%d given landmarks: proposed at a distance of %.2f mm in the mean, %.2f mm at most\n",
@@ -84,9 +90,7 @@ base::Exit run(const base::Options& options) {
   scene::Landmarks given;
   if (options.has("landmarks")) {
     const std::string file = options.text("landmarks");
-    for (const auto& [key, place] :
-         scene::with_standard_names(scene::landmarks_by_name(file), file))
-      if (!scene::standard_name(key).empty()) given[key] = place;
+    given = scene::with_standard_names(scene::landmarks_by_name(file), file);
   }
   const anatomy::Proposal alone = anatomy::propose_landmarks(skin, skull, mandible, {});
   const anatomy::Proposal proposal =

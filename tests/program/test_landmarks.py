@@ -38,6 +38,19 @@ def test_known_landmarks_are_kept(run, tmp_path):
     assert float(mean) < 3 and float(most) < 6
 
 
+def test_no_given_landmark_is_replaced_or_lost(run, tmp_path):
+    assert run("repose-landmarks", *SURFACES, "-output", "proposed").returncode == 0
+    given = {name: [x + 2, y + 1, z - 1] for name, (x, y, z) in points(tmp_path / "proposed.mrk.json").items()}
+    given["implant 2"] = [1.0, -70.0, -20.0]
+    del given["stomion"], given["b_point"]
+    (tmp_path / "given.json").write_text(json.dumps(given))
+    result = run("repose-landmarks", *SURFACES, "-landmarks", "given.json")
+    assert result.returncode == 0 and "'implant 2'" in result.stdout, result
+    found = points(tmp_path / "landmarks.mrk.json")
+    assert found.keys() == given.keys() | {"stomion", "b_point"}
+    assert all(found[name] == pytest.approx(place, abs=1e-4) for name, place in given.items())
+
+
 @pytest.mark.parametrize("arguments, line", [
     ([SURFACES[0]], "-skull FILE is required: the surface of the skull"),
     ([SURFACES[0], "-skull", SURFACES[4], "-mandible", SURFACES[2]],

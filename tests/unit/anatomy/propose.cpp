@@ -65,6 +65,17 @@ TEST(ProposeLandmarks, GivenOnesAreKeptAndGuide) {
   EXPECT_EQ(proposal.found.at("pogonion_bone"), chin);
 }
 
+TEST(ProposeLandmarks, NoneThatIsGivenIsReplaced) {
+  Landmarks given = {{"implant", Vec3(1, -70, -20)}};
+  for (const auto& [name, place] : propose(shipped()).found) given[name] = place + Vec3(2, 1, -1.5);
+  ASSERT_EQ(given.size(), scene::landmark_names().size() + 1);
+  const Proposal all = propose(shipped(), given);
+  EXPECT_EQ(all.found, given);
+  EXPECT_TRUE(all.missing.empty());
+  for (const auto& [name, place] : given)
+    EXPECT_EQ(propose(shipped(), {{name, place}}).found.at(name), place) << name;
+}
+
 TEST(ProposeLandmarks, RefusesRasAndExchangedBones) {
   const Head ras = turned(Vec3(-1, -1, 1).asDiagonal());
   EXPECT_NE(refusal([&] { propose(ras); }).find("as in RAS"), std::string::npos);
