@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -70,7 +71,7 @@ MetaHeader meta_header(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   for (std::string line; header.data.empty() && std::getline(in, line);) {
     const auto found = base::words(line);
-    if (found.size() != 3 || found[1] != "=") continue;
+    if (found.size() < 3 || found[1] != "=") continue;
     if (found[0] == "CompressedData") header.compressed = base::lower(found[2]) == "true";
     if (found[0] == "ElementDataFile") header.data = found[2];
   }
@@ -148,6 +149,37 @@ int64_t stored_bytes(const std::filesystem::path& file, ImageFormat format) {
   return all - nifti_header;
 }
 
+/// The values of a key in a MetaImage's header. ITK takes ':' for '=', several of them for one, and
+/// reads on behind a data file's name.
+std::vector<std::string> meta_values(const std::string& header, std::string_view key) {
+  std::vector<std::string> values;
+  for (size_t at = header.find(key); at != std::string::npos; at = header.find(key, at + 1)) {
+    const std::string text = header.substr(at + key.size(), 1000);
+    const std::string line = text.substr(0, text.find('\n'));
+    values.push_back(line.substr(std::min(line.find_first_not_of(" \t:="), line.size())));
+  }
+  return values;
+}
+
+void check_dimensions(const std::filesystem::path& file, const std::string& value) {
+  constexpr int64_t most = 10;
+  const auto words = base::words(value);
+  const auto number = words.size() == 1 ? base::parse_integer(words[0]) : std::nullopt;
+  if (!number || *number < 1 || *number > most)
+    base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
+                 base::shown(value), most);
+}
+
+/// ITK formats the name with sprintf, into a buffer of fixed size, for each of several files.
+void check_data_file(const std::filesystem::path& file, const std::string& value) {
+  static const std::regex one_number("[^%]{0,200}%[0-9]{0,2}d[^%]{0,200}");
+  if (value.find('%') != std::string::npos && !std::regex_match(value, one_number))
+    base::refuse(
+        "{}: its ElementDataFile is {}; a name may hold one number such as %03d and no other %; "
+        "rename the data file or mend the header",
+        file.string(), base::shown(value));
+}
+
 }  // namespace
 
 void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes) {
@@ -216,24 +248,14 @@ void check_nifti_header(const std::filesystem::path& file) {
           file.string(), "xyz"[entry / 4], entry % 4, mm, farthest);
 }
 
-void check_meta_dimensions(const std::filesystem::path& file) {
-  constexpr int64_t most = 10;
-  // ITK takes ':' for '=', several of them for one, and reads on behind a data file's name.
+void check_meta_header(const std::filesystem::path& file) {
   std::string begin(size_t{1} << 16, '\0');
   std::ifstream in(file, std::ios::binary);
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<size_t>(in.gcount()));
-  constexpr std::string_view name = "NDims";
-  for (size_t at = begin.find(name); at != std::string::npos; at = begin.find(name, at + 1)) {
-    const std::string text = begin.substr(at + name.size(), 100);
-    const std::string line = text.substr(0, text.find('\n'));
-    const std::string rest = line.substr(std::min(line.find_first_not_of(" \t:="), line.size()));
-    const auto value = base::words(rest);
-    const auto number = value.size() == 1 ? base::parse_integer(value[0]) : std::nullopt;
-    if (!number || *number < 1 || *number > most)
-      base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
-                   base::shown(line), most);
-  }
+  for (const std::string& value : meta_values(begin, "NDims")) check_dimensions(file, value);
+  for (const std::string& value : meta_values(begin, "ElementDataFile"))
+    check_data_file(file, value);
 }
 
 }  // namespace repose::imaging

@@ -22,7 +22,7 @@ void check_dicom_lengths(const std::filesystem::path& file);
 void check_nifti_header(const std::filesystem::path& file);
 
 /// Throws InputError where a MetaImage's header says it has more dimensions than its library counts
-/// to in a lifetime.
-void check_meta_dimensions(const std::filesystem::path& file);
+/// to in a lifetime, or where the name of its data file is a format other than of one number.
+void check_meta_header(const std::filesystem::path& file);
 
 }  // namespace repose::imaging

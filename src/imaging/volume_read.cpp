@@ -5,6 +5,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 #include "stored_bytes.h"
 #include "volume_grid.h"
 
@@ -38,7 +39,7 @@ Volume read_file(const std::filesystem::path& file) {
   const ImageFormat format = format_of(file);
   const std::string name = file.string();
   if (format == ImageFormat::nifti) check_nifti_header(file);
-  if (format == ImageFormat::meta) check_meta_dimensions(file);
+  if (format == ImageFormat::meta) check_meta_header(file);
   const Image image = read_header(file, format);
   check_header(image, name);
   Volume volume{name,
@@ -97,6 +98,7 @@ Volume read_volume(const std::filesystem::path& path, const Watch& watch) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     base::refuse("{}: no such file or folder; check the path of this volume", path.string());
+  base::record_input(path);
   Volume volume = std::filesystem::is_directory(path) ? read_dicom(path, watch) : read_file(path);
   check_grid(volume);
   replace_not_finite(volume);

@@ -8,12 +8,12 @@
 namespace repose::imaging {
 namespace volume_read_test {
 
-std::string meta(const std::string& dimensions) {
+std::string meta(const std::string& dimensions, const std::string& data = "LOCAL") {
   return fmt::format(
       "ObjectType = Image\nNDims = {}\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
       "ElementSpacing = 0.9 0.9 1.5\nDimSize = 3 3 3\nElementType = MET_SHORT\n"
-      "ElementDataFile = LOCAL\n{}",
-      dimensions, std::string(2 * 3 * 3 * 3, '\7'));
+      "ElementDataFile = {}\n{}",
+      dimensions, data, std::string(2 * 3 * 3 * 3, '\7'));
 }
 
 TEST(VolumeRead, TakesAMetaImageWithSpacesBehindItsDimensions) {
@@ -32,6 +32,21 @@ TEST(VolumeRead, RefusesAMetaImageOfTooManyDimensions) {
               }).find("its NDims is "),
               std::string::npos)
         << dimensions;
+}
+
+TEST(VolumeRead, RefusesAMetaImageWhoseDataFileIsAFormat) {
+  const test::Folder folder;
+  for (const char* name : {"%n%s", "%s", "a%d%d.raw 1 3 1", "a%9999d.raw 1 3 1", "%", "%%",
+                           "%5.raw", "a%*d.raw", "%d %n 1 3 1"})
+    EXPECT_NE(test::refusal([&] {
+                read_volume(folder.write("a.mha", meta("3", name)));
+              }).find("its ElementDataFile is "),
+              std::string::npos)
+        << name;
+  for (const int slice : {1, 2, 3})
+    folder.write(fmt::format("a{:03}.raw", slice), std::string(2 * 3 * 3, '\7'));
+  const Volume volume = read_volume(folder.write("a.mhd", meta("3", "a%03d.raw 1 3 1")));
+  EXPECT_EQ(volume.size, (std::array<int64_t, 3>{3, 3, 3}));
 }
 
 TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsHugeOrNotFinite) {
