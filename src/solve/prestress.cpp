@@ -30,6 +30,14 @@ double length(const Model& model, size_t spring) {
   return (model.points.position[q] - model.points.position[p]).norm();
 }
 
+/// A prism's volume at the initial position and its derivatives.
+mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
+  mechanics::PrismTriples<double> corners;
+  for (int c = 0; c < 6; ++c)
+    corners[c] = mechanics::triple(model.points.position[model.prisms.points[prism][c]]);
+  return mechanics::PrismSlope<double>{mechanics::PrismEdges<double>(corners)};
+}
+
 /// Which local springs are skin, whose tension is given. The names are known on rank 0.
 std::vector<char> skin_springs(MPI_Comm comm, const Model& whole, const discrete::Part& part) {
   const auto name = std::find(whole.spring_sets.begin(), whole.spring_sets.end(), "layer 0");
@@ -124,12 +132,14 @@ class Stiffness {
         solver_(positions_, tangent_),
         multiplier_(part_.model.points.position.size(), Vec3::Zero()) {}
 
-  /// Solves (A K Aᵀ) μ = −`force`.
-  void solve(Vec force) {
+  /// Solves (A K Aᵀ) μ = −`force` to that part of the force which is left to balance.
+  void solve(Vec force, const Prestress& so_far) {
+    constexpr double least = 1e-10, below = 1e-2;
+    const double left = below * balanced * so_far.largest_force / so_far.residual;
     base::VecHandle multiplier = positions_.make_vector();
     const base::VecHandle initial = positions_.make_vector();
     check(VecScale(force, -1));
-    solver_.solve(initial, force, multiplier, 1e-10);
+    solver_.solve(initial, force, multiplier, std::max(least, left));
     positions_.spread(multiplier, multiplier_);
   }
   /// Returns a spring's component of K Aᵀ μ, N.
@@ -144,10 +154,7 @@ class Stiffness {
   /// And the pressure of a prism, N/mm².
   double pressure(size_t prism) const {
     const Model& model = part_.model;
-    mechanics::PrismTriples<double> corners;
-    for (int c = 0; c < 6; ++c)
-      corners[c] = mechanics::triple(model.points.position[model.prisms.points[prism][c]]);
-    const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
+    const auto v = volume_slope(model, prism);
     double change = 0;
     for (int c = 0; c < 6; ++c)
       change += mechanics::vec3(v.gradient[c]).dot(multiplier_[model.prisms.points[prism][c]]);
@@ -175,22 +182,49 @@ base::VecHandle initial_forces(MPI_Comm comm, const discrete::Part& part) {
   return forces;
 }
 
-/// The largest force that the rounding of lengths alone can leave on a soft-tissue point, N: each
-/// spring's tension is known to its tangent times half a unit in the last place of its length.
-/// Collective.
-double rounding_force(MPI_Comm comm, const discrete::Part& part) {
-  const Model& model = part.model;
-  std::vector<double> force(model.points.position.size(), 0.0);
+/// Units in the last place that sums and directions of forces are known to.
+constexpr double rounded = 4 * std::numeric_limits<double>::epsilon();
+
+/// Adds what rounding leaves of each spring: its tension is known to its tangent times half a unit
+/// in the last place of its length, and itself to `rounded`.
+void add_rounding_of_springs(const Model& model, std::vector<double>& force) {
   for (size_t j = 0; j < model.springs.points.size(); ++j) {
-    const double r = length(model, j);
-    const double tangent = mechanics::with_exponent(model.springs.exponent[j], [&]<int p>() {
-      return mechanics::spring_tangent<p>(r - model.springs.rest_length[j],
-                                          model.springs.stiffness[j],
-                                          1.0 / model.springs.reference[j]);
+    const double r = length(model, j), s = r - model.springs.rest_length[j],
+                 k = model.springs.stiffness[j], inverse = 1.0 / model.springs.reference[j];
+    const double left = mechanics::with_exponent(model.springs.exponent[j], [&]<int p>() {
+      return 0.5 * std::numeric_limits<double>::epsilon() * r *
+                 mechanics::spring_tangent<p>(s, k, inverse) +
+             rounded * std::abs(mechanics::spring_tension<p>(s, k, inverse));
     });
-    for (const int64_t point : model.springs.points[j])
-      force[point] += 0.5 * std::numeric_limits<double>::epsilon() * r * tangent;
+    for (const int64_t point : model.springs.points[j]) force[point] += left;
   }
+}
+
+/// Adds what rounding leaves of a solid's edges and of the pressure of its prisms, whose volume is
+/// known to `rounded`.
+void add_rounding_of_solid(const Model& model, std::vector<double>& force) {
+  for (size_t j = 0; j < model.edges.points.size(); ++j) {
+    const auto [p, q] = model.edges.points[j];
+    const double left = rounded * std::abs(model.edges.weight[j]) *
+                        (model.points.position[q] - model.points.position[p]).norm();
+    force[p] += left;
+    force[q] += left;
+  }
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    const auto slope = volume_slope(model, m);
+    const double pressure =
+        rounded * model.prisms.modulus[m] * std::abs(slope.volume) / model.prisms.rest_volume[m];
+    for (int c = 0; c < 6; ++c)
+      force[model.prisms.points[m][c]] += pressure * mechanics::vec3(slope.gradient[c]).norm();
+  }
+}
+
+/// The largest force that rounding alone can leave on a soft-tissue point, N, where forces cancel
+/// that are much larger than those to balance. Collective.
+double rounding_force(MPI_Comm comm, const discrete::Part& part) {
+  std::vector<double> force(part.model.points.position.size(), 0.0);
+  add_rounding_of_springs(part.model, force);
+  if (part.solid) add_rounding_of_solid(part.model, force);
   double largest = 0;
   for (int64_t i = 0; i < part.owned_points; ++i)
     if (part.unknown[i] >= 0) largest = std::max(largest, force[i]);
@@ -315,17 +349,16 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
   result.solid = true;
   Stiffness stiffness(comm, solid_stiffness_part(part));
   constexpr int most_refinements = 6;
-  constexpr double rounding = 1e-10;  // of the largest force before: edges and prisms cancel
   for (int pass = 0; pass <= most_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
     result.residual = discrete::largest_block(force);
     if (pass == 0) result.largest_force = result.residual;
     if (result.residual <= balanced * result.largest_force) break;
     if (pass == most_refinements) {
-      if (result.residual <= rounding * result.largest_force) break;
+      if (result.residual <= rounding_force(comm, part)) break;
       refuse_unbalanced(comm, part, force, result);
     }
-    stiffness.solve(force);
+    stiffness.solve(force, result);
     result.largest_pressure += add_balance(stiffness, part.model);
   }
   MPI_Allreduce(MPI_IN_PLACE, &result.largest_pressure, 1, MPI_DOUBLE, MPI_MAX, comm);
@@ -363,7 +396,7 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
       if (result.residual <= rounding_force(comm, part)) break;
       refuse_unbalanced(comm, part, force, result);
     }
-    stiffness.solve(force);
+    stiffness.solve(force, result);
     for (size_t j = 0; j < skin.size(); ++j)
       if (!skin[j]) tension[j] += stiffness.tension(j);
     set_rest_lengths(skin, tension, part.model);

@@ -191,7 +191,7 @@ def main():
     for kind, count in counts.most_common():
         print(f"{count:5d}  {kind}")
     print(f"{end - begin} scenes in {time.time() - clock:.0f} s")
-    enough = counts["a rest position"] >= ENOUGH * (end - begin) or options.only is not None
+    enough = counts["a rest position"] >= ENOUGH * (end - begin)
     return 0 if enough and not counts["disagrees"] else 1
 
 

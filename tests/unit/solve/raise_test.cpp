@@ -228,6 +228,18 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   EXPECT_LE(largest_force(discrete::distribute(comm, whole)), 1e-10 * one.largest_force);
 }
 
+TEST(Raise, a_prestress_of_next_to_no_weight_is_balanced_to_rounding) {
+  for (const auto dilatation : {scene::Dilatation::prism, scene::Dilatation::nodal}) {
+    model::Anatomy anatomy = rich(12);
+    anatomy.scene.rim = scene::Rim::fixed;
+    anatomy.scene.tissue.material->dilatation = dilatation;
+    model::Model whole = model::build_model(anatomy).model;
+    const solve::Prestress of_weight = solve::prestress(comm, whole, {0.05, Vec3(0, 0, -9.81e-8)});
+    EXPECT_GT(of_weight.largest_force, 0);
+    EXPECT_LT(of_weight.residual, 1e-13);  // N; tissue of 0.015 N/mm² on some millimetres
+  }
+}
+
 TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
   model::Anatomy anatomy = rich(12);
   anatomy.scene.tissue.material->regions = {
