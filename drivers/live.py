@@ -102,13 +102,19 @@ class Handler(http.server.BaseHTTPRequestHandler):
         else:
             self.reply(404, b"there is no such page\n", "text/plain")
 
-    def do_POST(self):
+    def content(self):
+        """The body of a request; of one that is too long nothing is read, and the connection ends."""
         length = int(self.headers.get("Content-Length") or 0)
-        content = self.rfile.read(min(length, LONGEST_REQUEST))
-        if not self.allowed(self.headers.get("X-Token", "")):
-            return
+        if not 0 <= length <= LONGEST_REQUEST:
+            raise ValueError(f"its length must be 0 … {LONGEST_REQUEST} bytes")
+        return self.rfile.read(length)
+
+    def do_POST(self):
         from repose import Refused
         try:
+            content = self.content()
+            if not self.allowed(self.headers.get("X-Token", "")):
+                return
             request = json.loads(content)
             work = {"/solve": self.solve, "/scene_file": self.scene_file,
                     "/result": self.result}[self.path]
@@ -117,7 +123,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             overtaken = str(refusal).startswith("abandoned")  # the page has asked for another since
             self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
                        "text/plain; charset=utf-8")
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            self.close_connection = True  # what is left of the body is no request
             self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
 
     def solve(self, request):

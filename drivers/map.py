@@ -174,7 +174,7 @@ def arguments():
 def read_plan(text):
     try:
         plan = json.loads(text)
-    except ValueError as reason:
+    except (ValueError, RecursionError) as reason:
         refuse(f"-plan: not JSON: {reason}")
     motions = plan.values() if isinstance(plan, dict) else [None]
     for motion in motions:

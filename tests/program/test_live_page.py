@@ -117,8 +117,11 @@ def test_nothing_is_answered_without_the_token(served):
 def test_requests_are_answered_or_refused_in_words(served):
     server, address = served
     token = {"X-Token": server.token}
-    for content in (b"", b"[]", b"{", b"\xff"):
+    for content in (b"", b"[]", b"{", b"\xff", b"[" * 100000 + b"]" * 100000):
         code, said = status(address, "/solve", token, content)
+        assert code == 400 and said.count(b"\n") == 1
+    for length in ("-5", "many", str(1 << 30)):
+        code, said = status(address, "/solve", {**token, "Content-Length": length}, b"{}")
         assert code == 400 and said.count(b"\n") == 1
     far = json.dumps({"plan": {"chin": {"translate": [0, 99, 0]}}}).encode()
     code, said = status(address, "/solve", token, far)
