@@ -3,10 +3,10 @@
 
     tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
                                     [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]
-                                    [-output docs/measurements/solid.md]
+                                    [-contacts off,on] [-output docs/measurements/solid.md] [-mark growth]
 
 Synthetic heads of the given numbers of skin vertices, four layers, the jaw opened by 8° and brought
-6 mm forward, to 0.01 mm, without contact. lmvm is the default: limited-memory BFGS that begins with a
+6 mm forward, to 0.01 mm, without contact unless -contacts says otherwise. lmvm is the default: limited-memory BFGS that begins with a
 multigrid cycle and ends with Newton steps; ntr, nls and cg are TAO's. Seconds are those of the search
 on its own model, the estimate of the distance to rest included. Needs: apt-get install
 --no-install-recommends python3-h5py python3-numpy
@@ -24,42 +24,48 @@ bones:
   - {name: mandible, file: head_mandible.ply}
 tissue:
   layers: 4
+  edge: given
   material: {young: 0.015, poisson: POISSON}
 moves:
   - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}
   - {bone: mandible, translate: [0, -6, 0]}
-contact: {bones: off, cuts: off}
+CONTACT
 solve: {accuracy: 0.01}
 """
+CONTACT = {"off": "contact: {bones: off, cuts: off}", "on": ""}
 HEAD = ("| unknowns | ν | method | evaluations | Hessians | search, s | µs/unknown | memory, MiB | "
         "inverted prisms | from the first, mm |\n|--:|--:|---" + "|--:" * 7 + "|")
 
 
 def rows_of(size, poisson, chosen):
-    with synthetic(chosen.bin, size, SCENE.replace("POISSON", poisson)) as folder:
-        first = None
-        for method in chosen.methods.split(","):
-            solved = run([chosen.bin / "repose-solve", "scene.yaml", "-tao_type", method,
-                          "-output", method], folder, chosen.ranks)
-            with h5py.File(folder / f"{method}.h5") as h5:
-                step = h5["step"][max(h5["step"])]
-                position, inverted = step["point/position"][()], step.attrs["inverted_prisms"]
-                unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
-            first = position if first is None else first
-            apart = np.linalg.norm(position - first, axis=1).max()
-            said = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
-            seconds = solved.stages["solve"][0]
-            yield (f"| {unknowns} | {poisson} | {method} | {solved.evaluations[0]} | "
-                   f"{solved.evaluations[1]} | {seconds:.2f} | {1e6 * seconds / unknowns:.0f} | "
-                   f"{solved.memory:.0f} | {inverted} | {said} |")
+    text = SCENE.replace("POISSON", poisson)
+    with synthetic(chosen.bin, size, text.replace("CONTACT", "")) as folder:
+        for contact in chosen.contacts.split(","):
+            (folder / "scene.yaml").write_text(text.replace("CONTACT", CONTACT[contact]))
+            first = None
+            for method in chosen.methods.split(","):
+                solved = run([chosen.bin / "repose-solve", "scene.yaml", "-tao_type", method,
+                              "-output", method], folder, chosen.ranks)
+                with h5py.File(folder / f"{method}.h5") as h5:
+                    step = h5["step"][max(h5["step"])]
+                    position, inverted = step["point/position"][()], step.attrs["inverted_prisms"]
+                    unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
+                first = position if first is None else first
+                apart = np.linalg.norm(position - first, axis=1).max()
+                said = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
+                seconds = solved.stages["solve"][0]
+                name = method + ", contact" * (contact == "on")
+                yield (f"| {unknowns} | {poisson} | {name} | {solved.evaluations[0]} | "
+                       f"{solved.evaluations[1]} | {seconds:.2f} | {1e6 * seconds / unknowns:.0f} | "
+                       f"{solved.memory:.0f} | {inverted} | {said} |")
 
 
 def main():
-    chosen = option_parser(__doc__, sizes="500,2500,12500,125000", methods="lmvm,ntr",
-                           poissons="0.45,0.49", ranks=1).parse_args()
+    chosen = option_parser(__doc__, sizes="500,2500,12500,125000", methods="lmvm,ntr", poissons="0.45,0.49",
+                           ranks=1, contacts="off", mark="growth").parse_args()
     rows = (row for size in chosen.sizes.split(",") for poisson in chosen.poissons.split(",")
             for row in rows_of(size, poisson, chosen))
-    print_table(HEAD, rows, chosen.output, "growth")
+    print_table(HEAD, rows, chosen.output, chosen.mark)
 
 
 if __name__ == "__main__":
