@@ -15,6 +15,7 @@ import argparse
 import html
 import json
 import pathlib
+import re
 import shlex
 import sys
 
@@ -207,11 +208,21 @@ def solve_plan(chosen, session, box, store):
               f"{off.max():.2f} mm; its bound holds on {100 * np.mean(off <= plan_map.bound(plan)):.0f} %")
 
 
+def show_progress(text):
+    """A bar on a terminal; in a log the end alone, and plans that failed."""
+    done, total = map(int, re.match(r"(\d+) of (\d+)", text).groups())
+    if sys.stderr.isatty():
+        cells = 10 * done // total
+        print(f"\r\033[K[{'#' * cells}{'.' * (10 - cells)}] {text}", end="\n" if done == total else "",
+              file=sys.stderr, flush=True)
+    elif done == total or "not converge" in text:
+        print(text, file=sys.stderr, flush=True)
+
+
 def make_page(chosen, session, box, store):
     points = box.points(chosen.samples or default_samples(box))
-    tell = lambda text: print(text, file=sys.stderr, flush=True)
     samples = solve_all(chosen.scene, box, points, store, chosen.accuracy, session, chosen.processes,
-                        report=tell)
+                        report=show_progress)
     if samples is None:
         return  # another rank makes the page
     plan_map, text = fitted_page(chosen.scene, session, box, samples, chosen.accuracy)

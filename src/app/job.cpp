@@ -13,6 +13,11 @@ namespace repose::app {
 
 namespace {
 
+using Watch = std::function<void(double)>;
+
+/// Share of reading, completing and cutting surfaces in the time of building.
+constexpr double share_of_surfaces = 0.6;
+
 /// A model or its ground, from an anatomy.
 template <class Made>
 Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
@@ -78,7 +83,8 @@ void raise(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
 }
 
 /// Collective.
-void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole, Job& job) {
+void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
+          const Watch& watch, Job& job) {
   bool raised = false;
   const bool shared = base::size(comm) > 1;
   base::on_first_rank(comm, [&] {
@@ -88,6 +94,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
       return;
     }
     read_scene(scene::read_scene(input), job);
+    if (watch) watch(share_of_surfaces);
     const std::string why = why_whole(comm, *job.anatomy, whole);
     raised = shared && why.empty();
     if (raised) return;
@@ -133,9 +140,10 @@ void share(MPI_Comm comm, Job& job) {
 
 }  // namespace
 
-Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole) {
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
+             const Watch& watch) {
   Job job;
-  read(comm, input, whole, job);
+  read(comm, input, whole, watch, job);
   bring_into_equilibrium(comm, job);
   base::on_first_rank(comm, [&] {
     make_incisions(job);

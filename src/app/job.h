@@ -2,6 +2,7 @@
 #include <mpi.h>
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,7 +37,8 @@ struct Job {
 /// and makes its incisions. On several ranks each makes its part of a scene's model, unless the
 /// scene needs more than is known by columns or `whole` says why it is to be whole. Where no
 /// tissue fits, the places of the skin to look at are written to NAME_refused.ply. Throws
-/// InputError. Collective.
-Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole);
+/// InputError. `watch` is told the share that is done, on rank 0. Collective.
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
+             const std::function<void(double)>& watch = {});
 
 }  // namespace repose::app

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace repose::app {
@@ -11,6 +12,12 @@ Phase::Phase(MPI_Comm comm, std::string text) : progress_(comm), text_(std::move
 }
 
 Phase::~Phase() { end(); }
+
+void Phase::at(double done) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  done_ = done;
+  reached_ = seconds();
+}
 
 void Phase::end() {
   if (!thread_.joinable()) return;
@@ -26,12 +33,13 @@ void Phase::end() {
 void Phase::run() {
   constexpr std::chrono::seconds patience{2};
   constexpr std::chrono::milliseconds interval{500};
-  const auto start = std::chrono::steady_clock::now();
   std::unique_lock<std::mutex> lock(mutex_);
   if (ended_.wait_for(lock, patience, [&] { return over_; })) return;
   do {
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    progress_.show(fmt::format("{}  {:.0f} s", text_, seconds.count()), -1);
+    const double now = seconds();
+    // The share grows on as fast as it has so far.
+    const double done = done_ > 0 ? std::min(std::max(done_, done_ * now / reached_), 0.99) : -1;
+    progress_.show(fmt::format("{}  {:.0f} s", text_, now), done);
   } while (!ended_.wait_for(lock, interval, [&] { return over_; }));
 }
 

@@ -255,8 +255,9 @@ std::string Run::describe_folds(const model::StepNumbers& last, const Writer& wr
 /// Solves what came to rest again, in twice the load steps, where that is requested. Collective.
 std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.verifies_path || !summary.path.complete()) return {};
-  const Phase phase(comm, "verifying the path");
-  PathCheck check = verify_path(comm, job_.model, strategy_.settings, summary, writer.positions());
+  solve::Settings settings = strategy_.settings;
+  settings.activity = "verifying the path: ";
+  PathCheck check = verify_path(comm, job_.model, settings, summary, writer.positions());
   stages_.end("verify path");
   return check;
 }
@@ -300,8 +301,9 @@ std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summ
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
   const solve::RestState rest{writer.positions(), writer.contact_pressures()};
-  const Phase phase(comm, "estimating sensitivities");
-  const auto found = sensitivities(comm, job_, strategy_.settings.weights, rest);
+  Phase phase(comm, "estimating sensitivities");
+  const auto found = sensitivities(comm, job_, strategy_.settings.weights, rest,
+                                   [&](double done) { phase.at(done); });
   stages_.end("sensitivity");
   return describe_sensitivities(found);
 }
@@ -372,7 +374,7 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
     if (!dry) lock.emplace(name);
   });
   Phase building(comm, "building the model");
-  Job job = read_job(comm, input, needs_whole(options));
+  Job job = read_job(comm, input, needs_whole(options), [&](double done) { building.at(done); });
   Strategy strategy = make_strategy(comm, options, job);
   building.end();
   stages.end("build");

@@ -89,7 +89,8 @@ std::vector<Variation> variations(const scene::Scene& scene) {
 
 std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
                                        const mechanics::Weights& weights,
-                                       const solve::RestState& rest) {
+                                       const solve::RestState& rest,
+                                       const std::function<void(double)>& watch) {
   std::vector<Variation> all;
   if (job.anatomy) all = variations(job.anatomy->scene);
   auto count = static_cast<int>(all.size());
@@ -106,6 +107,7 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
     }
     one.name = variation.name;
     found.push_back(one);
+    watch(static_cast<double>(found.size()) / static_cast<double>(all.size()));
   }
   std::sort(found.begin(), found.end(),
             [](const auto& a, const auto& b) { return a.percentile_95 > b.percentile_95; });

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,10 +28,12 @@ struct Sensitivity {
 };
 
 /// One for each variation of a job that came to rest at `rest`, the largest first, by one linear
-/// solve each or, with contact, a few; on rank 0. Collective.
+/// solve each or, with contact, a few; on rank 0. `watch` is told the share that is done.
+/// Collective.
 std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
                                        const mechanics::Weights& weights,
-                                       const solve::RestState& rest);
+                                       const solve::RestState& rest,
+                                       const std::function<void(double)>& watch);
 
 /// Rows for a person.
 std::string describe_sensitivities(const std::vector<Sensitivity>& found);

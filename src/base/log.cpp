@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -46,6 +48,21 @@ std::string duration(double seconds) {
   return fmt::format("{:.0f} min", seconds / 60);
 }
 
+/// A bar of ten cells in front of a line; empty where the share is unknown.
+std::string bar(double done) {
+  if (done < 0) return "";
+  const int cells = static_cast<int>(10 * std::clamp(done, 0.0, 1.0));
+  return fmt::format("[{:.<10}] ", std::string(cells, '#'));
+}
+
+/// Cuts a line off where a terminal at stderr ends; what wraps around could not be cleared.
+std::string fit_terminal(std::string line) {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)
+    line.resize(size.ws_col - 1);
+  return line;
+}
+
 /// Returns whether stderr is shown on a terminal: it is one, or mpirun, which started this
 /// process with a pipe for stderr, passes it on to one.
 bool watched() {
@@ -75,7 +92,7 @@ void Progress::show(const std::string& text, double done) {
   std::string left;
   if (done > 0.02 && done < 1)
     left = fmt::format("  about {} left", duration(elapsed * (1 - done) / done));
-  std::fputs(fmt::format("\r\033[K{}{}", text, left).c_str(), stderr);
+  std::fputs(("\r\033[K" + fit_terminal(bar(done) + text + left)).c_str(), stderr);
   std::fflush(stderr);
 }
 

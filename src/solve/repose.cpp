@@ -79,15 +79,16 @@ class Watcher {
         interrupt_(settings.interrupt),
         abandoned_(settings.abandoned),
         accuracy_(settings.path.accuracy),
+        activity_(settings.activity),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
     const std::string to_go = std::isfinite(i.millimetres_to_go) && i.millimetres_to_go > 0
                                   ? fmt::format("{:.3g} mm to go", i.millimetres_to_go)
                                   : std::string("far from rest");
     if (prints_) print(i, to_go);
-    progress_.show(fmt::format("load {:.3f}  iteration {}  objective {:.6g} N mm  largest force "
+    progress_.show(fmt::format("{}load {:.3f}  iteration {}  objective {:.6g} N mm  largest force "
                                "{:.3g} N  {}",
-                               i.load, i.number, i.objective, i.largest_force, to_go),
+                               activity_, i.load, i.number, i.objective, i.largest_force, to_go),
                    done(i));
     if (on_iteration_) on_iteration_(i);
     if (abandoned_ && abandoned_()) return false;
@@ -126,6 +127,7 @@ class Watcher {
   std::function<void(const Iteration&)> on_iteration_;
   double accuracy_, load_ = 0, reached_ = 0;
   double farthest_ = 0, nearest_ = 0;  // mm, in this search
+  std::string activity_;
   bool prints_;
   Clock::time_point begin_ = Clock::now();
 };

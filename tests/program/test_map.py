@@ -53,7 +53,8 @@ def stored_map(scene):
     """The box and the map of the solved plans of a scene."""
     box = PlanBox(["mandible"], {"translate": [0, 4, 2], "rotate": [3, 0, 0]})
     folder = scene.with_name("one_map")
-    store = SampleStore(folder, next(folder.iterdir()).name)
+    fullest = max(folder.iterdir(), key=lambda plans: len(list(plans.glob("*.npz"))))
+    store = SampleStore(folder, fullest.name)
     return box, PlanMap(box, [store.load(u) for u in box.points(SAMPLES)], least_bound=0.05)
 
 
@@ -63,7 +64,7 @@ def test_a_page_is_made_and_says_what_it_rests_on(made):
     page = scene.with_name("one_map.html")
     assert 500_000 < page.stat().st_size < 5_000_000
     assert re.search(r"one_map.html: \d\.\d\d MB, 9 plans, \d+ modes", said.stdout)
-    assert "9 of 9 plans solved" in said.stderr
+    assert said.stderr.count("plans solved") == 1 and "9 of 9 plans solved" in said.stderr, "a quiet log"
     assert not re.search(r"(?:src|href)=[\"']?https?:|\bimport\(|\bfetch\(", page.read_text().split(
         "// three.js")[0]), "nothing is loaded"
 

@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import subprocess
 
 import pytest
@@ -42,6 +43,7 @@ def test_a_terminal_shows_load_iteration_and_distance(environment, tmp_path, ran
             pytest.skip("seen under mpirun with Open MPI 4 only")
         command = ["mpirun", "-n", str(ranks), *command]
     text = seen(command, tmp_path, environment)
+    assert re.search(r"\[#*\.+\] load", text)
     for word in ("load", "iteration", "largest force", "mm to go"):
         assert word in text
     assert text.endswith("\r\x1b[K"), "the line is cleared at the end"
@@ -59,6 +61,17 @@ def test_a_model_that_takes_long_shows_that_it_is_built(environment, tmp_path):
                    cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
     text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-dry_run"], tmp_path, environment)
     assert "building the model  " in text and text.endswith("\r\x1b[K")
+    assert re.search(r"\[#+\.+\] building the model  \d+ s  about \d+ s left", text)
+
+
+def test_estimates_have_a_bar_with_the_time_left(environment, tmp_path):
+    subprocess.run([programs() / "repose-phantom", "-skin_vertices", "4000", "-output", "head"],
+                   cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
+    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-sensitivity", "-verify_path",
+                 "-accuracy", "1"],
+                tmp_path, environment)
+    assert re.search(r"\[#*\.+\] verifying the path: load \d", text)
+    assert re.search(r"\[#+\.+\] estimating sensitivities  \d+ s  about \d+ s left", text)
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

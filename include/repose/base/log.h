@@ -42,7 +42,8 @@ class Progress {
   ~Progress();  ///< clears the line
 
   bool visible() const { return visible_; }
-  /// Shows `text`, at most ten times a second. `done` in [0, 1] gives the time left; < 0: unknown.
+  /// Shows `text`, at most ten times a second. `done` in [0, 1] gives a bar and the time left; < 0:
+  /// unknown.
   void show(const std::string& text, double done);
   void clear();
 

@@ -33,6 +33,7 @@ struct Settings {
   base::Stages* stages = nullptr;        ///< of which "distribute" and "solve" are ended
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
   bool monitor = false;                  ///< print a line for every iteration
+  std::string activity = {};             ///< begins the line that a terminal shows
   bool finds_other_rest = true;          ///< contact searches for another rest position at load 1
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene requests one
