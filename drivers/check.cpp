@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
                         {{"verbose", base::OptionKind::flag, "",
                           "Print every number of every step, not one row for each kind."}});
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
     return base::Exit::done;
   });
 }

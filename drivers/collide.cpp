@@ -34,14 +34,14 @@ std::vector<base::Option> option_table() {
 
 void report(const base::Options& options) {
   const scene::Scene scene = scene::read_scene(options.arguments()[0]);
-  scene::Collision wanted = scene.collision.value_or(scene::Collision{});
-  if (options.has("clearance")) wanted.clearance = options.number("clearance");
-  if (options.has("tolerance")) wanted.tolerance = options.number("tolerance");
+  scene::Collision requested = scene.collision.value_or(scene::Collision{});
+  if (options.has("clearance")) requested.clearance = options.number("clearance");
+  if (options.has("tolerance")) requested.tolerance = options.number("tolerance");
   const model::Bones bones = model::read_bones(scene);
   for (const std::string& remark : bones.remarks) std::printf("  %s\n", remark.c_str());
   const double start = MPI_Wtime();
-  const model::CollisionReport found = model::follow_moves(bones.surfaces, scene.moves, wanted);
-  for (const std::string& line : model::describe(found, scene, wanted))
+  const model::CollisionReport found = model::follow_moves(bones.surfaces, scene.moves, requested);
+  for (const std::string& line : model::describe(found, scene, requested))
     std::printf("  %s\n", line.c_str());
   if (found.pairs.empty())
     std::printf("  no two bones move differently\n");
@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
   base::Options options(argc, argv, "Reports contacts between bones along their planned moves.",
                         {{"SCENE", "scene file (.yaml) with moves"}}, option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { report(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { report(options); });
     return base::Exit::done;
   });
 }

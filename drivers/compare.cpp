@@ -8,7 +8,7 @@
 ///
 /// The last is the scorecard of a prediction: the scan is brought to it by what no surgery moved,
 /// then come the parts of the face and the landmarks. Distances are positive where PREDICTED lies
-/// in front of ACTUAL (outside it), weighted by area. Writes NAME.vtp, PREDICTED coloured by them,
+/// in front of ACTUAL (outside it), weighted by area. Writes NAME.vtp, PREDICTED colored by them,
 /// and NAME.csv, their histogram, which drivers/plot_compare.py draws. Exit status: 0 done, 1 bad
 /// input (nothing written), 3 internal error.
 #include <cmath>
@@ -65,7 +65,7 @@ std::vector<base::Option> option_table() {
       {.name = "reach",
        .kind = OptionKind::number,
        .default_text = "auto",
-       .help = "Distance of full colour and the histogram's ends.",
+       .help = "Distance of full color and the histogram's ends.",
        .range = length,
        .unit = "MM",
        .choices = {"auto"}},
@@ -81,7 +81,7 @@ void print_row(const std::string& name, const std::vector<Sample>& samples) {
   const auto s = tools::comparison::statistics(samples);
   std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.1f %8.1f\n", name.c_str(),
               static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.median,
-              s.percentile_90, s.percentile_95, s.most, 100 * s.within_1, 100 * s.within_2);
+              s.percentile_90, s.percentile_95, s.maximum, 100 * s.within_1, 100 * s.within_2);
 }
 
 /// The label at the nearest voxel; 0 outside the map.
@@ -147,7 +147,7 @@ surface::Surface above(const surface::Surface& whole, double height) {
 
 using Marks = std::map<std::string, Vec3>;
 
-/// What brings landmarks of ACTUAL to those of PREDICTED; nothing where fewer than three agree.
+/// Fits the landmarks of ACTUAL to those of PREDICTED; empty where fewer than three agree.
 base::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
   std::vector<Vec3> moving, fixed;
   for (const auto& [name, position] : actual)
@@ -209,7 +209,7 @@ Marks marks_of(const base::Options& options, const char* name) {
 void require_landmarks(const base::Options& options) {
   const bool named = options.has("landmarks");
   if (options.flag("parts") && !named)
-    base::refuse("-parts needs -landmarks, which tell the parts of the face");
+    base::refuse("-parts needs -landmarks, which define the parts of the face");
   if (options.has("actual_landmarks") && !named)
     base::refuse("-actual_landmarks needs -landmarks, those of PREDICTED");
   if (options.text("register") == "upper" && !named)
@@ -255,7 +255,7 @@ void write_results(const std::string& name, const surface::Surface& predicted,
   data.fields.push_back({"distance", {}});
   for (const Vec3& point : predicted.points) {
     data.fields[0].values.push_back(to.at(point).distance);
-    data.colours.push_back(tools::comparison::distance_colour(data.fields[0].values.back(), reach));
+    data.colors.push_back(tools::comparison::distance_color(data.fields[0].values.back(), reach));
   }
   surface::write_surface(name + ".vtp", predicted, data);
   base::write_whole_file(name + ".csv", histogram(samples, reach));
@@ -299,7 +299,7 @@ int main(int argc, char** argv) {
                          {"ACTUAL", "the same, what it is compared with"}},
                         option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
     return base::Exit::done;
   });
 }

@@ -31,27 +31,27 @@ std::vector<base::Option> option_table() {
       {.name = "triangles",
        .kind = OptionKind::integer,
        .default_text = "",
-       .help = "Stop at this many triangles; without -distance the distance is what it comes to.",
+       .help = "Stop at this many triangles; without -distance the distance reached is printed.",
        .range = base::Range::at_least(4)},
       {"landmarks", OptionKind::path, "",
        "Points whose nearest vertices stay (.mrk.json, .fcsv, .csv)."},
       {"output", OptionKind::path, "decimated.ply", "The file to write (PLY)."}};
 }
 
-tools::decimation::DecimateOptions wanted(const base::Options& options) {
-  tools::decimation::DecimateOptions wanted;
+tools::decimation::DecimateOptions requested(const base::Options& options) {
+  tools::decimation::DecimateOptions requested;
   const std::filesystem::path output = options.text("output");
   if (output.extension() != ".ply")
     base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
                  output.string());
   if (!options.has("distance") && !options.has("triangles"))
     base::refuse("neither -distance nor -triangles is given; say how far, e.g. -distance 0.5 (mm)");
-  if (options.has("distance")) wanted.distance = options.number("distance");
-  if (options.has("triangles")) wanted.triangles = options.integer("triangles");
+  if (options.has("distance")) requested.distance = options.number("distance");
+  if (options.has("triangles")) requested.triangles = options.integer("triangles");
   if (options.has("landmarks"))
     for (const auto& landmark : scene::read_landmarks(options.text("landmarks")))
-      wanted.landmarks.push_back(landmark.position);
-  return wanted;
+      requested.landmarks.push_back(landmark.position);
+  return requested;
 }
 
 void print(const char* what, const surface::Surface& surface) {
@@ -60,8 +60,9 @@ void print(const char* what, const surface::Surface& surface) {
 }
 
 void print(const tools::decimation::Decimated& result,
-           const tools::decimation::DecimateOptions& wanted) {
-  if (std::isfinite(wanted.distance)) std::printf("  bound asked      %g mm\n", wanted.distance);
+           const tools::decimation::DecimateOptions& requested) {
+  if (std::isfinite(requested.distance))
+    std::printf("  bound asked      %g mm\n", requested.distance);
   std::printf("  bound proven     %.6g mm from the result to the input (reached: %.6g mm)\n",
               result.to_input.upper, result.to_input.lower);
   std::printf("  the other way    %.4g mm from the input to the result, not bounded\n",
@@ -72,7 +73,7 @@ void print(const tools::decimation::Decimated& result,
 }
 
 void run(const base::Options& options) {
-  const tools::decimation::DecimateOptions choice = wanted(options);
+  const tools::decimation::DecimateOptions choice = requested(options);
   const surface::Surface input = surface::load_surface(options.arguments()[0], surface::Role::mesh);
   print("input", input);
   base::Progress progress(MPI_COMM_WORLD);
@@ -97,7 +98,7 @@ int main(int argc, char** argv) {
                         {{"MESH", "a manifold triangle mesh, open or closed (PLY, STL, OBJ, OFF)"}},
                         option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
     return base::Exit::done;
   });
 }

@@ -93,11 +93,11 @@ std::vector<base::Option> option_table() {
           {"output", OptionKind::path, "mesh.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
 }
 
-imaging::Extraction wanted_of(const base::Options& options) {
-  imaging::Extraction wanted;
-  if (options.has("level")) wanted.level = options.number("level");
-  wanted.otsu = options.flag("otsu");
-  if (options.has("label")) wanted.label = options.integer("label");
+imaging::Extraction requested_of(const base::Options& options) {
+  imaging::Extraction requested;
+  if (options.has("level")) requested.level = options.number("level");
+  requested.otsu = options.flag("otsu");
+  if (options.has("label")) requested.label = options.integer("label");
   if (options.has("box")) {
     std::array<Vec3, 2> box;
     const auto numbers = options.texts("box");
@@ -105,17 +105,17 @@ imaging::Extraction wanted_of(const base::Options& options) {
     if (!(box[0].array() < box[1].array()).all())
       base::refuse("-box: {} must be the lowest x, y, z and then the highest",
                    fmt::join(numbers, " "));
-    wanted.box = box;
+    requested.box = box;
   }
-  wanted.voxel = options.number("voxel");
-  wanted.close_holes = options.number("close_holes");
-  if (options.text("border") == "open") wanted.border = imaging::VolumeBorder::open;
-  wanted.largest = options.flag("largest");
-  wanted.components_above = options.number("components_above");
-  const bool labels = options.flag("labels") || wanted.label;
+  requested.voxel = options.number("voxel");
+  requested.close_holes = options.number("close_holes");
+  if (options.text("border") == "open") requested.border = imaging::VolumeBorder::open;
+  requested.largest = options.flag("largest");
+  requested.components_above = options.number("components_above");
+  const bool labels = options.flag("labels") || requested.label;
   const bool chosen = options.text("smooth") != "auto";
-  wanted.smooth = chosen ? options.integer("smooth") : labels ? rounds_for_labels : 0;
-  return wanted;
+  requested.smooth = chosen ? options.integer("smooth") : labels ? rounds_for_labels : 0;
+  return requested;
 }
 
 void print_volume(const imaging::Volume& volume) {
@@ -142,17 +142,17 @@ std::string numbered(const std::filesystem::path& file, int64_t label) {
   return (file.parent_path() / name).string() + file.extension().string();
 }
 
-void write_one(const imaging::Volume& volume, const imaging::Extraction& wanted,
+void write_one(const imaging::Volume& volume, const imaging::Extraction& requested,
                const std::string& file) {
   base::Progress progress(MPI_COMM_WORLD);
   const auto result = imaging::extract(
-      volume, wanted, [&](const std::string& step, double done) { progress.show(step, done); });
+      volume, requested, [&](const std::string& step, double done) { progress.show(step, done); });
   progress.show("checking and writing", -1);
   const std::string summary = describe_surface(result.surface);
   surface::write_surface(file, result.surface);
   progress.clear();
   for (const std::string& remark : result.remarks) std::printf("  %s\n", remark.c_str());
-  if (wanted.otsu) std::printf("  level by Otsu's method: %.6g\n", result.level);
+  if (requested.otsu) std::printf("  level by Otsu's method: %.6g\n", result.level);
   std::printf("%s: %s\n", file.c_str(), summary.c_str());
 }
 
@@ -181,32 +181,32 @@ std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, dou
 }
 
 /// A surface of each of two bones that touch; `files` of points may be empty.
-void write_apart(const imaging::Volume& volume, imaging::Extraction wanted,
+void write_apart(const imaging::Volume& volume, imaging::Extraction requested,
                  const std::vector<std::string>& files, const std::string& output) {
-  if (wanted.otsu) wanted.level = imaging::otsu_level(volume);
-  wanted.otsu = false;
+  if (requested.otsu) requested.level = imaging::otsu_level(volume);
+  requested.otsu = false;
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("parting the bones", -1);
   const tools::bone_separation::PartedBones bones = tools::bone_separation::part_bones(
-      volume, *wanted.level,
-      files.empty() ? write_points(volume, *wanted.level, output)
+      volume, *requested.level,
+      files.empty() ? write_points(volume, *requested.level, output)
                     : std::array{points_in(files[0]), points_in(files[1])});
   progress.clear();
   std::printf("  parted where voxels share %.0f mm²\n", bones.cut_area);
   for (int part = 0; part < 2; ++part)
-    write_one(bones.parts[part], wanted, numbered(output, part + 1));
+    write_one(bones.parts[part], requested, numbered(output, part + 1));
 }
 
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
-  imaging::Extraction wanted = wanted_of(options);
+  imaging::Extraction requested = requested_of(options);
   const bool all = options.flag("labels"), apart = options.has("apart") || options.flag("jaw");
-  if (int{wanted.level.has_value()} + wanted.otsu + wanted.label.has_value() + all != 1)
+  if (int{requested.level.has_value()} + requested.otsu + requested.label.has_value() + all != 1)
     base::refuse("repose-isosurface: give one of -level HU, -otsu, -label N and -labels");
   if (options.has("apart") && options.flag("jaw"))
     base::refuse("repose-isosurface: give one of -apart and -jaw");
-  if (apart && (all || wanted.label))
+  if (apart && (all || requested.label))
     base::refuse(
         "repose-isosurface: -apart and -jaw go with -level or -otsu: labels are apart already");
   base::Progress progress(MPI_COMM_WORLD);
@@ -216,15 +216,15 @@ void run(const base::Options& options) {
   progress.clear();
   print_volume(volume);
   if (apart)
-    return write_apart(volume, wanted,
+    return write_apart(volume, requested,
                        options.flag("jaw") ? std::vector<std::string>{} : options.texts("apart"),
                        output);
-  if (!all) return write_one(volume, wanted, output);
+  if (!all) return write_one(volume, requested, output);
   const auto labels = imaging::labels_of(volume);
   if (labels.empty()) base::refuse("{}: holds no label, only 0", volume.name);
   for (const int64_t label : labels) {
-    wanted.label = label;
-    write_one(volume, wanted, numbered(output, label));
+    requested.label = label;
+    write_one(volume, requested, numbered(output, label));
   }
 }
 
@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
       argc, argv, "Triangle meshes from a CT or a label map, by marching cubes.",
       {{"VOLUME", "a folder of DICOM slices, .nii, .nii.gz, .nrrd, .mha or .mhd"}}, option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
     return base::Exit::done;
   });
 }

@@ -47,7 +47,7 @@ surface::Surface read(const base::Options& options, const char* name) {
 void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal& alone,
                      const scene::Landmarks& given) {
   std::printf("%-24s %10s %10s %10s   %s\n", "landmark, mm", "x", "y", "z", "");
-  double sum = 0, most = 0;
+  double sum = 0, maximum = 0;
   int count = 0;
   for (const scene::LandmarkName& landmark : scene::landmark_names()) {
     const auto found = proposal.found.find(landmark.name);
@@ -62,7 +62,7 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
       const double off = (own->second - found->second).norm();
       note = fmt::format("given; proposed {:.1f} mm from it", off);
       sum += off;
-      most = std::max(most, off);
+      maximum = std::max(maximum, off);
       ++count;
     } else if (given.contains(landmark.name)) {
       note = "given";
@@ -73,12 +73,12 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
   }
   for (const auto& [name, at] : given)
     if (scene::standard_name(name).empty())
-      std::printf("%-24s %10.2f %10.2f %10.2f   given\n", base::shown(name).c_str(), at.x(), at.y(),
+      std::printf("%-24s %10.2f %10.2f %10.2f   given\n", base::quote(name).c_str(), at.x(), at.y(),
                   at.z());
   if (count > 0)
     std::printf(
         "%d given landmarks: proposed at a distance of %.2f mm in the mean, %.2f mm at most\n",
-        count, sum / count, most);
+        count, sum / count, maximum);
 }
 
 base::Exit run(const base::Options& options) {
@@ -99,8 +99,8 @@ base::Exit run(const base::Options& options) {
   for (const std::string& remark : proposal.remarks) std::printf("remark: %s\n", remark.c_str());
   base::write_whole_file(name + ending, scene::markups_text(proposal.found));
   base::write_whole_file(name + ".svg", anatomy::draw_landmarks(skin, skull, mandible, proposal));
-  std::printf("wrote %s.mrk.json and %s.svg: look at the picture before you use them\n",
-              name.c_str(), name.c_str());
+  std::printf("wrote %s.mrk.json and %s.svg: check the picture before you use them\n", name.c_str(),
+              name.c_str());
   for (const char* name : needed)
     if (proposal.missing.contains(name)) return base::Exit::not_converged;
   return base::Exit::done;
@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
                         option_table());
   return base::run_program(options, [&] {
     base::Exit exit = base::Exit::done;
-    base::on_first_rank(MPI_COMM_WORLD, [&] { exit = run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { exit = run(options); });
     return exit;
   });
 }

@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
                           .range = {0, 65535}}});
   // Standard output is for answers alone: what else is printed goes to standard error.
   const int output = dup(STDOUT_FILENO);
-  if (!options.help_wanted()) dup2(STDERR_FILENO, STDOUT_FILENO);
+  if (!options.help_requested()) dup2(STDERR_FILENO, STDOUT_FILENO);
   return base::run_program(options, [&] {
     std::optional<int> port;
     if (options.has("port")) port = static_cast<int>(options.integer("port"));

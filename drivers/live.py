@@ -120,7 +120,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
                     "/result": self.result}[self.path]
             self.reply(200, work(request))
         except Refused as refusal:
-            overtaken = str(refusal).startswith("abandoned")  # the page has asked for another since
+            overtaken = str(refusal).startswith("abandoned")  # the page has requested another since
             self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
                        "text/plain; charset=utf-8")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

@@ -4,8 +4,9 @@
 ///     repose-osteotomy mandible.ply -surface split.ply -seed 0 -290 350 -piece jaw
 ///     repose-osteotomy scene.yaml -output plan
 ///
-/// Of a scene, makes all osteotomies. Writes NAME_PIECE.ply for every part, the rest under the
-/// bone's own name. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
+/// Makes all osteotomies of a scene, where one is given. Writes NAME_PIECE.ply for every part, the
+/// rest under the bone's own name. Exit status: 0 done, 1 bad input (nothing written), 3 internal
+/// error.
 #include <cstdio>
 
 #include "repose/base/agreement.h"
@@ -118,7 +119,7 @@ int main(int argc, char** argv) {
       {{"BONE", "a closed surface (PLY, STL, OBJ, OFF), or a scene (.yaml) with osteotomies"}},
       option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { cut(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { cut(options); });
     return base::Exit::done;
   });
 }

@@ -60,7 +60,7 @@ std::vector<int> read_layers(const std::string& text) {
   for (std::string word; std::getline(words, word, ',');) {
     const auto number = base::parse_integer(word);
     if (!number || *number < 2 || *number > 64)
-      base::refuse("-layers {}: {} is not a number of layers, 2 … 64", text, base::shown(word));
+      base::refuse("-layers {}: {} is not a number of layers, 2 … 64", text, base::quote(word));
     layers.push_back(static_cast<int>(*number));
   }
   if (layers.empty()) base::refuse("-layers: give numbers of layers, such as 2,4,6");
@@ -82,7 +82,7 @@ void write_results(const std::filesystem::path& meshes, const scene::Scene& adva
   solved(turned, "turned");
 }
 
-/// What a person types for this page, the output's folder left out.
+/// Returns the command that makes this page, without the output's folder.
 std::string command_of(const base::Options& options) {
   std::string command = "repose-paper";
   for (const char* name : {"layers", "accuracy", "limit", "seconds", "path_seconds", "images"})

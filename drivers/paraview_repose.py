@@ -97,10 +97,10 @@ def look_from(made, direction, skin):
     made.CameraParallelScale = 0.65 * (box[5] - box[4])
 
 
-def shown(source, made, colour, opacity=1.0):
+def shown(source, made, color, opacity=1.0):
     drawn = Show(source, made)
     ColorBy(drawn, None)
-    drawn.DiffuseColor = drawn.AmbientColor = list(colour)
+    drawn.DiffuseColor = drawn.AmbientColor = list(color)
     drawn.Opacity = opacity
     return drawn
 
@@ -113,7 +113,7 @@ def initial(source, name):
     return made
 
 
-def coloured_by_movement(source, made):
+def colored_by_movement(source, made):
     drawn = shown(source, made, SKIN, 0.75)
     ColorBy(drawn, ("POINTS", "displacement", "Magnitude"))
     drawn.RescaleTransferFunctionToDataRange(False)
@@ -161,12 +161,12 @@ def given_skin(name):
                                 Vectors=["POINTS", "displacement"], ScaleFactor=1.0)
 
 
-def profile(source, name, made, colour):
+def profile(source, name, made, color):
     """The cut of a skin with the plane through its middle."""
     low, high = bounds(source)[:2]
     line = Slice(registrationName=name, Input=source)
     line.SliceType.Origin, line.SliceType.Normal = [(low + high) / 2, 0, 0], [1, 0, 0]
-    shown(line, made, colour).LineWidth = 4
+    shown(line, made, color).LineWidth = 4
 
 
 def main():
@@ -194,7 +194,7 @@ def main():
             shown(initial(bones, "bones before") if drawn is before else bones, made, IVORY)
         shown(drawn, made, SKIN, 0.5)
         look_from(made, FRONT_RIGHT, skin)
-    coloured_by_movement(skin, middle)
+    colored_by_movement(skin, middle)
     if bones:
         each_bone(name, bones)
     profile(before, "profile before", right, BLUE)

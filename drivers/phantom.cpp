@@ -35,13 +35,13 @@ std::vector<base::Option> option_table() {
 }
 
 void write_head(const base::Options& options) {
-  tools::phantom::PhantomOptions wanted;
-  wanted.skin_vertices = options.integer("skin_vertices");
-  if (options.text("bone_edge") != "auto") wanted.bone_edge = options.number("bone_edge");
+  tools::phantom::PhantomOptions requested;
+  requested.skin_vertices = options.integer("skin_vertices");
+  if (options.text("bone_edge") != "auto") requested.bone_edge = options.number("bone_edge");
   std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)\n",
               options.text("output").c_str());
   std::fflush(stdout);
-  const tools::phantom::Phantom head = tools::phantom::make_phantom(wanted);
+  const tools::phantom::Phantom head = tools::phantom::make_phantom(requested);
   for (const surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
     std::printf("  %-17s %7zu vertices, %7zu triangles\n", part->name.c_str(), part->points.size(),
                 part->triangles.size());
@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
   base::Options options(argc, argv, "Writes a synthetic head: skin, skull, mandible and scenes.",
                         {}, option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { write_head(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { write_head(options); });
     return base::Exit::done;
   });
 }

@@ -32,8 +32,8 @@ def read(file):
 def draw(low, high, share, target):
     figure, axes = plt.subplots(figsize=(5.5, 3.2))
     reach = high[-1]
-    colours = plt.get_cmap("coolwarm")((low + high) / (4 * reach) + 0.5)
-    axes.bar(low, 100 * share, high - low, align="edge", color=colours, edgecolor="0.4", lw=0.2)
+    colors = plt.get_cmap("coolwarm")((low + high) / (4 * reach) + 0.5)
+    axes.bar(low, 100 * share, high - low, align="edge", color=colors, edgecolor="0.4", lw=0.2)
     axes.axvline(0, color="0.3", lw=0.7)
     axes.set(xlabel="signed distance, mm (beyond the ends: in the outermost bars)",
              ylabel="share of the area, %", xlim=(low[0], reach))

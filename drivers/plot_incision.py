@@ -84,8 +84,8 @@ def draw(axes, result, middle, frame, half):
     near = (np.abs((a + b + c) / 3)[:, :2] < 1.5 * half).all(axis=1) & (normal[:, 2] > 0)
     bright = 0.55 + 0.45 * np.clip(normal @ LIGHT, 0, 1)
     faces = np.stack([a, b, c], axis=1)[near, :, :2]
-    colour = bright[near, None] * SKIN
-    axes.add_collection(PolyCollection(faces, facecolors=colour, edgecolors=EDGE, linewidths=0.3))
+    color = bright[near, None] * SKIN
+    axes.add_collection(PolyCollection(faces, facecolors=color, edgecolors=EDGE, linewidths=0.3))
     axes.set(xlim=(-0.6 * half, 0.6 * half), ylim=(-half, half), aspect="equal")
     axes.set_facecolor((0.35, 0.08, 0.08))
     axes.set_xticks([]), axes.set_yticks([])

@@ -86,13 +86,13 @@ def faces(points, triangles, view):
 
 
 def draw_face(axes, result, state, view, largest=None):
-    """The skin before or after; coloured by displacement up to `largest` mm where that is given."""
+    """The skin before or after; colored by displacement up to `largest` mm where that is given."""
     flat, bright, order = faces(result[state], result["skin"], view)
-    colour = np.tile(SKIN, (len(order), 1))
+    color = np.tile(SKIN, (len(order), 1))
     if largest:
         moved = np.linalg.norm(result["after"] - result["before"], axis=1)
-        colour = plt.cm.magma_r(0.9 * moved[result["skin"]].mean(axis=1)[order] / largest)[:, :3]
-    shaded = np.clip(colour * bright[:, None], 0, 1)
+        color = plt.cm.magma_r(0.9 * moved[result["skin"]].mean(axis=1)[order] / largest)[:, :3]
+    shaded = np.clip(color * bright[:, None], 0, 1)
     axes.add_collection(PolyCollection(flat, facecolors=shaded, edgecolors=shaded, lw=0.3))
     axes.autoscale_view()
     axes.set_aspect("equal")
@@ -105,13 +105,13 @@ def largest_move(results):
 
 
 def draw_states(panels, target):
-    """A picture of panels (title, result, state, colour) as columns and the views as rows."""
+    """A picture of panels (title, result, state, color) as columns and the views as rows."""
     largest = largest_move([result for _, result, _, _ in panels])
     figure, axes = plt.subplots(len(VIEWS), len(panels), squeeze=False,
                                 figsize=(COLUMN * 0.8 * len(panels), 0.8 * COLUMN * len(VIEWS)))
     for row, view in zip(axes, VIEWS):
-        for place, (title, result, state, coloured) in zip(row, panels):
-            draw_face(place, result, state, view, largest if coloured else None)
+        for place, (title, result, state, colored) in zip(row, panels):
+            draw_face(place, result, state, view, largest if colored else None)
             if view == next(iter(VIEWS)):
                 place.set_title(title, fontsize=9)
     scale = plt.cm.ScalarMappable(plt.Normalize(0, largest / 0.9), plt.cm.magma_r)

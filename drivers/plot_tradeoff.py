@@ -132,7 +132,7 @@ def draw_study(name, rows):
 
 
 def draw_map(name):
-    """The reference's face from the side and the front, coloured by each way's error."""
+    """The reference's face from the side and the front, colored by each way's error."""
     with open(name + "_map.csv", newline="") as file:
         titles = next(csv.reader(file))[3:]
     values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))

@@ -66,7 +66,7 @@ const scene::Landmark* find(const std::vector<scene::Landmark>& landmarks, const
     if (landmark.name != name) continue;
     if (found)
       base::refuse("{}: landmark {} comes twice; rename one, or use -match order", file,
-                   base::shown(name));
+                   base::quote(name));
     found = &landmark;
   }
   return found;
@@ -137,11 +137,11 @@ void print(const tools::registration::LandmarkFit& fit, const Pairs& pairs) {
 
 base::Exit refine(const base::Options& options, const surface::Surface& moving,
                   const surface::Surface& fixed, tools::registration::Similarity& transform) {
-  tools::registration::IcpOptions wanted;
-  wanted.trim = options.number("trim");
-  wanted.most_steps = static_cast<int>(options.integer("icp_steps"));
+  tools::registration::IcpOptions requested;
+  requested.trim = options.number("trim");
+  requested.max_steps = static_cast<int>(options.integer("icp_steps"));
   const tools::registration::IcpResult icp =
-      tools::registration::refine_by_icp(moving, fixed, transform, wanted);
+      tools::registration::refine_by_icp(moving, fixed, transform, requested);
   transform = icp.transform;
   std::printf(
       "  ICP %s after %d step(s): rms %.4g mm point to plane, %.4g mm point to point over "
@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
                         option_table());
   return base::run_program(options, [&] {
     base::Exit exit = base::Exit::done;
-    base::on_first_rank(MPI_COMM_WORLD, [&] { exit = run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { exit = run(options); });
     return exit;
   });
 }

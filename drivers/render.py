@@ -39,8 +39,8 @@ if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_scr
 # Where the camera stands as seen from the head: +x patient left, +y posterior, +z up. A profile
 # looks to the right.
 VIEWS = {"front": (0, -1, 0), "three-quarter": (-0.65, -0.75, 0.1), "profile": (-1, 0, 0)}
-COLOURED = ("movement", "advance", "stress", "region")
-COLUMNS = ("before", "after", *COLOURED, "bones")
+COLORED = ("movement", "advance", "stress", "region")
+COLUMNS = ("before", "after", *COLORED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
@@ -238,7 +238,7 @@ class Result:
         return total[self.used]
 
     def state(self, step):
-        """Skin, bones and the numbers of each coloured column, at a step."""
+        """Skin, bones and the numbers of each colored column, at a step."""
         skin = self.skin(step)
         numbers = {"movement": np.linalg.norm(skin - self.before, axis=1), "region": self.solved}
         if "point/advance" in self.steps[step]:
@@ -363,8 +363,8 @@ def round_up(number):
     return float(np.ceil(number / digit * (1 - 1e-12)) * digit)
 
 
-def colours(column, numbers):
-    """The colour table of a column: from 0, or as far inwards as outwards."""
+def colors(column, numbers):
+    """The color table of a column: from 0, or as far inwards as outwards."""
     largest = 1.0 if column == "region" else round_up(float(np.abs(numbers).max())) or 1.0
     ramp, low = {"advance": (BOTH, -largest), "region": (REGION, 0.0)}.get(column, (RAMP, 0.0))
     table = vtk.vtkColorTransferFunction()
@@ -374,7 +374,7 @@ def colours(column, numbers):
     return table
 
 
-def actor(drawn, colour, table=None, opacity=1.0):
+def actor(drawn, color, table=None, opacity=1.0):
     mapper = vtk.vtkPolyDataMapper()
     mapper.SetInputData(drawn)
     mapper.SetScalarVisibility(table is not None)
@@ -382,7 +382,7 @@ def actor(drawn, colour, table=None, opacity=1.0):
         mapper.SetLookupTable(table)
     shown = vtk.vtkActor()
     shown.SetMapper(mapper)
-    shown.GetProperty().SetColor(colour)
+    shown.GetProperty().SetColor(color)
     shown.GetProperty().SetOpacity(opacity)
     shown.GetProperty().SetAmbient(0.2)
     shown.GetProperty().SetDiffuse(0.8)
@@ -442,7 +442,7 @@ def label(text):
     return scene
 
 
-def colour_bar(table):
+def color_bar(table):
     scene = renderer([])
     bar = vtk.vtkScalarBarActor()
     bar.SetLookupTable(table)
@@ -552,9 +552,9 @@ def scales(drawn):
     """The color table of each colored column, one for all panels of it."""
     numbers = {}
     for panel in drawn:
-        if panel.column in (*COLOURED, "difference"):
+        if panel.column in (*COLORED, "difference"):
             numbers.setdefault(panel.column, []).append(panel.state[panel.column])
-    return {column: colours(column, np.concatenate(values)) for column, values in numbers.items()}
+    return {column: colors(column, np.concatenate(values)) for column, values in numbers.items()}
 
 
 def picture(drawn, views, tables, title=""):
@@ -576,7 +576,7 @@ def picture(drawn, views, tables, title=""):
             look(scene, view, middle, margin * up)
             top += high
         table = tables.get(panel.column)
-        sheet.put(colour_bar(table) if table else renderer([]), i * wide, top, wide, bars)
+        sheet.put(color_bar(table) if table else renderer([]), i * wide, top, wide, bars)
     return sheet.pixels()
 
 
@@ -612,7 +612,7 @@ def state_of(result, chosen):
         refuse(f"-step {chosen.step}: {result.name}.h5 has the steps 0 to {last}, or last")
     state = result.state(last if chosen.step == "last" else int(chosen.step))
     for column in chosen.columns:
-        if column in COLOURED and column not in state:
+        if column in COLORED and column not in state:
             refuse(f"-columns {column}: {result.name}.h5 does not have it; solve it again")
     return state
 

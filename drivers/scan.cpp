@@ -4,8 +4,8 @@
 ///     repose-scan bun000.ply -output face.ply
 ///     repose-scan head.ply -cylinder -max_edge 4 -output head.vtp
 ///
-/// Cuts steps in depth, keeps colours, says how many holes are left. The mesh is in mm; a scan less
-/// than 5 units across is taken to be in metres. Exit status: 0 done, 1 bad input (nothing
+/// Cuts steps in depth, keeps colors, says how many holes are left. The mesh is in mm; a scan less
+/// than 5 units across is taken to be in meters. Exit status: 0 done, 1 bad input (nothing
 /// written), 3 internal error.
 #include <algorithm>
 #include <cstdio>
@@ -22,7 +22,7 @@ namespace {
 using namespace repose;
 using base::OptionKind;
 
-constexpr double smallest_in_mm = 5;  // a scan less than this across is in metres
+constexpr double smallest_in_mm = 5;  // a scan less than this across is in meters
 
 std::vector<base::Option> option_table() {
   return {{.name = "unit",
@@ -59,7 +59,7 @@ double scale_of(const base::Options& options, const tools::range_scan::RangeGrid
   }
   const double size = (high - low).norm();
   if (size >= smallest_in_mm) return 1;
-  std::printf("  %.3g units across: taken as metres (-unit mm says otherwise)\n", size);
+  std::printf("  %.3g units across: taken as meters (-unit mm says otherwise)\n", size);
   return 1000;
 }
 
@@ -78,7 +78,7 @@ void print_mesh(const std::string& file, const tools::range_scan::ScanMesh& mesh
   if (!holes.empty()) std::printf(", the longest %.3g mm around", holes.front());
   std::printf("\n%s: %lld vertices, %lld triangles, area %.6g mm²%s\n", file.c_str(),
               count(mesh.surface.points.size()), count(mesh.surface.triangles.size()),
-              surface::area_of(mesh.surface), mesh.data.colours.empty() ? "" : ", with colours");
+              surface::area_of(mesh.surface), mesh.data.colors.empty() ? "" : ", with colors");
   std::printf("  %s\n", surface::describe(surface::inspect(mesh.surface, false)).c_str());
 }
 
@@ -91,13 +91,13 @@ void run(const base::Options& options) {
       grid.cell.size() - static_cast<size_t>(std::count(grid.cell.begin(), grid.cell.end(), -1));
   std::printf("%s: %lld × %lld cells, %zu of them with a point\n", grid.name.c_str(),
               static_cast<long long>(grid.columns), static_cast<long long>(grid.rows), filled);
-  tools::range_scan::ScanOptions wanted;
-  wanted.scale = scale_of(options, grid);
-  if (options.text("max_edge") != "auto") wanted.longest_edge = options.number("max_edge");
-  wanted.steepest = options.number("max_angle");
-  wanted.cylinder = options.flag("cylinder");
-  wanted.largest = options.flag("largest");
-  const tools::range_scan::ScanMesh mesh = tools::range_scan::mesh_of(grid, wanted);
+  tools::range_scan::ScanOptions requested;
+  requested.scale = scale_of(options, grid);
+  if (options.text("max_edge") != "auto") requested.longest_edge = options.number("max_edge");
+  requested.steepest = options.number("max_angle");
+  requested.cylinder = options.flag("cylinder");
+  requested.largest = options.flag("largest");
+  const tools::range_scan::ScanMesh mesh = tools::range_scan::mesh_of(grid, requested);
   surface::write_surface(output, mesh.surface, mesh.data);
   print_mesh(output, mesh);
 }
@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
   base::Options options(argc, argv, "A laser scanner's range grid as a triangle mesh.",
                         {{"RANGE.ply", "a Cyberware or Stanford range-grid PLY"}}, option_table());
   return base::run_program(options, [&] {
-    base::on_first_rank(MPI_COMM_WORLD, [&] { run(options); });
+    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
     return base::Exit::done;
   });
 }

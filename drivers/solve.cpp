@@ -7,7 +7,7 @@
 /// Writes NAME.h5 and one XDMF file a block for ParaView. Exit status: 0 converged, 1 bad input
 /// (nothing written), 2 not converged or folded (result written), 3 internal error.
 ///
-/// How a solve is organised, in the order in which it happens: app/job.h reads and builds,
+/// Order of a solve: app/job.h reads and builds,
 /// app/strategy.h decides what goes with what (-dry_run prints it), app/run.h solves and writes.
 #include "repose/app/options.h"
 #include "repose/app/run.h"

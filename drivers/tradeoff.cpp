@@ -22,7 +22,7 @@
 #include "repose/base/whole_file.h"
 #include "tradeoff/conclusion.h"
 #include "tradeoff/study.h"
-#include "tradeoff/ways.h"
+#include "tradeoff/variants.h"
 
 namespace {
 
@@ -69,7 +69,7 @@ std::vector<double> numbers_of(const base::Options& options, const char* name,
   for (const std::string& word : words_of(options, name)) {
     const auto number = base::parse_number(word);
     if (!number || !range.contains(*number))
-      base::refuse("-{} {}: {} is not a number, {}", name, options.text(name), base::shown(word),
+      base::refuse("-{} {}: {} is not a number, {}", name, options.text(name), base::quote(word),
                    range.text());
     numbers.push_back(*number);
   }
@@ -92,7 +92,7 @@ std::vector<std::string> choices_of(const base::Options& options, const char* na
   const std::vector<std::string> chosen = words_of(options, name);
   for (const std::string& word : chosen)
     if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
-      base::refuse("-{} {}: {} is not one of {}", name, options.text(name), base::shown(word),
+      base::refuse("-{} {}: {} is not one of {}", name, options.text(name), base::quote(word),
                    fmt::format("{}", fmt::join(allowed, ", ")));
   return chosen;
 }
@@ -124,7 +124,7 @@ std::string triangle_table(const std::vector<Triangle>& triangles) {
 base::Exit run(const base::Options& options) {
   const std::filesystem::path input = options.arguments()[0];
   tradeoff::Plan plan = read_plan(options);
-  base::together(comm, [&] { plan.scene = scene::read_scene(input); });
+  base::collective_try(comm, [&] { plan.scene = scene::read_scene(input); });
   const std::string name =
       options.has("output") ? options.text("output") : input.stem().string() + "_tradeoff";
   const auto tell = [](const std::string& line, size_t number, size_t runs) {
@@ -134,11 +134,12 @@ base::Exit run(const base::Options& options) {
     std::fflush(stdout);
   };
   const tradeoff::Findings found = tradeoff::measure(plan, tell);
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     base::write_whole_file(name + ".csv", tradeoff::table(found.measurements));
     base::write_whole_file(name + "_map.csv", tradeoff::map_table(found.map));
     base::write_whole_file(name + "_triangles.csv", triangle_table(found.map.triangles));
-    std::printf("%s\n", tradeoff::conclude(found.measurements, tradeoff::usual_way(plan)).c_str());
+    std::printf("%s\n",
+                tradeoff::conclude(found.measurements, tradeoff::usual_variant(plan)).c_str());
     std::printf("%s.csv, %s_map.csv, %s_triangles.csv: drivers/plot_tradeoff.py %s draws them\n",
                 name.c_str(), name.c_str(), name.c_str(), name.c_str());
   });

@@ -67,7 +67,7 @@ std::string energy_or_force(const Findings& findings) {
 
 /// Evaluations with f_v over those without, for every method that came to the same reference.
 std::string volume_ratios(const Findings& findings) {
-  double least = 1e300, most = 0;
+  double minimum = 1e300, maximum = 0;
   for (const Comparison& comparison : findings.comparisons) {
     const Comparison* with = find(findings, comparison.layers, false, true);
     if (comparison.functional.force || comparison.functional.volume || !with) continue;
@@ -75,15 +75,15 @@ std::string volume_ratios(const Findings& findings) {
       if (!comparison.entries[k].arrived() || !with->entries[k].arrived()) continue;
       const double ratio = static_cast<double>(with->entries[k].evaluations) /
                            static_cast<double>(comparison.entries[k].evaluations);
-      least = std::min(least, ratio);
-      most = std::max(most, ratio);
+      minimum = std::min(minimum, ratio);
+      maximum = std::max(maximum, ratio);
     }
   }
-  return most > 0 ? fmt::format("{:.2g} to {:.2g} times", least, most)
-                  : "an unknown number of times";
+  return maximum > 0 ? fmt::format("{:.2g} to {:.2g} times", minimum, maximum)
+                     : "an unknown number of times";
 }
 
-/// How near the paper's method came to rest by forces, for each number of layers.
+/// Closest distances to rest that the paper's method reached by forces, for each number of layers.
 std::string closest(const Findings& findings, bool volume) {
   std::string text;
   for (const Comparison& comparison : findings.comparisons)
@@ -100,13 +100,13 @@ std::string volume_and_force(const Findings& findings) {
   };
   const Score without = score(findings, of(true, false)), with = score(findings, of(true, true));
   const Score energy = score(findings, of(false, false)), both = score(findings, of(false, true));
-  return claim("f_v helps force minimisation.", with.arrived > without.arrived,
+  return claim("f_v helps force minimization.", with.arrived > without.arrived,
                fmt::format("One-step searches that converge: {} of {} with f_v, {} of {} without "
                            "it. The paper's method\ncame within {} with f_v and {} without it.",
                            with.arrived, with.run, without.arrived, without.run,
                            closest(findings, true), closest(findings, false))) +
          claim(
-             "f_v does not help energy minimisation.", both.other >= energy.other,
+             "f_v does not help energy minimization.", both.other >= energy.other,
              fmt::format("Not in evaluations: with f_v a method that converges takes "
                          "{}\nthose without. But it makes the minimum unique: {} of {} one-step "
                          "searches reach another minimum\nwith f_v, {} of {} without.",
@@ -114,16 +114,16 @@ std::string volume_and_force(const Findings& findings) {
 }
 
 std::string memory(const Findings& findings) {
-  double least = 1e300, most = 0;
+  double minimum = 1e300, maximum = 0;
   std::string text;
   for (const Size& s : findings.sizes) {
     const double bytes = s.model_bytes + s.descent_bytes + s.newton_bytes;
     const double each = bytes / static_cast<double>(s.counts.springs);
     text += fmt::format("{}{:.0f}", text.empty() ? "" : ", ", each);
-    least = std::min(least, each);
-    most = std::max(most, each);
+    minimum = std::min(minimum, each);
+    maximum = std::max(maximum, each);
   }
-  return claim("Memory grows linearly.", most <= 1.5 * least,
+  return claim("Memory grows linearly.", maximum <= 1.5 * minimum,
                fmt::format("Bytes per spring, Newton's method included: {}. From 2 thousand to a "
                            "million points:\n[scaling](scaling.md).",
                            text));
@@ -131,20 +131,20 @@ std::string memory(const Findings& findings) {
 
 std::string preprocessing(const Findings& findings) {
   std::string text;
-  double most = 0;
+  double maximum = 0;
   for (const Size& s : findings.sizes) {
     const double evaluations = s.ready / s.evaluation;
-    most = std::max(most, evaluations);
+    maximum = std::max(maximum, evaluations);
     text += fmt::format("{}{:.1f} ms", text.empty() ? "" : ", ", 1e3 * s.ready);
   }
   constexpr double little = 500;  // evaluations
   return claim(
-      "No preprocessing.", most <= little,
+      "No preprocessing.", maximum <= little,
       fmt::format("From the model in memory to the first evaluation: {}, the time of at "
                   "most {:.0f} evaluations\n(distribution over ranks and layout of the loops). "
-                  "Newton's factorisations are made on the way\nand are included in its "
-                  "times; nothing is condensed or factorised in advance.",
-                  text, most));
+                  "Newton's factorizations are made on the way\nand are included in its "
+                  "times; nothing is condensed or factorized in advance.",
+                  text, maximum));
 }
 
 std::string evaluations_text(const Entry& e) {
@@ -171,7 +171,7 @@ std::string motion(const Findings& findings) {
         evaluations_text(paper), newton);
   }
   return claim(
-             "By the paper's method, direct minimisation is faster than integrating the "
+             "By the paper's method, direct minimization is faster than integrating the "
              "equations of motion.",
              paper_wins,
              text +

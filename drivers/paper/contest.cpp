@@ -15,7 +15,7 @@ namespace {
 
 const MPI_Comm comm = PETSC_COMM_SELF;
 
-/// How often PETSc's log has seen an event.
+/// Returns the number of times that PETSc's log recorded an event.
 int64_t logged(const char* name) {
   PetscBool on = PETSC_FALSE;
   check(PetscLogIsActive(&on));
@@ -32,12 +32,12 @@ int64_t logged(const char* name) {
 class WatchedSearch {
  public:
   WatchedSearch(solve::Problem& problem, discrete::Function& watched)
-      : minimiser_(watched, problem.solver(), error_estimate(problem, watched), nullptr) {
-    if (problem.force()) force_search_.emplace(*problem.force(), minimiser_);
+      : minimizer_(watched, problem.solver(), error_estimate(problem, watched), nullptr) {
+    if (problem.force()) force_search_.emplace(*problem.force(), minimizer_);
   }
   solve::RestSearch& search() {
     if (force_search_) return *force_search_;
-    return minimiser_;
+    return minimizer_;
   }
 
  private:
@@ -47,7 +47,7 @@ class WatchedSearch {
     return {watched, own.solver};
   }
 
-  solve::Minimiser minimiser_;
+  solve::Minimizer minimizer_;
   std::optional<solve::ForceSearch> force_search_;
 };
 
@@ -79,7 +79,7 @@ base::VecHandle Contest::displacement_to(const std::vector<Vec3>& position) cons
   std::vector<Vec3> moved(part_.point_row.size());
   for (size_t i = 0; i < moved.size(); ++i)
     moved[i] = position[part_.point_row[i]] - part_.model.points.position[i];
-  positions_.keep_owned(moved, displacement);
+  positions_.restrict_to_owned(moved, displacement);
   return displacement;
 }
 
@@ -156,7 +156,7 @@ bool Contest::find_own_minimum(Vec displacement) {
   const base::VecHandle moved = positions_.make_vector();
   check(VecCopy(displacement, moved));
   const base::ScopedOption few("-tao_max_it", "50");
-  solve::Minimiser newton(problem_.function(), problem_.solver(), nullptr);
+  solve::Minimizer newton(problem_.function(), problem_.solver(), nullptr);
   const solve::Outcome outcome = newton.run(displacement, 0.01 * rules_.accuracy);
   check(VecAXPY(moved, -1, displacement));
   return outcome.converged && discrete::largest_block(moved) < nearby;
@@ -188,8 +188,8 @@ Entry Contest::run_polak_ribiere() {
 Entry Contest::run_tao(const std::string& type) {
   const base::ScopedOption chosen("-tao_type", type);
   return run("TAO " + type, [&](discrete::Function& function, Vec displacement) {
-    solve::Minimiser minimiser(function, problem_.solver(), nullptr);
-    minimiser.run(displacement, 0);
+    solve::Minimizer minimizer(function, problem_.solver(), nullptr);
+    minimizer.run(displacement, 0);
   });
 }
 
@@ -204,7 +204,7 @@ Contest::Curvature Contest::curvature() {
     check(VecNormalize(v, nullptr));
     check(VecSet(w, 0));
     solver.solve(reference_, v, w, 1e-3);
-    found.least = 1 / dot(v, w);
+    found.minimum = 1 / dot(v, w);
     check(VecCopy(w, v));
   }
   for (int k = 0; k < steps; ++k) {

@@ -9,7 +9,7 @@
 
 namespace repose::paper {
 
-/// How one method did.
+/// Outcome of one method.
 struct Entry {
   enum class End {
     reached,      ///< within the accuracy of the reference
@@ -30,7 +30,7 @@ struct Entry {
   bool arrived() const { return end == End::reached || end == End::own_minimum; }
 };
 
-/// A functional of a model with the bones at their ends, minimised by one method after another from
+/// A functional of a model with the bones at their ends, minimized by one method after another from
 /// the initial positions of the tissue. Serial.
 class Contest {
  public:
@@ -60,7 +60,7 @@ class Contest {
   // The others, in one load step.
   Entry run_polak_ribiere();
   Entry run_tao(const std::string& type);  ///< a TAO method: cg, lmvm, nls, ntr, …
-  /// Any search: `search` minimises the function it is given from the displacement it is given.
+  /// Any search: `search` minimizes the function it is given from the displacement it is given.
   /// One that does not come to the reference is followed to an energy minimum near where it ended
   /// and, if there is one, run again to that.
   using Search = std::function<void(discrete::Function&, Vec)>;
@@ -68,7 +68,7 @@ class Contest {
 
   /// Smallest and largest eigenvalue of the Hessian at the reference, N/mm.
   struct Curvature {
-    double least, largest;
+    double minimum, largest;
   };
   Curvature curvature();
 

@@ -102,13 +102,13 @@ bool move_by_euler(discrete::Function& function, Vec displacement, Damping dampi
 
 bool move_by_runge_kutta(discrete::Function& function, Vec displacement, Damping damping,
                          const RungeKuttaSettings& settings) {
-  constexpr double safety = 0.9, least_factor = 0.2, most_factor = 5, least_step = 1e-12;
+  constexpr double safety = 0.9, min_factor = 0.2, max_factor = 5, min_step = 1e-12;
   BogackiShampine pair(function, damping);
   State state(function.positions());
   check(VecCopy(displacement, state.x));
   pair.start(state);
   double time = 0, h = settings.first_step;
-  while (time < settings.duration && h > least_step) {
+  while (time < settings.duration && h > min_step) {
     h = std::min(h, settings.duration - time);
     const double error = pair.attempt(state, h);
     if (error <= settings.tolerance) {
@@ -116,7 +116,7 @@ bool move_by_runge_kutta(discrete::Function& function, Vec displacement, Damping
       pair.accept(state);
     }
     const double factor = safety * std::cbrt(settings.tolerance / std::max(error, 1e-300));
-    h *= std::clamp(factor, least_factor, most_factor);
+    h *= std::clamp(factor, min_factor, max_factor);
   }
   check(VecCopy(state.x, displacement));
   return time >= settings.duration;

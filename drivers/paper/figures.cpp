@@ -70,10 +70,10 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
 
 bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   const model::Model model = model::build_model(scene).model;
-  scene::Solve wanted = scene.solve;
-  wanted.volume = scene::VolumeTerm::penalty;
-  wanted.bulk_modulus = model::default_bulk_modulus(scene.tissue, wanted, model);
-  const solve::Settings settings = app::settings_of(wanted, false);
+  scene::Solve requested = scene.solve;
+  requested.volume = scene::VolumeTerm::penalty;
+  requested.bulk_modulus = model::default_bulk_modulus(scene.tissue, requested, model);
+  const solve::Settings settings = app::settings_of(requested, false);
   results::ResultFile file(alone, name, model);
   const solve::Summary summary =
       solve::find_repose(alone, model, settings, {},

@@ -3,7 +3,7 @@
 
 #include "repose/scene/scene.h"
 
-/// What the paper's figures are drawn from (drivers/plot_paper.py).
+/// Data of the paper's figures (drivers/plot_paper.py).
 namespace repose::paper {
 
 /// Fig. 3: s (mm) and the tensions T(s)/k0 of the linear, quadratic and quartic law, s_ref = 1 mm.

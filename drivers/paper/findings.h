@@ -23,7 +23,7 @@ struct MotionRun {
   std::vector<Entry> entries;
 };
 
-/// What is to be measured.
+/// Scene and settings of the measurements.
 struct Plan {
   scene::Scene scene;
   std::vector<int> layers;

@@ -5,11 +5,11 @@
 namespace repose::paper {
 
 solve::Settings settings_of(const Functional& functional, double accuracy) {
-  scene::Solve wanted;
-  wanted.functional = functional.force ? scene::Functional::force : scene::Functional::energy;
-  wanted.volume = functional.volume ? scene::VolumeTerm::paper : scene::VolumeTerm::none;
-  wanted.accuracy = accuracy;
-  return app::settings_of(wanted, false);
+  scene::Solve requested;
+  requested.functional = functional.force ? scene::Functional::force : scene::Functional::energy;
+  requested.volume = functional.volume ? scene::VolumeTerm::paper : scene::VolumeTerm::none;
+  requested.accuracy = accuracy;
+  return app::settings_of(requested, false);
 }
 
 }  // namespace repose::paper

@@ -18,7 +18,7 @@ inline constexpr std::array<Functional, 4> functionals = {
      {.name = "f_f", .force = true},
      {.name = "f_f + f_v", .force = true, .volume = true}}};
 
-/// What repose-solve would be requested, with automatic load steps.
+/// Returns the settings of an equivalent run of repose-solve, with automatic load steps.
 solve::Settings settings_of(const Functional& functional, double accuracy);
 
 }  // namespace repose::paper

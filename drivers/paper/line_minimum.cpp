@@ -12,7 +12,7 @@ constexpr double golden = 1.618033988749895;                   // a longer inter
 constexpr double golden_part = 2 - golden;                     // where it cuts the longer part
 constexpr double furthest = 100;                               // parabolic step over the last one
 constexpr double tiny_curvature = 1e-20, tiny_length = 1e-10;  // against division by zero
-constexpr int most_steps = 100;
+constexpr int max_steps = 100;
 
 struct Point {
   double x = 0, value = 0;
@@ -80,7 +80,7 @@ Bracket bracket_minimum(const LineFunction& f, double first, double second) {
   Point a = at(first), b = at(second);
   if (b.value > a.value) std::swap(a, b);
   Point c = at(b.x + golden * (b.x - a.x));
-  for (int step = 0; b.value > c.value && step < most_steps; ++step) {
+  for (int step = 0; b.value > c.value && step < max_steps; ++step) {
     const double limit = b.x + furthest * (c.x - b.x);
     double x = parabola_extremum(a, b, c);
     if (between(x, b.x, c.x)) {
@@ -101,7 +101,7 @@ Bracket bracket_minimum(const LineFunction& f, double first, double second) {
 LineMinimum brent_minimum(const LineFunction& f, const Bracket& bracket, double tolerance) {
   Search s{std::min(bracket.a, bracket.c), std::max(bracket.a, bracket.c), {}, {}, {}};
   s.best = s.second = s.third = {bracket.b, bracket.value_b};
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < max_steps; ++step) {
     const double accuracy = tolerance * std::abs(s.best.x) + tiny_length;
     if (std::abs(s.best.x - s.middle()) <= 2 * accuracy - 0.5 * (s.high - s.low)) break;
     s.choose_step(accuracy);

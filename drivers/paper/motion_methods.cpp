@@ -10,7 +10,7 @@ namespace repose::paper {
 namespace {
 
 constexpr double damping_factors[] = {1, 2, 4};
-constexpr int most_halvings = 4;
+constexpr int max_halvings = 4;
 
 /// The better one of two: the one that arrives, with the fewer evaluations, or comes closer.
 void keep_better(std::optional<Entry>& best, const Entry& tried) {
@@ -25,7 +25,7 @@ void keep_better(std::optional<Entry>& best, const Entry& tried) {
 void scan_steps(Contest& contest, double damping, double longest, std::optional<Entry>& best) {
   constexpr int64_t unlimited = INT64_MAX;
   double step = longest;
-  for (int k = 0; k <= most_halvings; ++k, step /= 2) {
+  for (int k = 0; k <= max_halvings; ++k, step /= 2) {
     if (damping * step >= 2) continue;  // the damping alone is unstable
     const Entry tried =
         contest.run(fmt::format("semi-implicit Euler, c = {:.2g}, h = {:.2g}", damping, step),
@@ -41,7 +41,7 @@ void scan_steps(Contest& contest, double damping, double longest, std::optional<
 
 std::vector<Entry> run_motion(Contest& contest, double accuracy) {
   const Contest::Curvature curvature = contest.curvature();
-  const double critical = 2 * std::sqrt(curvature.least);
+  const double critical = 2 * std::sqrt(curvature.minimum);
   const double longest = 2 / std::sqrt(curvature.largest);
   std::optional<Entry> euler, runge_kutta;
   for (const double factor : damping_factors) {

@@ -11,7 +11,7 @@ using base::check;
 namespace {
 
 /// Moves `displacement` to the minimum along `direction`.
-void minimise_along(discrete::Function& function, Vec direction, double tolerance, Vec displacement,
+void minimize_along(discrete::Function& function, Vec direction, double tolerance, Vec displacement,
                     Vec trial) {
   const LineFunction value = [&](double step) {
     check(VecWAXPY(trial, step, direction, displacement));
@@ -38,10 +38,10 @@ PolakRibiereOutcome polak_ribiere(discrete::Function& function, Vec displacement
   outcome.value = function.evaluate(displacement, gradient);
   check(VecAXPY(residual, -1, gradient));
   check(VecCopy(residual, direction));
-  while (outcome.iterations < settings.most_iterations) {
+  while (outcome.iterations < settings.max_iterations) {
     const double length = dot(residual, residual);
     if (length == 0) break;
-    minimise_along(function, direction, settings.line_tolerance, displacement, trial);
+    minimize_along(function, direction, settings.line_tolerance, displacement, trial);
     ++outcome.iterations;
     const double before = outcome.value;
     outcome.value = function.evaluate(displacement, gradient);

@@ -4,7 +4,7 @@
 
 namespace repose::paper {
 
-/// How large a head is: elements, bytes held on the heap, CPU seconds. Serial.
+/// Size of a head: elements, bytes held on the heap, CPU seconds. Serial.
 struct Size {
   int layers = 0;
   model::Counts counts;

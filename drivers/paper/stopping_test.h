@@ -11,12 +11,12 @@ struct Rules {
   double seconds = 3;        ///< CPU; for methods whose evaluations are few and dear
 };
 
-/// What a test throws to stop a search: near enough, or no evaluation or time left.
+/// Thrown by a test to stop a search: near enough, or no evaluation or time left.
 struct SearchOver {
   bool reached = false;
 };
 
-/// A function that watches the search that minimises it: throws SearchOver at the first evaluated
+/// A function that watches the search that minimizes it: throws SearchOver at the first evaluated
 /// state within the accuracy of the goal, and at the limits. Its looks are not timed.
 class StoppingTest : public discrete::Function {
  public:

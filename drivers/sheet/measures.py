@@ -137,9 +137,9 @@ def turns(rotation):
 def shift_in_words(shift, digits=1):
     """A motion as a surgeon says it: forward first."""
     words = ((1, "back", "forward"), (2, "up", "down"), (0, "to the left", "to the right"))
-    said = [f"{abs(shift[axis]):.{digits}f} mm {plus if shift[axis] > 0 else minus}"
+    message = [f"{abs(shift[axis]):.{digits}f} mm {plus if shift[axis] > 0 else minus}"
             for axis, plus, minus in words if abs(shift[axis]) >= 0.5 * 10**-digits]
-    return ", ".join(said) or "stays"
+    return ", ".join(message) or "stays"
 
 
 def turns_in_words(rotation):

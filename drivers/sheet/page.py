@@ -232,8 +232,8 @@ def numbers(plans):
                                                 name if len(landmarks) > 1 else "")))
                 if name in plan.known:
                     big, rest = figure_of(plan.known, name)
-                    said = ": ".join(filter(None, (label, rest)))
-                    parts.append(f"<b>{big}</b><p>{html.escape(said)}</p>")
+                    message = ": ".join(filter(None, (label, rest)))
+                    parts.append(f"<b>{big}</b><p>{html.escape(message)}</p>")
                 else:
                     parts.append(f"<b>–</b><p>{html.escape(label)} no landmark</p>")
         cards.append("".join([*parts, "</div>"]))
@@ -259,8 +259,8 @@ def plan_lines(plan):
     lines = []
     for name, _, step, turn in moved_bones(plan):
         turned = turns_in_words(turn)
-        said = shift_in_words(step) + (f"; {turned}" if turned else "")
-        lines.append(f'<p class="plan-line"><b>{html.escape(name)}</b> {html.escape(said)}</p>')
+        message = shift_in_words(step) + (f"; {turned}" if turned else "")
+        lines.append(f'<p class="plan-line"><b>{html.escape(name)}</b> {html.escape(message)}</p>')
     return "".join(lines) or "<p>No bone moves.</p>"
 
 
@@ -444,7 +444,7 @@ def write(plans, norms, scene, appearance):
     first = plans[0]
     title = html.escape(" and ".join(plan.name for plan in plans))
     words, packed = described(plans, appearance)
-    said = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
+    message = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
                    paragraphs(plan.result, plan.known, plan.parts, plan.guessed,
                               plan is plans[-1]) + plan_lines(plan) for plan in plans)
     landmarks = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
@@ -454,7 +454,7 @@ def write(plans, norms, scene, appearance):
 <meta name="viewport" content="width=device-width,initial-scale=1"><title>{title}</title>
 <style>{style()}</style></head><body><main>
 <header><h1>{title}</h1><span class="soft">predicted face after the planned surgery</span></header>
-<section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{said}</div></section>
+<section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{message}</div></section>
 <div class="stills" id="stills"></div>
 <section><h2>The plan</h2>{plan_table(plans)}</section>
 <section class="two"><div><h2 class="page-two">Profile</h2>{profile_section(plans)}</div>

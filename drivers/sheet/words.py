@@ -110,7 +110,7 @@ def trust(result):
 
 def paragraphs(result, known, parts, guessed, trusted=True):
     """The verdict with its cautions; `trusted`: with what every sheet says once."""
-    said = "".join(f'<p class="warning">{html.escape(line)}</p>'
+    message = "".join(f'<p class="warning">{html.escape(line)}</p>'
                    for line in cautions(result, known, parts, guessed))
     rest = html.escape(trust(result)) if trusted else ""
-    return f'<p class="verdict"><b>{html.escape(verdict(result))}</b> {rest}</p>{said}'
+    return f'<p class="verdict"><b>{html.escape(verdict(result))}</b> {rest}</p>{message}'

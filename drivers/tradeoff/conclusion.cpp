@@ -16,8 +16,8 @@ constexpr double negligible = 0.3;  // of what the model leaves: a finer search 
 std::map<double, const Measurement*> fastest(const std::vector<Measurement>& found) {
   std::map<double, const Measurement*> best;
   for (const Measurement& m : found) {
-    if (m.way.study != "solver" || !m.converged) continue;
-    const Measurement*& kept = best[m.way.accuracy];
+    if (m.variant.study != "solver" || !m.converged) continue;
+    const Measurement*& kept = best[m.variant.accuracy];
     if (!kept || m.seconds < kept->seconds) kept = &m;
   }
   return best;
@@ -26,50 +26,50 @@ std::map<double, const Measurement*> fastest(const std::vector<Measurement>& fou
 std::string describe_costs(const std::map<double, const Measurement*>& best) {
   if (best.empty()) return "No run of the solver reached its accuracy.";
   const Measurement &loose = *best.rbegin()->second, &tight = *best.begin()->second;
-  std::string text = fmt::format("{:g} mm costs {:.2g} s ({})", loose.way.accuracy, loose.seconds,
-                                 loose.way.method);
+  std::string text = fmt::format("{:g} mm costs {:.2g} s ({})", loose.variant.accuracy,
+                                 loose.seconds, loose.variant.method);
   if (best.size() > 1)
-    text +=
-        fmt::format(", {:g} mm {:.2g} s ({})", tight.way.accuracy, tight.seconds, tight.way.method);
+    text += fmt::format(", {:g} mm {:.2g} s ({})", tight.variant.accuracy, tight.seconds,
+                        tight.variant.method);
   return text + ".";
 }
 
 /// The row of a study at the scene's own layers or, of a mesh, the finest one; none where no row
 /// could be compared.
 const Measurement* row_of(const std::vector<Measurement>& found, const std::string& study,
-                          const Way& usual) {
+                          const Variant& usual) {
   const Measurement* chosen = nullptr;
   for (const Measurement& m : found) {
-    if (m.way.study != study || !std::isfinite(m.skin_95)) continue;
-    if (study == "layers" && m.way.layers != usual.layers) continue;
-    if (!chosen || m.way.edge < chosen->way.edge) chosen = &m;
+    if (m.variant.study != study || !std::isfinite(m.skin_95)) continue;
+    if (study == "layers" && m.variant.layers != usual.layers) continue;
+    if (!chosen || m.variant.edge < chosen->variant.edge) chosen = &m;
   }
   return chosen;
 }
 
-int most_layers(const std::vector<Measurement>& found) {
-  int most = 0;
+int max_layers(const std::vector<Measurement>& found) {
+  int maximum = 0;
   for (const Measurement& m : found)
-    if (m.way.study == "layers") most = std::max(most, m.way.layers);
-  return most;
+    if (m.variant.study == "layers") maximum = std::max(maximum, m.variant.layers);
+  return maximum;
 }
 
 }  // namespace
 
-std::string conclude(const std::vector<Measurement>& found, const Way& usual) {
+std::string conclude(const std::vector<Measurement>& found, const Variant& usual) {
   std::string text = describe_costs(fastest(found));
   const Measurement* layers = row_of(found, "layers", usual);
   const Measurement* mesh = row_of(found, "mesh", usual);
-  const int most = most_layers(found);
+  const int maximum = max_layers(found);
   double left = 0;
-  if (layers && most > usual.layers) {
+  if (layers && maximum > usual.layers) {
     left = layers->skin_95;
     text += fmt::format(" {} layers leave 95 % of the skin within {:.2g} mm of {} layers.",
-                        usual.layers, left, most);
+                        usual.layers, left, maximum);
   }
   if (mesh)
-    text += fmt::format(" A skin with edges of {:g} mm is {:.2g} mm away (95 %).", mesh->way.edge,
-                        mesh->skin_95);
+    text += fmt::format(" A skin with edges of {:g} mm is {:.2g} mm away (95 %).",
+                        mesh->variant.edge, mesh->skin_95);
   if (left == 0) return text + " Compare more layers (-layers) to learn what the model leaves.";
   if (usual.accuracy <= negligible * left)
     return text + fmt::format(" Refine layers and mesh before asking for more than {:g} mm.",

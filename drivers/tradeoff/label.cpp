@@ -4,13 +4,15 @@
 
 namespace repose::tradeoff {
 
-std::string label(const Way& way) {
-  if (way.study == "load steps")
-    return way.load_steps > 0 ? fmt::format("{}", way.load_steps) : "automatic";
-  if (way.study == "volume") return std::string(word(way.volume));
-  if (way.study == "layers" || way.study == "springs") return fmt::format("{}", way.layers);
-  if (way.study == "mesh") return way.edge > 0 ? fmt::format("{:g} mm", way.edge) : "as it is";
-  return fmt::format("{}, {:g} mm", way.method, way.accuracy);
+std::string label(const Variant& variant) {
+  if (variant.study == "load steps")
+    return variant.load_steps > 0 ? fmt::format("{}", variant.load_steps) : "automatic";
+  if (variant.study == "volume") return std::string(word(variant.volume));
+  if (variant.study == "layers" || variant.study == "springs")
+    return fmt::format("{}", variant.layers);
+  if (variant.study == "mesh")
+    return variant.edge > 0 ? fmt::format("{:g} mm", variant.edge) : "as it is";
+  return fmt::format("{}, {:g} mm", variant.method, variant.accuracy);
 }
 
 }  // namespace repose::tradeoff

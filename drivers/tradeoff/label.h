@@ -5,7 +5,8 @@
 
 namespace repose::tradeoff {
 
-/// What differs from the other ways of its study: "lmvm, 0.01 mm", "6 layers", "penalty".
-std::string label(const Way& way);
+/// Returns the difference from the other variants of its study: "lmvm, 0.01 mm", "6 layers",
+/// "penalty".
+std::string label(const Variant& variant);
 
 }  // namespace repose::tradeoff

@@ -21,7 +21,7 @@
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "skin.h"
-#include "ways.h"
+#include "variants.h"
 
 namespace repose::tradeoff {
 
@@ -31,14 +31,14 @@ const MPI_Comm comm = MPI_COMM_WORLD;
 constexpr double patience = 4;  // time limits of a run that a reference may take
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
-/// What a run left behind, the positions on rank 0.
+/// Result of a run, with the positions on rank 0.
 struct Run {
   Measurement measurement;
   std::vector<Vec3> position;
 };
 
 /// A model of the scene, and its own rest position found to the reference's accuracy, if it was.
-struct Discretisation {
+struct Discretization {
   model::Model model;  // on rank 0
   double bulk_modulus = 0;
   std::vector<Vec3> rest;  // on rank 0
@@ -49,20 +49,22 @@ class Study {
   Study(const Plan& plan, const Tell& tell) : plan_(plan), tell_(tell) {}
 
   Findings run() {
-    base::on_first_rank(comm, [&] { load(); });
+    base::on_root(comm, [&] { load(); });
     choose_edges();
-    const std::vector<Way> ways = ways_of(plan_);
-    prepare(ways);
-    for (size_t k = 0; k < ways.size(); ++k) {
-      tell_(fmt::format("{}: {}", ways[k].study, label(ways[k])), k + 1, ways.size());
-      add(ways[k]);
+    const std::vector<Variant> variants = variants_of(plan_);
+    prepare(variants);
+    for (size_t k = 0; k < variants.size(); ++k) {
+      tell_(fmt::format("{}: {}", variants[k].study, label(variants[k])), k + 1, variants.size());
+      add(variants[k]);
     }
     return std::move(findings_);
   }
 
  private:
   using Key = std::tuple<int, double, scene::VolumeTerm>;  // layers, edge, volume term
-  static Key key_of(const Way& way) { return {way.layers, way.edge, way.volume}; }
+  static Key key_of(const Variant& variant) {
+    return {variant.layers, variant.edge, variant.volume};
+  }
 
   /// The anatomy and the scene's own model, of whose material the others are made. On rank 0.
   void load() {
@@ -91,9 +93,9 @@ class Study {
   }
 
   /// The scene's tissue, or springs that resemble its material.
-  scene::Tissue tissue_of(const Way& way) const {
+  scene::Tissue tissue_of(const Variant& variant) const {
     scene::Tissue tissue = plan_.scene.tissue;
-    if (tissue.material && way.volume != scene::VolumeTerm::material) {
+    if (tissue.material && variant.volume != scene::VolumeTerm::material) {
       tissue.isotropic = tissue.material->deep;
       tissue.material.reset();
     }
@@ -101,21 +103,21 @@ class Study {
   }
 
   /// The scene's own model, or one of the same material at another resolution. On rank 0.
-  model::Model build(const Way& way) const {
-    const bool own = way.volume == scene::VolumeTerm::material || !plan_.scene.tissue.material;
-    if (own && way.edge == 0 && way.layers == plan_.scene.tissue.layers) return own_;
+  model::Model build(const Variant& variant) const {
+    const bool own = variant.volume == scene::VolumeTerm::material || !plan_.scene.tissue.material;
+    if (own && variant.edge == 0 && variant.layers == plan_.scene.tissue.layers) return own_;
     model::Anatomy anatomy = anatomy_;
-    anatomy.scene.tissue = tissue_of(way);
-    return adapt::coarse_model(anatomy, own_, {way.edge, way.layers}).model;
+    anatomy.scene.tissue = tissue_of(variant);
+    return adapt::coarse_model(anatomy, own_, {variant.edge, variant.layers}).model;
   }
 
   /// The reference: the most layers, the skin as it is, the scene's volume term.
-  void prepare(const std::vector<Way>& ways) {
-    Way finest = usual_way(plan_);
-    for (const Way& way : ways) finest.layers = std::max(finest.layers, way.layers);
-    tell_("the reference", 0, ways.size());
-    const Discretisation& reference = discretisation(finest);
-    base::on_first_rank(comm, [&] {
+  void prepare(const std::vector<Variant>& variants) {
+    Variant finest = usual_variant(plan_);
+    for (const Variant& variant : variants) finest.layers = std::max(finest.layers, variant.layers);
+    tell_("the reference", 0, variants.size());
+    const Discretization& reference = discretization(finest);
+    base::on_root(comm, [&] {
       if (reference.rest.empty())
         base::refuse(
             "the reference, with {} layers, does not come to {:g} mm in {:g} s; raise -time_limit "
@@ -127,19 +129,19 @@ class Study {
     });
   }
 
-  const Discretisation& discretisation(const Way& way) {
-    const auto known = known_.find(key_of(way));
+  const Discretization& discretization(const Variant& variant) {
+    const auto known = known_.find(key_of(variant));
     if (known != known_.end()) return known->second;
-    Discretisation& made = known_[key_of(way)];
-    base::on_first_rank(comm, [&] {
-      made.model = build(way);
+    Discretization& made = known_[key_of(variant)];
+    base::on_root(comm, [&] {
+      made.model = build(variant);
       made.bulk_modulus = plan_.scene.solve.bulk_modulus.value_or(
-          model::default_bulk_modulus(tissue_of(way), plan_.scene.solve, made.model));
+          model::default_bulk_modulus(tissue_of(variant), plan_.scene.solve, made.model));
     });
     MPI_Bcast(&made.bulk_modulus, 1, MPI_DOUBLE, 0, comm);
     bring_into_equilibrium(made.model);
-    Way closely = usual_way(plan_);
-    closely.volume = way.volume;
+    Variant closely = usual_variant(plan_);
+    closely.volume = variant.volume;
     closely.accuracy = plan_.reference_accuracy;
     Run run = solve_as(closely, made, patience * plan_.seconds);
     if (run.measurement.converged) made.rest = std::move(run.position);
@@ -147,27 +149,27 @@ class Study {
   }
 
   void bring_into_equilibrium(model::Model& model) const {
-    if (const auto recording = app::recording_of(plan_.scene))
-      solve::prestress(comm, model, *recording);
+    if (const auto reference_state = app::reference_state_of(plan_.scene))
+      solve::prestress(comm, model, *reference_state);
   }
 
-  solve::Settings settings_of(const Way& way, double bulk_modulus) const {
-    scene::Solve wanted = plan_.scene.solve;
-    const bool solid = way.volume == scene::VolumeTerm::material;
-    if (!solid) wanted.volume = way.volume;
-    wanted.bulk_modulus = bulk_modulus;
-    wanted.accuracy = way.accuracy;
-    wanted.load_steps = way.load_steps;
-    return app::settings_of(wanted, solid);
+  solve::Settings settings_of(const Variant& variant, double bulk_modulus) const {
+    scene::Solve requested = plan_.scene.solve;
+    const bool solid = variant.volume == scene::VolumeTerm::material;
+    if (!solid) requested.volume = variant.volume;
+    requested.bulk_modulus = bulk_modulus;
+    requested.accuracy = variant.accuracy;
+    requested.load_steps = variant.load_steps;
+    return app::settings_of(requested, solid);
   }
 
-  Run solve_as(const Way& way, const Discretisation& made, double limit) const {
-    const base::ScopedOption method("-tao_type", way.method);
+  Run solve_as(const Variant& variant, const Discretization& made, double limit) const {
+    const base::ScopedOption method("-tao_type", variant.method);
     Run run;
-    run.measurement.way = way;
+    run.measurement.variant = variant;
     const double begin = base::cpu_seconds();
     base::Interrupt end(comm, limit, false);
-    solve::Settings settings = settings_of(way, made.bulk_modulus);
+    solve::Settings settings = settings_of(variant, made.bulk_modulus);
     settings.interrupt = &end;
     const solve::Summary summary =
         solve::find_repose(comm, made.model, settings, {},
@@ -189,10 +191,10 @@ class Study {
     return run;
   }
 
-  void add(const Way& way) {
-    const Discretisation& made = discretisation(way);
-    Run run = solve_as(way, made, plan_.seconds);
-    base::on_first_rank(comm, [&] {
+  void add(const Variant& variant) {
+    const Discretization& made = discretization(variant);
+    Run run = solve_as(variant, made, plan_.seconds);
+    base::on_root(comm, [&] {
       Measurement& m = run.measurement;
       m.error = m.skin_rms = m.skin_95 = m.skin_max = unknown;
       if (!run.position.empty()) compare(run, made);
@@ -200,7 +202,7 @@ class Study {
     });
   }
 
-  void compare(Run& run, const Discretisation& made) {
+  void compare(Run& run, const Discretization& made) {
     Measurement& m = run.measurement;
     if (made.rest.size() == run.position.size()) {
       m.error = 0;
@@ -208,8 +210,8 @@ class Study {
         m.error = std::max(m.error, (made.rest[i] - run.position[i]).norm());
     }
     std::vector<double> off = skin_->distances(made.model, run.position);
-    if (m.way.study != "solver") {
-      findings_.map.ways.push_back(m.way);
+    if (m.variant.study != "solver") {
+      findings_.map.variants.push_back(m.variant);
       findings_.map.error.push_back(off);
     }
     std::sort(off.begin(), off.end());
@@ -224,7 +226,7 @@ class Study {
   const Tell& tell_;
   model::Anatomy anatomy_;  // on rank 0
   model::Model own_;        // on rank 0
-  std::map<Key, Discretisation> known_;
+  std::map<Key, Discretization> known_;
   std::optional<Skin> skin_;  // on rank 0
   Findings findings_;
 };

@@ -7,11 +7,11 @@
 #include "repose/scene/scene.h"
 #include "repose/surface/surface.h"
 
-/// What accuracy costs: one scene solved in many ways, each against one reference.
+/// Cost of accuracy: one scene solved in many variants, each against one reference.
 namespace repose::tradeoff {
 
-/// One way to solve the scene.
-struct Way {
+/// One variant of solving the scene.
+struct Variant {
   std::string study;   ///< what is varied: solver, load steps, volume, layers, springs, mesh
   std::string method;  ///< -tao_type
   double accuracy;     ///< mm requested
@@ -21,10 +21,10 @@ struct Way {
   double edge = 0;     ///< mm, mean edge of the remeshed skin; 0: the skin as it is
 };
 
-/// What it cost and how far it came. Errors are largest distances to the reference, mm; NaN where
+/// Cost and accuracy of a variant. Errors are largest distances to the reference, mm; NaN where
 /// there is nothing to compare.
 struct Measurement {
-  Way way;
+  Variant variant;
   int64_t points = 0, unknowns = 0;
   bool converged = false;
   std::string reason;
@@ -37,7 +37,7 @@ struct Measurement {
   double skin_max = 0;  ///< likewise
 };
 
-/// What is to be varied, one thing at a time but for methods × accuracies.
+/// Settings to be varied, one thing at a time but for methods × accuracies.
 struct Plan {
   scene::Scene scene;
   std::vector<std::string> methods;
@@ -55,7 +55,7 @@ struct Plan {
 struct Map {
   std::vector<Vec3> rest;           ///< [V] mm
   std::vector<Triangle> triangles;  ///< of the skin
-  std::vector<Way> ways;
+  std::vector<Variant> variants;
   std::vector<std::vector<double>> error;  ///< [ways][V] mm
 };
 

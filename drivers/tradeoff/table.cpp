@@ -11,7 +11,7 @@ std::string table(const std::vector<Measurement>& measurements) {
       "cpu_s,evaluations,hessians,iterations,estimate_mm,error_mm,skin_rms_mm,skin_95_mm,"
       "skin_max_mm,reason\n";
   for (const Measurement& m : measurements) {
-    const Way& w = m.way;
+    const Variant& w = m.variant;
     text += fmt::format("{},{},{:g},{},{},{},{:g},{},{},{},", w.study, w.method, w.accuracy,
                         word(w.volume), w.load_steps > 0 ? std::to_string(w.load_steps) : "auto",
                         w.layers, w.edge, m.points, m.unknowns, m.converged ? 1 : 0);
@@ -24,7 +24,8 @@ std::string table(const std::vector<Measurement>& measurements) {
 
 std::string map_table(const Map& map) {
   std::string text = "x,y,z";
-  for (const Way& way : map.ways) text += fmt::format(",\"{}: {}\"", way.study, label(way));
+  for (const Variant& variant : map.variants)
+    text += fmt::format(",\"{}: {}\"", variant.study, label(variant));
   text += "\n";
   for (size_t v = 0; v < map.rest.size(); ++v) {
     text += fmt::format("{:.4f},{:.4f},{:.4f}", map.rest[v].x(), map.rest[v].y(), map.rest[v].z());

@@ -29,7 +29,7 @@ base::Exit run(const base::Options& options) {
   model::Model model;
   solve::Settings settings;
   settings.weights = {1, mechanics::VolumeTerm::penalty, 1.0};
-  base::on_first_rank(MPI_COMM_WORLD, [&] {
+  base::on_root(MPI_COMM_WORLD, [&] {
     const scene::Scene scene = scene::read_scene(options.arguments()[0]);
     model = model::build_model(model::load_anatomy(scene)).model;
     model::TermElements skin{"pressure", Pressure::points, Pressure::numbers, {}, {}};
@@ -42,7 +42,7 @@ base::Exit run(const base::Options& options) {
       MPI_COMM_WORLD, model, settings, {},
       [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
   file.commit();
-  base::on_first_rank(MPI_COMM_WORLD, [] {
+  base::on_root(MPI_COMM_WORLD, [] {
     const tools::check::Comparison comparison = tools::check::check_file("own_energy.h5");
     if (comparison.disagreeing() > 0) base::refuse("{} is wrong", comparison.worst());
   });

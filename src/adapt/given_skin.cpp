@@ -11,10 +11,10 @@ namespace repose::adapt {
 
 namespace {
 
-constexpr size_t neighbours = 16;
-constexpr int most_rings = 4;            // of edges around the nearest triangle
+constexpr size_t neighbors = 16;
+constexpr int max_rings = 4;             // of edges around the nearest triangle
 constexpr double fade = 20;              // mm
-constexpr double ridge = 0.01;           // of the mean square extent of the neighbours
+constexpr double ridge = 0.01;           // of the mean square extent of the neighbors
 constexpr double beyond_farthest = 1.1;  // where the weights end
 
 /// The skin of a model by itself.
@@ -86,14 +86,14 @@ class SolvedSkin {
 std::vector<int64_t> SolvedSkin::points_near(const Vec3& at) const {
   const Triangle& nearest = skin_.triangles[tree_.nearest(at).triangle];
   std::vector<int64_t> found(nearest.begin(), nearest.end());
-  for (int ring = 0; ring < most_rings && found.size() < neighbours; ++ring)
+  for (int ring = 0; ring < max_rings && found.size() < neighbors; ++ring)
     for (size_t k = 0, count = found.size(); k < count; ++k)
       for (const int64_t p : beside_[found[k]])
         if (std::find(found.begin(), found.end(), p) == found.end()) found.push_back(p);
   std::sort(found.begin(), found.end(), [&](int64_t p, int64_t q) {
     return (skin_.points[p] - at).squaredNorm() < (skin_.points[q] - at).squaredNorm();
   });
-  found.resize(std::min(found.size(), neighbours));
+  found.resize(std::min(found.size(), neighbors));
   return found;
 }
 

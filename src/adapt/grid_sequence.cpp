@@ -43,12 +43,12 @@ std::vector<Vec3> sum(const std::vector<Vec3>& a, const std::vector<Vec3>& b, do
 class SequenceSolver {
  public:
   SequenceSolver(MPI_Comm comm, const model::Anatomy& anatomy, const Model& fine,
-                 const SequencePlan& wanted)
-      : comm_(comm), anatomy_(anatomy), fine_(fine), wanted_(wanted) {}
+                 const SequencePlan& requested)
+      : comm_(comm), anatomy_(anatomy), fine_(fine), requested_(requested) {}
 
   GridSequence run() {
     const base::ScopedOption method("-tao_type", "ntr");
-    for (const Resolution& resolution : wanted_.levels) {
+    for (const Resolution& resolution : requested_.levels) {
       bool done = false;
       try {
         done = step_up(resolution);
@@ -67,8 +67,9 @@ class SequenceSolver {
     level.resolution = resolution;
     const double begin = MPI_Wtime();
     model::BuiltModel built;
-    base::on_first_rank(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
-    if (wanted_.recording) solve::prestress(comm_, built.model, *wanted_.recording);
+    base::on_root(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
+    if (requested_.reference_state)
+      solve::prestress(comm_, built.model, *requested_.reference_state);
     std::vector<Vec3> position;
     const solve::Settings settings = settings_for(built.model);
     const solve::Summary summary =
@@ -84,20 +85,21 @@ class SequenceSolver {
     level.unknowns = summary.unknowns;
     level.evaluations = summary.evaluations;
     level.assemblies = summary.assemblies;
-    base::on_first_rank(comm_, [&] { store(std::move(built), std::move(position), level); });
-    MPI_Bcast(&level.discretisation_error, 1, MPI_DOUBLE, 0, comm_);
+    base::on_root(comm_, [&] { store(std::move(built), std::move(position), level); });
+    MPI_Bcast(&level.discretization_error, 1, MPI_DOUBLE, 0, comm_);
     level.seconds = MPI_Wtime() - begin;
     sequence_.levels.push_back(level);
     sequence_.last_settings = settings;
-    const double error = level.discretisation_error + summary.last.displacement_error;
-    sequence_.near_enough = wanted_.enough > 0 && error <= wanted_.enough;
+    const double error = level.discretization_error + summary.last.displacement_error;
+    sequence_.near_enough = requested_.enough > 0 && error <= requested_.enough;
     return true;
   }
 
   solve::Settings settings_for(const Model& model) const {
-    solve::Settings settings = wanted_.settings;
-    settings.path.accuracy = wanted_.enough > 0 ? search_share * wanted_.enough
-                                                : std::max(settings.path.accuracy, loosest_guide);
+    solve::Settings settings = requested_.settings;
+    settings.path.accuracy = requested_.enough > 0
+                                 ? search_share * requested_.enough
+                                 : std::max(settings.path.accuracy, loosest_guide);
     settings.monitor = settings.stability = false;
     settings.stages = nullptr;
     double volume_ratio = 1;  // f_v of a strain grows with the volume of the prisms
@@ -111,7 +113,7 @@ class SequenceSolver {
   solve::Start start_for(const Model& model) const {
     if (sequence_.levels.empty()) return {};
     std::vector<Vec3> all;
-    base::on_first_rank(comm_, [&] {
+    base::on_root(comm_, [&] {
       const Model& before = sequence_.last.model;
       const auto moved = sum(sequence_.last_position, before.points.position, -1);
       all = sum(model.points.position, Transfer(before, model).carry(moved), 1);
@@ -131,7 +133,7 @@ class SequenceSolver {
       if (fine_.points.layer[i] == 0)
         level.skin_change =
             std::max(level.skin_change, (carried[i] - sequence_.position[i]).norm());
-    level.discretisation_error = safety * level.skin_change;
+    level.discretization_error = safety * level.skin_change;
     sequence_.last = std::move(built);
     sequence_.last_position = std::move(position);
     sequence_.before = std::exchange(sequence_.position, std::move(carried));
@@ -140,7 +142,7 @@ class SequenceSolver {
   MPI_Comm comm_;
   const model::Anatomy& anatomy_;
   const Model& fine_;
-  const SequencePlan& wanted_;
+  const SequencePlan& requested_;
   GridSequence sequence_;
 };
 
@@ -165,18 +167,18 @@ std::vector<Resolution> resolutions_by(double coarsening, double fewest,
 
 }  // namespace
 
-std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t most_columns) {
+std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t max_columns) {
   std::vector<Resolution> levels = resolutions_by(2, 150, anatomy);
-  const double finest = meshtools::even_edge(anatomy.skin) *
-                        std::sqrt(static_cast<double>(anatomy.skin.points.size()) /
-                                  static_cast<double>(most_columns));
+  const double finest =
+      meshtools::even_edge(anatomy.skin) *
+      std::sqrt(static_cast<double>(anatomy.skin.points.size()) / static_cast<double>(max_columns));
   std::erase_if(levels, [&](const Resolution& r) { return r.edge < finest; });
   return levels;
 }
 
 GridSequence solve_sequence(MPI_Comm comm, const model::Anatomy& anatomy, const Model& fine,
-                            const SequencePlan& wanted) {
-  return SequenceSolver(comm, anatomy, fine, wanted).run();
+                            const SequencePlan& requested) {
+  return SequenceSolver(comm, anatomy, fine, requested).run();
 }
 
 }  // namespace repose::adapt

@@ -126,12 +126,12 @@ void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
   constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
   const Vec3 *spine = find(plan, "nasal_spine"), *upper = find(plan, "upper_incisor_edge"),
              *lower = find(plan, "lower_incisor_edge"), *menton = find(plan, "menton_bone");
-  const auto remark = [&](const char* jaw, double height, double least) {
-    if (height < least)
+  const auto remark = [&](const char* jaw, double height, double minimum) {
+    if (height < minimum)
       remarks.push_back(fmt::format(
           "the {} jaw is {:.0f} mm high at the midline, with teeth {:g} mm or more: it may be "
           "edentulous, and lips without support of teeth are predicted with a larger error",
-          jaw, height, least));
+          jaw, height, minimum));
   };
   if (spine && upper) remark("upper", spine->z() - upper->z(), upper_height);
   if (lower && menton) remark("lower", lower->z() - menton->z(), lower_height);

@@ -80,11 +80,11 @@ std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>&
   const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
   std::optional<ProfilePoint> best;
-  double most = -nothing;
+  double maximum = -nothing;
   for (const ProfilePoint& p : profile) {
     const double distance = sign * ahead.dot(p - a);
-    if (p.y() < from_z || p.y() > to_z || !(distance > most)) continue;
-    most = distance;
+    if (p.y() < from_z || p.y() > to_z || !(distance > maximum)) continue;
+    maximum = distance;
     best = p;
   }
   return best;

@@ -50,18 +50,18 @@ std::vector<Pair> nearest_pairs(const Plane& plane, const std::vector<Vec3>& cho
 /// The best of planes through `middle`, yawed and rolled by up to 20° in steps of 4°.
 Plane first_plane(const Vec3& middle, const std::vector<Vec3>& points,
                   const surface::PointTree& tree) {
-  constexpr double most = 20, step = 4, degree = 0.017453292519943295;
+  constexpr double maximum = 20, step = 4, degree = 0.017453292519943295;
   const std::vector<Vec3> few = thinned(points, coarse_samples);
   Plane best{Vec3::UnitX(), middle};
-  double least = INFINITY;
-  for (double yaw = -most; yaw <= most; yaw += step)
-    for (double roll = -most; roll <= most; roll += step) {
+  double minimum = INFINITY;
+  for (double yaw = -maximum; yaw <= maximum; yaw += step)
+    for (double roll = -maximum; roll <= maximum; roll += step) {
       const Plane plane{Vec3(1, std::tan(degree * yaw), std::tan(degree * roll)).normalized(),
                         middle};
       double sum = 0;
       for (const Pair& pair : nearest_pairs(plane, few, points, tree)) sum += pair.off;
-      if (!(sum < least)) continue;
-      least = sum;
+      if (!(sum < minimum)) continue;
+      minimum = sum;
       best = plane;
     }
   return best;

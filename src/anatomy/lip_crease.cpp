@@ -101,11 +101,11 @@ std::optional<double> crease_depth(const FrontMap& skin, double x, double z) {
 }
 
 std::optional<double> open_mouth(const FrontMap& skin, double z) {
-  constexpr double least = 1.5, above = 14;  // mm
+  constexpr double minimum = 1.5, above = 14;  // mm
   const auto lips = skin.foremost(0, z + above, 1);
   if (!lips) return std::nullopt;
   const auto gap = gap_at(skin, 0, z, *lips);
-  if (!gap || gap->second - gap->first < least) return std::nullopt;
+  if (!gap || gap->second - gap->first < minimum) return std::nullopt;
   return (gap->first + gap->second) / 2;
 }
 

@@ -40,12 +40,12 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
         "change the signs of x and y",
         mandible.name, back);
   constexpr double beside = 30;  // mm
-  Vec3 least = skin.points.front(), most = least;
+  Vec3 minimum = skin.points.front(), maximum = minimum;
   for (const Vec3& p : skin.points) {
-    least = least.cwiseMin(p);
-    most = most.cwiseMax(p);
+    minimum = minimum.cwiseMin(p);
+    maximum = maximum.cwiseMax(p);
   }
-  if (((jaw - least).array() < -beside).any() || ((most - jaw).array() < -beside).any())
+  if (((jaw - minimum).array() < -beside).any() || ((maximum - jaw).array() < -beside).any())
     base::refuse("{}: the mandible {} lies outside of it; give surfaces of one head in one frame",
                  skin.name, mandible.name);
 }

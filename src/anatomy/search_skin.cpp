@@ -14,7 +14,7 @@ std::optional<double> crease_height(const FrontMap& skin, double edge) {
   constexpr double below = 10, above = 7;  // mm
   if (const auto gap = open_mouth(skin, edge)) return gap;
   std::optional<double> height;
-  double most = -INFINITY;
+  double maximum = -INFINITY;
   for (double z = edge - below; z <= edge + above; z += skin.spacing()) {
     double sum = 0;
     int count = 0;
@@ -23,8 +23,8 @@ std::optional<double> crease_height(const FrontMap& skin, double edge) {
         sum += *depth;
         ++count;
       }
-    if (count < 4 || !(sum / count > most)) continue;
-    most = sum / count;
+    if (count < 4 || !(sum / count > maximum)) continue;
+    maximum = sum / count;
     height = z;
   }
   return height;

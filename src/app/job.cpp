@@ -18,13 +18,13 @@ using Watch = std::function<void(double)>;
 /// Share of reading, completing and cutting surfaces in the time of building.
 constexpr double share_of_surfaces = 0.6;
 
-/// A model or its ground, from an anatomy.
+/// A model or its column geometry, from an anatomy.
 template <class Made>
 Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
   try {
     return model::build_on_solvable_skin(anatomy, [](const model::Anatomy& on) {
-      if constexpr (std::is_same_v<Made, model::Ground>)
-        return model::Ground(on);
+      if constexpr (std::is_same_v<Made, model::ColumnGeometry>)
+        return model::ColumnGeometry(on);
       else
         return model::build_model(on);
     });
@@ -36,21 +36,22 @@ Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
 }
 
 /// Why rank 0 builds the model whole, or nothing where every rank makes its part.
-std::string why_whole(MPI_Comm comm, const model::Anatomy& anatomy, const std::string& wish) {
+std::string explain_undistributed(MPI_Comm comm, const model::Anatomy& anatomy,
+                                  const std::string& reason) {
   constexpr size_t worth_a_part = 8;  // columns a rank
-  if (!wish.empty()) return wish;
+  if (!reason.empty()) return reason;
   if (anatomy.skin.points.size() < worth_a_part * static_cast<size_t>(base::size(comm)))
     return "its skin has few vertices";
-  return model::beyond_columns(anatomy.scene);
+  return model::explain_central_build(anatomy.scene);
 }
 
 /// Takes over what a scene states before its model is built. On rank 0.
 void read_scene(const scene::Scene& scene, Job& job) {
   job.anatomy = model::load_anatomy(scene);
   job.tearing = scene.tearing;
-  job.wanted = scene.solve;
-  job.recording = recording_of(scene);
-  job.initial_equilibrium = job.recording.has_value();
+  job.requested = scene.solve;
+  job.reference_state = reference_state_of(scene);
+  job.initial_equilibrium = job.reference_state.has_value();
 }
 
 /// On rank 0.
@@ -64,45 +65,45 @@ void build(const std::filesystem::path& input, Job& job) {
 }
 
 /// Every rank makes its part. Collective.
-void raise(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
-  std::optional<model::Ground> ground;  // on rank 0
-  base::on_first_rank(comm, [&] { ground.emplace(make<model::Ground>(*job.anatomy, input)); });
+void build_local(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
+  std::optional<model::ColumnGeometry> geometry;  // on rank 0
+  base::on_root(comm, [&] { geometry.emplace(make<model::ColumnGeometry>(*job.anatomy, input)); });
   scene::Scene scene;
-  base::together(
+  base::collective_try(
       comm, [&] { scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input); });
   job.layers = scene.tissue.layers;
-  job.raised = discrete::raise(comm, ground ? &*ground : nullptr, std::move(scene));
-  base::on_first_rank(comm, [&] {
-    model::BuildReport report = ground->report();
-    report.effective_modulus = job.raised->effective_modulus;
+  job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
+  base::on_root(comm, [&] {
+    model::BuildReport report = geometry->report();
+    report.effective_modulus = job.local_model->effective_modulus;
     job.building = describe_build(report) +
                    report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
     job.warnings = std::move(report.warnings);
-    job.model = std::move(job.raised->frame);
+    job.model = std::move(job.local_model->global_metadata);
   });
 }
 
 /// Collective.
 void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
           const Watch& watch, Job& job) {
-  bool raised = false;
+  bool distributed = false;
   const bool shared = base::size(comm) > 1;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     if (results::is_hdf5(input)) {
       job.model = results::read_model(input);
-      job.wanted.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
+      job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
       return;
     }
     read_scene(scene::read_scene(input), job);
     if (watch) watch(share_of_surfaces);
-    const std::string why = why_whole(comm, *job.anatomy, whole);
-    raised = shared && why.empty();
-    if (raised) return;
+    const std::string why = explain_undistributed(comm, *job.anatomy, whole);
+    distributed = shared && why.empty();
+    if (distributed) return;
     build(input, job);
     if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
   });
-  MPI_Bcast(&raised, 1, MPI_C_BOOL, 0, comm);
-  if (raised) raise(comm, input, job);
+  MPI_Bcast(&distributed, 1, MPI_C_BOOL, 0, comm);
+  if (distributed) build_local(comm, input, job);
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
@@ -116,25 +117,25 @@ void make_incisions(Job& job) {
 }
 
 void bring_into_equilibrium(MPI_Comm comm, Job& job) {
-  solve::Recording recording = job.recording.value_or(solve::Recording{});
+  solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
-  MPI_Bcast(&recording, sizeof recording, MPI_BYTE, 0, comm);
+  MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
   if (!job.initial_equilibrium) return;
-  job.recording = recording;
-  job.building +=
-      describe_prestress(job.raised ? solve::prestress(comm, job.raised->part, recording)
-                                    : solve::prestress(comm, job.model, recording));
+  job.reference_state = reference_state;
+  job.building += describe_prestress(
+      job.local_model ? solve::prestress(comm, job.local_model->part, reference_state)
+                      : solve::prestress(comm, job.model, reference_state));
 }
 
-/// Gives all ranks what rank 0 knows and all have to know.
+/// Broadcasts rank 0's flags and counts to all ranks.
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
-  job.solid = job.raised || model::is_solid(job.model);
+  job.solid = job.local_model || model::is_solid(job.model);
   job.remeshed = job.anatomy && job.anatomy->given_skin;
-  job.touches = job.raised ? job.raised->part.contact : !job.model.contact.empty();
+  job.has_contact = job.local_model ? job.local_model->part.contact : !job.model.contact.empty();
   for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
-  MPI_Bcast(&job.wanted, sizeof job.wanted, MPI_BYTE, 0, comm);
-  for (bool* flag : {&job.solid, &job.touches, &job.remeshed, &job.initial_equilibrium})
+  MPI_Bcast(&job.requested, sizeof job.requested, MPI_BYTE, 0, comm);
+  for (bool* flag : {&job.solid, &job.has_contact, &job.remeshed, &job.initial_equilibrium})
     MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
 }
 
@@ -145,11 +146,11 @@ Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::strin
   Job job;
   read(comm, input, whole, watch, job);
   bring_into_equilibrium(comm, job);
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     make_incisions(job);
-    if (job.wanted.bulk_modulus) return;
+    if (job.requested.bulk_modulus) return;
     const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
-    job.wanted.bulk_modulus = model::default_bulk_modulus(tissue, job.wanted, job.model);
+    job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, job.model);
   });
   share(comm, job);
   return job;

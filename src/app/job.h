@@ -15,22 +15,23 @@ namespace repose::app {
 
 /// A scene or a model, read and built: what is to be solved.
 struct Job {
-  model::Model model;                          ///< on rank 0; where it is raised, its frame
-  std::optional<discrete::RaisedPart> raised;  ///< on all ranks, of a fully distributed model
-  int64_t layers = 0;                          ///< where it is raised, on all ranks
-  scene::Solve wanted;                         ///< the scene's, bulk modulus set; on all ranks
-  std::optional<model::Anatomy> anatomy;       ///< of a scene, on rank 0
-  std::optional<solve::Recording> recording;   ///< of an initial equilibrium, on all ranks
-  bool solid = false;                          ///< the tissue is one, on all ranks
-  bool initial_equilibrium = false;            ///< before the bones move, on all ranks
-  bool remeshed = false;                       ///< the skin is not the given one, on all ranks
-  std::string building;                        ///< what the builder has to say, on rank 0
-  std::vector<std::string> warnings;           ///< of what is implausible, on rank 0
-  std::vector<std::vector<int64_t>> held;      ///< points of each instrument, on rank 0
-  std::vector<std::string> bodies;             ///< that the tissue may touch, on rank 0
-  bool touches = false;                        ///< it touches bodies or itself, on all ranks
-  std::vector<model::Cut> cuts;                ///< on rank 0
-  std::optional<double> tearing;               ///< N, on rank 0
+  model::Model model;  ///< on rank 0; global metadata of a fully distributed model
+  std::optional<discrete::LocalModel> local_model;  ///< on all ranks, of a fully distributed model
+  int64_t layers = 0;                               ///< of a fully distributed model, on all ranks
+  scene::Solve requested;                           ///< the scene's, bulk modulus set; on all ranks
+  std::optional<model::Anatomy> anatomy;            ///< of a scene, on rank 0
+  std::optional<solve::ReferenceState>
+      reference_state;                     ///< of an initial equilibrium, on all ranks
+  bool solid = false;                      ///< the tissue is one, on all ranks
+  bool initial_equilibrium = false;        ///< before the bones move, on all ranks
+  bool remeshed = false;                   ///< the skin is not the given one, on all ranks
+  std::string building;                    ///< what the builder has to say, on rank 0
+  std::vector<std::string> warnings;       ///< of what is implausible, on rank 0
+  std::vector<std::vector<int64_t>> held;  ///< points of each instrument, on rank 0
+  std::vector<std::string> bodies;         ///< that the tissue may touch, on rank 0
+  bool has_contact = false;                ///< it touches bodies or itself, on all ranks
+  std::vector<model::Cut> cuts;            ///< on rank 0
+  std::optional<double> tearing;           ///< N, on rank 0
 };
 
 /// Reads a scene (.yaml) or a model (.h5), builds the scene's model with its initial equilibrium

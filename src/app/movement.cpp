@@ -21,7 +21,7 @@ size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
 }
 
 /// "7.4 mm forward, 0.3 down", the largest component first and with its unit.
-std::string in_words(const Vec3& by) {
+std::string describe_shift(const Vec3& by) {
   struct Component {
     double length;
     const char* word;
@@ -69,7 +69,7 @@ std::string describe_movement(const std::vector<model::FacePlace>& places,
   for (const model::FacePlace& place : places) {
     movement.push_back(moved_by(nearest_point(place.at, initial)));
     if (movement.back().norm() >= unmoved)
-      text += fmt::format("{} {}; ", place.name, in_words(movement.back()));
+      text += fmt::format("{} {}; ", place.name, describe_shift(movement.back()));
   }
   text += fmt::format("largest movement {:.1f} mm ({})", largest,
                       place_of(initial[farthest], largest, places, movement));
@@ -77,12 +77,12 @@ std::string describe_movement(const std::vector<model::FacePlace>& places,
   return text + ".";
 }
 
-std::string describe_trust(const solve::Summary& summary, double discretisation) {
+std::string describe_trust(const solve::Summary& summary, double discretization) {
   const double error = summary.last.displacement_error;
   std::string text = !summary.path.complete() ? "NOT AT REST"
                      : std::isfinite(error)   ? fmt::format("Within {:.2g} mm of rest", error)
                                               : "At rest, within a distance that is not known";
-  if (discretisation >= 0) text += fmt::format("; the mesh adds up to {:.2g} mm", discretisation);
+  if (discretization >= 0) text += fmt::format("; the mesh adds up to {:.2g} mm", discretization);
   return text + ".";
 }
 

@@ -12,8 +12,8 @@ namespace repose::app {
 std::string describe_movement(const std::vector<model::FacePlace>& places,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
 
-/// Returns how far the face is from rest and, where that was estimated (`discretisation`, mm; else
+/// Returns how far the face is from rest and, where that was estimated (`discretization`, mm; else
 /// negative), from the continuum.
-std::string describe_trust(const solve::Summary& summary, double discretisation);
+std::string describe_trust(const solve::Summary& summary, double discretization);
 
 }  // namespace repose::app

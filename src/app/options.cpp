@@ -83,8 +83,7 @@ std::vector<base::Option> run_options() {
        .range = {0, 1e9},
        .unit = "s",
        .default_note = "none"},
-      {"allow_folded", OptionKind::flag, "",
-       "Take a rest position with tissue inside out (else exit status 2)."},
+      {"allow_folded", OptionKind::flag, "", "Accept inverted elements (else exit status 2)."},
       {"dry_run", OptionKind::flag, "",
        "Build and report the model and how it would be solved; solve nothing. With -output, write "
        "NAME_solved_skin.ply."},
@@ -125,15 +124,15 @@ std::vector<base::Option> solve_options() {
   return table;
 }
 
-void override_by(const base::Options& options, scene::Solve& wanted) {
-  choose<scene::Functional>(options, "functional", "solve.functional", wanted.functional);
-  choose<scene::VolumeTerm>(options, "volume", "solve.volume.form", wanted.volume);
-  wanted.accuracy = accuracy_of(options.text("profile")).value_or(wanted.accuracy);
-  if (options.has("accuracy")) wanted.accuracy = options.number("accuracy");
-  if (options.has("lambda")) wanted.lambda = options.number("lambda");
-  if (options.has("bulk_modulus")) wanted.bulk_modulus = options.number("bulk_modulus");
+void override_by(const base::Options& options, scene::Solve& requested) {
+  choose<scene::Functional>(options, "functional", "solve.functional", requested.functional);
+  choose<scene::VolumeTerm>(options, "volume", "solve.volume.form", requested.volume);
+  requested.accuracy = accuracy_of(options.text("profile")).value_or(requested.accuracy);
+  if (options.has("accuracy")) requested.accuracy = options.number("accuracy");
+  if (options.has("lambda")) requested.lambda = options.number("lambda");
+  if (options.has("bulk_modulus")) requested.bulk_modulus = options.number("bulk_modulus");
   if (options.has("load_steps"))
-    wanted.load_steps =
+    requested.load_steps =
         options.text("load_steps") == "auto" ? 0 : static_cast<int>(options.integer("load_steps"));
 }
 

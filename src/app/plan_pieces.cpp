@@ -29,7 +29,7 @@ std::vector<solve::PlanPiece> find_pieces(const Job& job) {
 
 std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
   std::vector<solve::PlanPiece> pieces;
-  base::on_first_rank(comm, [&] { pieces = find_pieces(job); });
+  base::on_root(comm, [&] { pieces = find_pieces(job); });
   auto count = static_cast<int>(pieces.size());
   MPI_Bcast(&count, 1, MPI_INT, 0, comm);
   pieces.resize(count);

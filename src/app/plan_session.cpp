@@ -17,7 +17,7 @@ namespace repose::app {
 
 namespace {
 
-constexpr size_t most_bases = 32;
+constexpr size_t max_bases = 32;
 
 /// A solved plan that searches begin at: this rank's slabs.
 struct Base {
@@ -54,7 +54,7 @@ void require_plan(const std::filesystem::path& input, const Job& job) {
   if (!job.anatomy->scene.plan)
     base::refuse("{}: the scene has no plan; add plan: {{pieces: [BONE, …]}}", file);
   if (job.tearing) base::refuse("{}: tissue that tears has no session; remove tearing", file);
-  if (job.wanted.functional == scene::Functional::force)
+  if (job.requested.functional == scene::Functional::force)
     base::refuse("{}: a session minimizes the energy; remove solve.functional", file);
 }
 
@@ -71,7 +71,7 @@ struct PlanSession::State {
   std::list<Base> bases;  // the latest first
   std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
 
-  discrete::Part& part() { return job.raised ? job.raised->part : own; }
+  discrete::Part& part() { return job.local_model ? job.local_model->part : own; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
   solve::Summary search(const solve::Settings& settings, const solve::Start& start);
@@ -121,7 +121,7 @@ const Base* PlanSession::State::base(const Placements& placements,
   }
   if (summary.path.last.stopped) return nullptr;
   bases.push_front(std::move(base));
-  if (bases.size() > most_bases) bases.pop_back();
+  if (bases.size() > max_bases) bases.pop_back();
   return &bases.front();
 }
 
@@ -147,23 +147,23 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input)
   State& s = *state_;
   s.comm = comm;
   s.job = read_job(comm, input, "");
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     require_plan(input, s.job);
     s.box = *s.job.anatomy->scene.plan;
   });
   s.box.pieces.clear();
   MPI_Bcast(s.box.translate.data(), 3, MPI_DOUBLE, 0, comm);
   MPI_Bcast(s.box.rotate.data(), 3, MPI_DOUBLE, 0, comm);
-  s.settings = settings_of(s.job.wanted, s.job.solid);
+  s.settings = settings_of(s.job.requested, s.job.solid);
   s.settings.initial_equilibrium = s.job.initial_equilibrium;
   s.settings.finds_other_rest = false;
   s.plan = plan_pieces(comm, s.job);
   for (const solve::PlanPiece& piece : s.plan) {
     std::string name = base::rank(comm) == 0 ? s.job.model.bones[piece.bone] : "";
-    base::share(comm, name);
+    base::broadcast(comm, name);
     s.pieces.push_back({name, piece.bone, piece.centroid, piece.placement});
   }
-  if (!s.job.raised) s.own = discrete::distribute(comm, s.job.model);
+  if (!s.job.local_model) s.own = discrete::distribute(comm, s.job.model);
 }
 
 PlanSession::~PlanSession() = default;
@@ -173,7 +173,7 @@ const scene::Plan& PlanSession::box() const { return state_->box; }
 double PlanSession::accuracy() const { return state_->settings.path.accuracy; }
 const model::Model& PlanSession::model() const { return state_->job.model; }
 const std::string& PlanSession::building() const { return state_->job.building; }
-int64_t PlanSession::layers() const { return state_->job.raised ? state_->job.layers : 0; }
+int64_t PlanSession::layers() const { return state_->job.local_model ? state_->job.layers : 0; }
 
 const surface::Surface* PlanSession::given_skin() const {
   const auto& anatomy = state_->job.anatomy;
@@ -216,12 +216,13 @@ void PlanSession::write(const std::filesystem::path& name) {
   State& s = *state_;
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
   std::optional<results::NameLock> lock;
-  base::on_first_rank(s.comm, [&] { lock.emplace(name); });
+  base::on_root(s.comm, [&] { lock.emplace(name); });
   results::ResultFile file =
-      s.job.raised ? results::ResultFile(s.comm, name, s.job.model,
-                                         discrete::NaturalRows::of_model(s.comm, *s.job.raised),
-                                         results::Kind::result)
-                   : results::ResultFile(s.comm, name, s.job.model, results::Kind::result);
+      s.job.local_model
+          ? results::ResultFile(s.comm, name, s.job.model,
+                                discrete::NaturalRows::of_model(s.comm, *s.job.local_model),
+                                results::Kind::result)
+          : results::ResultFile(s.comm, name, s.job.model, results::Kind::result);
   file.append(s.last->first, s.last->second);
   file.commit();
 }

@@ -20,12 +20,12 @@ std::string ending(bool settled, bool stopped, const std::string& unsettled) {
 }
 
 /// Why a way that came to its end was hard, and what to change.
-std::string hardship(const solve::Halvings& h) {
+std::string describe_halvings(const solve::Halvings& h) {
   constexpr int64_t usual = 4;
   if (h.count() <= usual) return "";
   return report_row(
       "remark",
-      h.folded >= h.failed + h.strayed
+      h.folded >= h.failed + h.off_prediction
           ? "a hard way: tissue folds on it; move the bones less or release more tissue "
             "(tissue.release); springs: raise the volume stiffness, or make the tissue a solid"
           : "a hard way: tissue buckles on it, or has several rest positions, and -verify_path "
@@ -37,7 +37,7 @@ std::string hardship(const solve::Halvings& h) {
 std::string halved(const solve::Halvings& h) {
   if (h.count() == 0) return "none halved";
   return fmt::format("{} halved: {} folded tissue, {} led elsewhere than predicted, {} failed",
-                     h.count(), h.folded, h.strayed, h.failed);
+                     h.count(), h.folded, h.off_prediction, h.failed);
 }
 
 std::string work_rows(const solve::Summary& s) {
@@ -46,7 +46,7 @@ std::string work_rows(const solve::Summary& s) {
           ? fmt::format("; {} of value to find another rest position", s.evaluations_for_other)
           : "";
   return report_row("load steps", fmt::format("{} ({})", s.path.steps, halved(s.path.halvings))) +
-         hardship(s.path.halvings) +
+         describe_halvings(s.path.halvings) +
          report_row("iterations", fmt::format("{}", s.path.iterations)) +
          report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian{}",
                                                s.evaluations, s.assemblies, other));
@@ -61,7 +61,7 @@ std::string stability(const solve::Spectrum& s) {
   return text;
 }
 
-/// Why a run that did not come to rest did not, as far as that is known, and what to change.
+/// Explains a failed run, as far as known, with a remedy.
 std::string remedy(const solve::Summary& s, bool stretched) {
   if (!s.path.last.stable && stretched)
     return " The tissue buckles there, or is between several rest positions: move the bones less, "
@@ -127,7 +127,7 @@ std::string describe_prestress(const solve::Prestress& p) {
   return report_row(
       "initial equilibrium",
       fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
-                  p.residual, p.largest_force, p.least_rest_ratio));
+                  p.residual, p.largest_force, p.min_rest_ratio));
 }
 
 std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
@@ -146,7 +146,7 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 
 std::string describe_pierced(const std::vector<std::string>& bodies,
                              const solve::PiercedColumns& pierced) {
-  if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 knows their names
+  if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 has their names
   return report_row(
       "pierced by bone",
       fmt::format(
@@ -195,7 +195,7 @@ std::string describe_other_rest(const solve::Outcome& last) {
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s) {
   std::string text;
   for (size_t k = 0; k < s.contacts.size(); ++k) {
-    const solve::BodyContact& on = s.contacts[k];
+    const solve::ContactSummary& on = s.contacts[k];
     const std::string name = k < bodies.size() ? bodies[k] : "the sides of cuts";
     if (on.inside > 0)
       text += report_row(
@@ -246,19 +246,22 @@ std::string describe_folds(const model::Model& model, const std::vector<double>&
 std::string describe_path(const PathCheck& c) {
   const auto row = [](const std::string& text) { return report_row("path", text); };
   if (c.steps == 0) return row("none: nothing moves");
-  const std::string way = fmt::format("in {} load steps in place of {}", 2 * c.steps, c.steps);
+  const std::string repetition =
+      fmt::format("in {} load steps in place of {}", 2 * c.steps, c.steps);
   if (!c.again.path.complete())
-    return row(fmt::format("NOT VERIFIED: {} the run ended at load {:.4g}: {}", way,
+    return row(fmt::format("NOT VERIFIED: {} the run ended at load {:.4g}: {}", repetition,
                            c.again.path.load, c.again.last.reason));
   const std::string apart =
       fmt::format("{:.2g} mm apart at most, 95 % within {:.2g} mm", c.largest, c.percentile_95);
-  if (c.holds()) return row(fmt::format("verified: {} the same rest position, {}", way, apart));
+  if (c.holds())
+    return row(fmt::format("verified: {} the same rest position, {}", repetition, apart));
   return row(fmt::format(
       "THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about ({:.1f}, "
       "{:.1f}, {:.1f}) mm; its objective is {:.6g}, that of the result {:.6g}: look "
       "there before you trust it; springs buckle where they are pressed together "
       "(raise the volume stiffness, or make the tissue a solid)",
-      way, apart, c.place.x(), c.place.y(), c.place.z(), c.again.last.objective, c.objective));
+      repetition, apart, c.place.x(), c.place.y(), c.place.z(), c.again.last.objective,
+      c.objective));
 }
 
 std::string describe_stages(const base::Stages& stages) {
@@ -272,14 +275,14 @@ std::string describe_stages(const base::Stages& stages) {
 std::string describe_saved(const std::string& name) {
   return report_row(
       "told to end",
-      fmt::format("{}.h5 holds the last state saved; -restart {}.h5 goes on from it", name, name));
+      fmt::format("{}.h5 holds the last state saved; -restart {}.h5 resumes from it", name, name));
 }
 
 std::string describe_finished(const std::string& file, const model::StepNumbers& end,
                               double accuracy, bool folded) {
   return report_row(
       "finished",
-      fmt::format("{}: at rest at load 1, {:.3g} mm reached, {:.3g} mm asked for{}; nothing is "
+      fmt::format("{}: at rest at load 1, {:.3g} mm reached, {:.3g} mm requested{}; nothing is "
                   "left to do",
                   file, end.displacement_error, accuracy,
                   folded ? fmt::format(", {} prisms inside out (-allow_folded accepts them)",
@@ -304,7 +307,7 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
   const double error = s.last.displacement_error;
   text += report_row(
       "accuracy",
-      fmt::format("{}, {:.3g} mm asked for",
+      fmt::format("{}, {:.3g} mm requested",
                   std::isfinite(error) ? fmt::format("{:.3g} mm reached", error) : "not known",
                   settings.path.accuracy));
   text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
@@ -324,14 +327,14 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
   return text + describe_stages(stages);
 }
 
-std::string describe_choice(const adapt::GridSequence& sequence, double wanted) {
+std::string describe_choice(const adapt::GridSequence& sequence, double requested) {
   const adapt::Level& chosen = sequence.levels.back();
   return fmt::format(
       "  {:<22} of these, the last; its skin is {:.2g} mm from the scene's own at most, by its "
       "distance from the one before{}\n",
-      "solved model", chosen.discretisation_error,
-      chosen.discretisation_error > wanted
-          ? fmt::format(": MORE THAN THE {:g} mm ASKED FOR", wanted)
+      "solved model", chosen.discretization_error,
+      chosen.discretization_error > requested
+          ? fmt::format(": MORE THAN THE {:g} mm REQUESTED", requested)
           : "");
 }
 

@@ -18,7 +18,7 @@ std::string describe_model(const model::Counts& counts);
 
 /// Describes the built model: columns, thickness, attachment, remarks.
 std::string describe_build(const model::BuildReport& report);
-/// What of the anatomy is implausible, a row each.
+/// Rows for the implausible properties of the anatomy.
 std::string describe_warnings(const std::vector<std::string>& warnings);
 /// An incision and how many points it doubled.
 std::string describe_cut(const model::Cut& cut, int64_t doubled);
@@ -71,7 +71,7 @@ std::string describe_saved(const std::string& name);
 std::string describe_finished(const std::string& file, const model::StepNumbers& end,
                               double accuracy, bool folded);
 
-/// Why a run did not come to rest and what to change, loudly in one line; nothing where it did.
+/// One-line failure message with a remedy; empty on success.
 /// `stretched`: it began in an initial equilibrium.
 std::string describe_failure(const solve::Summary& summary, bool stretched);
 
@@ -83,8 +83,8 @@ std::string describe_run(const solve::Summary& summary, const solve::Settings& s
 /// Lines of the closing table about a nested iteration; only rank 0 has them.
 std::string describe_sequence(const adapt::GridSequence& sequence);
 
-/// A line about the last coarse model where it was solved in place of the scene's own, to `wanted`
-/// mm; only rank 0 has it.
-std::string describe_choice(const adapt::GridSequence& sequence, double wanted);
+/// A line about the last coarse model where it was solved in place of the scene's own, to
+/// `requested` mm; only rank 0 has it.
+std::string describe_choice(const adapt::GridSequence& sequence, double requested);
 
 }  // namespace repose::app

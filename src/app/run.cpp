@@ -16,7 +16,7 @@
 #include "phase.h"
 #include "plan_pieces.h"
 #include "report.h"
-#include "repose/adapt/discretisation.h"
+#include "repose/adapt/discretization.h"
 #include "repose/adapt/given_skin.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
@@ -39,7 +39,7 @@ namespace {
 
 const MPI_Comm comm = MPI_COMM_WORLD;
 
-void say(const std::string& text) {
+void print(const std::string& text) {
   if (base::rank(comm) == 0) std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
 }
@@ -64,7 +64,7 @@ std::string needs_whole(const base::Options& options) {
 
 /// On rank 0.
 model::Counts counts_of(const Job& job) {
-  return job.raised ? job.raised->counts : model::count(job.model);
+  return job.local_model ? job.local_model->counts : model::count(job.model);
 }
 
 /// Why a result is not to be trusted as an end, or nothing.
@@ -81,7 +81,7 @@ class Saving {
       : interrupt_(interrupt) {
     if (base::rank(comm) > 0) return;
     interrupt_.on_signal([&writer, name] {
-      if (writer.save()) say(describe_saved(name));
+      if (writer.save()) print(describe_saved(name));
     });
   }
   ~Saving() { interrupt_.on_signal({}); }
@@ -165,16 +165,16 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
   earlier_ = file;
   kept_ = strategy_.tears ? 0 : from.kept;
   bool done = false, folded = false;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     if (!from.end || !is_done(*from.end)) return;
     done = true;
     folded = from.end->inverted_prisms > 0 && !folds_allowed;
-    say(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
+    print(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
     copy_result(file);
   });
   for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (!done) return {};
-  say(write_given_skin(discrete::gather_points(comm, start_.position)));
+  print(write_given_skin(discrete::gather_points(comm, start_.position)));
   return folded ? base::Exit::not_converged : base::Exit::done;
 }
 
@@ -196,19 +196,19 @@ Coarser Run::solve_coarser() {
   if (strategy_.coarse == Strategy::Coarse::none) return {};
   solve::Settings& settings = strategy_.settings;
   const bool compare = strategy_.coarse == Strategy::Coarse::compare;
-  const adapt::SequencePlan wanted{strategy_.resolutions, job_.recording, settings,
-                                   compare ? 0 : settings.path.accuracy};
+  const adapt::SequencePlan requested{strategy_.resolutions, job_.reference_state, settings,
+                                      compare ? 0 : settings.path.accuracy};
   const model::Anatomy none;
   adapt::GridSequence sequence =
-      adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none, job_.model, wanted);
+      adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none, job_.model, requested);
   Coarser coarser{describe_sequence(sequence), {}, {}};
   const bool converging = !compare && !strategy_.preview && job_.solid;
   const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
   if (sequence.near_enough || last) {
-    coarser.discretisation_error = sequence.levels.back().discretisation_error;
+    coarser.discretization_error = sequence.levels.back().discretization_error;
     const double accuracy = settings.path.accuracy;
-    coarser.told += converging ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
-                               : describe_choice(sequence, accuracy);
+    coarser.report += converging ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
+                                 : describe_choice(sequence, accuracy);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
     settings.weights = sequence.last_settings.weights;
     job_.model = std::move(sequence.last.model);
@@ -227,11 +227,14 @@ Coarser Run::solve_coarser() {
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
   settings.tangents = strategy_.tangents;
-  settings.under_way = [&](double load, const auto& look) { writer.look_in(load, look); };
+  settings.on_iterate = [&](double load, const auto& snapshot) {
+    writer.on_iterate(load, snapshot);
+  };
   const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
                       strategy_.sensitivity || !job_.held.empty();
   solve::Summary summary =
-      job_.raised ? solve::find_repose(comm, job_.raised->part, settings, start_, std::ref(writer))
+      job_.local_model
+          ? solve::find_repose(comm, job_.local_model->part, settings, start_, std::ref(writer))
       : needed
           ? solve::find_repose(comm, job_.model, settings, start_, std::ref(writer))
           : solve::find_repose(comm, std::move(job_.model), settings, start_, std::ref(writer));
@@ -247,8 +250,8 @@ std::string Run::describe_folds(const model::StepNumbers& last, const Writer& wr
   if (last.inverted_prisms == 0) return "";
   const std::vector<double> ratios = writer.volume_ratios();
   std::string text;
-  base::on_first_rank(
-      comm, [&] { text = app::describe_folds(results::read_model(name_ + ".h5"), ratios); });
+  base::on_root(comm,
+                [&] { text = app::describe_folds(results::read_model(name_ + ".h5"), ratios); });
   return text;
 }
 
@@ -265,7 +268,7 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
 /// Positions of the points at the last step, or of the skin alone where no rank holds the whole
 /// model; on rank 0. Collective.
 std::vector<Vec3> Run::positions(const Writer& writer) const {
-  return job_.raised ? writer.skin_positions(job_.layers) : writer.positions();
+  return job_.local_model ? writer.skin_positions(job_.layers) : writer.positions();
 }
 
 /// Writes the displacement of the given skin, in the place of which another was solved, to
@@ -279,8 +282,8 @@ std::string Run::write_given_skin(const std::vector<Vec3>& position) const {
     const surface::Surface& given = *job_.anatomy->given_skin;
     surface::write_surface(file, given, adapt::displacement_of_given(given, solved, displacement));
   };
-  base::on_first_rank(comm, [&] {
-    if (job_.raised) return write(job_.anatomy->skin, job_.anatomy->skin.points);
+  base::on_root(comm, [&] {
+    if (job_.local_model) return write(job_.anatomy->skin, job_.anatomy->skin.points);
     const model::Model model = results::read_model(name_ + ".h5");
     write(model, model.points.position);
   });
@@ -293,7 +296,7 @@ std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summ
   if (!summary.path.complete()) return "";
   const std::vector<Vec3> position = positions(writer);
   std::string text;
-  base::on_first_rank(comm, [&] { text = skin.describe_self_contact(position); });
+  base::on_root(comm, [&] { text = skin.describe_self_contact(position); });
   return text;
 }
 
@@ -308,17 +311,17 @@ std::string Run::describe_sensitivity(const solve::Summary& summary, const Write
   return describe_sensitivities(found);
 }
 
-/// What the closing summary begins with: how the face moved, how far to trust it, and the warnings.
+/// First lines of the end-of-run summary: movement of the face, its accuracy, and warnings.
 /// Collective.
 std::string Run::describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
                                  const Writer& writer) const {
   const std::vector<Vec3> position = positions(writer);
   std::string text;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     std::vector<model::FacePlace> places;
     if (job_.anatomy) places = model::face_places(*job_.anatomy);
     text = describe_movement(places, skin.initial_points(), skin.points_at(position)) + " " +
-           describe_trust(summary, writer.discretisation_error()) + "\n" +
+           describe_trust(summary, writer.discretization_error()) + "\n" +
            describe_warnings(job_.warnings);
   });
   return text;
@@ -327,7 +330,7 @@ std::string Run::describe_answer(const SolvedSkin& skin, const solve::Summary& s
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  Writer writer(comm, name_, job_.model, job_.raised ? &*job_.raised : nullptr, coarser,
+  Writer writer(comm, name_, job_.model, job_.local_model ? &*job_.local_model : nullptr, coarser,
                 checkpoint_interval, unsettled(tearing));
   if (kept_ > 0) writer.keep(earlier_, kept_);
   const Saving saving(interrupt_, writer, name_);
@@ -340,17 +343,17 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
-  say(describe_answer(skin, summary, writer));
-  say(folds + describe_failure(summary, job_.recording.has_value()));
-  say(describe_run(summary, strategy_.settings, base::size(comm), stages_));
-  say(coarser.told + writer.comparison() + sensitivity + describe_tearing(tearing) +
-      describe_tangents(writer.point_fields()));
-  if (path) say(describe_path(*path));
-  say(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
-      describe_pierced(job_.bodies, summary.pierced));
-  say(describe_self_contact(skin, summary, writer));
-  say(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
-  say(given);
+  print(describe_answer(skin, summary, writer));
+  print(folds + describe_failure(summary, job_.reference_state.has_value()));
+  print(describe_run(summary, strategy_.settings, base::size(comm), stages_));
+  print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
+        describe_tangents(writer.point_fields()));
+  if (path) print(describe_path(*path));
+  print(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
+        describe_pierced(job_.bodies, summary.pierced));
+  print(describe_self_contact(skin, summary, writer));
+  print(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
+  print(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
@@ -358,7 +361,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
 /// Writes the skin that a job solves, with its border, to NAME_solved_skin.ply. Collective.
 std::string write_solved_skin(const Job& job, const std::string& name) {
   const std::string file = name + "_solved_skin.ply";
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     if (!job.anatomy) base::refuse("-output: a model file has no skin to write with -dry_run");
     surface::write_surface(file, job.anatomy->skin);
   });
@@ -370,7 +373,7 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
   const bool dry = options.flag("dry_run");
   const std::string name = dry ? "" : result_name(options, input);
   std::optional<results::NameLock> lock;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     if (!dry) lock.emplace(name);
   });
   Phase building(comm, "building the model");
@@ -379,11 +382,11 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
   building.end();
   stages.end("build");
   if (base::rank(comm) == 0)
-    say(job.building + describe_model(counts_of(job)) + describe_warnings(job.warnings) +
-        strategy.explanation);
+    print(job.building + describe_model(counts_of(job)) + describe_warnings(job.warnings) +
+          strategy.explanation);
   if (dry) {
-    if (options.has("output")) say(write_solved_skin(job, options.text("output")));
-    say(describe_stages(stages));
+    if (options.has("output")) print(write_solved_skin(job, options.text("output")));
+    print(describe_stages(stages));
     return base::Exit::done;
   }
   const auto number = [&](const char* name, double otherwise) {
@@ -405,7 +408,7 @@ base::Exit run(const base::Options& options) {
   try {
     return run_input(options, input);
   } catch (const base::InputError& error) {
-    // What refuses a model or a state of it does not know the file.
+    // Messages about a model or a state lack the file's name.
     const std::string text = error.what();
     const bool named = text.find(input.filename().string()) != std::string::npos;
     const bool of_another = text.substr(0, text.find(' ')).ends_with(':');  // a file or an option

@@ -12,7 +12,7 @@
 namespace repose::app {
 
 SolvedSkin::SolvedSkin(const Job& job) {
-  if (job.raised) {
+  if (job.local_model) {
     if (job.anatomy) initial_ = job.anatomy->skin;
     for (size_t i = 0; i < initial_.points.size(); ++i) row_.push_back(static_cast<int64_t>(i));
     on_a_side_.resize(row_.size(), 0);
@@ -27,8 +27,8 @@ SolvedSkin::SolvedSkin(const Job& job) {
   for (const int64_t row : row_) initial_.points.push_back(job.model.points.position[row]);
   for (const Triangle& t : job.model.skin)
     initial_.triangles.push_back({number(t[0]), number(t[1]), number(t[2])});
-  const std::set<int64_t> sides(job.model.contact.walls.point.begin(),
-                                job.model.contact.walls.point.end());
+  const std::set<int64_t> sides(job.model.contact.cut_faces.point.begin(),
+                                job.model.contact.cut_faces.point.end());
   for (const int64_t row : row_) on_a_side_.push_back(sides.contains(row));
 }
 

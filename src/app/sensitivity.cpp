@@ -18,7 +18,7 @@ namespace {
 constexpr double moves = 0.5;  // mm, of the skin that counts
 
 /// Downwards: pressures of a change towards 0.5 are not of first order.
-void give_way(scene::Material& material) {
+void soften(scene::Material& material) {
   const auto lower = [](double& poisson) { poisson = poisson < 0.47 ? poisson - 0.05 : 0.45; };
   lower(material.deep.poisson);
   for (scene::Stratum& stratum : material.strata) lower(stratum.elasticity.poisson);
@@ -33,10 +33,10 @@ void stiffen_skin(scene::Material& material) {
 /// The model of a scene in place of the job's own, as read_job would make it. Collective.
 model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) {
   model::BuiltModel built;
-  base::on_first_rank(
-      comm, [&] { built = model::build_model(scene, job.anatomy->skin, job.anatomy->bones); });
-  if (job.recording) solve::prestress(comm, built.model, *job.recording);
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm,
+                [&] { built = model::build_model(scene, job.anatomy->skin, job.anatomy->bones); });
+  if (job.reference_state) solve::prestress(comm, built.model, *job.reference_state);
+  base::on_root(comm, [&] {
     for (const model::Cut& cut : built.cuts) model::cut_along(cut, built.model);
   });
   return std::move(built.model);
@@ -74,10 +74,10 @@ std::vector<Variation> variations(const scene::Scene& scene) {
   };
   using scene::Rim;
   using scene::Scene;
-  vary("a rim let go", scene.rim != Rim::free, [](Scene& s) { s.rim = Rim::free; });
+  vary("a free rim", scene.rim != Rim::free, [](Scene& s) { s.rim = Rim::free; });
   vary("a rim held all round", scene.rim != Rim::fixed, [](Scene& s) { s.rim = Rim::fixed; });
   vary("a lower Poisson's ratio (0.40 for 0.45, 0.45 for 0.49)", scene.tissue.material.has_value(),
-       [](Scene& s) { give_way(*s.tissue.material); });
+       [](Scene& s) { soften(*s.tissue.material); });
   vary("a skin of 1.5 mm, five times as stiff", scene.tissue.material.has_value(),
        [](Scene& s) { stiffen_skin(*s.tissue.material); });
   const bool moved = std::any_of(scene.moves.begin(), scene.moves.end(),
@@ -117,14 +117,14 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
 std::string describe_sensitivities(const std::vector<Sensitivity>& found) {
   std::string text;
   for (const Sensitivity& s : found) {
-    const std::string told =
+    const std::string report =
         s.known ? fmt::format(
                       "{} moves half of the skin by less than {:.2g} mm, 95 % by {:.2g} mm, "
                       "all by {:.2g} mm, the most near ({:.0f}, {:.0f}, {:.0f})",
                       s.name, s.median, s.percentile_95, s.largest, s.where.x(), s.where.y(),
                       s.where.z())
                 : fmt::format("{}: not known to first order", s.name);
-    text += report_row("sensitivity", told);
+    text += report_row("sensitivity", report);
   }
   return text;
 }

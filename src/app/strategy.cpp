@@ -4,7 +4,7 @@
 
 #include "plan_pieces.h"
 #include "report.h"
-#include "repose/adapt/discretisation.h"
+#include "repose/adapt/discretization.h"
 #include "repose/app/options.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
@@ -19,22 +19,21 @@ using Coarse = Strategy::Coarse;
 bool is_force(const Strategy& s) { return s.settings.functional == scene::Functional::force; }
 
 /// Why a part of a strategy cannot go with what a job or its options hold.
-struct Obstacle {
+struct Conflict {
   bool given;
   const char* what;
   bool to_coarse = true;  ///< solving coarser models
   bool to_path = false;   ///< verifying the path
 };
 
-std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, const Strategy& s) {
+std::vector<Conflict> conflicts(const base::Options& options, const Job& job, const Strategy& s) {
   return {
       {.given = is_force(s), .what = "the functional is force"},
       {.given = options.has("restart"),
-       .what = "the run goes on from another result",
+       .what = "the run resumes from another result",
        .to_path = true},
-      {.given = !job.anatomy,
-       .what = "the input is a model, which does not tell what it was made from"},
-      {.given = s.settings.path.load_steps > 0, .what = "load_steps are asked for"},
+      {.given = !job.anatomy, .what = "the input is a model, which does not state its scene"},
+      {.given = s.settings.path.load_steps > 0, .what = "load_steps are requested"},
       {.given = !job.cuts.empty(), .what = "the scene has incisions or parted lips"},
       {.given = s.tears, .what = "the tissue may tear", .to_path = true},
       {.given = s.verifies_path, .what = "the path is to be verified"},
@@ -42,20 +41,20 @@ std::vector<Obstacle> obstacles(const base::Options& options, const Job& job, co
 }
 
 /// The first obstacle, or nothing.
-std::string first_obstacle(const std::vector<Obstacle>& obstacles, bool Obstacle::*to) {
-  for (const Obstacle& o : obstacles)
+std::string first_conflict(const std::vector<Conflict>& conflicts, bool Conflict::*to) {
+  for (const Conflict& o : conflicts)
     if (o.given && o.*to) return o.what;
   return "";
 }
 
 /// Request for coarser models by options; a scene alone requests none.
-struct Wish {
+struct CoarseRequest {
   Coarse coarse = Coarse::none;
   const char* option = "";
-  bool insisted = false;  // not to be passed over where it cannot be
+  bool required = false;  // not to be passed over where it cannot be
 };
 
-Wish wish_of(const base::Options& options) {
+CoarseRequest coarse_request(const base::Options& options) {
   const bool adapt = options.flag("adapt"), compare = options.flag("discretisation");
   const std::string profile = options.text("profile");
   if (adapt && compare)
@@ -64,41 +63,43 @@ Wish wish_of(const base::Options& options) {
   for (const char* name : {"adapt", "discretisation"})
     if (options.flag(name) && profile == "exact")
       base::refuse("-{} solves coarser models; leave -profile exact out", name);
-  if (compare) return {.coarse = Coarse::compare, .option = "-discretisation", .insisted = true};
-  if (adapt) return {.coarse = Coarse::instead, .option = "-adapt", .insisted = true};
+  if (compare) return {.coarse = Coarse::compare, .option = "-discretisation", .required = true};
+  if (adapt) return {.coarse = Coarse::instead, .option = "-adapt", .required = true};
   if (profile == "preview") return {.coarse = Coarse::instead, .option = "-profile preview"};
   return {};
 }
 
-std::vector<adapt::Resolution> resolutions_for(const Wish& wish, const model::Anatomy& anatomy) {
+std::vector<adapt::Resolution> resolutions_for(const CoarseRequest& request,
+                                               const model::Anatomy& anatomy) {
   constexpr int64_t preview_columns = 4000;
-  if (wish.coarse == Coarse::compare) return adapt::halved_resolutions(anatomy);
+  if (request.coarse == Coarse::compare) return adapt::halved_resolutions(anatomy);
   const auto columns = static_cast<int64_t>(anatomy.skin.points.size());
-  if (!wish.insisted && columns < preview_columns) return {};  // is as soon solved itself
-  return adapt::compared_resolutions(anatomy, wish.insisted ? columns : preview_columns);
+  if (!request.required && columns < preview_columns) return {};  // is as soon solved itself
+  return adapt::compared_resolutions(anatomy, request.required ? columns : preview_columns);
 }
 
 /// On rank 0.
-void choose_coarse(const Wish& wish, const std::string& obstacle, const Job& job, Strategy& s) {
-  if (wish.coarse == Coarse::none) return;
-  if (obstacle.empty()) {
-    s.preview = wish.coarse == Coarse::instead && !wish.insisted;
-    if (wish.coarse == Coarse::instead && wish.insisted && job.solid) {
+void choose_coarse(const CoarseRequest& request, const std::string& conflict, const Job& job,
+                   Strategy& s) {
+  if (request.coarse == Coarse::none) return;
+  if (conflict.empty()) {
+    s.preview = request.coarse == Coarse::instead && !request.required;
+    if (request.coarse == Coarse::instead && request.required && job.solid) {
       adapt::Convergence convergence = adapt::convergence_of(*job.anatomy, job.model);
       s.resolutions = std::move(convergence.resolutions);
       s.limit = std::move(convergence.limit);
     } else {
-      s.resolutions = resolutions_for(wish, *job.anatomy);
+      s.resolutions = resolutions_for(request, *job.anatomy);
     }
-  } else if (wish.insisted) {
-    base::refuse("{}: {}; leave the option out", wish.option, obstacle);
+  } else if (request.required) {
+    base::refuse("{}: {}; leave the option out", request.option, conflict);
   }
-  if (!s.resolutions.empty()) s.coarse = wish.coarse;
+  if (!s.resolutions.empty()) s.coarse = request.coarse;
 }
 
-/// Refuses what minimises without regard to contact.
+/// Refuses what minimizes without regard to contact.
 void require_contact_kept(const Strategy& s, const Job& job) {
-  if (!job.touches) return;
+  if (!job.has_contact) return;
   const char* remedy = "leave contact and sliding instruments out of the scene";
   if (is_force(s))
     base::refuse(
@@ -108,43 +109,44 @@ void require_contact_kept(const Strategy& s, const Job& job) {
 }
 
 /// Refuses to verify a path that is not a matter of load steps.
-void require_path(const std::string& obstacle, const Strategy& s) {
-  if (s.verifies_path && !obstacle.empty())
-    base::refuse("-verify_path: {}; leave the option out", obstacle);
+void require_path(const std::string& conflict, const Strategy& s) {
+  if (s.verifies_path && !conflict.empty())
+    base::refuse("-verify_path: {}; leave the option out", conflict);
 }
 
 std::string describe_minimum(const Strategy& s, const Job& job) {
-  const std::string minimised =
+  const std::string minimized =
       job.solid ? "the energy of a solid"
                 : fmt::format("the {} of springs, volume term {}",
                               is_force(s) ? "forces" : "energy", word(s.settings.weights.volume));
-  return fmt::format("{}, to {:g} mm", minimised, s.settings.path.accuracy);
+  return fmt::format("{}, to {:g} mm", minimized, s.settings.path.accuracy);
 }
 
 std::string describe_steps(const Strategy& s) {
   const int steps = s.settings.path.load_steps;
-  return steps > 0 ? fmt::format("{} equal ones, as asked for; halved where one fails", steps)
+  return steps > 0 ? fmt::format("{} equal ones, as requested; halved where one fails", steps)
                    : "as long as the prediction holds; halved where one fails";
 }
 
-std::string describe_coarse(const Wish& wish, const std::string& obstacle, const Strategy& s) {
-  if (wish.coarse == Coarse::none) return "none: no option asks for any";
-  if (!obstacle.empty()) return fmt::format("none: {}", obstacle);
+std::string describe_coarse(const CoarseRequest& request, const std::string& conflict,
+                            const Strategy& s) {
+  if (request.coarse == Coarse::none) return "none: no option requests any";
+  if (!conflict.empty()) return fmt::format("none: {}", conflict);
   if (s.resolutions.empty()) return "none: the skin has too few vertices";
   return fmt::format("{}, {}, because of {}", s.resolutions.size(),
                      s.coarse == Coarse::compare ? "to compare the scene's own with"
                                                  : "the first that is near enough in its place",
-                     wish.option);
+                     request.option);
 }
 
 /// A row for each choice.
-std::string explain(const Wish& wish, const std::vector<Obstacle>& all, const Job& job,
+std::string explain(const CoarseRequest& request, const std::vector<Conflict>& all, const Job& job,
                     const Strategy& s) {
   std::string text =
-      report_row("minimises", describe_minimum(s, job)) +
+      report_row("minimizes", describe_minimum(s, job)) +
       report_row("load steps", describe_steps(s)) +
       report_row("coarser models",
-                 describe_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), s));
+                 describe_coarse(request, first_conflict(all, &Conflict::to_coarse), s));
   if (s.verifies_path) text += report_row("verified", "by a second run in twice the load steps");
   if (s.tears) text += report_row("tearing", "in rounds: at rest, then springs above the limit go");
   return text;
@@ -159,7 +161,7 @@ void choose_sensitivity(const base::Options& options, const Job& job, Strategy& 
     base::refuse("-sensitivity: {}; leave the option out", why);
   };
   if (!job.solid) cannot("it is of a material, and the tissue is springs");
-  if (!job.anatomy) cannot("the input is a model, which does not tell what it was made from");
+  if (!job.anatomy) cannot("the input is a model, which does not state its scene");
   if (s.coarse == Coarse::instead) cannot("a coarser model takes the place of the scene's own");
   s.sensitivity = true;
 }
@@ -178,10 +180,10 @@ void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job
 }
 
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
-  scene::Solve wanted = job.wanted;
-  override_by(options, wanted);
+  scene::Solve requested = job.requested;
+  override_by(options, requested);
   Strategy s;
-  s.settings = settings_of(wanted, job.solid);
+  s.settings = settings_of(requested, job.solid);
   s.settings.stability = options.flag("stability");
   s.settings.finds_other_rest = !options.flag("skip_other_rest");
   s.settings.monitor = options.flag("monitor_mm");
@@ -189,12 +191,12 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.tears = job.tearing.has_value();
   s.verifies_path = options.flag("verify_path");
   require_contact_kept(s, job);
-  const Wish wish = wish_of(options);
-  std::vector<Obstacle> all;  // on rank 0, which alone has all of the job
-  base::on_first_rank(comm, [&] {
-    all = obstacles(options, job, s);
-    require_path(first_obstacle(all, &Obstacle::to_path), s);
-    choose_coarse(wish, first_obstacle(all, &Obstacle::to_coarse), job, s);
+  const CoarseRequest request = coarse_request(options);
+  std::vector<Conflict> all;  // on rank 0, which alone has all of the job
+  base::on_root(comm, [&] {
+    all = conflicts(options, job, s);
+    require_path(first_conflict(all, &Conflict::to_path), s);
+    choose_coarse(request, first_conflict(all, &Conflict::to_coarse), job, s);
     choose_sensitivity(options, job, s);
   });
   MPI_Bcast(&s.coarse, sizeof s.coarse, MPI_BYTE, 0, comm);
@@ -203,7 +205,8 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   s.resolutions.resize(models);
   for (bool* flag : {&s.preview, &s.sensitivity, &s.tears}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   choose_tangents(comm, options, job, s);
-  if (base::rank(comm) == 0 && options.flag("dry_run")) s.explanation = explain(wish, all, job, s);
+  if (base::rank(comm) == 0 && options.flag("dry_run"))
+    s.explanation = explain(request, all, job, s);
   return s;
 }
 

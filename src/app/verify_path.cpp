@@ -45,7 +45,7 @@ PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings 
       [&](const model::StepNumbers&, const model::StepRows& rows) { slab = rows.position; });
   const std::vector<Vec3> other = discrete::gather_points(comm, slab);
   if (!check.again.path.complete()) return check;
-  base::on_first_rank(comm, [&] { compare(model, position, other, check); });
+  base::on_root(comm, [&] { compare(model, position, other, check); });
   MPI_Bcast(&check.largest, 1, MPI_DOUBLE, 0, comm);
   return check;
 }

@@ -1,7 +1,7 @@
 #include "writer.h"
 
 #include "report.h"
-#include "repose/adapt/discretisation.h"
+#include "repose/adapt/discretization.h"
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
@@ -10,12 +10,12 @@
 namespace repose::app {
 
 Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-               const discrete::RaisedPart* raised, const Coarser& coarser, double interval,
+               const discrete::LocalModel* local_model, const Coarser& coarser, double interval,
                std::string unsettled)
     : comm_(comm),
       name_(name),
       model_(model),
-      raised_(raised),
+      local_model_(local_model),
       coarser_(coarser),
       unsettled_(std::move(unsettled)),
       file_(open("", results::Kind::result)),
@@ -23,14 +23,14 @@ Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Mo
 
 results::ResultFile Writer::open(const std::string& ending, results::Kind kind) const {
   const std::filesystem::path file = name_.string() + ending;
-  if (!raised_) return results::ResultFile(comm_, file, model_, kind);
-  return results::ResultFile(comm_, file, model_, discrete::NaturalRows::of_model(comm_, *raised_),
-                             kind);
+  if (!local_model_) return results::ResultFile(comm_, file, model_, kind);
+  return results::ResultFile(comm_, file, model_,
+                             discrete::NaturalRows::of_model(comm_, *local_model_), kind);
 }
 
 void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
-  if (numbers.load == 1 && coarser_.discretisation_error)
-    numbers.discretisation_error = *coarser_.discretisation_error;
+  if (numbers.load == 1 && coarser_.discretization_error)
+    numbers.discretization_error = *coarser_.discretization_error;
   if (coarser_.compared) compare(numbers, rows);
   if (numbers.load == 1 && !unsettled_.empty()) {
     numbers.converged = false;
@@ -53,13 +53,14 @@ void Writer::keep(const std::filesystem::path& earlier, int64_t count) {
   file_.keep(earlier, count);
 }
 
-void Writer::look_in(double load, const solve::Look& look) {
+void Writer::on_iterate(double load, const solve::StateSnapshot& snapshot) {
   if (!begun_)
-    look([&](const auto& numbers, const auto& rows) { file_.append_under_way(numbers, rows); });
+    snapshot(
+        [&](const auto& numbers, const auto& rows) { file_.append_provisional(numbers, rows); });
   begun_ = true;
   if (!makes_checkpoints()) return;
   const bool news = !saved_ || load == 1;
-  if (reached_ && news && due()) write_checkpoint(load == 1 ? look : nullptr);
+  if (reached_ && news && due()) write_checkpoint(load == 1 ? snapshot : nullptr);
 }
 
 std::vector<Vec3> Writer::positions() const {
@@ -94,18 +95,18 @@ std::string Writer::reactions(const std::vector<std::vector<int64_t>>& held) con
 }
 
 void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
-  rows.discretisation_error.assign(rows.position.size(), 0.0);
+  rows.discretization_error.assign(rows.position.size(), 0.0);
   if (numbers.load < 1) return;
   const std::vector<Vec3> position = discrete::gather_points(comm_, rows.position);
   std::vector<Vec3> at_point(position.size());
-  base::on_first_rank(comm_, [&] {
-    const auto found = adapt::discretisation_of(model_, position, *coarser_.compared);
-    numbers.discretisation_error = found.largest;
-    comparison_ = adapt::describe_discretisation(found);
+  base::on_root(comm_, [&] {
+    const auto found = adapt::discretization_of(model_, position, *coarser_.compared);
+    numbers.discretization_error = found.largest;
+    comparison_ = adapt::describe_discretization(found);
     for (size_t i = 0; i < at_point.size(); ++i) at_point[i].x() = found.at_point[i];
   });
   const std::vector<Vec3> mine = base::scatter(comm_, at_point);
-  for (size_t i = 0; i < mine.size(); ++i) rows.discretisation_error[i] = mine[i].x();
+  for (size_t i = 0; i < mine.size(); ++i) rows.discretization_error[i] = mine[i].x();
 }
 
 bool Writer::due() const {
@@ -116,11 +117,11 @@ bool Writer::due() const {
 
 /// The last rest position reached and, of a search at load 1, the state it is at: with both a run
 /// can go on from there or, should that lead astray, along the path.
-void Writer::write_checkpoint(const solve::Look& look) {
+void Writer::write_checkpoint(const solve::StateSnapshot& snapshot) {
   results::ResultFile file = open("_checkpoint", results::Kind::checkpoint);
   file.append(reached_->numbers, reached_->rows);
-  if (look && reached_->numbers.load < 1)
-    look([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });
+  if (snapshot && reached_->numbers.load < 1)
+    snapshot([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });
   file.commit();
   saved_ = true;
   last_saved_ = MPI_Wtime();

@@ -13,25 +13,25 @@ namespace repose::app {
 
 /// Result of coarser models.
 struct Coarser {
-  std::string told;                             ///< on rank 0
+  std::string report;                           ///< on rank 0
   std::optional<adapt::GridSequence> compared;  ///< with the scene's own model, where requested
-  std::optional<double> discretisation_error;   ///< mm, of the model that was chosen, if one was
+  std::optional<double> discretization_error;   ///< mm, of the model that was chosen, if one was
 };
 
 /// Writes every step to the result, and from time to time what was reached to a checkpoint. All
 /// members that write or gather are collective.
 class Writer {
  public:
-  /// `raised`: what there is of a fully distributed model, or none; `model` is its frame then.
-  /// `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a rest position at
-  /// load 1 is the end, or empty.
+  /// `local_model`: the local model of a fully distributed model, or none; `model` is its global
+  /// metadata then. `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a
+  /// rest position at load 1 is the end, or empty.
   Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-         const discrete::RaisedPart* raised, const Coarser& coarser, double interval,
+         const discrete::LocalModel* local_model, const Coarser& coarser, double interval,
          std::string unsettled);
 
   void operator()(model::StepNumbers numbers, model::StepRows rows);
   /// At an iteration of a search.
-  void look_in(double load, const solve::Look& look);
+  void on_iterate(double load, const solve::StateSnapshot& snapshot);
   /// Begins with steps of an earlier result.
   void keep(const std::filesystem::path& earlier, int64_t count);
   void commit() { file_.commit(); }
@@ -45,8 +45,8 @@ class Writer {
   /// Returns the estimated discretization error of the skin, on rank 0.
   const std::string& comparison() const { return comparison_; }
   /// mm, estimate of the last step; negative without one. On rank 0.
-  double discretisation_error() const {
-    const double error = last_.numbers.discretisation_error;
+  double discretization_error() const {
+    const double error = last_.numbers.discretization_error;
     return std::isnan(error) ? -1 : error;
   }
   /// [N] and [prisms] of the last step, on rank 0.
@@ -69,12 +69,12 @@ class Writer {
   results::ResultFile open(const std::string& ending, results::Kind kind) const;
   void compare(model::StepNumbers& numbers, model::StepRows& rows);
   bool due() const;
-  void write_checkpoint(const solve::Look& look);
+  void write_checkpoint(const solve::StateSnapshot& snapshot);
 
   MPI_Comm comm_;
   std::filesystem::path name_;
   const model::Model& model_;
-  const discrete::RaisedPart* raised_;
+  const discrete::LocalModel* local_model_;
   const Coarser& coarser_;
   std::string comparison_, unsettled_;
   results::ResultFile file_;

@@ -24,12 +24,12 @@ namespace {
 
 enum Outcome { fine = 0, input_error = 1, internal_error = 2 };
 
-struct Told {
+struct Result {
   Outcome outcome = fine;
   std::string text;
 };
 
-Told run(const std::function<void()>& work) {
+Result run(const std::function<void()>& work) {
   try {
     work();
     return {};
@@ -42,7 +42,7 @@ Told run(const std::function<void()>& work) {
   }
 }
 
-void agree(MPI_Comm comm, const Told& mine) {
+void agree(MPI_Comm comm, const Result& mine) {
   int failing = mine.outcome == fine ? INT_MAX : rank(comm);
   int first = INT_MAX;
   MPI_Allreduce(&failing, &first, 1, MPI_INT, MPI_MIN, comm);
@@ -59,13 +59,13 @@ void agree(MPI_Comm comm, const Told& mine) {
 
 }  // namespace
 
-void together(MPI_Comm comm, const std::function<void()>& work) { agree(comm, run(work)); }
+void collective_try(MPI_Comm comm, const std::function<void()>& work) { agree(comm, run(work)); }
 
-void on_first_rank(MPI_Comm comm, const std::function<void()>& work) {
-  agree(comm, rank(comm) == 0 ? run(work) : Told{});
+void on_root(MPI_Comm comm, const std::function<void()>& work) {
+  agree(comm, rank(comm) == 0 ? run(work) : Result{});
 }
 
-void share(MPI_Comm comm, std::string& text) {
+void broadcast(MPI_Comm comm, std::string& text) {
   int length = static_cast<int>(text.size());
   MPI_Bcast(&length, 1, MPI_INT, 0, comm);
   text.resize(length);

@@ -13,7 +13,7 @@ herr_t keep_innermost(unsigned depth, const H5E_error2_t* error, void* text) {
 }
 
 // HDF5 buries the system's words in a long list: "…, errno = 28, error message = 'No space …', …".
-std::string in_one_line(std::string text) {
+std::string single_line(std::string text) {
   const std::string mark = "error message = '";
   if (const auto start = text.find(mark); start != std::string::npos) {
     const auto begin = start + mark.size();
@@ -36,7 +36,7 @@ Hdf5Properties file_access() {
 void throw_hdf5_error() {
   std::string text;
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_innermost, &text);
-  throw Hdf5Error(in_one_line(text));
+  throw Hdf5Error(single_line(text));
 }
 
 Hdf5File open_hdf5(const std::filesystem::path& file) {
@@ -74,9 +74,9 @@ std::vector<double> read_hdf5_numbers(hid_t file, const std::string& path) {
   const Hdf5Type type(H5Dget_type(dataset));
   const H5T_class_t kind = H5Tget_class(type);
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) throw Hdf5Error(path + " holds no numbers");
-  constexpr hssize_t most = 1 << 20;
+  constexpr hssize_t maximum = 1 << 20;
   const hssize_t count = check_hdf5(H5Sget_simple_extent_npoints(space));
-  if (count > most) throw Hdf5Error(path + " holds too many numbers");
+  if (count > maximum) throw Hdf5Error(path + " holds too many numbers");
   std::vector<double> values(count);
   check_hdf5(H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()));
   return values;

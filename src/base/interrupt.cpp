@@ -21,7 +21,7 @@ volatile std::sig_atomic_t received = 0;
 std::atomic<int> wake = -1;  // the pipe to the listener, if there is one
 static_assert(std::atomic<int>::is_always_lock_free, "a signal handler reads it");
 
-constexpr char signalled = 's', ended = 'e';
+constexpr char signaled = 's', ended = 'e';
 
 void send(int pipe, char word) {
   while (write(pipe, &word, 1) < 0 && errno == EINTR) {
@@ -31,7 +31,7 @@ void send(int pipe, char word) {
 extern "C" void remember(int) {
   const int reason = errno;
   received = 1;
-  if (wake >= 0) send(wake, signalled);
+  if (wake >= 0) send(wake, signaled);
   errno = reason;
 }
 
@@ -49,7 +49,7 @@ class Interrupt::Listener {
     thread_ = std::thread([this] { listen(); });
     pthread_sigmask(SIG_SETMASK, &usual, nullptr);
     wake = ends_[1];
-    if (received != 0) send(ends_[1], signalled);
+    if (received != 0) send(ends_[1], signaled);
   }
   ~Listener() {
     wake = -1;
@@ -65,7 +65,7 @@ class Interrupt::Listener {
     for (char word = 0; word != ended;) {
       const ssize_t length = read(ends_[0], &word, 1);
       if (length < 0 && errno != EINTR) return;
-      if (length == 1 && word == signalled) work_();
+      if (length == 1 && word == signaled) work_();
     }
   }
 
@@ -95,13 +95,13 @@ Interrupt::~Interrupt() {
   for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &before[k], nullptr);
 }
 
-bool Interrupt::wanted() {
-  if (wanted_) return true;
+bool Interrupt::requested() {
+  if (requested_) return true;
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
   int any = received != 0 || elapsed > limit_;
   MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm_);
-  wanted_ = any;
-  return wanted_;
+  requested_ = any;
+  return requested_;
 }
 
 }  // namespace repose::base

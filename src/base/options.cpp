@@ -49,7 +49,7 @@ bool is_value(const std::vector<std::string>& tokens, int position) {
   return position < static_cast<int>(tokens.size()) && name_of(tokens[position]).empty();
 }
 
-std::string wanted(const Option& option) {
+std::string expected(const Option& option) {
   switch (option.kind) {
     case OptionKind::flag:
       return "true or false";
@@ -62,8 +62,8 @@ std::string wanted(const Option& option) {
     case OptionKind::integer:
       break;
   }
-  return wanted_number(option.kind == OptionKind::integer, option.unit, option.range,
-                       option.choices);
+  return expected_number(option.kind == OptionKind::integer, option.unit, option.range,
+                         option.choices);
 }
 
 bool is_word(const Option& option, const std::string& value) {
@@ -126,7 +126,7 @@ std::string help_line(const Option& option) {
 }
 
 /// Returns whether PETSc reads the option only in PetscFinalize.
-bool read_at_the_end(const std::string& name) {
+bool is_read_at_finalize(const std::string& name) {
   return name == "options_left" || name == "options_view" || name == "objects_dump" ||
          name == "malloc_dump" || name == "mpidump";
 }
@@ -141,7 +141,7 @@ std::vector<std::string> left_in_database() {
   return result;
 }
 
-/// Whether PETSC_OPTIONS, which is meant for any program that uses PETSc, holds the option.
+/// Returns whether PETSC_OPTIONS, which is meant for any program that uses PETSc, holds the option.
 bool is_in_environment(const std::string& name) {
   const char* text = std::getenv("PETSC_OPTIONS");
   std::istringstream words(text ? text : "");
@@ -212,11 +212,11 @@ int Options::sort_option(int position, const std::vector<std::string>& tokens) {
   const bool for_petsc =
       is_value(tokens, next) && (tokens[next] == "petsc" || tokens[next] == "intro");
   if (help && !for_petsc) {
-    help_wanted_ = true;
+    help_requested_ = true;
     return next;
   }
   if (name == "version") {
-    version_wanted_ = true;
+    version_requested_ = true;
     return next;
   }
   if (!help && !begins_as_petsc(name)) {
@@ -264,9 +264,9 @@ void Options::check() {
 }
 
 void Options::read_database() {
-  PetscBool initialised = PETSC_FALSE;
-  base::check(PetscInitialized(&initialised));
-  if (!initialised) return;
+  PetscBool initialized = PETSC_FALSE;
+  base::check(PetscInitialized(&initialized));
+  if (!initialized) return;
   for (const Option& option : table_) {
     std::array<char, 4096> value{};
     PetscBool set = PETSC_FALSE;
@@ -279,7 +279,7 @@ void Options::read_database() {
   }
   for (const auto& [name, value] : petsc_options()) {
     check_viewer(name, value);
-    if (find(name) || name.starts_with("log_") || read_at_the_end(name)) continue;
+    if (find(name) || name.starts_with("log_") || is_read_at_finalize(name)) continue;
     petsc_settings_ += fmt::format("{}-{}{}{}", petsc_settings_.empty() ? "" : " ", name,
                                    value.empty() ? "" : " ", value);
   }
@@ -292,19 +292,19 @@ void Options::refuse_unknown(const std::string& name) const {
   std::vector<std::string> known{"help"};
   for (const Option& option : table_) known.push_back(option.name);
   refuse("{}: unknown option {}; the nearest known one is -{} (-help lists all)", program_,
-         shown("-" + name), nearest(name, known));
+         quote("-" + name), nearest(name, known));
 }
 
 void Options::check_values(const Option& option, const std::vector<std::string>& values) const {
   if (static_cast<int>(values.size()) < option.values)
     refuse("{}: -{} needs {} value{}: {}", program_, option.name, option.values,
-           option.values == 1 ? "" : "s", wanted(option));
+           option.values == 1 ? "" : "s", expected(option));
   for (const std::string& value : values) {
     if (is_valid(option, value)) continue;
     if (const auto removed = option.removed.find(value); removed != option.removed.end())
       refuse("{}: -{} no longer takes {}; {}", program_, option.name, value, removed->second);
     const bool words = option.kind == OptionKind::choice;
-    refuse("{}: -{} {} must be {}{}", program_, option.name, shown(value), wanted(option),
+    refuse("{}: -{} {} must be {}{}", program_, option.name, quote(value), expected(option),
            words ? fmt::format("; did you mean {}?", nearest(value, option.choices)) : "");
   }
 }
@@ -312,14 +312,14 @@ void Options::check_values(const Option& option, const std::vector<std::string>&
 void Options::check_arguments() const {
   if (positional_.size() > arguments_.size())
     refuse("{}: unexpected argument {}; it takes {} (-help explains)", program_,
-           shown(positional_[arguments_.size()]),
+           quote(positional_[arguments_.size()]),
            arguments_.empty() ? "none" : fmt::format("{}", arguments_.size()));
   if (positional_.size() == arguments_.size()) return;
   const Argument& missing = arguments_[positional_.size()];
   std::string hint;
   for (std::size_t i = 2; i < petsc_tokens_.size(); ++i)
     if (name_of(petsc_tokens_[i]).empty())
-      hint = fmt::format("; {} was taken as the value of {}: put {} first", shown(petsc_tokens_[i]),
+      hint = fmt::format("; {} was taken as the value of {}: put {} first", quote(petsc_tokens_[i]),
                          petsc_tokens_[i - 1], missing.name);
   refuse("{}: {} is missing: {}{} (-help explains)", program_, missing.name, missing.help, hint);
 }
@@ -363,7 +363,7 @@ int64_t Options::integer(std::string_view name) const {
 
 std::vector<std::string> Options::unused() const {
   std::vector<std::string> left = left_in_database();
-  std::erase_if(left, read_at_the_end);
+  std::erase_if(left, is_read_at_finalize);
   std::vector<std::string> result;
   for (const std::string& token : petsc_tokens_)
     if (std::find(left.begin(), left.end(), name_of(token)) != left.end()) result.push_back(token);

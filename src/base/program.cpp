@@ -16,12 +16,12 @@ namespace repose::base {
 
 namespace {
 
-void say(std::FILE* where, const std::string& line) {
+void print(std::FILE* where, const std::string& line) {
   if (rank(MPI_COMM_WORLD) == 0) std::fprintf(where, "%s\n", line.c_str());
   std::fflush(where);
 }
 
-/// Prints one line and ends all ranks, of which some may not know that one has failed.
+/// Prints one line and ends all ranks, some of which may be unaware that one has failed.
 int abandon(const std::string& line, Exit status) {
   constexpr std::chrono::seconds while_the_first_prints{1};
   int started = 0;
@@ -46,10 +46,10 @@ int guarded(Options& options, const std::function<Exit()>& work) {
     options.check();
     const Exit status = work();
     for (const std::string& name : options.unused())
-      say(stderr, fmt::format("warning: option {} was not used", name));
+      print(stderr, fmt::format("warning: option {} was not used", name));
     return static_cast<int>(status);
   } catch (const InputError& e) {
-    say(stderr, fmt::format("error: {}", e.what()));
+    print(stderr, fmt::format("error: {}", e.what()));
     return static_cast<int>(Exit::bad_input);
   } catch (const PetscError& e) {
     if (options.petsc_settings().empty()) return internal_error(e);
@@ -62,7 +62,7 @@ int guarded(Options& options, const std::function<Exit()>& work) {
   }
 }
 
-/// Ends a program that PETSc does not start in, which some ranks may not know.
+/// Ends a program that PETSc does not start in, of which some ranks may be unaware.
 int leave(const InputError& error) {
   const int status = abandon(fmt::format("error: {}", error.what()), Exit::bad_input);
   int started = 0;
@@ -80,14 +80,14 @@ int run_program(Options& options, const std::function<Exit()>& work) {
   } catch (const InputError& error) {
     return leave(error);
   }
-  if (options.help_wanted()) {
-    say(stdout, options.help());
+  if (options.help_requested()) {
+    print(stdout, options.help());
     return static_cast<int>(Exit::done);
   }
-  if (options.version_wanted()) {
+  if (options.version_requested()) {
     const auto run = this_run(MPI_COMM_WORLD);
-    say(stdout, run.front().second);
-    say(stdout, run.back().second);
+    print(stdout, run.front().second);
+    print(stdout, run.back().second);
     return static_cast<int>(Exit::done);
   }
   return guarded(options, work);

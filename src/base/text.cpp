@@ -28,7 +28,7 @@ std::optional<double> parse_number(std::string_view text) {
 
 std::optional<int64_t> parse_integer(std::string_view text) { return parse_whole<int64_t>(text); }
 
-std::string shown(std::string_view text) {
+std::string quote(std::string_view text) {
   constexpr std::size_t longest = 60;
   std::string result(text.substr(0, longest));
   for (char& c : result)
@@ -48,8 +48,8 @@ std::string Range::text() const {
   return result;
 }
 
-std::string wanted_number(bool whole, std::string_view unit, const Range& range,
-                          const std::vector<std::string>& words) {
+std::string expected_number(bool whole, std::string_view unit, const Range& range,
+                            const std::vector<std::string>& words) {
   std::string result = whole ? "a whole number" : "a number";
   if (!unit.empty()) result.append(" of ").append(unit);
   if (const std::string limits = range.text(); !limits.empty()) result.append(", ").append(limits);
@@ -83,7 +83,7 @@ std::vector<std::string_view> words(std::string_view line) {
 }
 
 std::size_t edit_distance(std::string_view a_text, std::string_view b_text) {
-  // Long input is garbage, not a misspelt name: the distance is only taken over its beginning.
+  // Long input is garbage, not a misspelled name: the distance is only taken over its beginning.
   constexpr std::size_t longest = 200;
   const std::string a = lower(a_text.substr(0, longest)), b = lower(b_text.substr(0, longest));
   std::vector<std::size_t> two_before(b.size() + 1), before(b.size() + 1), row(b.size() + 1);

@@ -54,7 +54,7 @@ void require_name(const std::string& name) {
   const std::string last = std::filesystem::path(name).filename().string();
   if (last.empty() || last == "." || last == ".." || std::ranges::any_of(name, is_control))
     refuse("-output {}: is no name of files; give a path without ending such as plans/first",
-           shown(name));
+           quote(name));
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& file) {

@@ -47,7 +47,7 @@ std::span<const Vec3> ForceFunctional::directions() {
     Eigen::Map<Vec3>(unit + 3 * row) = force / std::hypot(force.norm(), epsilon_);
   });
   check(VecRestoreArray(unit_, &unit));
-  positions_.spread(unit_, direction_);
+  positions_.scatter_to_local(unit_, direction_);
   return direction_;
 }
 
@@ -56,7 +56,7 @@ double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
   double value = 0;
   for_each_force(elastic_, [&](int64_t, const Vec3& force) {
     const double length = std::hypot(force.norm(), epsilon_);
-    value += force.squaredNorm() / (length + epsilon_);  // √(|F|² + ε²) − ε without cancelling
+    value += force.squaredNorm() / (length + epsilon_);  // √(|F|² + ε²) − ε without canceling
   });
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, positions_.comm());
   value *= weights_.elastic;
@@ -111,11 +111,11 @@ void ForceHessian::fill_metric() {
 void ForceHessian::lift_diagonal() {
   constexpr double lift = 1e-12;  // of the largest diagonal entry, so that factors stay positive
   base::VecHandle diagonal = functional_.positions().make_vector();
-  check(MatGetDiagonal(convex_, diagonal));
+  check(MatGetDiagonal(spd_, diagonal));
   PetscReal largest = 0;
   check(VecNorm(diagonal, NORM_INFINITY, &largest));
-  check(MatShift(convex_, lift * largest));
-  check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
+  check(MatShift(spd_, lift * largest));
+  check(MatSetOption(spd_, MAT_SPD, PETSC_TRUE));
 }
 
 void ForceHessian::assemble(Vec displacement) {
@@ -125,19 +125,19 @@ void ForceHessian::assemble(Vec displacement) {
   epsilon_ = functional_.epsilon();
   functional_.positions().update(displacement);
   fill_metric();
-  if (convex_)
-    check(MatPtAP(metric_, elastic_.exact(), MAT_REUSE_MATRIX, PETSC_DEFAULT, convex_.out()));
+  if (spd_)
+    check(MatPtAP(metric_, elastic_.exact(), MAT_REUSE_MATRIX, PETSC_DEFAULT, spd_.out()));
   else
-    check(MatPtAP(metric_, elastic_.exact(), MAT_INITIAL_MATRIX, 2, convex_.out()));
-  if (!exact_) check(MatDuplicate(convex_, MAT_DO_NOT_COPY_VALUES, exact_.out()));
-  check(MatCopy(convex_, exact_, SAME_NONZERO_PATTERN));
+    check(MatPtAP(metric_, elastic_.exact(), MAT_INITIAL_MATRIX, 2, spd_.out()));
+  if (!exact_) check(MatDuplicate(spd_, MAT_DO_NOT_COPY_VALUES, exact_.out()));
+  check(MatCopy(spd_, exact_, SAME_NONZERO_PATTERN));
   elastic_.third(functional_.directions(), third_);
   check(MatAXPY(exact_, -functional_.weights().elastic, third_, SUBSET_NONZERO_PATTERN));
   if (volume_) {
     volume_->assemble(displacement);
     volume_->renew();
     check(MatAXPY(exact_, 1, volume_->exact(), SUBSET_NONZERO_PATTERN));
-    check(MatAXPY(convex_, 1, volume_->convex(), SUBSET_NONZERO_PATTERN));
+    check(MatAXPY(spd_, 1, volume_->spd_approximation(), SUBSET_NONZERO_PATTERN));
   }
   lift_diagonal();
   ++assemblies_;

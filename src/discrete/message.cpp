@@ -9,8 +9,9 @@ namespace {
 /// Calls work(begin, length) for pieces that fit MPI's int counts.
 template <class Work>
 void in_pieces(size_t size, Work&& work) {
-  constexpr size_t most = size_t{1} << 30;
-  for (size_t at = 0; at < size; at += most) work(at, static_cast<int>(std::min(most, size - at)));
+  constexpr size_t maximum = size_t{1} << 30;
+  for (size_t at = 0; at < size; at += maximum)
+    work(at, static_cast<int>(std::min(maximum, size - at)));
 }
 
 }  // namespace

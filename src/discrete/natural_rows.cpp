@@ -26,7 +26,7 @@ const double* numbers(std::span<const Vec3> points) {
 
 }  // namespace
 
-void NaturalRows::carry_at_once(const Rows& rows, const double* owned_values,
+void NaturalRows::scatter_chunk(const Rows& rows, const double* owned_values,
                                 const double* natural_values, ScatterMode mode) const {
   const auto count = static_cast<PetscInt>(rows.row.size());
   const auto slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
@@ -50,14 +50,14 @@ void NaturalRows::carry_at_once(const Rows& rows, const double* owned_values,
   check(VecScatterEnd(scatter, source, target, INSERT_VALUES, mode));
 }
 
-void NaturalRows::carry(const Rows& rows, const double* owned, const double* natural,
-                        ScatterMode mode) const {
+void NaturalRows::scatter_rows(const Rows& rows, const double* owned, const double* natural,
+                               ScatterMode mode) const {
   const auto size = static_cast<int64_t>(rows.row.size());
   int64_t longest = 0;
   MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
   for (int64_t begin = 0; begin < longest; begin += at_once_) {
     const int64_t first = std::min(begin, size), count = std::min(at_once_, size - first);
-    carry_at_once({rows.row.subspan(first, count), rows.total, rows.block},
+    scatter_chunk({rows.row.subspan(first, count), rows.total, rows.block},
                   owned + first * rows.block, natural, mode);
   }
 }
@@ -70,10 +70,10 @@ NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
       springs_{part.spring_row, part.total_springs, 1},
       prisms_{part.prism_row, part.total_prisms, 1} {}
 
-std::vector<double> NaturalRows::bring(const Rows& rows, const std::vector<double>& owned) const {
+std::vector<double> NaturalRows::to_slab(const Rows& rows, const std::vector<double>& owned) const {
   const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
   std::vector<double> natural(slab.rows());
-  carry(rows, owned.data(), natural.data(), SCATTER_FORWARD);
+  scatter_rows(rows, owned.data(), natural.data(), SCATTER_FORWARD);
   return natural;
 }
 
@@ -90,8 +90,8 @@ constexpr int width<std::array<T, n>> = static_cast<int>(n);
 }  // namespace
 
 template <class Value>
-std::vector<Value> NaturalRows::bring_each(const Rows& rows,
-                                           const std::vector<Value>& values) const {
+std::vector<Value> NaturalRows::to_slab_each(const Rows& rows,
+                                             const std::vector<Value>& values) const {
   constexpr int numbers = width<Value>;
   const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
   std::vector<double> owned(rows.row.size() * numbers), natural(slab.rows() * numbers);
@@ -105,7 +105,7 @@ std::vector<Value> NaturalRows::bring_each(const Rows& rows,
   for (size_t i = 0; i < rows.row.size(); ++i)
     for (int k = 0; k < numbers; ++k)
       owned[numbers * i + k] = static_cast<double>(at(values[i], k));
-  carry({rows.row, rows.total, numbers}, owned.data(), natural.data(), SCATTER_FORWARD);
+  scatter_rows({rows.row, rows.total, numbers}, owned.data(), natural.data(), SCATTER_FORWARD);
   for (size_t i = 0; i < mine.size(); ++i)
     for (int k = 0; k < numbers; ++k) {
       auto& number = at(mine[i], k);
@@ -128,40 +128,41 @@ std::vector<std::array<int64_t, n>> in_rows(const std::vector<std::array<int64_t
 
 }  // namespace
 
-model::ModelRows NaturalRows::of_model(MPI_Comm comm, const RaisedPart& raised) {
-  const Part& part = raised.part;
+model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_model) {
+  const Part& part = local_model.part;
   const NaturalRows natural(comm, part);
   model::ModelRows rows;
-  rows.counts = raised.counts;
-  rows.touches = raised.touches;
-  const auto bring = [&](const Rows& of, const auto& values) {
-    return natural.bring_each(of, values);
+  rows.counts = local_model.counts;
+  rows.contact_pairs = local_model.contact_pairs;
+  const auto to_slab = [&](const Rows& of, const auto& values) {
+    return natural.to_slab_each(of, values);
   };
   const Rows& points = natural.points_;
   const model::Points& p = part.model.points;
-  rows.points = {bring(points, p.position), bring(points, p.set),           bring(points, p.target),
-                 bring(points, p.layer),    bring(points, p.column),        bring(points, p.bone),
-                 bring(points, p.mass),     bring(points, p.external_force)};
-  rows.outward = bring(points, raised.outward);
+  rows.points = {to_slab(points, p.position), to_slab(points, p.set),
+                 to_slab(points, p.target),   to_slab(points, p.layer),
+                 to_slab(points, p.column),   to_slab(points, p.bone),
+                 to_slab(points, p.mass),     to_slab(points, p.external_force)};
+  rows.outward = to_slab(points, local_model.outward);
   const Rows& prisms = natural.prisms_;
   const model::Prisms& m = part.model.prisms;
   int averaged = !m.nodal_modulus.empty();
   MPI_Allreduce(MPI_IN_PLACE, &averaged, 1, MPI_INT, MPI_MAX, comm);
-  rows.prisms = {bring(prisms, in_rows(m.points, part.owned_prisms, part.point_row)),
-                 bring(prisms, m.rest_volume),
-                 bring(prisms, m.shear_modulus),
-                 bring(prisms, m.modulus),
-                 bring(prisms, m.target_volume),
+  rows.prisms = {to_slab(prisms, in_rows(m.points, part.owned_prisms, part.point_row)),
+                 to_slab(prisms, m.rest_volume),
+                 to_slab(prisms, m.shear_modulus),
+                 to_slab(prisms, m.modulus),
+                 to_slab(prisms, m.target_volume),
                  {}};
-  if (averaged != 0) rows.prisms.nodal_modulus = bring(prisms, m.nodal_modulus);
-  const Rows edges{part.edge_row, raised.counts.edges, 1};
+  if (averaged != 0) rows.prisms.nodal_modulus = to_slab(prisms, m.nodal_modulus);
+  const Rows edges{part.edge_row, local_model.counts.edges, 1};
   const model::Edges& e = part.model.edges;
-  rows.edges = {bring(edges, in_rows(e.points, part.owned_edges, part.point_row)),
-                bring(edges, e.weight)};
-  const Rows touching{raised.touch_row, raised.touches, 1};
-  const model::Touches& t = part.model.contact.touches;
-  rows.touch = {bring(touching, base::pick(part.point_row, t.point)), bring(touching, t.body),
-                bring(touching, t.binding), bring(touching, t.area)};
+  rows.edges = {to_slab(edges, in_rows(e.points, part.owned_edges, part.point_row)),
+                to_slab(edges, e.weight)};
+  const Rows touching{local_model.pair_row, local_model.contact_pairs, 1};
+  const model::ContactPairs& t = part.model.contact.pairs;
+  rows.pairs = {to_slab(touching, base::pick(part.point_row, t.point)), to_slab(touching, t.body),
+                to_slab(touching, t.binding), to_slab(touching, t.area)};
   return rows;
 }
 
@@ -172,9 +173,9 @@ void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& r
     const auto& [p, q] = springs.points[e];
     values[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
   }
-  rows.elongation = bring(springs_, values);
+  rows.elongation = to_slab(springs_, values);
   for (int64_t e = 0; e < part_.owned_springs; ++e) values[e] = tension(springs, e, values[e]);
-  rows.tension = bring(springs_, values);
+  rows.tension = to_slab(springs_, values);
 }
 
 void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& rows) const {
@@ -185,7 +186,7 @@ void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& ro
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
-  rows.volume_ratio = bring(prisms_, ratio);
+  rows.volume_ratio = to_slab(prisms_, ratio);
 }
 
 void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
@@ -205,18 +206,19 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
     von_mises[e] = state.von_mises;
     stretch[e] = state.stretch;
   }
-  rows.pressure = bring(prisms_, pressure);
-  rows.von_mises = bring(prisms_, von_mises);
+  rows.pressure = to_slab(prisms_, pressure);
+  rows.von_mises = to_slab(prisms_, von_mises);
   const base::Slab slab = base::slab(prisms_.total, base::rank(comm_), base::size(comm_));
   rows.stretch.resize(slab.rows());
-  carry({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch), SCATTER_FORWARD);
+  scatter_rows({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch),
+               SCATTER_FORWARD);
 }
 
 void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const {
   const Rows points{points_.row, points_.total, 1};
   const ContactState state = contact_state(objective);
-  rows.point_fields.push_back({"contact_gap", false, bring(points, state.gap)});
-  rows.point_fields.push_back({"contact_pressure", false, bring(points, state.pressure)});
+  rows.point_fields.push_back({"contact_gap", false, to_slab(points, state.gap)});
+  rows.point_fields.push_back({"contact_pressure", false, to_slab(points, state.pressure)});
   rows.point_fields.push_back(field("contact_force", state.force));
 }
 
@@ -235,7 +237,7 @@ model::StepRows NaturalRows::rows(Objective& objective) const {
 std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
   const base::Slab slab = base::slab(points_.total, base::rank(comm_), base::size(comm_));
   std::vector<Vec3> rows(slab.rows());
-  carry(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
+  scatter_rows(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
   return rows;
 }
 
@@ -247,7 +249,7 @@ model::PointField NaturalRows::field(const std::string& name, std::span<const Ve
 
 std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
   std::vector<Vec3> rows(part_.owned_points);
-  carry(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
+  scatter_rows(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
   return rows;
 }
 
@@ -255,7 +257,7 @@ void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& p
                                Vec displacement) const {
   std::vector<Vec3> rows = owned(slab);
   for (size_t i = 0; i < rows.size(); ++i) rows[i] -= part_.model.points.position[i];
-  positions.keep_owned(rows, displacement);
+  positions.restrict_to_owned(rows, displacement);
 }
 
 }  // namespace repose::discrete

@@ -43,23 +43,23 @@ std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& lo
 /// where the tissue's mesh is coarser, 0.75 of its edges, by the areas that its points stand for.
 /// Collective.
 double rounding_times(MPI_Comm comm, const model::Contact& contact) {
-  constexpr double least = 2.5, of_an_edge = 0.75, square_of_edge = 1.155;  // over a point's area
-  double sums[2] = {0, static_cast<double>(contact.touches.area.size())};
-  for (const double area : contact.touches.area) sums[0] += area;
+  constexpr double minimum = 2.5, of_an_edge = 0.75, square_of_edge = 1.155;  // over a point's area
+  double sums[2] = {0, static_cast<double>(contact.pairs.area.size())};
+  for (const double area : contact.pairs.area) sums[0] += area;
   MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, comm);
   const double edge = std::sqrt(square_of_edge * sums[0] / std::max(sums[1], 1.0));
-  return std::max(least, of_an_edge * edge / contact.spacing);
+  return std::max(minimum, of_an_edge * edge / contact.spacing);
 }
 
 /// The contact with bodies whose edges are rounded. Collective.
-mechanics::TouchLoop rounded_touches(MPI_Comm comm, const Part& part) {
+mechanics::BodyContact rounded_touches(MPI_Comm comm, const Part& part) {
   if (!part.contact) return {};
   const double times = rounding_times(comm, part.model.contact);
   std::vector<mechanics::RigidBody> bodies;
   for (const mechanics::RigidBody& body : part.bodies) bodies.push_back(body.rounded(times));
-  model::Touches touches = part.model.contact.touches;
-  if (!touches.point.empty()) touches.offset = mechanics::touch_offsets(part.model, bodies);
-  return {touches, part.model.contact.stiffness, std::move(bodies)};
+  model::ContactPairs pairs = part.model.contact.pairs;
+  if (!pairs.point.empty()) pairs.offset = mechanics::contact_offsets(part.model, bodies);
+  return {pairs, part.model.contact.stiffness, std::move(bodies)};
 }
 
 /// Replaces what is not finite by nothing and cuts blocks to a length that can still be squared.
@@ -88,10 +88,11 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
                                    positions.part().owned_prisms, positions.part().owned_edges,
                                    positions.part().owned_points)),
       averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
-      touches_(positions.part().model.contact.touches, positions.part().model.contact.stiffness,
-               positions.part().bodies),
-      other_touches_(rounded_touches(positions.comm(), positions.part())),
-      walls_(positions.part().model.contact.walls, positions.part().model.contact.stiffness),
+      body_contact_(positions.part().model.contact.pairs, positions.part().model.contact.stiffness,
+                    positions.part().bodies),
+      other_body_contact_(rounded_touches(positions.comm(), positions.part())),
+      cut_face_contact_(positions.part().model.contact.cut_faces,
+                        positions.part().model.contact.stiffness),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
       initial_(mechanics::totals(loops_, positions.part().model.points.position)),
       work_(positions.local().size()) {}
@@ -99,9 +100,9 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
 void Objective::round_bodies(bool rounded) {
   if (rounded == rounded_) return;
   rounded_ = rounded;
-  other_touches_.set_multipliers(touches_.multipliers());
-  other_touches_.set_stiffness(touches_.stiffness());
-  std::swap(touches_, other_touches_);
+  other_body_contact_.set_multipliers(body_contact_.multipliers());
+  other_body_contact_.set_stiffness(body_contact_.stiffness());
+  std::swap(body_contact_, other_body_contact_);
   placed_at_ = -1;
 }
 
@@ -110,7 +111,7 @@ void Objective::place_bodies() {
   placed_at_ = positions_.revision();
   mechanics::place_bodies(
       positions_.load(), [&](int32_t bone) { return positions_.bone_matrix(bone); },
-      touches_.bodies());
+      body_contact_.bodies());
 }
 
 double Objective::add_contact(double scale, std::span<Vec3> gradient) {
@@ -118,8 +119,8 @@ double Objective::add_contact(double scale, std::span<Vec3> gradient) {
   static const PetscLogEvent event = base::log_event("RpContact");
   const base::Logged logged(event);
   place_bodies();
-  return touches_.add_gradient(positions_.local(), scale, gradient) +
-         walls_.add_gradient(positions_.local(), scale, gradient);
+  return body_contact_.add_gradient(positions_.local(), scale, gradient) +
+         cut_face_contact_.add_gradient(positions_.local(), scale, gradient);
 }
 
 double Objective::add_terms(double scale, std::span<Vec3> gradient) const {
@@ -153,15 +154,16 @@ std::vector<Objective::Block> Objective::contact_blocks(bool exact) {
     blocks.push_back({static_cast<int32_t>(p), static_cast<int32_t>(q), weights_.elastic * block});
   };
   place_bodies();
-  touches_.look(positions_.local());
-  touches_.for_each_block(exact, [&](int64_t p, const Mat3& block) { add(p, p, block); });
-  walls_.look(positions_.local());
-  walls_.for_each_block(exact, add);
+  body_contact_.update_gaps(positions_.local());
+  body_contact_.for_each_block(exact, [&](int64_t p, const Mat3& block) { add(p, p, block); });
+  cut_face_contact_.update_gaps(positions_.local());
+  cut_face_contact_.for_each_block(exact, add);
   return blocks;
 }
 
 std::vector<std::array<int32_t, 2>> Objective::links() const {
-  std::vector<std::array<int32_t, 2>> links(walls_.links().begin(), walls_.links().end());
+  std::vector<std::array<int32_t, 2>> links(cut_face_contact_.links().begin(),
+                                            cut_face_contact_.links().end());
   for (const mechanics::TermLoop& loop : loops_.terms)
     loop.for_each_link([&](int32_t p, int32_t q) {
       if (p != q) links.push_back({p, q});
@@ -206,7 +208,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
     value = overflown;
     make_finite(work_);
   }
-  if (gradient) positions_.keep_owned(work_, gradient);
+  if (gradient) positions_.restrict_to_owned(work_, gradient);
   return value;
 }
 
@@ -224,7 +226,7 @@ void Objective::hessian_action(std::span<const Vec3> direction, Vec product, boo
                                 mechanics::nodal_slopes(loops_.nodal, positions_.local()));
   add_blocks(term_blocks(true), direction, work_);
   if (contact) add_blocks(contact_blocks(true), direction, work_);
-  positions_.keep_owned(work_, product);
+  positions_.restrict_to_owned(work_, product);
 }
 
 std::vector<Vec3> Objective::residual_force() {
@@ -268,13 +270,14 @@ ContactState contact_state(Objective& objective) {
     state.gap[point] = std::min(state.gap[point], gap);
     state.pressure[point] += pressure;
   };
-  mechanics::TouchLoop& touches = objective.touches();
-  touches.look_at_all(objective.positions().local());
-  for (size_t c = 0; c < touches.gaps().size(); ++c)
-    add(touches.touches().point[c], touches.gaps()[c], touches.pressure(c));
-  mechanics::WallLoop& walls = objective.walls();
-  walls.look(objective.positions().local());
-  for (size_t w = 0; w < walls.size(); ++w) add(walls.point(w), walls.gap(w), walls.pressure(w));
+  mechanics::BodyContact& body_contact = objective.body_contact();
+  body_contact.update_all_gaps(objective.positions().local());
+  for (size_t c = 0; c < body_contact.gaps().size(); ++c)
+    add(body_contact.pairs().point[c], body_contact.gaps()[c], body_contact.pressure(c));
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  cut_faces.update_gaps(objective.positions().local());
+  for (size_t w = 0; w < cut_faces.size(); ++w)
+    add(cut_faces.point(w), cut_faces.gap(w), cut_faces.pressure(w));
   return state;
 }
 

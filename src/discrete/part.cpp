@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "countable.h"
+#include "distribution.h"
 #include "partition.h"
 #include "pass_bodies.h"
-#include "plan.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
@@ -23,63 +23,64 @@ using model::Model;
 using model::PointSet;
 
 /// The shares of all ranks in one model.
-struct Shares {
+struct OwnedRanges {
   std::vector<int64_t> order;          // [N] point rows by their places
   std::vector<int64_t> begin;          // [ranks + 1] into order
   std::vector<int64_t> unknown_begin;  // [ranks + 1]
-  Share of(int rank) const {
+  OwnedRange of(int rank) const {
     return {rank, std::span(order).subspan(begin[rank], begin[rank + 1] - begin[rank]),
             unknown_begin[rank], unknown_begin[rank + 1] - unknown_begin[rank]};
   }
 };
 
-Shares number_points(const ColumnGraph& graph, int ranks, Plan& plan) {
-  const int64_t n = static_cast<int64_t>(plan.owner.size());
-  Shares shares;
-  shares.order.resize(n);
-  for (int64_t i = 0; i < n; ++i) shares.order[i] = i;
+OwnedRanges number_points(const ColumnGraph& graph, int ranks, Distribution& distribution) {
+  const int64_t n = static_cast<int64_t>(distribution.owner.size());
+  OwnedRanges ranges;
+  ranges.order.resize(n);
+  for (int64_t i = 0; i < n; ++i) ranges.order[i] = i;
   const std::vector<int64_t> column = pick(memory_order(graph), graph.column_of_point);
-  std::stable_sort(shares.order.begin(), shares.order.end(), [&](int64_t a, int64_t b) {
-    return std::pair(plan.owner[a], column[a]) < std::pair(plan.owner[b], column[b]);
+  std::stable_sort(ranges.order.begin(), ranges.order.end(), [&](int64_t a, int64_t b) {
+    return std::pair(distribution.owner[a], column[a]) <
+           std::pair(distribution.owner[b], column[b]);
   });
-  plan.place.resize(n);
-  for (int64_t k = 0; k < n; ++k) plan.place[shares.order[k]] = k;
-  shares.begin.assign(ranks + 1, n);
-  shares.unknown_begin.assign(ranks + 1, 0);
-  plan.unknown.assign(n, -1);
+  distribution.place.resize(n);
+  for (int64_t k = 0; k < n; ++k) distribution.place[ranges.order[k]] = k;
+  ranges.begin.assign(ranks + 1, n);
+  ranges.unknown_begin.assign(ranks + 1, 0);
+  distribution.unknown.assign(n, -1);
   int64_t next = 0;
   int rank = -1;
   for (int64_t k = 0; k < n; ++k) {
-    const int64_t row = shares.order[k];
-    while (rank < plan.owner[row]) {
-      shares.begin[++rank] = k;
-      shares.unknown_begin[rank] = next;
+    const int64_t row = ranges.order[k];
+    while (rank < distribution.owner[row]) {
+      ranges.begin[++rank] = k;
+      ranges.unknown_begin[rank] = next;
     }
-    if (plan.set[row] == PointSet::soft_tissue) plan.unknown[row] = next++;
+    if (distribution.set[row] == PointSet::soft_tissue) distribution.unknown[row] = next++;
   }
-  while (rank < ranks - 1) shares.unknown_begin[++rank] = next;
-  shares.unknown_begin[ranks] = next;
-  plan.total_points = n;
-  plan.total_unknowns = next;
-  return shares;
+  while (rank < ranks - 1) ranges.unknown_begin[++rank] = next;
+  ranges.unknown_begin[ranks] = next;
+  distribution.total_points = n;
+  distribution.total_unknowns = next;
+  return ranges;
 }
 
 /// The columns along cuts whose sides may meet go to one rank.
-void keep_cuts_whole(const ColumnGraph& graph, Plan& plan) {
-  const model::Walls& walls = plan.model.contact.walls;
-  if (walls.empty()) return;
-  const int owner = plan.owner[walls.point.front()];
+void keep_cuts_whole(const ColumnGraph& graph, Distribution& distribution) {
+  const model::CutFaces& cut_faces = distribution.model.contact.cut_faces;
+  if (cut_faces.empty()) return;
+  const int owner = distribution.owner[cut_faces.point.front()];
   std::vector<char> moves(graph.columns(), 0);
-  for (const int64_t point : walls.point) moves[graph.column_of_point[point]] = 1;
-  for (size_t p = 0; p < plan.owner.size(); ++p)
-    if (moves[graph.column_of_point[p]]) plan.owner[p] = owner;
+  for (const int64_t point : cut_faces.point) moves[graph.column_of_point[point]] = 1;
+  for (size_t p = 0; p < distribution.owner.size(); ++p)
+    if (moves[graph.column_of_point[p]]) distribution.owner[p] = owner;
 }
 
-void plan_contact(Plan& plan, const ColumnGraph& graph) {
-  if (plan.model.contact.empty()) return;
-  keep_cuts_whole(graph, plan);
-  plan.bodies = mechanics::make_bodies(plan.model);
-  plan.touch_offset = mechanics::touch_offsets(plan.model, plan.bodies);
+void distribute_contact(Distribution& distribution, const ColumnGraph& graph) {
+  if (distribution.model.contact.empty()) return;
+  keep_cuts_whole(graph, distribution);
+  distribution.bodies = mechanics::make_bodies(distribution.model);
+  distribution.contact_offset = mechanics::contact_offsets(distribution.model, distribution.bodies);
 }
 
 template <class Archive>
@@ -106,9 +107,9 @@ void pass(Archive& archive, Part& part) {
           m.prisms.target_volume, m.prisms.nodal_modulus, m.edges.points, m.edges.weight,
           m.bone_transform);
   model::Contact& c = m.contact;
-  archive(c.stiffness, c.spacing, c.touches.point, c.touches.body, c.touches.binding,
-          c.touches.area, c.touches.offset, c.walls.size, c.walls.begin, c.walls.point,
-          c.walls.weight, c.walls.area, part.contact);
+  archive(c.stiffness, c.spacing, c.pairs.point, c.pairs.body, c.pairs.binding, c.pairs.area,
+          c.pairs.offset, c.cut_faces.size, c.cut_faces.begin, c.cut_faces.point,
+          c.cut_faces.weight, c.cut_faces.area, part.contact);
   pass_elements(archive, m.elements);
   pass_bodies(archive, part.bodies);
   pass_meshes(archive, part.body_meshes);
@@ -118,15 +119,17 @@ void pass(Archive& archive, Part& part) {
           part.total_prisms, part.total_unknowns);
 }
 
-Plan make_plan(const Model& model, const ColumnGraph& graph, const std::vector<int>& column_owner) {
-  Plan plan{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {}, {}};
-  plan_motion(plan);
-  plan_contact(plan, graph);
-  return plan;
+Distribution make_distribution(const Model& model, const ColumnGraph& graph,
+                               const std::vector<int>& column_owner) {
+  Distribution distribution{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {},
+                            {}};
+  distribute_motion(distribution);
+  distribute_contact(distribution, graph);
+  return distribution;
 }
 
 /// Rank 0 parts with `part`, which a rank takes over; the others do nothing.
-void hand_over(MPI_Comm comm, int to, Part& part) {
+void send_part(MPI_Comm comm, int to, Part& part) {
   if (base::rank(comm) == 0) {
     Sender sender(comm, to);
     pass(sender, part);
@@ -145,24 +148,24 @@ Part distribute(MPI_Comm comm, const Model& model) {
   const base::Logged logged(event);
   const int ranks = base::size(comm);
   ColumnGraph graph;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     require_countable(static_cast<int64_t>(model.points.position.size()));
     graph = column_graph(model);
   });
   const std::vector<int> column_owner = partition(comm, graph);
-  std::optional<Plan> plan;  // on rank 0
-  Shares shares;
+  std::optional<Distribution> distribution;  // on rank 0
+  OwnedRanges ranges;
   std::optional<LocalNumbers> local;
-  base::on_first_rank(comm, [&] {
-    plan.emplace(make_plan(model, graph, column_owner));
-    shares = number_points(std::exchange(graph, {}), ranks, *plan);
-    local.emplace(static_cast<int64_t>(plan->owner.size()));
+  base::on_root(comm, [&] {
+    distribution.emplace(make_distribution(model, graph, column_owner));
+    ranges = number_points(std::exchange(graph, {}), ranks, *distribution);
+    local.emplace(static_cast<int64_t>(distribution->owner.size()));
   });
   Part part;
   for (int r = ranks - 1; r >= 0; --r) {
-    base::on_first_rank(comm, [&] { part = make_part(*plan, shares.of(r), *local); });
+    base::on_root(comm, [&] { part = make_part(*distribution, ranges.of(r), *local); });
     if (r == 0) break;
-    base::together(comm, [&] { hand_over(comm, r, part); });
+    base::collective_try(comm, [&] { send_part(comm, r, part); });
   }
   return part;
 }

@@ -33,28 +33,28 @@ void for_each_link(const model::Model& model, const std::vector<int64_t>& column
 /// Fills in the graph's edges, each once, by columns: of a fine model there are many times more
 /// links than edges.
 void add_edges(const model::Model& model, ColumnGraph& graph) {
-  std::vector<int64_t>&begin = graph.row_begin, &neighbour = graph.neighbour;
+  std::vector<int64_t>&begin = graph.row_begin, &neighbor = graph.neighbor;
   for_each_link(model, graph.column_of_point, [&](int64_t c, int64_t) { ++begin[c + 1]; });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   std::vector<int64_t> end(begin.begin(), begin.end() - 1);
-  neighbour.resize(begin.back());
+  neighbor.resize(begin.back());
   for_each_link(model, graph.column_of_point,
-                [&](int64_t c, int64_t d) { neighbour[end[c]++] = d; });
-  auto kept = neighbour.begin();
+                [&](int64_t c, int64_t d) { neighbor[end[c]++] = d; });
+  auto kept = neighbor.begin();
   for (size_t c = 0; c < end.size(); ++c) {
-    const auto first = neighbour.begin() + begin[c], last = neighbour.begin() + end[c];
+    const auto first = neighbor.begin() + begin[c], last = neighbor.begin() + end[c];
     std::sort(first, last);
-    begin[c] = kept - neighbour.begin();
+    begin[c] = kept - neighbor.begin();
     for (auto next = first; next != last; ++next)
       if (next == first || *next != kept[-1]) *kept++ = *next;
   }
-  begin.back() = kept - neighbour.begin();
-  neighbour.erase(kept, neighbour.end());
-  neighbour.shrink_to_fit();
+  begin.back() = kept - neighbor.begin();
+  neighbor.erase(kept, neighbor.end());
+  neighbor.shrink_to_fit();
 }
 
 /// A copy in PETSc's own memory, which PETSc frees.
-PetscInt* handed_over(const std::vector<int64_t>& values) {
+PetscInt* petsc_copy(const std::vector<int64_t>& values) {
   PetscInt* copy = nullptr;
   check(PetscMalloc1(std::max<size_t>(values.size(), 1), &copy));
   std::copy(values.begin(), values.end(), copy);
@@ -75,14 +75,14 @@ std::vector<int> in_order(int64_t columns, int ranks) {
 std::vector<int> by_scotch(const ColumnGraph& graph, int ranks) {
   const auto columns = static_cast<PetscInt>(graph.columns());
   base::MatHandle matrix;
-  check(MatCreateMPIAdj(PETSC_COMM_SELF, columns, columns, handed_over(graph.row_begin),
-                        handed_over(graph.neighbour), nullptr, matrix.out()));
+  check(MatCreateMPIAdj(PETSC_COMM_SELF, columns, columns, petsc_copy(graph.row_begin),
+                        petsc_copy(graph.neighbor), nullptr, matrix.out()));
   base::Handle<MatPartitioning, MatPartitioningDestroy> partitioning;
   check(MatPartitioningCreate(PETSC_COMM_SELF, partitioning.out()));
   check(MatPartitioningSetAdjacency(partitioning, matrix));
   check(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
   check(MatPartitioningSetNParts(partitioning, ranks));
-  check(MatPartitioningSetVertexWeights(partitioning, handed_over(graph.weight)));
+  check(MatPartitioningSetVertexWeights(partitioning, petsc_copy(graph.weight)));
   base::check_options(MatPartitioningSetFromOptions(partitioning));
   base::IndexSetHandle assignment;
   check(MatPartitioningApply(partitioning, assignment.out()));
@@ -101,7 +101,7 @@ void walk(const ColumnGraph& graph, int64_t start, int round, std::vector<int>& 
   met[start] = round;
   for (; next < visited.size(); ++next)
     for (int64_t k = graph.row_begin[visited[next]]; k < graph.row_begin[visited[next] + 1]; ++k) {
-      const int64_t other = graph.neighbour[k];
+      const int64_t other = graph.neighbor[k];
       if (met[other] == round) continue;
       met[other] = round;
       visited.push_back(other);
@@ -145,7 +145,7 @@ std::vector<int> partition(MPI_Comm comm, const ColumnGraph& graph) {
   const int ranks = base::size(comm);
   constexpr int64_t worth_a_partition = 8;  // columns a rank
   std::vector<int> owner;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     const bool worth = ranks > 1 && graph.columns() >= worth_a_partition * ranks;
     owner = worth ? by_scotch(graph, ranks) : in_order(graph.columns(), ranks);
   });

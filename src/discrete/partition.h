@@ -12,13 +12,13 @@ namespace repose::discrete {
 struct ColumnGraph {
   std::vector<int64_t> column_of_point;  ///< [N] 0-based, consecutive, in order of first appearance
   std::vector<int64_t> row_begin;        ///< [columns + 1]
-  std::vector<int64_t> neighbour;        ///< sorted in each row, no column its own neighbour
+  std::vector<int64_t> neighbor;         ///< sorted in each row, no column its own neighbor
   std::vector<int64_t> weight;           ///< [columns] 1 + soft-tissue points
   int64_t columns() const { return static_cast<int64_t>(weight.size()); }
 };
 ColumnGraph column_graph(const model::Model& model);
 
-/// [columns] Place of each column in an order that keeps neighbours near one another in memory,
+/// [columns] Place of each column in an order that keeps neighbors near one another in memory,
 /// whatever the skin's vertices are numbered like: breadth first from a column at the end of each
 /// connected piece (Cuthill & McKee 1969, without sorting by degree). Linear in the graph.
 std::vector<int64_t> memory_order(const ColumnGraph& graph);

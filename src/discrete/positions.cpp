@@ -58,7 +58,7 @@ double Positions::largest_travel() const {
   return travel;
 }
 
-void Positions::spread(Vec in, std::span<Vec3> out) const {
+void Positions::scatter_to_local(Vec in, std::span<Vec3> out) const {
   check(VecScatterBegin(scatter_, in, ghosted_, INSERT_VALUES, SCATTER_FORWARD));
   check(VecScatterEnd(scatter_, in, ghosted_, INSERT_VALUES, SCATTER_FORWARD));
   const PetscScalar* values = nullptr;
@@ -68,11 +68,11 @@ void Positions::spread(Vec in, std::span<Vec3> out) const {
 }
 
 void Positions::update(Vec displacement) {
-  spread(displacement, local_);
+  scatter_to_local(displacement, local_);
   for (int32_t i : soft_) local_[i] += part_.model.points.position[i];
 }
 
-void Positions::keep_owned(std::span<const Vec3> values, Vec out) const {
+void Positions::restrict_to_owned(std::span<const Vec3> values, Vec out) const {
   PetscScalar* target = nullptr;
   check(VecGetArrayWrite(out, &target));
   for (int64_t i = 0; i < part_.owned_points; ++i)

@@ -17,10 +17,10 @@ using mechanics::Curvature;
 namespace {
 
 /// The most numbers in a row of them.
-PetscInt most_around(const std::vector<mechanics::NodalGradient>& rows) {
-  size_t most = 0;
-  for (const mechanics::NodalGradient& row : rows) most = std::max(most, row.points.size());
-  return static_cast<PetscInt>(3 * most);
+PetscInt max_around(const std::vector<mechanics::NodalGradient>& rows) {
+  size_t maximum = 0;
+  for (const mechanics::NodalGradient& row : rows) maximum = std::max(maximum, row.points.size());
+  return static_cast<PetscInt>(3 * maximum);
 }
 
 }  // namespace
@@ -48,12 +48,12 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     const Objective& objective = self->objective_;
     static const PetscLogEvent event = base::log_event("RpHessianAction");
     const base::Logged logged(event, flops_of(objective.loops(), action_flops));
-    objective.positions().spread(direction, self->direction_);
+    objective.positions().scatter_to_local(direction, self->direction_);
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
                                   self->direction_, self->work_, self->nodal_slopes_);
     Objective::add_blocks(self->blocks_, self->direction_, self->work_);
-    objective.positions().keep_owned(self->work_, product);
+    objective.positions().restrict_to_owned(self->work_, product);
   } catch (const std::exception&) {
     return PETSC_ERR_LIB;
   }
@@ -74,14 +74,14 @@ void Tangent::third(std::span<const Vec3> direction, Mat matrix) {
 void Tangent::lift_diagonal() {
   constexpr double lift = 1e-9;  // keeps factors positive where the convex Hessian is singular
   base::VecHandle diagonal = objective_.positions().make_vector();
-  check(MatGetDiagonal(convex_, diagonal));
+  check(MatGetDiagonal(spd_, diagonal));
   PetscScalar* values = nullptr;
   PetscInt size = 0;
   check(VecGetLocalSize(diagonal, &size));
   check(VecGetArray(diagonal, &values));
   for (PetscInt i = 0; i < size; ++i) values[i] = values[i] > 0 ? values[i] * (1 + lift) : 1.0;
   check(VecRestoreArray(diagonal, &values));
-  check(MatDiagonalSet(convex_, diagonal, INSERT_VALUES));
+  check(MatDiagonalSet(spd_, diagonal, INSERT_VALUES));
 }
 
 void Tangent::assemble(Vec displacement) {
@@ -112,17 +112,17 @@ void Tangent::set_contact(std::vector<Objective::Block> exact,
   ++assemblies_;
 }
 
-Mat Tangent::convex() {
-  if (convex_) return convex_;
-  convex_ = entries().make();
-  check(MatSetOption(convex_, MAT_SPD, PETSC_TRUE));
-  return convex_;
+Mat Tangent::spd_approximation() {
+  if (spd_) return spd_;
+  spd_ = entries().make();
+  check(MatSetOption(spd_, MAT_SPD, PETSC_TRUE));
+  return spd_;
 }
 
 void Tangent::renew() {
   std::vector<Objective::Block> blocks = convex_terms_;
   blocks.insert(blocks.end(), convex_contact_.begin(), convex_contact_.end());
-  entries().fill(convex(), at_, blocks, Curvature::convex);
+  entries().fill(spd_approximation(), at_, blocks, Curvature::semidefinite);
   lift_diagonal();
 }
 
@@ -146,8 +146,8 @@ base::MatHandle Tangent::nodal_coupling() const {
   const auto columns = static_cast<PetscInt>(3 * part.owned_unknowns);
   base::MatHandle gradients, product;
   check(MatCreateAIJ(objective_.positions().comm(), static_cast<PetscInt>(part.owned_points),
-                     columns, PETSC_DETERMINE, PETSC_DETERMINE, most_around(rows), nullptr,
-                     most_around(rows), nullptr, gradients.out()));
+                     columns, PETSC_DETERMINE, PETSC_DETERMINE, max_around(rows), nullptr,
+                     max_around(rows), nullptr, gradients.out()));
   check(MatSetOption(gradients, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   PetscInt row = 0;
   check(MatGetOwnershipRange(gradients, &row, nullptr));
@@ -168,11 +168,11 @@ base::MatHandle Tangent::nodal_coupling() const {
   return product;
 }
 
-void Tangent::visit_convex(const BlockVisitor& visit) const {
+void Tangent::visit_spd_blocks(const BlockVisitor& visit) const {
   std::vector<Mat3> diagonal(at_.size(), Mat3::Zero());  // summed first: most blocks are there
   for (const mechanics::SpringLoop& loop : objective_.loops().springs)
-    mechanics::for_each_spring_block(loop, at_, objective_.weights().elastic, Curvature::convex,
-                                     [&](int64_t e, const Mat3& block) {
+    mechanics::for_each_spring_block(loop, at_, objective_.weights().elastic,
+                                     Curvature::semidefinite, [&](int64_t e, const Mat3& block) {
                                        const auto [p, q] = loop.points[e];
                                        diagonal[p] += block;
                                        diagonal[q] += block;
@@ -221,7 +221,7 @@ void Tangent::visit_level(std::span<const Objective::Block> blocks,
   }
 }
 
-void Tangent::visit_contact(const BlockVisitor& visit) const {
+void Tangent::visit_contact_blocks(const BlockVisitor& visit) const {
   visit_level(convex_contact_, visit);
 }
 

@@ -14,7 +14,7 @@ using mechanics::Curvature;
 TangentEntries::TangentEntries(const Objective& objective)
     : objective_(objective), part_(objective.positions().part()) {
   make_pattern();
-  base::together(objective.positions().comm(), [this] {
+  base::collective_try(objective.positions().comm(), [this] {
     require_addressable(static_cast<int64_t>(rows_[0].column.size() + rows_[1].column.size()));
   });
   make_pattern_matrix();
@@ -29,13 +29,13 @@ namespace {
 
 /// Calls link(p, q) for points of the sides of one cut, whichever may come to face.
 template <class Link>
-void for_each_facing_pair(const model::Walls& walls, Link&& link) {
+void for_each_facing_pair(const model::CutFaces& cut_faces, Link&& link) {
   size_t control = 0;
-  for (const auto& [columns, rows] : walls.size) {
-    const auto first = walls.begin[control];
+  for (const auto& [columns, rows] : cut_faces.size) {
+    const auto first = cut_faces.begin[control];
     control += 2 * static_cast<size_t>(columns * rows);
-    const std::set<int64_t> points(walls.point.begin() + first,
-                                   walls.point.begin() + walls.begin[control]);
+    const std::set<int64_t> points(cut_faces.point.begin() + first,
+                                   cut_faces.point.begin() + cut_faces.begin[control]);
     for (const int64_t p : points)
       for (const int64_t q : points) link(static_cast<int32_t>(p), static_cast<int32_t>(q));
   }
@@ -44,10 +44,10 @@ void for_each_facing_pair(const model::Walls& walls, Link&& link) {
 }  // namespace
 
 void TangentEntries::make_pattern() {
-  std::vector<std::vector<int32_t>> neighbours(part_.owned_unknowns);
+  std::vector<std::vector<int32_t>> neighbors(part_.owned_unknowns);
   const auto link = [&](int32_t p, int32_t q) {
     if (!owns(p) || part_.unknown[q] < 0) return;
-    neighbours[part_.unknown[p] - part_.first_unknown].push_back(
+    neighbors[part_.unknown[p] - part_.first_unknown].push_back(
         static_cast<int32_t>(part_.unknown[q]));
   };
   for (int64_t i = 0; i < part_.owned_points; ++i)
@@ -60,10 +60,10 @@ void TangentEntries::make_pattern() {
       for (int32_t p : corners)
         for (int32_t q : corners) link(p, q);
   for (const mechanics::TermLoop& loop : objective_.loops().terms) loop.for_each_link(link);
-  for_each_facing_pair(part_.model.contact.walls, link);
+  for_each_facing_pair(part_.model.contact.cut_faces, link);
   const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
   for (BlockRows& rows : rows_) rows.begin.push_back(0);
-  for (auto& row : neighbours) {
+  for (auto& row : neighbors) {
     std::sort(row.begin(), row.end());
     row.erase(std::unique(row.begin(), row.end()), row.end());
     for (int32_t column : row)
@@ -197,10 +197,10 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
     for (size_t e = 0; e < edge_slots_.size(); ++e)
       add_pair(values, edges.points[e], edge_slots_[e], scale * edges.weight[e] * Mat3::Identity());
     const mechanics::PrismLoop& prisms = objective_.loops().prisms;
-    std::vector<double> most_slope;
-    if (curvature == Curvature::convex)
-      most_slope = mechanics::semidefinite_slopes(prisms, part_.model.points.position, at);
-    mechanics::for_each_prism_block(objective_.loops(), at, objective_.weights(), most_slope,
+    std::vector<double> max_slope;
+    if (curvature == Curvature::semidefinite)
+      max_slope = mechanics::semidefinite_slopes(prisms, part_.model.points.position, at);
+    mechanics::for_each_prism_block(objective_.loops(), at, objective_.weights(), max_slope,
                                     [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                       for (int i = 0; i < 6; ++i)
                                         for (int j = 0; j < 6; ++j)

@@ -9,7 +9,7 @@ namespace {
 
 using Offset = std::array<int64_t, 3>;
 
-/// The voxels whose centres lie within `radius` mm of that of voxel (0, 0, 0), but itself.
+/// The voxels whose centers lie within `radius` mm of that of voxel (0, 0, 0), but itself.
 std::vector<Offset> ball(const Mat3& axes, double radius) {
   const Mat3 inverse = axes.inverse();
   std::array<int64_t, 3> reach;

@@ -77,13 +77,13 @@ Vec3 middle(int edge) {
 }
 
 double smallest_angle(const std::array<uint8_t, 3>& triangle) {
-  double least = M_PI;
+  double minimum = M_PI;
   for (int k = 0; k < 3; ++k) {
     const Vec3 here = middle(triangle[k]);
     const Vec3 a = middle(triangle[(k + 1) % 3]) - here, b = middle(triangle[(k + 2) % 3]) - here;
-    least = std::min(least, std::atan2(a.cross(b).norm(), a.dot(b)));
+    minimum = std::min(minimum, std::atan2(a.cross(b).norm(), a.dot(b)));
   }
-  return least;
+  return minimum;
 }
 
 struct Cut {

@@ -23,14 +23,14 @@ struct DicomSlice {
 DicomSlice describe(const std::filesystem::path& file) {
   DicomSlice slice{file, read_header(file, ImageFormat::dicom), {}, {}};
   if (slice.header.numbers != 1)
-    base::refuse("{}: is a colour picture, not a slice; move it elsewhere", file.string());
+    base::refuse("{}: is a color picture, not a slice; move it elsewhere", file.string());
   if (slice.frames() == 1) slice.header.spacing[2] = 1;
   slice.axes = axes_of(slice.header, file.string());
   slice.origin = origin_of(slice.header);
   return slice;
 }
 
-/// Files that are DICOM images; others (DICOMDIR, reports, licences) are passed over.
+/// Files that are DICOM images; others (DICOMDIR, reports, licenses) are passed over.
 std::vector<DicomSlice> find_slices(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
@@ -56,7 +56,7 @@ void check_one_series(const std::vector<DicomSlice>& slices, const std::string& 
   if (series.size() == 1) return;
   std::string list;
   for (const auto& [number, entry] : series)
-    list += fmt::format("{}{} ({} slices)", list.empty() ? "" : ", ", base::shown(entry.first),
+    list += fmt::format("{}{} ({} slices)", list.empty() ? "" : ", ", base::quote(entry.first),
                         entry.second);
   base::refuse("{}: holds {} series: {}; put the slices of one into a folder of its own", folder,
                series.size(), list);
@@ -83,7 +83,7 @@ double median(std::vector<double> numbers) {
   return *middle;
 }
 
-/// Slices must be as far apart as most are, to a hundredth of that or of a millimetre.
+/// Slices must be as far apart as most are, to a hundredth of that or of a millimeter.
 void check_steps(const std::vector<DicomSlice>& slices, const Vec3& normal) {
   std::vector<double> steps;
   for (size_t s = 1; s < slices.size(); ++s)

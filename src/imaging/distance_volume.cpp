@@ -12,7 +12,7 @@ namespace {
 using Index = std::array<int64_t, 3>;
 using Vec3f = Eigen::Vector3f;
 
-/// Closest points of a surface, found at its triangles and handed on between neighbours.
+/// Closest points of a surface, found at its triangles and handed on between neighbors.
 class ClosestPoints {
  public:
   ClosestPoints(const Volume& grid, double reach)
@@ -28,10 +28,10 @@ class ClosestPoints {
   void add(const Corners& triangle) {
     Index low, high;
     for (int a = 0; a < 3; ++a) {
-      const auto [least, most] = std::minmax({triangle[0][a], triangle[1][a], triangle[2][a]});
-      low[a] = std::clamp(static_cast<int64_t>(std::floor((least - grid_.origin[a]) / voxel_)),
+      const auto [minimum, maximum] = std::minmax({triangle[0][a], triangle[1][a], triangle[2][a]});
+      low[a] = std::clamp(static_cast<int64_t>(std::floor((minimum - grid_.origin[a]) / voxel_)),
                           int64_t{0}, grid_.size[a] - 1);
-      high[a] = std::clamp(static_cast<int64_t>(std::ceil((most - grid_.origin[a]) / voxel_)),
+      high[a] = std::clamp(static_cast<int64_t>(std::ceil((maximum - grid_.origin[a]) / voxel_)),
                            int64_t{0}, grid_.size[a] - 1);
     }
     for (int64_t k = low[2]; k <= high[2]; ++k)
@@ -45,7 +45,7 @@ class ClosestPoints {
         }
   }
 
-  /// Each voxel offers its closest point to its neighbours until none is improved.
+  /// Each voxel offers its closest point to its neighbors until none is improved.
   std::vector<float> distances() {
     std::vector<Index> front, next;  // in the order of memory at first
     for (Index at{0, 0, 0}; at[2] < grid_.size[2]; ++at[2])
@@ -54,7 +54,7 @@ class ClosestPoints {
           if (changed_[grid_.index(at[0], at[1], at[2])]) front.push_back(at);
     for (; !front.empty(); front.swap(next)) {
       next.clear();
-      for (const Index& at : front) hand_on(at, next);
+      for (const Index& at : front) propagate(at, next);
     }
     for (float& value : squared_) value = std::sqrt(value);
     return std::move(squared_);
@@ -76,7 +76,7 @@ class ClosestPoints {
     return true;
   }
 
-  void hand_on(const Index& at, std::vector<Index>& next) {
+  void propagate(const Index& at, std::vector<Index>& next) {
     const int64_t voxel = grid_.index(at[0], at[1], at[2]);
     changed_[voxel] = 0;
     const Vec3f point = closest_[voxel];

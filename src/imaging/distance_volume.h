@@ -6,7 +6,7 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// A grid of cubes of `voxel` mm whose values are the distance, mm, from each centre to the nearest
+/// A grid of cubes of `voxel` mm whose values are the distance, mm, from each center to the nearest
 /// triangle, whatever the triangles' orientation and holes; `reach` mm where it is larger. It
 /// reaches at least `margin` mm beyond the surface on every side. Exact in the voxels that a
 /// triangle passes; elsewhere the closest points are handed on from voxel to voxel (Danielsson,

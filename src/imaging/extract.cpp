@@ -21,38 +21,38 @@ std::string size_text(const Volume& volume) {
 }
 
 /// Returns the input of the isosurface: the volume itself if it is unchanged, else `changed`.
-const Volume& prepare(const Volume& volume, const Extraction& wanted, const StepWatch& watch,
+const Volume& prepare(const Volume& volume, const Extraction& requested, const StepWatch& watch,
                       Volume& changed, std::vector<std::string>& remarks) {
   const Volume* field = &volume;
   const auto become = [&](Volume next) {
     changed = std::move(next);
     field = &changed;
   };
-  if (wanted.box) become(crop(*field, (*wanted.box)[0], (*wanted.box)[1]));
-  if (wanted.box) remarks.push_back("cropped to " + size_text(*field));
-  if (wanted.label) become(label_field(*field, *wanted.label, label_smoothing));
-  if (wanted.close_holes > 0) {
-    become(close_gaps(*field, wanted.close_holes, watch_step(watch, "closing holes")));
-    remarks.push_back(fmt::format("holes closed up to {:g} mm wide", 2 * wanted.close_holes));
+  if (requested.box) become(crop(*field, (*requested.box)[0], (*requested.box)[1]));
+  if (requested.box) remarks.push_back("cropped to " + size_text(*field));
+  if (requested.label) become(label_field(*field, *requested.label, label_smoothing));
+  if (requested.close_holes > 0) {
+    become(close_gaps(*field, requested.close_holes, watch_step(watch, "closing holes")));
+    remarks.push_back(fmt::format("holes closed up to {:g} mm wide", 2 * requested.close_holes));
   }
-  if (wanted.voxel > 0) {
-    become(coarsen(*field, wanted.voxel));
+  if (requested.voxel > 0) {
+    become(coarsen(*field, requested.voxel));
     remarks.push_back("averaged to " + size_text(*field));
   }
   return *field;
 }
 
-void choose_components(Surface& surface, const Extraction& wanted,
+void choose_components(Surface& surface, const Extraction& requested,
                        std::vector<std::string>& remarks) {
-  if (!wanted.largest && wanted.components_above == 0) return;
+  if (!requested.largest && requested.components_above == 0) return;
   const size_t all = surface.triangles.size();
-  surface = wanted.largest ? largest_component(surface)
-                           : components_above(surface, wanted.components_above);
-  remarks.push_back(fmt::format("{} kept: {} of {} triangles",
-                                wanted.largest
-                                    ? "largest component"
-                                    : fmt::format("components ≥ {:g} mm³", wanted.components_above),
-                                surface.triangles.size(), all));
+  surface = requested.largest ? largest_component(surface)
+                              : components_above(surface, requested.components_above);
+  remarks.push_back(fmt::format(
+      "{} kept: {} of {} triangles",
+      requested.largest ? "largest component"
+                        : fmt::format("components ≥ {:g} mm³", requested.components_above),
+      surface.triangles.size(), all));
 }
 
 void smooth(Surface& surface, int64_t rounds, const StepWatch& watch,
@@ -67,18 +67,20 @@ void smooth(Surface& surface, int64_t rounds, const StepWatch& watch,
 
 }  // namespace
 
-Extracted extract(const Volume& volume, const Extraction& wanted, const StepWatch& watch) {
-  if (int{wanted.level.has_value()} + int{wanted.otsu} + int{wanted.label.has_value()} != 1)
+Extracted extract(const Volume& volume, const Extraction& requested, const StepWatch& watch) {
+  if (int{requested.level.has_value()} + int{requested.otsu} + int{requested.label.has_value()} !=
+      1)
     base::refuse("{}: what the surface is must be said in one way: a level, Otsu's, or a label",
                  volume.name);
   Extracted result{{}, 0, volume.remarks};
   Volume changed;
-  const Volume& field = prepare(volume, wanted, watch, changed, result.remarks);
-  if (wanted.level) result.level = *wanted.level;
-  if (wanted.otsu) result.level = otsu_level(field);
-  result.surface = isosurface(field, result.level, wanted.border, watch_step(watch, "isosurface"));
-  choose_components(result.surface, wanted, result.remarks);
-  smooth(result.surface, wanted.smooth, watch, result.remarks);
+  const Volume& field = prepare(volume, requested, watch, changed, result.remarks);
+  if (requested.level) result.level = *requested.level;
+  if (requested.otsu) result.level = otsu_level(field);
+  result.surface =
+      isosurface(field, result.level, requested.border, watch_step(watch, "isosurface"));
+  choose_components(result.surface, requested, result.remarks);
+  smooth(result.surface, requested.smooth, watch, result.remarks);
   return result;
 }
 

@@ -10,7 +10,7 @@ using namespace surface;
 namespace {
 
 constexpr double beside_plane = 0.5;  // mm
-constexpr double least_cosine = 0.95;
+constexpr double min_cosine = 0.95;
 constexpr int64_t seed_every = 40;
 constexpr int refits = 3;
 
@@ -30,13 +30,13 @@ class Parts {
       }
     for (const auto& [a, b, c] : surface.triangles) {
       const Vec3 &p = surface.points[a], &q = surface.points[b], &r = surface.points[c];
-      centre_.push_back((p + q + r) / 3);
+      center_.push_back((p + q + r) / 3);
       normal_.push_back((q - p).cross(r - p) / 2);
     }
     last_visit_.assign(beside_.size(), -1);
   }
 
-  Plane at(int64_t triangle) const { return {centre_[triangle], normal_[triangle].normalized()}; }
+  Plane at(int64_t triangle) const { return {center_[triangle], normal_[triangle].normalized()}; }
 
   /// The triangles around `seed` that are near the plane, and the plane that fits them better.
   std::vector<int64_t> grow(int64_t seed, Plane& plane, double& area) {
@@ -47,7 +47,7 @@ class Parts {
     for (size_t next = 0; next < part.size(); ++next) {
       const int64_t t = part[next];
       area += normal_[t].norm();
-      point += normal_[t].norm() * centre_[t];
+      point += normal_[t].norm() * center_[t];
       normal += normal_[t];
       for (const int64_t other : beside_[t]) {
         if (other < 0 || last_visit_[other] == visit_ || !fits(other, plane)) continue;
@@ -61,12 +61,12 @@ class Parts {
 
  private:
   bool fits(int64_t t, const Plane& plane) const {
-    return std::abs((centre_[t] - plane.point).dot(plane.normal)) < beside_plane &&
-           normal_[t].dot(plane.normal) > least_cosine * normal_[t].norm();
+    return std::abs((center_[t] - plane.point).dot(plane.normal)) < beside_plane &&
+           normal_[t].dot(plane.normal) > min_cosine * normal_[t].norm();
   }
 
   std::vector<Triangle> beside_;
-  std::vector<Vec3> centre_, normal_;  ///< mm; mm², the length is the area
+  std::vector<Vec3> center_, normal_;  ///< mm; mm², the length is the area
   std::vector<int64_t> last_visit_;
   int64_t visit_ = 0;
 };

@@ -160,10 +160,10 @@ class Marching {
 }  // namespace
 
 Surface isosurface(const Volume& volume, double level, VolumeBorder border, const Watch& watch) {
-  const auto [least, greatest] = value_range(volume);
-  if (!(level > least && level <= greatest))
+  const auto [minimum, greatest] = value_range(volume);
+  if (!(level > minimum && level <= greatest))
     base::refuse("{}: no surface at level {:g}: its values go from {:g} to {:g}; choose between",
-                 volume.name, level, least, greatest);
+                 volume.name, level, minimum, greatest);
   Surface surface = Marching(volume, level, border).run(watch);
   surface.name = volume.name;
   return surface;

@@ -81,7 +81,7 @@ Volume smooth_indicator(const Volume& labels, float label, double sigma) {
 }  // namespace
 
 std::vector<int64_t> labels_of(const Volume& volume) {
-  constexpr size_t most = 1000;
+  constexpr size_t maximum = 1000;
   std::set<float> found;
   float last = -1;
   for (const float value : volume.values) {
@@ -90,9 +90,9 @@ std::vector<int64_t> labels_of(const Volume& volume) {
     if (value < 0 || value != std::floor(value))
       base::refuse("{}: holds {:g}; a label map holds whole numbers, 0 where nothing is",
                    volume.name, value);
-    if (found.insert(value).second && found.size() > most)
+    if (found.insert(value).second && found.size() > maximum)
       base::refuse("{}: holds more than {} different numbers; a label map is needed, not a CT",
-                   volume.name, most);
+                   volume.name, maximum);
   }
   found.erase(0.0f);
   return {found.begin(), found.end()};

@@ -16,7 +16,7 @@ namespace repose::imaging {
 using namespace surface;
 namespace {
 
-constexpr double most_voxels = 3e7;
+constexpr double max_voxels = 3e7;
 constexpr double open_end = 150;   // mm, length of the border loop where a head is cut off
 constexpr double open_mouth = 60;  // mm, least length of the border loop of an open mouth
 constexpr double cap_area = 3000;  // mm²
@@ -126,7 +126,7 @@ double voxel_for(const Surface& surface, const Rolling& rolling, double margin) 
     high = high.cwiseMax(point);
   }
   const Vec3 size = high - low + Vec3::Constant(2 * margin);
-  return std::max(rolling.voxel, std::cbrt(size.prod() / most_voxels));
+  return std::max(rolling.voxel, std::cbrt(size.prod() / max_voxels));
 }
 
 /// The parts of the border of the outside, `radius` away from the skin, that lie over the scan's

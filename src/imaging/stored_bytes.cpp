@@ -162,12 +162,12 @@ std::vector<std::string> meta_values(const std::string& header, std::string_view
 }
 
 void check_dimensions(const std::filesystem::path& file, const std::string& value) {
-  constexpr int64_t most = 10;
+  constexpr int64_t maximum = 10;
   const auto words = base::words(value);
   const auto number = words.size() == 1 ? base::parse_integer(words[0]) : std::nullopt;
-  if (!number || *number < 1 || *number > most)
+  if (!number || *number < 1 || *number > maximum)
     base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
-                 base::shown(value), most);
+                 base::quote(value), maximum);
 }
 
 /// ITK formats the name with sprintf, into a buffer of fixed size, for each of several files.
@@ -177,7 +177,7 @@ void check_data_file(const std::filesystem::path& file, const std::string& value
     base::refuse(
         "{}: its ElementDataFile is {}; a name may hold one number such as %03d and no other %; "
         "rename the data file or mend the header",
-        file.string(), base::shown(value));
+        file.string(), base::quote(value));
 }
 
 }  // namespace
@@ -185,7 +185,7 @@ void check_data_file(const std::filesystem::path& file, const std::string& value
 void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes) {
   const int64_t stored = stored_bytes(file, format);
   if (stored >= 0 && stored < bytes)
-    base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it anew",
+    base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it again",
                  file.string(), stored, bytes);
 }
 
@@ -211,7 +211,7 @@ void check_dicom_lengths(const std::filesystem::path& file) {
     if (element.bytes > size - at)
       base::refuse(
           "{}: truncated or damaged: its element ({:04x},{:04x}) says it holds {} bytes, {} are "
-          "left; copy it anew",
+          "left; copy it again",
           file.string(), element.tag >> 16, element.tag & 0xffff, element.bytes,
           std::max<int64_t>(0, size - at));
     at += element.bytes;

@@ -17,7 +17,7 @@ void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, i
 void check_dicom_lengths(const std::filesystem::path& file);
 
 /// Throws InputError where a NIfTI file's header holds a spacing of 0, which its library takes for
-/// 1, or none that is finite, or an orientation that is huge or not finite, which ITK factorises
+/// 1, or none that is finite, or an orientation that is huge or not finite, which ITK factorizes
 /// for ever. A file that is no NIfTI passes.
 void check_nifti_header(const std::filesystem::path& file);
 

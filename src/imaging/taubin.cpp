@@ -18,10 +18,10 @@ std::vector<char> on_border(const EdgeTable& edges, size_t points) {
 }
 
 /// Moves all points that do not stay.
-void step(const VertexNeighbours& neighbours, const std::vector<char>& stays, double weight,
+void step(const VertexNeighbors& neighbors, const std::vector<char>& stays, double weight,
           const std::vector<Vec3>& from, std::vector<Vec3>& to) {
   for (size_t p = 0; p < from.size(); ++p) {
-    const std::span<const int64_t> around = neighbours[static_cast<int64_t>(p)];
+    const std::span<const int64_t> around = neighbors[static_cast<int64_t>(p)];
     to[p] = from[p];
     if (stays[p] || around.empty()) continue;
     Vec3 sum = Vec3::Zero();
@@ -34,19 +34,19 @@ void step(const VertexNeighbours& neighbours, const std::vector<char>& stays, do
 
 double smooth_taubin(Surface& surface, int64_t rounds, const Watch& watch) {
   const EdgeTable edges(surface.triangles);
-  const VertexNeighbours neighbours(edges, surface.points.size());
+  const VertexNeighbors neighbors(edges, surface.points.size());
   const std::vector<char> stays = on_border(edges, surface.points.size());
   const std::vector<Vec3> before = surface.points;
   std::vector<Vec3> between(before.size());
   for (int64_t round = 0; round < rounds; ++round) {
-    step(neighbours, stays, lambda, surface.points, between);
-    step(neighbours, stays, mu, between, surface.points);
+    step(neighbors, stays, lambda, surface.points, between);
+    step(neighbors, stays, mu, between, surface.points);
     if (watch) watch(static_cast<double>(round + 1) / static_cast<double>(rounds));
   }
-  double most = 0;
+  double maximum = 0;
   for (size_t p = 0; p < before.size(); ++p)
-    most = std::max(most, (surface.points[p] - before[p]).norm());
-  return most;
+    maximum = std::max(maximum, (surface.points[p] - before[p]).norm());
+  return maximum;
 }
 
 }  // namespace repose::imaging

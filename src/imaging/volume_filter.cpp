@@ -10,25 +10,25 @@
 namespace repose::imaging {
 
 std::array<float, 2> value_range(const Volume& volume) {
-  float least = std::numeric_limits<float>::infinity(), greatest = -least;
+  float minimum = std::numeric_limits<float>::infinity(), greatest = -minimum;
   for (const float value : volume.values) {
-    least = std::min(least, value);
+    minimum = std::min(minimum, value);
     greatest = std::max(greatest, value);
   }
-  return {least, greatest};
+  return {minimum, greatest};
 }
 
 double otsu_level(const Volume& volume) {
   constexpr int bins = 1024;
-  const auto [least, greatest] = value_range(volume);
-  if (least == greatest)
+  const auto [minimum, greatest] = value_range(volume);
+  if (minimum == greatest)
     base::refuse("{}: every value is {:g}, so no level parts them; check the volume", volume.name,
-                 least);
-  const double width = (static_cast<double>(greatest) - least) / bins;
+                 minimum);
+  const double width = (static_cast<double>(greatest) - minimum) / bins;
   std::array<double, bins> count{};
   for (const float value : volume.values)
-    ++count[std::min(bins - 1, static_cast<int>((value - least) / width))];
-  double all = 0, moment = 0, below = 0, moment_below = 0, most = -1;
+    ++count[std::min(bins - 1, static_cast<int>((value - minimum) / width))];
+  double all = 0, moment = 0, below = 0, moment_below = 0, maximum = -1;
   int split = 0;
   for (int b = 0; b < bins; ++b) {
     all += count[b];
@@ -40,11 +40,11 @@ double otsu_level(const Volume& volume) {
     if (below == 0 || below == all) continue;
     const double apart = moment_below / below - (moment - moment_below) / (all - below);
     const double between = below * (all - below) * apart * apart;
-    if (between <= most) continue;
-    most = between;
+    if (between <= maximum) continue;
+    maximum = between;
     split = b;
   }
-  return least + (split + 1) * width;
+  return minimum + (split + 1) * width;
 }
 
 Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
@@ -59,9 +59,9 @@ Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
   }
   std::array<int64_t, 3> begin, end;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto most = static_cast<double>(volume.size[axis] - 1);
-    begin[axis] = static_cast<int64_t>(std::clamp(std::floor(first[axis] + 1e-6), 0.0, most));
-    end[axis] = static_cast<int64_t>(std::clamp(std::ceil(last[axis] - 1e-6), 0.0, most)) + 1;
+    const auto maximum = static_cast<double>(volume.size[axis] - 1);
+    begin[axis] = static_cast<int64_t>(std::clamp(std::floor(first[axis] + 1e-6), 0.0, maximum));
+    end[axis] = static_cast<int64_t>(std::clamp(std::ceil(last[axis] - 1e-6), 0.0, maximum)) + 1;
     if (end[axis] - begin[axis] < 2)
       base::refuse("{}: the box ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}) mm lies beside it",
                    volume.name, low.x(), low.y(), low.z(), high.x(), high.y(), high.z());

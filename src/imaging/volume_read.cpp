@@ -31,7 +31,7 @@ void check_header(const Image& image, const std::string& name) {
     if (image.size[axis] != 1)
       base::refuse("{}: holds {} volumes; export one of them", name, image.size[axis]);
   if (image.numbers != 1)
-    base::refuse("{}: has {} numbers a voxel (colours?); a CT or a label map has one", name,
+    base::refuse("{}: has {} numbers a voxel (colors?); a CT or a label map has one", name,
                  image.numbers);
 }
 
@@ -64,16 +64,16 @@ void check_grid(const Volume& volume) {
 }
 
 void replace_not_finite(Volume& volume) {
-  float least = std::numeric_limits<float>::infinity();
+  float minimum = std::numeric_limits<float>::infinity();
   for (const float value : volume.values)
-    if (std::isfinite(value)) least = std::min(least, value);
+    if (std::isfinite(value)) minimum = std::min(minimum, value);
   const auto infinite = [](float value) { return !std::isfinite(value); };
   const auto count = std::count_if(volume.values.begin(), volume.values.end(), infinite);
   if (count == 0) return;
-  if (std::isinf(least)) base::refuse("{}: holds no finite number; export it anew", volume.name);
-  std::replace_if(volume.values.begin(), volume.values.end(), infinite, least);
+  if (std::isinf(minimum)) base::refuse("{}: holds no finite number; export it again", volume.name);
+  std::replace_if(volume.values.begin(), volume.values.end(), infinite, minimum);
   volume.remarks.push_back(
-      fmt::format("{} values that are not finite taken as {:g}, the least", count, least));
+      fmt::format("{} values that are not finite taken as {:g}, the least", count, minimum));
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ std::vector<int32_t> columns_of_points(const ColumnLevel& level) {
 
 /// Calls visit(own column) for the columns that column `c` is coupled to, some more than once.
 template <class Visit>
-void for_each_neighbour(const ColumnLevel& level, const std::vector<int32_t>& column, size_t c,
-                        Visit&& visit) {
+void for_each_neighbor(const ColumnLevel& level, const std::vector<int32_t>& column, size_t c,
+                       Visit&& visit) {
   const BlockPattern& pattern = level.pattern();
   for (int64_t k = pattern.begin[level.columns()[c]]; k < pattern.begin[level.columns()[c + 1]];
        ++k)
@@ -30,8 +30,8 @@ void for_each_neighbour(const ColumnLevel& level, const std::vector<int32_t>& co
       visit(column[j]);
 }
 
-/// Columns whose neighbours are all free start an aggregate with them; what is left joins a
-/// neighbour's or stays alone.
+/// Columns whose neighbors are all free start an aggregate with them; what is left joins a
+/// neighbor's or stays alone.
 std::vector<int32_t> aggregate(const ColumnLevel& fine) {
   const std::vector<int32_t> column = columns_of_points(fine);
   const size_t columns = fine.columns().size() - 1;
@@ -39,15 +39,15 @@ std::vector<int32_t> aggregate(const ColumnLevel& fine) {
   int32_t groups = 0;
   for (size_t c = 0; c < columns; ++c) {
     bool free = group[c] == none;
-    for_each_neighbour(fine, column, c, [&](int32_t d) { free &= group[d] == none; });
+    for_each_neighbor(fine, column, c, [&](int32_t d) { free &= group[d] == none; });
     if (!free) continue;
     group[c] = groups++;
-    for_each_neighbour(fine, column, c, [&](int32_t d) { group[d] = group[c]; });
+    for_each_neighbor(fine, column, c, [&](int32_t d) { group[d] = group[c]; });
   }
   const std::vector<int32_t> roots = group;
   for (size_t c = 0; c < columns; ++c)
     if (roots[c] == none)
-      for_each_neighbour(fine, column, c, [&](int32_t d) {
+      for_each_neighbor(fine, column, c, [&](int32_t d) {
         if (group[c] == none) group[c] = roots[d];
       });
   for (int32_t& g : group)
@@ -77,7 +77,7 @@ std::vector<Place> number_points(const ColumnLevel& fine, const std::vector<int3
   return place;
 }
 
-/// How strongly a block draws two points together.
+/// Coupling strength of a block between two points.
 float pull(const Eigen::Matrix3f& block) { return -block.trace(); }
 
 }  // namespace
@@ -88,7 +88,7 @@ Coarsening::Coarsening(MPI_Comm comm, const ColumnLevel& fine, const std::vector
   std::vector<int32_t> point;
   std::vector<Place> place = number_points(fine, group, point);
   const auto own = static_cast<int32_t>(place.size());
-  find_centres(at, point, own);
+  find_centers(at, point, own);
   smooth(fine, at, point);
   transpose(own);
   const std::vector<int64_t> ghost = find_ghosts(comm, fine, own);
@@ -96,31 +96,31 @@ Coarsening::Coarsening(MPI_Comm comm, const ColumnLevel& fine, const std::vector
   coarse_ = std::make_unique<ColumnLevel>(comm, std::move(place), ghost, std::move(pattern));
 }
 
-void Coarsening::find_centres(const std::vector<Vec3>& at, const std::vector<int32_t>& point,
+void Coarsening::find_centers(const std::vector<Vec3>& at, const std::vector<int32_t>& point,
                               int32_t own) {
-  centre_.assign(own, Vec3::Zero());
+  center_.assign(own, Vec3::Zero());
   std::vector<int> members(own, 0);
   for (int32_t i = 0; i < fine_own_; ++i) {
-    centre_[point[i]] += at[i];
+    center_[point[i]] += at[i];
     ++members[point[i]];
   }
-  for (int32_t a = 0; a < own; ++a) centre_[a] /= members[a];
+  for (int32_t a = 0; a < own; ++a) center_[a] /= members[a];
 }
 
 /// Changes weights that add up to 1 as little as carries linear fields, nearly.
 void Coarsening::make_linear(const Vec3& at, std::vector<Candidate>& found) const {
-  constexpr double regularisation = 0.02;  // of the scatter: layers are flat
+  constexpr double regularization = 0.02;  // of the scatter: layers are flat
   Vec3 mean = Vec3::Zero();
-  for (const Candidate& c : found) mean += c.weight * centre_[c.point];
+  for (const Candidate& c : found) mean += c.weight * center_[c.point];
   Mat3 scatter = Mat3::Zero();
   for (const Candidate& c : found) {
-    const Vec3 away = centre_[c.point] - mean;
+    const Vec3 away = center_[c.point] - mean;
     scatter += c.weight * away * away.transpose();
   }
   const double size = scatter.trace();
   if (!(size > 0)) return;
-  const Vec3 slope = (scatter + regularisation * size * Mat3::Identity()).ldlt().solve(at - mean);
-  for (Candidate& c : found) c.weight *= 1 + slope.dot(centre_[c.point] - mean);
+  const Vec3 slope = (scatter + regularization * size * Mat3::Identity()).ldlt().solve(at - mean);
+  for (Candidate& c : found) c.weight *= 1 + slope.dot(center_[c.point] - mean);
 }
 
 void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
@@ -148,13 +148,13 @@ void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
     found.front().weight += total > 0 ? 1 - damping : 1.0;
     std::sort(found.begin(), found.end(),
               [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
-    if (found.size() > most) found.resize(most);
+    if (found.size() > maximum) found.resize(maximum);
     double sum = 0;
     for (const Candidate& c : found) sum += c.weight;
     for (Candidate& c : found) c.weight /= sum;
     make_linear(at[i], found);
     Weights& weights = weights_[i];
-    for (size_t m = 0; m < most; ++m) {
+    for (size_t m = 0; m < maximum; ++m) {
       weights.point[m] = m < found.size() ? found[m].point : point[i];
       weights.weight[m] = m < found.size() ? static_cast<float>(found[m].weight) : 0.0f;
     }
@@ -165,15 +165,15 @@ void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
 /// Returns the global numbers of these.
 std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own) {
   struct Message {
-    std::array<int64_t, most> point;
-    std::array<float, most> weight;
+    std::array<int64_t, maximum> point;
+    std::array<float, maximum> weight;
   };
   int64_t first = 0;
   const int64_t mine = own;
   MPI_Exscan(&mine, &first, 1, MPI_INT64_T, MPI_SUM, comm);
   std::vector<Message> sent(fine.own()), received(fine.ghosts());
   for (int32_t i = 0; i < fine.own(); ++i)
-    for (int m = 0; m < most; ++m) {
+    for (int m = 0; m < maximum; ++m) {
       sent[i].point[m] = first + weights_[i].point[m];
       sent[i].weight[m] = weights_[i].weight[m];
     }
@@ -181,11 +181,11 @@ std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& f
   fine.share(sent.data(), received.data(), unit);
   std::vector<int64_t> ghost;
   for (const Message& message : received)
-    for (int m = 0; m < most; ++m) ghost.push_back(message.point[m]);
+    for (int m = 0; m < maximum; ++m) ghost.push_back(message.point[m]);
   std::sort(ghost.begin(), ghost.end());
   ghost.erase(std::unique(ghost.begin(), ghost.end()), ghost.end());
   for (size_t g = 0; g < received.size(); ++g)
-    for (int m = 0; m < most; ++m) {
+    for (int m = 0; m < maximum; ++m) {
       const auto at = std::lower_bound(ghost.begin(), ghost.end(), received[g].point[m]);
       weights_[fine.own() + g].point[m] = own + static_cast<int32_t>(at - ghost.begin());
       weights_[fine.own() + g].weight[m] = received[g].weight[m];
@@ -270,7 +270,7 @@ void Coarsening::add_to(std::span<const Lanes> coarse, std::span<Lanes> fine) co
   for (int32_t i = 0; i < fine_own_; ++i) {
     const Weights& w = weights_[i];
     Lanes sum{};
-    for (int m = 0; m < most; ++m) sum += w.weight[m] * coarse[w.point[m]];
+    for (int m = 0; m < maximum; ++m) sum += w.weight[m] * coarse[w.point[m]];
     fine[i] += sum;
   }
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int64_t coarse_enough = 40;  // points that are solved for by factors
 constexpr int64_t too_many = 1500;     // for factors
-constexpr double least_coarsening = 0.7;
+constexpr double min_coarsening = 0.7;
 
 /// The unknown points of `part` by their numbers in it: own ones, then ghosts by global number.
 std::vector<int32_t> number_points(const discrete::Part& part) {
@@ -31,7 +31,7 @@ std::vector<int32_t> number_points(const discrete::Part& part) {
   return number;
 }
 
-/// What pairs of coupled points are, and how stiff the stiffest of them is.
+/// Pairs of coupled points and their largest stiffness.
 class Couplings {
  public:
   Couplings(const std::vector<int32_t>& number, const std::vector<int32_t>& layer, int32_t own)
@@ -47,7 +47,7 @@ class Couplings {
   double stiffest() const {
     return own() == 0 ? 0.0 : *std::max_element(diagonal_.begin(), diagonal_.end()) / 3;
   }
-  /// What is right of the diagonal and on it, and its mirror image.
+  /// Returns the pattern right of the diagonal and on it, and its transpose.
   BlockPattern pattern() {
     std::vector<int64_t> left(own(), 0);
     for (int32_t i = 0; i < own(); ++i) {
@@ -172,9 +172,9 @@ ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
     const ColumnLevel& above = *levels_.back().matrix;
     auto next = std::make_unique<Coarsening>(comm_, above, at);
     const auto total = static_cast<double>(next->coarse().total());
-    if (total > least_coarsening * static_cast<double>(above.total())) break;
+    if (total > min_coarsening * static_cast<double>(above.total())) break;
     next->refill(above);
-    at = next->centre();
+    at = next->center();
     levels_.emplace_back(next->coarse());
     coarsening_.push_back(std::move(next));
   }

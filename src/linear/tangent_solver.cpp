@@ -85,7 +85,7 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
   choose_preconditioner();
-  lend_preconditioner(krylov_);
+  share_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
   choose_norm(krylov_);
   if (is_columns(preconditioner())) lag_ = LagPolicy(price_of_renewal(price_of_columns));
@@ -108,7 +108,7 @@ void TangentSolver::choose_preconditioner() {
 }
 
 Mat TangentSolver::preconditioner_matrix() {
-  return is_columns(preconditioner()) ? hessian_.model() : hessian_.convex();
+  return is_columns(preconditioner()) ? hessian_.model() : hessian_.spd_approximation();
 }
 
 PC TangentSolver::preconditioner() {
@@ -117,7 +117,7 @@ PC TangentSolver::preconditioner() {
   return pc;
 }
 
-void TangentSolver::lend_preconditioner(KSP other) {
+void TangentSolver::share_preconditioner(KSP other) {
   if (other != krylov_) check(KSPSetPC(other, preconditioner()));
   check(KSPSetResidualHistory(other, nullptr, PETSC_DECIDE, PETSC_TRUE));
   check(KSPSetPostSolve(other, after_solve, this));
@@ -136,7 +136,7 @@ void TangentSolver::prepare(Vec displacement) {
   hessian_.assemble(displacement);
   const bool moved = hessian_.assemblies() != made_at_;
   if (moved) lag_.move();
-  const bool renew = renewals_ == 0 || hopeless() || (moved && lag_.out());
+  const bool renew = renewals_ == 0 || use_direct_fallback() || (moved && lag_.should_rebuild());
   check(PCSetReusePreconditioner(preconditioner(), renew ? PETSC_FALSE : PETSC_TRUE));
   if (renew) renew_preconditioner();
 }
@@ -149,8 +149,8 @@ void TangentSolver::renew(Vec displacement) {
   renew_preconditioner();
 }
 
-bool TangentSolver::hopeless() const {
-  return columns_ && lag_.hopeless() && !factors_ && unknowns_ <= factors_limit;
+bool TangentSolver::use_direct_fallback() const {
+  return columns_ && lag_.stagnates() && !factors_ && unknowns_ <= factors_limit;
 }
 
 void TangentSolver::renew_preconditioner() {
@@ -172,9 +172,9 @@ void TangentSolver::renew_preconditioner() {
 
 void TangentSolver::renew_columns() {
   const BlockSource blocks = [this](const discrete::BlockVisitor& visit) {
-    hessian_.visit_convex(visit);
+    hessian_.visit_spd_blocks(visit);
   };
-  if (hopeless()) {
+  if (use_direct_fallback()) {
     columns_.reset();
     check(PCCreate(positions_.comm(), factors_.out()));
     choose_factors(factors_);
@@ -182,7 +182,7 @@ void TangentSolver::renew_columns() {
   }
   if (factors_) {
     hessian_.renew();
-    check(PCSetOperators(factors_, hessian_.convex(), hessian_.convex()));
+    check(PCSetOperators(factors_, hessian_.spd_approximation(), hessian_.spd_approximation()));
     give_room(factors_);
     check(PCSetUp(factors_));
   } else if (columns_) {
@@ -201,7 +201,7 @@ void TangentSolver::refresh(Vec displacement) {
 void TangentSolver::update_contact() {
   if (columns_ && positions_.part().contact)
     columns_->set_extra(
-        [this](const discrete::BlockVisitor& visit) { hessian_.visit_contact(visit); });
+        [this](const discrete::BlockVisitor& visit) { hessian_.visit_contact_blocks(visit); });
 }
 
 PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
@@ -218,9 +218,9 @@ PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
   return PETSC_SUCCESS;
 }
 
-void TangentSolver::give_up() {
+void TangentSolver::throw_unsolvable() {
   int finite = 1;
-  hessian_.visit_convex([&](int32_t, int32_t, const Mat3& block) {
+  hessian_.visit_spd_blocks([&](int32_t, int32_t, const Mat3& block) {
     if (!block.allFinite()) finite = 0;
   });
   MPI_Allreduce(MPI_IN_PLACE, &finite, 1, MPI_INT, MPI_MIN, positions_.comm());
@@ -235,7 +235,7 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov_, &reason));
-  if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF) give_up();
+  if (reason == KSP_DIVERGED_PC_FAILED || reason == KSP_DIVERGED_NANORINF) throw_unsolvable();
   finished_ = reason > 0 && reason != KSP_CONVERGED_ITS;  // preonly asks for no accuracy
   // PETSc's conjugate gradients see the curvature change its sign, not that it has the wrong one.
   PetscReal product = 0;
@@ -257,17 +257,18 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
   if (measured_at_ == hessian_.assemblies()) check(VecEqual(gradient, measured_, &same));
   if (same) return distance_;
   check(VecSet(work_, 0));
-  bends_ = !solve(displacement, gradient, work_, usual_);
-  distance_ = bends_ ? std::numeric_limits<double>::infinity() : discrete::largest_block(work_);
+  negative_curvature_ = !solve(displacement, gradient, work_, usual_);
+  distance_ = negative_curvature_ ? std::numeric_limits<double>::infinity()
+                                  : discrete::largest_block(work_);
   measured_at_ = hessian_.assemblies();
-  sure_at_ = -1;
+  bounded_at_ = -1;
   check(VecCopy(gradient, measured_));
   return distance_;
 }
 
-/// Of a point, mm/N, or more: what a load of random signs moves. Soft points go farthest, and take
-/// most of its energy, so that a rough solution will do. At one load what a preconditioner serves
-/// for is alike.
+/// Upper estimate of a point's compliance, mm/N, by a load of random signs. Soft points move most,
+/// and take most of its energy, so that a rough solution suffices. States that share a
+/// preconditioner at one load have similar compliance.
 double TangentSolver::largest_compliance(Vec displacement) {
   const double load_now = positions_.load();
   if (compliance_at_ == renewals_ && compliance_load_ == load_now) return compliance_;
@@ -282,7 +283,7 @@ double TangentSolver::largest_compliance(Vec displacement) {
   bool known = false;
   for (const double share : {0.3, 1e-3, 1e-6}) {
     convex_ = solve(displacement, load, next_, share);
-    known = convex_ && finished_ && truly_smaller(load, next_);
+    known = convex_ && finished_ && residual_decreased(load, next_);
     if (known || !convex_) break;
   }
   compliance_ = known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
@@ -291,7 +292,7 @@ double TangentSolver::largest_compliance(Vec displacement) {
   return compliance_;
 }
 
-bool TangentSolver::truly_smaller(Vec rhs, Vec delta) {
+bool TangentSolver::residual_decreased(Vec rhs, Vec delta) {
   base::VecHandle left = positions_.make_vector();
   PetscReal before = 0, after = 0;
   check(MatMult(hessian_.action(), delta, left));
@@ -305,7 +306,7 @@ bool TangentSolver::is_minimum(Vec displacement) {
   return std::isfinite(largest_compliance(displacement)) || convex_;
 }
 
-bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
+bool TangentSolver::refine(Vec displacement, Vec gradient, double factor) {
   base::VecHandle left = positions_.make_vector();
   check(MatMult(hessian_.action(), work_, left));
   check(VecAYPX(left, -1, gradient));
@@ -315,7 +316,7 @@ bool TangentSolver::improve(Vec displacement, Vec gradient, double factor) {
   return convex && finished_;
 }
 
-double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack) {
+double TangentSolver::error_bound(Vec displacement, Vec gradient, double slack) {
   // The preconditioner's norm, which ends a solve, is the energy's but roughly, and a random load
   // does not find the largest compliance. Stiffnesses of springs may lie twelve orders of magnitude
   // apart, where the preconditioner's rounding adds to it.
@@ -325,35 +326,36 @@ double TangentSolver::sure_distance(Vec displacement, Vec gradient, double slack
   PetscBool trusting = PETSC_FALSE;  // the preconditioner alone, by the user's wish
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(static_cast<KSP>(krylov_)), KSPPREONLY,
                                &trusting));
-  if (!(rough > 0) || !std::isfinite(rough) || sure_at_ == measured_at_ || trusting) return rough;
+  if (!(rough > 0) || !std::isfinite(rough) || bounded_at_ == measured_at_ || trusting)
+    return rough;
   PetscReal energy = 0;
   check(VecDot(gradient, work_, &energy));
   const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm
   const double bound = std::max(rough, slack);
   double left = usual_ * reach;
   if (left > bound) {
-    const double wanted = bound / reach;
+    const double requested = bound / reach;
     left = bound;
-    const bool sure = wanted > finest && improve(displacement, gradient, wanted / usual_);
+    const bool sure = requested > finest && refine(displacement, gradient, requested / usual_);
     distance_ = sure ? std::max(rough, discrete::largest_block(work_))
                      : std::numeric_limits<double>::infinity();
   }
-  unsure_ = left > rough ? 2 * left : 0;
-  sure_at_ = measured_at_;
+  error_slack_ = left > rough ? 2 * left : 0;
+  bounded_at_ = measured_at_;
   return distance_;
 }
 
 double TangentSolver::contraction(Vec displacement, Vec trial, Vec gradient) {
   constexpr double endless = std::numeric_limits<double>::infinity();
-  constexpr double close = 0.2, most_left = 0.5;
+  constexpr double close = 0.2, max_left = 0.5;
   PetscReal slope = 0, left = 0, next_slope = 0;
   check(VecDot(measured_, work_, &slope));
   check(VecDot(gradient, work_, &left));
-  if (std::abs(left) > most_left * slope) return endless;
+  if (std::abs(left) > max_left * slope) return endless;
   check(VecSet(next_, 0));
   const bool convex = solve(trial, gradient, next_, close);
   hessian_.assemble(displacement);
-  if (sure_at_ == measured_at_) sure_at_ = hessian_.assemblies();
+  if (bounded_at_ == measured_at_) bounded_at_ = hessian_.assemblies();
   measured_at_ = hessian_.assemblies();  // what is known there is not lost
   if (!convex) return endless;
   check(VecDot(gradient, next_, &next_slope));

@@ -17,11 +17,11 @@ constexpr base::Range accuracies = base::Range::between(1e-6, 10);  // mm
 
 /// A value as a message shows it.
 std::string shown(const json& value) {
-  return base::shown(value.dump(-1, ' ', true, json::error_handler_t::replace));
+  return base::quote(value.dump(-1, ' ', true, json::error_handler_t::replace));
 }
 
-[[noreturn]] void refuse_value(const std::string& name, const char* wanted, const json& value) {
-  base::refuse("{} must be {}, not {}", name, wanted, shown(value));
+[[noreturn]] void refuse_value(const std::string& name, const char* requested, const json& value) {
+  base::refuse("{} must be {}, not {}", name, requested, shown(value));
 }
 
 void require_known(const json& map, const std::string& where,
@@ -29,7 +29,7 @@ void require_known(const json& map, const std::string& where,
   if (!map.is_object()) base::refuse("{} must be an object, not {}", where, shown(map));
   for (const auto& [name, value] : map.items())
     if (std::ranges::find(known, name) == known.end())
-      base::refuse("{} has no member {}; it has {}", where, base::shown(name),
+      base::refuse("{} has no member {}; it has {}", where, base::quote(name),
                    fmt::join(known, ", "));
 }
 
@@ -39,7 +39,7 @@ Vec3 read_vector(const json& motion, const std::string& piece, const char* name)
   const json& value = motion[name];
   const auto is_number = [](const json& v) { return v.is_number(); };
   if (!value.is_array() || value.size() != 3 || !std::ranges::all_of(value, is_number))
-    refuse_value(fmt::format("{}: {}", base::shown(piece), name), "three numbers", value);
+    refuse_value(fmt::format("{}: {}", base::quote(piece), name), "three numbers", value);
   for (int a = 0; a < 3; ++a) vector[a] = value[a].get<double>();
   return vector;
 }

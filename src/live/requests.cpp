@@ -18,7 +18,7 @@ namespace repose::live {
 namespace {
 
 /// Rank 0's text on all ranks, which wait for it asleep.
-void share_asleep(MPI_Comm comm, std::string& text) {
+void broadcast_asleep(MPI_Comm comm, std::string& text) {
   using namespace std::chrono_literals;
   const auto wait = [](MPI_Request request) {
     for (int done = 0; !done;) {
@@ -94,19 +94,19 @@ std::optional<std::string> Requests::next() {
     const std::optional<std::string> line = wait();
     text = line ? "l" + *line : "e";
   }
-  share_asleep(comm_, text);
+  broadcast_asleep(comm_, text);
   if (text[0] == 'e') return {};
   return text.substr(1);
 }
 
-bool Requests::overtaken(const std::function<bool(const std::string&)>& overtakes) {
-  int overtaken = 0;
+bool Requests::superseded(const std::function<bool(const std::string&)>& overtakes) {
+  int superseded = 0;
   if (base::rank(comm_) == 0) {
     const std::lock_guard lock(mutex_);
-    overtaken = ended_ || std::ranges::any_of(lines_, overtakes);
+    superseded = ended_ || std::ranges::any_of(lines_, overtakes);
   }
-  MPI_Bcast(&overtaken, 1, MPI_INT, 0, comm_);
-  return overtaken != 0;
+  MPI_Bcast(&superseded, 1, MPI_INT, 0, comm_);
+  return superseded != 0;
 }
 
 }  // namespace repose::live

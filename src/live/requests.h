@@ -24,7 +24,7 @@ class Requests {
   std::optional<std::string> next();
   /// Returns whether the input has ended or a line waits that `overtakes` the present request.
   /// Collective.
-  bool overtaken(const std::function<bool(const std::string&)>& overtakes);
+  bool superseded(const std::function<bool(const std::string&)>& overtakes);
 
  private:
   void read();

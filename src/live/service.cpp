@@ -61,8 +61,8 @@ class Service {
   void solve(const Request& request, Reply& reply);
   PlanSession::Placements place(const PlanMoves& plan) const;
   template <class Row>
-  std::vector<Row> shown(const std::vector<Row>& rows) const;
-  void find_shown();
+  std::vector<Row> visible(const std::vector<Row>& rows) const;
+  void find_visible();
 
   MPI_Comm comm_;
   PlanSession session_;
@@ -96,7 +96,7 @@ void Service::dispatch(const Request& request, Reply& reply) {
 }
 
 /// The skin's points: those of layer 0 that its triangles have.
-void Service::find_shown() {
+void Service::find_visible() {
   if (!skin_.empty()) return;
   for (const auto& triangle : session_.model().skin)
     skin_.insert(skin_.end(), triangle.begin(), triangle.end());
@@ -105,7 +105,7 @@ void Service::find_shown() {
 }
 
 template <class Row>
-std::vector<Row> Service::shown(const std::vector<Row>& rows) const {
+std::vector<Row> Service::visible(const std::vector<Row>& rows) const {
   std::vector<Row> picked;
   if (rows.empty()) return picked;
   for (const int64_t row : skin_) picked.push_back(rows[row]);
@@ -114,23 +114,23 @@ std::vector<Row> Service::shown(const std::vector<Row>& rows) const {
 
 /// Adds the given skin and how it follows the one that is solved.
 void add_given_skin(const surface::Surface& given, const surface::Surface& skin, Reply& reply) {
-  constexpr size_t most = 16;  // points that a vertex follows
+  constexpr size_t maximum = 16;  // points that a vertex follows
   const adapt::GivenSkinMap map = adapt::map_to_given(given, skin);
   std::vector<int32_t> row;
   std::vector<float> weight;
   for (const auto& sum : map.sum)
-    for (size_t k = 0; k < most; ++k) {
+    for (size_t k = 0; k < maximum; ++k) {
       row.push_back(k < sum.size() ? static_cast<int32_t>(sum[k].first) : 0);
       weight.push_back(k < sum.size() ? static_cast<float>(sum[k].second) : 0);
     }
   reply.add("given_position", given.points);
   reply.add("given_triangles", given.triangles);
-  reply.add("given_rows", row, most);
-  reply.add("given_weights", weight, most);
+  reply.add("given_rows", row, maximum);
+  reply.add("given_weights", weight, maximum);
 }
 
 void Service::describe(Reply& reply) {
-  find_shown();
+  find_visible();
   json& head = reply.head();
   head["accuracy"] = session_.accuracy();
   head["box"] = {{"translate", write_vector(session_.box().translate)},
@@ -147,7 +147,7 @@ void Service::describe(Reply& reply) {
   head["points"] = initial.size();
   head["bones"] = model.bones;
   head["cuts"] = session_.has_cuts();
-  surface::Surface skin{"skin", shown(initial), {}};
+  surface::Surface skin{"skin", visible(initial), {}};
   for (const auto& triangle : model.skin) {
     Triangle& corners = skin.triangles.emplace_back();
     for (int k = 0; k < 3; ++k)
@@ -170,7 +170,7 @@ PlanSession::Placements Service::place(const PlanMoves& plan) const {
     if (piece == session_.pieces().end()) {
       std::vector<std::string> names;
       for (const PlanSession::Piece& other : session_.pieces()) names.push_back(other.name);
-      base::refuse("plan: {} is no piece of the plan; its pieces are {}", base::shown(name),
+      base::refuse("plan: {} is no piece of the plan; its pieces are {}", base::quote(name),
                    fmt::join(names, ", "));
     }
     placements[piece - session_.pieces().begin()] = placement;
@@ -179,18 +179,18 @@ PlanSession::Placements Service::place(const PlanMoves& plan) const {
 }
 
 void Service::solve(const Request& request, Reply& reply) {
-  find_shown();
-  PlanSession::Request wanted;
-  wanted.plan = place(request.plan);
-  wanted.accuracy = request.accuracy.value_or(session_.accuracy());
-  wanted.tangents = request.tangents;
+  find_visible();
+  PlanSession::Request requested;
+  requested.plan = place(request.plan);
+  requested.accuracy = request.accuracy.value_or(session_.accuracy());
+  requested.tangents = request.tangents;
   PlanSession::Placements scenes;
   for (const PlanSession::Piece& piece : session_.pieces()) scenes.push_back(piece.scenes);
   const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
-  if (!request.from_rest) wanted.base = &from;
-  wanted.abandoned = [this] { return requests_->overtaken(ends_a_solve); };
+  if (!request.from_rest) requested.base = &from;
+  requested.abandoned = [this] { return requests_->superseded(ends_a_solve); };
   const double before = base::cpu_seconds();
-  const PlanSession::Answer answer = session_.solve(wanted);
+  const PlanSession::Answer answer = session_.solve(requested);
   const solve::PathOutcome& path = answer.summary.path;
   if (path.last.stopped) base::refuse("abandoned: a later request overtook it");
   json& head = reply.head();
@@ -202,16 +202,16 @@ void Service::solve(const Request& request, Reply& reply) {
   head["seconds"] = base::cpu_seconds() - before;
   if (base::rank(comm_) > 0) return;
   const bool all = request.all_points;
-  reply.add("position", all ? answer.position : shown(answer.position));
+  reply.add("position", all ? answer.position : visible(answer.position));
   for (const model::PointField& field : answer.field) {
     std::vector<Vec3> vectors;
     if (field.vector)
       for (size_t i = 0; i + 2 < field.values.size(); i += 3)
         vectors.push_back(Vec3::Map(&field.values[i]));
     if (field.vector)
-      reply.add(field.name, all ? vectors : shown(vectors));
+      reply.add(field.name, all ? vectors : visible(vectors));
     else
-      reply.add(field.name, all ? field.values : shown(field.values));
+      reply.add(field.name, all ? field.values : visible(field.values));
     for (const auto& [name, flag] : field.flags) head["flags"][field.name][name] = flag;
   }
 }
@@ -221,7 +221,7 @@ void Service::solve(const Request& request, Reply& reply) {
 base::Exit serve(MPI_Comm comm, const std::filesystem::path& scene, const Channel& channel) {
   std::signal(SIGPIPE, SIG_IGN);
   std::optional<Listener> listener;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     if (channel.port) listener.emplace(*channel.port);
   });
   Service service(comm, scene);

@@ -21,53 +21,54 @@ Mat3 negative_part(const Mat3& symmetric) {
 
 }  // namespace
 
-TouchLoop::TouchLoop(const model::Touches& touches, double stiffness, std::vector<RigidBody> bodies)
-    : touches_(touches),
+BodyContact::BodyContact(const model::ContactPairs& pairs, double stiffness,
+                         std::vector<RigidBody> bodies)
+    : pairs_(pairs),
       stiffness_(stiffness),
       bodies_(std::move(bodies)),
-      multiplier_(touches.point.size(), 0.0),
-      seen_(touches.point.size(), Vec3::Zero()),
-      distance_(touches.point.size(), -infinite),
-      gap_(touches.point.size(), infinite),
-      normal_(touches.point.size(), Vec3::Zero()),
-      curvature_(touches.point.size(), Mat3::Zero()) {}
+      multiplier_(pairs.point.size(), 0.0),
+      seen_(pairs.point.size(), Vec3::Zero()),
+      distance_(pairs.point.size(), -infinite),
+      gap_(pairs.point.size(), infinite),
+      normal_(pairs.point.size(), Vec3::Zero()),
+      curvature_(pairs.point.size(), Mat3::Zero()) {}
 
-double TouchLoop::least_gap(size_t c, const Vec3& beside) const {
+double BodyContact::min_gap(size_t c, const Vec3& beside) const {
   constexpr double steepest = 1.1;  // of a distance read from a grid
-  return distance_[c] - steepest * (beside - seen_[c]).norm() - touches_.offset[c];
+  return distance_[c] - steepest * (beside - seen_[c]).norm() - pairs_.offset[c];
 }
 
 /// True if the gap is at least `gap` mm: by the way since it was last evaluated, or else by a lower
 /// bound, which is kept.
-bool TouchLoop::stays_above(double gap, size_t c, const Vec3& beside) {
+bool BodyContact::stays_above(double gap, size_t c, const Vec3& beside) {
   constexpr double margin = 0.5;  // mm, by which a rough bound exceeds what is needed
-  if (least_gap(c, beside) >= gap) return true;
-  const double needed = gap + touches_.offset[c];
-  const double bound = bodies_[touches_.body[c]].lower_bound(beside, needed + margin);
+  if (min_gap(c, beside) >= gap) return true;
+  const double needed = gap + pairs_.offset[c];
+  const double bound = bodies_[pairs_.body[c]].lower_bound(beside, needed + margin);
   if (bound < needed) return false;
   seen_[c] = beside;
   distance_[c] = bound;
   return true;
 }
 
-void TouchLoop::set(size_t c, const Vec3& beside, const surface::Distance& distance) {
+void BodyContact::set(size_t c, const Vec3& beside, const surface::Distance& distance) {
   seen_[c] = beside;
   distance_[c] = distance.value;
-  gap_[c] = distance.value - touches_.offset[c];
+  gap_[c] = distance.value - pairs_.offset[c];
   normal_[c] = distance.gradient;
   curvature_[c] = distance.curvature;
 }
 
-void TouchLoop::measure(size_t c, const Vec3& beside) {
-  set(c, beside, bodies_[touches_.body[c]].distance(beside));
+void BodyContact::measure(size_t c, const Vec3& beside) {
+  set(c, beside, bodies_[pairs_.body[c]].distance(beside));
 }
 
-void TouchLoop::look(std::span<const Vec3> position) {
+void BodyContact::update_gaps(std::span<const Vec3> position) {
   acting_.clear();
-  for (size_t c = 0; c < touches_.point.size(); ++c) {
-    const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    const Vec3 beside = bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]);
     if (!slides(c) && stays_above(multiplier_[c] / stiffness_, c, beside)) {
-      gap_[c] = least_gap(c, beside);
+      gap_[c] = min_gap(c, beside);
       continue;
     }
     measure(c, beside);
@@ -76,25 +77,25 @@ void TouchLoop::look(std::span<const Vec3> position) {
 }
 
 /// False if the gap is at least `reach` mm; evaluates it otherwise.
-bool TouchLoop::measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside) {
-  if (least_gap(c, beside) > reach) return false;
-  const RigidBody& body = bodies_[touches_.body[c]];
-  const double bound = body.lower_bound(beside, reach + touches_.offset[c]);
-  if (bound - touches_.offset[c] >= reach) {
+bool BodyContact::measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside) {
+  if (min_gap(c, beside) > reach) return false;
+  const RigidBody& body = bodies_[pairs_.body[c]];
+  const double bound = body.lower_bound(beside, reach + pairs_.offset[c]);
+  if (bound - pairs_.offset[c] >= reach) {
     seen_[c] = beside;
     distance_[c] = bound;
     return false;
   }
-  const bool smoothed = multiplier_[c] != 0 || bound - touches_.offset[c] < smoothed_to;
+  const bool smoothed = multiplier_[c] != 0 || bound - pairs_.offset[c] < smoothed_to;
   set(c, beside, smoothed ? body.distance(beside) : body.outside(beside));
   return gap_[c] <= reach;
 }
 
-std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, double reach,
-                                              double smoothed_to) {
+std::vector<LinearGap> BodyContact::linear_gaps(std::span<const Vec3> position, double reach,
+                                                double smoothed_to) {
   std::vector<LinearGap> gaps;
-  for (size_t c = 0; c < touches_.point.size(); ++c) {
-    const Vec3 beside = bodies_[touches_.body[c]].beside(position[touches_.point[c]]);
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    const Vec3 beside = bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]);
     if (slides(c))
       measure(c, beside);
     else if (!measure_within(reach, smoothed_to, c, beside))
@@ -102,18 +103,18 @@ std::vector<LinearGap> TouchLoop::linear_gaps(std::span<const Vec3> position, do
     if (normal_[c].isZero(0)) continue;
     gaps.push_back({c,
                     slides(c),
-                    touches_.area[c],
+                    pairs_.area[c],
                     gap_[c],
-                    {{static_cast<int32_t>(touches_.point[c]), normal_[c]}},
+                    {{static_cast<int32_t>(pairs_.point[c]), normal_[c]}},
                     {}});
   }
   return gaps;
 }
 
-std::vector<Vec3> TouchLoop::places(std::span<const Vec3> position) const {
+std::vector<Vec3> BodyContact::places(std::span<const Vec3> position) const {
   std::vector<Vec3> places;
-  for (size_t c = 0; c < touches_.point.size(); ++c)
-    places.push_back(bodies_[touches_.body[c]].beside(position[touches_.point[c]]));
+  for (size_t c = 0; c < pairs_.point.size(); ++c)
+    places.push_back(bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]));
   return places;
 }
 
@@ -129,59 +130,59 @@ Vec3 direction_within(double reach, const RigidBody& body, const Vec3& beside) {
 
 }  // namespace
 
-bool TouchLoop::changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const {
+bool BodyContact::changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const {
   constexpr double pressing = 1, was_near = 6;  // mm
-  for (size_t c = 0; c < touches_.point.size(); ++c) {
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
     if (multiplier_[c] <= 0) continue;
-    const RigidBody& body = bodies_[touches_.body[c]];
-    const Vec3 now = direction_within(pressing, body, body.beside(position[touches_.point[c]]));
+    const RigidBody& body = bodies_[pairs_.body[c]];
+    const Vec3 now = direction_within(pressing, body, body.beside(position[pairs_.point[c]]));
     if (!now.isZero(0) && now.dot(direction_within(was_near, body, before[c])) < 0) return true;
   }
   return false;
 }
 
-void TouchLoop::carry(std::span<const Vec3> position, std::span<const RigidBody> before,
-                      std::vector<LinearGap>& gaps) const {
+void BodyContact::carry(std::span<const Vec3> position, std::span<const RigidBody> before,
+                        std::vector<LinearGap>& gaps) const {
   for (LinearGap& g : gaps) {
-    const int32_t body = touches_.body[g.constraint];
+    const int32_t body = pairs_.body[g.constraint];
     auto& [point, normal] = g.gradient.front();
     normal = bodies_[body].turned(before[body].own_direction(normal));
     g.gap += normal.dot(position[point] - bodies_[body].in_space(seen_[g.constraint]));
   }
 }
 
-void TouchLoop::look_at_all(std::span<const Vec3> position) {
+void BodyContact::update_all_gaps(std::span<const Vec3> position) {
   constexpr double smoothed_to = 1;  // mm
-  look(position);
-  for (size_t c = 0; c < touches_.point.size(); ++c) {
-    const RigidBody& body = bodies_[touches_.body[c]];
-    const Vec3 beside = body.beside(position[touches_.point[c]]);
-    const double needed = smoothed_to + touches_.offset[c];
+  update_gaps(position);
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    const RigidBody& body = bodies_[pairs_.body[c]];
+    const Vec3 beside = body.beside(position[pairs_.point[c]]);
+    const double needed = smoothed_to + pairs_.offset[c];
     const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
     set(c, beside, away ? body.outside(beside) : body.distance(beside));
   }
 }
 
-double TouchLoop::add_gradient(std::span<const Vec3> position, double scale,
-                               std::span<Vec3> gradient) {
-  look(position);
+double BodyContact::add_gradient(std::span<const Vec3> position, double scale,
+                                 std::span<Vec3> gradient) {
+  update_gaps(position);
   double value = 0;
   for (size_t c = 0; c < multiplier_.size(); ++c)
     if (multiplier_[c] > 0 && !slides(c))
-      value -= touches_.area[c] * multiplier_[c] * multiplier_[c] / (2 * stiffness_);
+      value -= pairs_.area[c] * multiplier_[c] * multiplier_[c] / (2 * stiffness_);
   for (const size_t c : acting_) {
     const Pressing now = press(gap_[c], multiplier_[c], stiffness_, slides(c));
     const double before = slides(c) ? 0 : multiplier_[c] * multiplier_[c] / (2 * stiffness_);
-    value += touches_.area[c] * (now.value + before);
-    gradient[touches_.point[c]] -= scale * touches_.area[c] * now.pressure * normal_[c];
+    value += pairs_.area[c] * (now.value + before);
+    gradient[pairs_.point[c]] -= scale * pairs_.area[c] * now.pressure * normal_[c];
   }
   return value;
 }
 
-Mat3 TouchLoop::block(size_t c, bool exact, const Pressing& pressing) const {
+Mat3 BodyContact::block(size_t c, bool exact, const Pressing& pressing) const {
   Mat3 bend = pressing.pressure * curvature_[c];
   if (!exact) bend = negative_part(bend);
-  return touches_.area[c] * (pressing.stiffness * normal_[c] * normal_[c].transpose() - bend);
+  return pairs_.area[c] * (pressing.stiffness * normal_[c] * normal_[c].transpose() - bend);
 }
 
 }  // namespace repose::mechanics

@@ -264,7 +264,7 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
 }
 
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
-                         const Weights& weights, double most_slope) {
+                         const Weights& weights, double max_slope) {
   PrismTriples<double> x;
   for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
   const PrismEdges<double> edges(x);
@@ -272,7 +272,7 @@ PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& te
   const VolumeLaw law = volume_law(weights, v.volume, term.compliance, term.target_volume);
   const double slope = law.slope + weights.volume_weight * term.nodal_slope;
   const double curvature = law.curvature + weights.volume_weight * term.nodal_curvature;
-  const double turning = std::clamp(slope, -most_slope, most_slope);
+  const double turning = std::clamp(slope, -max_slope, max_slope);
   const auto skew = prism_volume_hessian(edges);
   PrismBlocks blocks;
   for (int i = 0; i < 6; ++i)

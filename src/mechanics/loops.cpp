@@ -18,12 +18,12 @@ struct Chosen {
 };
 
 /// Those that touch soft tissue, or those that do not, in the order of their points in memory.
-template <size_t n, class Wanted>
+template <size_t n, class Request>
 Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>>& elements,
-              int64_t owned, Wanted&& wanted, bool soft = true) {
+              int64_t owned, Request&& requested, bool soft = true) {
   Chosen chosen;
   for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
-    if (wanted(e) && touches_soft_tissue(part.points, elements[e]) == soft)
+    if (requested(e) && touches_soft_tissue(part.points, elements[e]) == soft)
       (e < owned ? chosen.counted : chosen.others).push_back(e);
   const auto first = [&](int64_t e) { return *std::ranges::min_element(elements[e]); };
   std::ranges::stable_sort(chosen.counted, {}, first);

@@ -99,8 +99,8 @@ const surface::Surface* mesh_of(const model::Model& model, const model::Body& bo
 }  // namespace
 
 std::vector<RigidBody> make_bodies(const model::Model& model) {
-  constexpr double least_reach = 6;  // mm, more than tissue that slides keeps away
-  const double spacing = model.contact.spacing, reach = std::max(least_reach, 4 * spacing);
+  constexpr double min_reach = 6;  // mm, more than tissue that slides keeps away
+  const double spacing = model.contact.spacing, reach = std::max(min_reach, 4 * spacing);
   std::vector<RigidBody> bodies;
   for (const model::Body& body : model.contact.bodies) {
     if (const surface::Surface* mesh = mesh_of(model, body)) {
@@ -119,13 +119,14 @@ std::vector<RigidBody> make_bodies(const model::Model& model) {
   return bodies;
 }
 
-std::vector<double> touch_offsets(const model::Model& model, const std::vector<RigidBody>& bodies) {
-  const model::Touches& touches = model.contact.touches;
-  std::vector<double> offset(touches.point.size());
+std::vector<double> contact_offsets(const model::Model& model,
+                                    const std::vector<RigidBody>& bodies) {
+  const model::ContactPairs& pairs = model.contact.pairs;
+  std::vector<double> offset(pairs.point.size());
   for (size_t c = 0; c < offset.size(); ++c) {
-    const RigidBody& body = bodies[touches.body[c]];
-    const Vec3 beside = body.beside(model.points.position[touches.point[c]]);
-    if (touches.binding[c] == model::Binding::slides)
+    const RigidBody& body = bodies[pairs.body[c]];
+    const Vec3 beside = body.beside(model.points.position[pairs.point[c]]);
+    if (pairs.binding[c] == model::Binding::slides)
       offset[c] = body.distance(beside).value;
     else if (body.lower_bound(beside, 0) < 0)
       offset[c] = std::min(0.0, body.distance(beside).value);

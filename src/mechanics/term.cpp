@@ -25,7 +25,8 @@ const Term& term_of(const model::TermElements& elements) {
   const auto found = known_terms().find(elements.term);
   if (found == known_terms().end())
     base::refuse(
-        "the model has elements of an energy \"{}\", which this program does not know; use the one "
+        "the model has elements of an energy \"{}\", which this program does not define; use the "
+        "one "
         "that made it",
         elements.term);
   const Term& term = *found->second;

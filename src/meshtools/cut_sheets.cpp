@@ -49,7 +49,7 @@ Surface plane_sheet(const CutPlane& plane, const Surface& bone, double offset) {
 /// Each vertex moved so that the planes of the triangles around it move by `distance`, or by less
 /// where they are folded sharply.
 Surface offset_sheet(const Surface& sheet, double distance) {
-  constexpr double least_cosine = 0.3;
+  constexpr double min_cosine = 0.3;
   const auto normal_of = [&](const Triangle& t) {
     const auto& p = sheet.points;
     return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).normalized();
@@ -67,7 +67,7 @@ Surface offset_sheet(const Surface& sheet, double distance) {
     for (const int64_t i : t) cosine[i] = std::min(cosine[i], normals[i].dot(normal_of(t)));
   Surface moved = sheet;
   for (size_t i = 0; i < normals.size(); ++i)
-    moved.points[i] += distance / std::max(cosine[i], least_cosine) * normals[i];
+    moved.points[i] += distance / std::max(cosine[i], min_cosine) * normals[i];
   return moved;
 }
 

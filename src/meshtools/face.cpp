@@ -30,38 +30,39 @@ constexpr double thin = 0.93;   // cosine of an angle that is widened, 21.6°
 constexpr double folded = 0.2;  // cosine between a vertex' normal and that of a triangle around it
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-VertexNeighbours neighbours_of(const Surface& surface) {
+VertexNeighbors neighbors_of(const Surface& surface) {
   return {EdgeTable(surface.triangles), surface.points.size()};
 }
 
 /// mm along edges from the vertices within `near` of the bones, but for those at a scan's end.
-std::vector<double> way_from_bones(const Surface& skin, const VertexNeighbours& neighbours,
-                                   const std::vector<char>& end, const FaceRequest& request) {
+std::vector<double> path_length_from_bones(const Surface& skin, const VertexNeighbors& neighbors,
+                                           const std::vector<char>& end,
+                                           const FaceRequest& request) {
   using Entry = std::pair<double, int64_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
-  std::vector<double> way(skin.points.size(), infinite);
+  std::vector<double> length_to(skin.points.size(), infinite);
   const auto offer = [&](int64_t v, double length) {
-    if (end[v] || !(length < way[v])) return;
-    way[v] = length;
+    if (end[v] || !(length < length_to[v])) return;
+    length_to[v] = length;
     front.emplace(length, v);
   };
-  for (size_t v = 0; v < way.size(); ++v)
+  for (size_t v = 0; v < length_to.size(); ++v)
     for (const Vec3& place : request.places)
       if ((skin.points[v] - place).norm() <= request.near) offer(static_cast<int64_t>(v), 0);
   for (const Surface& bone : request.beneath) {
     const TriangleTree tree(bone);
-    for (size_t v = 0; v < way.size(); ++v)
+    for (size_t v = 0; v < length_to.size(); ++v)
       if (tree.any_within(skin.points[v], request.near * request.near) >= 0)
         offer(static_cast<int64_t>(v), 0);
   }
   while (!front.empty()) {
     const auto [length, v] = front.top();
     front.pop();
-    if (length > way[v]) continue;
-    for (const int64_t other : neighbours[v])
+    if (length > length_to[v]) continue;
+    for (const int64_t other : neighbors[v])
       offer(other, length + (skin.points[other] - skin.points[v]).norm());
   }
-  return way;
+  return length_to;
 }
 
 /// Vertices at the end of the scan.
@@ -76,7 +77,7 @@ std::vector<char> ends_of(const OuterSkin& outer) {
 }
 
 /// Makes the parts outside that the face surrounds a part of it, but where the scan ends.
-void fill(const VertexNeighbours& neighbours, const std::vector<char>& end,
+void fill(const VertexNeighbors& neighbors, const std::vector<char>& end,
           std::vector<double>& inside) {
   std::vector<char> seen(inside.size(), 0);
   std::vector<std::vector<int64_t>> parts;
@@ -85,7 +86,7 @@ void fill(const VertexNeighbours& neighbours, const std::vector<char>& end,
     std::vector<int64_t> part{static_cast<int64_t>(v)};
     seen[v] = 1;
     for (size_t next = 0; next < part.size(); ++next)
-      for (const int64_t other : neighbours[part[next]])
+      for (const int64_t other : neighbors[part[next]])
         if (!seen[other] && inside[other] < 0) {
           seen[other] = 1;
           part.push_back(other);
@@ -101,13 +102,13 @@ void fill(const VertexNeighbours& neighbours, const std::vector<char>& end,
   }
 }
 
-void smooth(const VertexNeighbours& neighbours, int rounds, std::vector<double>& values) {
+void smooth(const VertexNeighbors& neighbors, int rounds, std::vector<double>& values) {
   for (int round = 0; round < rounds; ++round) {
     const std::vector<double> old = values;
     for (size_t v = 0; v < values.size(); ++v) {
       double sum = old[v];
-      for (const int64_t other : neighbours[v]) sum += old[other];
-      values[v] = sum / static_cast<double>(neighbours[v].size() + 1);
+      for (const int64_t other : neighbors[v]) sum += old[other];
+      values[v] = sum / static_cast<double>(neighbors[v].size() + 1);
     }
   }
 }
@@ -133,21 +134,21 @@ void leave_open(const OuterSkin& outer, const Surface& given, std::vector<double
 
 /// The part of the outer skin that is solved.
 Surface region_of(const OuterSkin& outer, const Surface& given, const FaceRequest& request) {
-  const VertexNeighbours neighbours = neighbours_of(outer.skin);
+  const VertexNeighbors neighbors = neighbors_of(outer.skin);
   const std::vector<char> end = ends_of(outer);
   std::vector<double> inside(end.size(), request.margin);
   if (!request.regions.empty()) {
     for (size_t v = 0; v < end.size(); ++v)
       if (!in_any(request.regions, outer.skin.points[v])) inside[v] = -request.margin;
   } else if (!request.beneath.empty() || !request.places.empty()) {
-    inside = way_from_bones(outer.skin, neighbours, end, request);
+    inside = path_length_from_bones(outer.skin, neighbors, end, request);
     for (double& value : inside) value = request.margin - std::min(value, 2 * request.margin);
   }
   for (size_t v = 0; v < end.size(); ++v)
     if (end[v]) inside[v] = -request.margin;
   const double edge = even_edge(outer.skin);
-  smooth(neighbours, static_cast<int>(std::lround(border_smoothing / (edge * edge))), inside);
-  fill(neighbours, end, inside);
+  smooth(neighbors, static_cast<int>(std::lround(border_smoothing / (edge * edge))), inside);
+  fill(neighbors, end, inside);
   leave_open(outer, given, inside);
   const Surface part = cut_at_zero(outer.skin, inside);
   if (part.triangles.empty() && !request.regions.empty())
@@ -209,7 +210,7 @@ Sampled sample(const Surface& surface, double spacing) {
 }
 
 /// Draws the vertices along their normals to the samples within the tolerance.
-void fit(Sampled& samples, double tolerance, const VertexNeighbours& neighbours, Surface& face) {
+void fit(Sampled& samples, double tolerance, const VertexNeighbors& neighbors, Surface& face) {
   const TriangleTree tree(face);
   const std::vector<Vec3> normals = normals_of(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
@@ -226,7 +227,7 @@ void fit(Sampled& samples, double tolerance, const VertexNeighbours& neighbours,
     }
   }
   for (size_t v = 0; v < offset.size(); ++v) offset[v] = weight[v] > 0 ? offset[v] / weight[v] : 0;
-  smooth(neighbours, 1, offset);
+  smooth(neighbors, 1, offset);
   for (size_t v = 0; v < offset.size(); ++v) face.points[v] += offset[v] * normals[v];
 }
 
@@ -245,10 +246,10 @@ double greatest_cosine(const Corners& p) {
   return greatest;
 }
 
-/// Moves the corners of thin triangles towards the middle of their neighbours where that widens the
+/// Moves the corners of thin triangles towards the middle of their neighbors where that widens the
 /// least angle around them (smart Laplacian smoothing; Freitag, "On combining Laplacian and
 /// optimization-based mesh smoothing techniques", 1997).
-void widen_angles(const VertexNeighbours& neighbours, Surface& face) {
+void widen_angles(const VertexNeighbors& neighbors, Surface& face) {
   std::vector<std::vector<int64_t>> around(face.points.size());
   for (size_t t = 0; t < face.triangles.size(); ++t)
     for (const int64_t v : face.triangles[t]) around[v].push_back(static_cast<int64_t>(t));
@@ -265,7 +266,7 @@ void widen_angles(const VertexNeighbours& neighbours, Surface& face) {
       const double before = cosine_at(v);
       if (before <= thin) continue;
       const Vec3 old = face.points[v];
-      const Vec3 step = middle_of(neighbours[static_cast<int64_t>(v)], face.points) - old;
+      const Vec3 step = middle_of(neighbors[static_cast<int64_t>(v)], face.points) - old;
       for (double share = 1; share > 0.1; share /= 2) {
         face.points[v] = old + share * step;
         if (cosine_at(v) < before) break;
@@ -276,8 +277,8 @@ void widen_angles(const VertexNeighbours& neighbours, Surface& face) {
   }
 }
 
-/// Moves vertices on folds to the middle of their neighbours until none is.
-void unfold(const VertexNeighbours& neighbours, Surface& face) {
+/// Moves vertices on folds to the middle of their neighbors until none is.
+void unfold(const VertexNeighbors& neighbors, Surface& face) {
   for (int round = 0; round < relaxations; ++round) {
     const std::vector<Vec3> normals = normals_of(face), old = face.points;
     std::vector<char> moved(old.size(), 0);
@@ -290,7 +291,7 @@ void unfold(const VertexNeighbours& neighbours, Surface& face) {
     }
     if (std::count(moved.begin(), moved.end(), 1) == 0) return;
     for (size_t v = 0; v < moved.size(); ++v)
-      if (moved[v]) face.points[v] = middle_of(neighbours[static_cast<int64_t>(v)], old);
+      if (moved[v]) face.points[v] = middle_of(neighbors[static_cast<int64_t>(v)], old);
   }
 }
 
@@ -301,11 +302,11 @@ void measure(const Surface& near, Face& face) {
   for (const Vec3& point : face.skin.points) off.push_back(std::sqrt(tree.nearest(point).squared));
   std::sort(off.begin(), off.end());
   face.off_95 = off[static_cast<size_t>(0.95 * static_cast<double>(off.size() - 1))];
-  face.off_most = off.back();
+  face.off_max = off.back();
   double greatest = -1;
   for (const Triangle& triangle : face.skin.triangles)
     greatest = std::max(greatest, greatest_cosine(corners(face.skin, triangle)));
-  face.least_angle = std::acos(std::min(greatest, 1.0)) * 180 / std::numbers::pi;
+  face.min_angle = std::acos(std::min(greatest, 1.0)) * 180 / std::numbers::pi;
 }
 
 /// Openings of the given skin beside the face, and how many of them its border has.
@@ -329,12 +330,12 @@ Face solvable_face(const Surface& given, const FaceRequest& request) {
   const OuterSkin outer = outer_skin(given, rolling);
   face.skin = remesh(region_of(outer, given, request), request.edge);
   count_openings(outer, face);
-  const VertexNeighbours neighbours = neighbours_of(face.skin);
-  widen_angles(neighbours, face.skin);
+  const VertexNeighbors neighbors = neighbors_of(face.skin);
+  widen_angles(neighbors, face.skin);
   const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
   Sampled samples = sample(near, request.edge / 2);
-  for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbours, face.skin);
-  unfold(neighbours, face.skin);
+  for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbors, face.skin);
+  unfold(neighbors, face.skin);
   measure(near, face);
   face.skin.name = given.name;
   return face;

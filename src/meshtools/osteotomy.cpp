@@ -113,8 +113,8 @@ class Sorter {
       for (const int64_t cell : cells_.cells[t])
         for (const int64_t point : cells_.triangles[t]) {
           const double distance = (cells_.points[point] - plane.point).dot(normal);
-          double& most = farthest[cell];
-          if (std::abs(distance) > std::abs(most)) most = distance;
+          double& maximum = farthest[cell];
+          if (std::abs(distance) > std::abs(maximum)) maximum = distance;
         }
     for (auto& [cell, what] : touched_)
       if (what.cut() && farthest[cell] < -plan_.kerf / 2 - slack) what.behind = true;
@@ -154,16 +154,16 @@ class Sorter {
   std::string where() const {
     if (plan_.planes.size() != 1 || plan_.surface) return "; move the cut, or name another bone";
     const CutPlane& plane = plan_.planes[0];
-    double least = std::numeric_limits<double>::infinity(), most = -least;
+    double minimum = std::numeric_limits<double>::infinity(), maximum = -minimum;
     for (const Vec3& p : bone_.points) {
       const double distance = (p - plane.point).dot(plane.normal.normalized());
-      least = std::min(least, distance);
-      most = std::max(most, distance);
+      minimum = std::min(minimum, distance);
+      maximum = std::max(maximum, distance);
     }
     return fmt::format(
         ", which lies {:.1f} to {:.1f} mm in front of its plane; move the plane's point along its "
         "normal by a distance between{}",
-        least, most, std::isfinite(plane.radius) ? ", or give a greater radius" : "");
+        minimum, maximum, std::isfinite(plane.radius) ? ", or give a greater radius" : "");
   }
 
   /// The piece is the cell around the seed, the kerf what the saw took; all else stays.

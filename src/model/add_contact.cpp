@@ -31,25 +31,25 @@ std::vector<double> layer_areas(const SkinMesh& mesh, const Model& model) {
   return area;
 }
 
-void add(int64_t point, int32_t body, Binding binding, double area, Touches& touches) {
-  touches.point.push_back(point);
-  touches.body.push_back(body);
-  touches.binding.push_back(binding);
-  touches.area.push_back(area);
+void add(int64_t point, int32_t body, Binding binding, double area, ContactPairs& pairs) {
+  pairs.point.push_back(point);
+  pairs.body.push_back(body);
+  pairs.binding.push_back(binding);
+  pairs.area.push_back(area);
 }
 
 /// Free points against the bones that they may come to.
-void touch_bones(const scene::Scene& scene, const Attachment& attachment,
-                 const std::vector<double>& area, Model& model) {
+void add_bone_contact(const scene::Scene& scene, const Attachment& attachment,
+                      const std::vector<double>& area, Model& model) {
   for (size_t b = 0; b < model.bones.size(); ++b)
     model.contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
   const bool touching = scene.contact && scene.contact->bones;
   std::vector<surface::TriangleTree> trees(model.bone_surfaces.begin(), model.bone_surfaces.end());
-  std::vector<double> way;
+  std::vector<double> travel;
   const MotionRange range(scene, model.bone_surfaces);
   for (size_t b = 0; b < model.bones.size(); ++b)
-    way.push_back(range.travel(model.bone_surfaces[b], static_cast<int32_t>(b)));
-  const double farthest = way.empty() ? 0 : *std::max_element(way.begin(), way.end());
+    travel.push_back(range.travel(model.bone_surfaces[b], static_cast<int32_t>(b)));
+  const double farthest = travel.empty() ? 0 : *std::max_element(travel.begin(), travel.end());
   const size_t layers = area.size() / std::max<size_t>(attachment.bone.size(), 1);
   for (size_t p = 0; p < area.size(); ++p) {
     if (model.points.set[p] != PointSet::soft_tissue) continue;
@@ -57,12 +57,12 @@ void touch_bones(const scene::Scene& scene, const Attachment& attachment,
     const int32_t slides_on = p % layers == layers - 1 ? attachment.slides_on[column] : -1;
     for (int32_t b = 0; b < static_cast<int32_t>(trees.size()); ++b) {
       const auto row = static_cast<int64_t>(p);
-      const double reach = way[b] + farthest + margin;
+      const double reach = travel[b] + farthest + margin;
       if (b == slides_on)
-        add(row, b, Binding::slides, area[p], model.contact.touches);
+        add(row, b, Binding::slides, area[p], model.contact.pairs);
       else if (touching && !attachment.free[column] &&
                trees[b].any_within(model.points.position[p], reach * reach) >= 0)
-        add(row, b, Binding::touches, area[p], model.contact.touches);
+        add(row, b, Binding::touches, area[p], model.contact.pairs);
     }
   }
 }
@@ -80,8 +80,8 @@ Body::Shape shape_of(const scene::Instrument& instrument) {
 
 /// Free points of the skin against an instrument: those that slide on it, or those around what it
 /// holds.
-void touch_instrument(const scene::Scene& scene, size_t number, const std::vector<double>& area,
-                      Model& model) {
+void add_instrument_contact(const scene::Scene& scene, size_t number,
+                            const std::vector<double>& area, Model& model) {
   const scene::Instrument& instrument = scene.instruments[number];
   const auto body = static_cast<int32_t>(model.contact.bodies.size());
   model.contact.bodies.push_back(
@@ -90,7 +90,7 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
   bool met = !instrument.slide;
   for (size_t p = 0; p < area.size(); ++p) {
     if (model.points.layer[p] != 0 || model.points.set[p] != PointSet::soft_tissue) continue;
-    add(static_cast<int64_t>(p), body, Binding::touches, area[p], model.contact.touches);
+    add(static_cast<int64_t>(p), body, Binding::touches, area[p], model.contact.pairs);
     const auto part = pushed.along(model.points.position[p]);
     met = met || (part && part->enter <= instrument.push.norm() && part->leave > 0);
   }
@@ -103,21 +103,21 @@ void touch_instrument(const scene::Scene& scene, size_t number, const std::vecto
 
 /// mm, the 2nd percentile of the thickness of bone that is near the deep end of a column, along the
 /// way from there into the bone; `most` if that is larger.
-double thin_bone(const Foundation& on, double most) {
+double thin_bone(const ColumnLayout& layout, double maximum) {
   constexpr double near = 20, start = 0.01, share = 0.02;  // mm, mm, of the rays
   constexpr size_t rays = 1000;
   std::vector<double> thickness;
-  const std::vector<Vec3>& deep = on.columns.deep;
+  const std::vector<Vec3>& deep = layout.columns.deep;
   for (size_t c = 0; c < deep.size(); c += 1 + deep.size() / rays) {
-    const BoneField::Nearest bone = on.field.nearest(deep[c]);
+    const BoneField::Nearest bone = layout.field.nearest(deep[c]);
     if (!(bone.distance < near)) continue;
     const Vec3 into =
-        bone.distance > 10 * start ? bone.point - deep[c] : deep[c] - on.mesh.points[c];
+        bone.distance > 10 * start ? bone.point - deep[c] : deep[c] - layout.mesh.points[c];
     const Vec3 direction = into.normalized();
-    const auto exit = on.field.first_hit(bone.point + start * direction, direction, most);
-    thickness.push_back(exit ? start + exit->distance : most);
+    const auto exit = layout.field.first_hit(bone.point + start * direction, direction, maximum);
+    thickness.push_back(exit ? start + exit->distance : maximum);
   }
-  if (thickness.empty()) return most;
+  if (thickness.empty()) return maximum;
   const auto thin =
       thickness.begin() + static_cast<int64_t>(share * static_cast<double>(thickness.size()));
   std::nth_element(thickness.begin(), thin, thickness.end());
@@ -126,43 +126,43 @@ double thin_bone(const Foundation& on, double most) {
 
 }  // namespace
 
-double grid_spacing(const scene::Scene& scene, const Foundation& on) {
+double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout) {
   constexpr double finest = 0.5;  // mm
   if (scene.contact && scene.contact->grid) return *scene.contact->grid;
   if (!scene.osteotomies.empty()) return finest;  // edges that a saw leaves are sharp
   constexpr double coarsest = 0.6;                // mm
-  return std::clamp(thin_bone(on, 2 * coarsest) / 2, finest, coarsest);
+  return std::clamp(thin_bone(layout, 2 * coarsest) / 2, finest, coarsest);
 }
 
-void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                 Model& model) {
-  touch_bones(scene, attachment, layer_areas(mesh, model), model);
+void add_bone_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                      Model& model) {
+  add_bone_contact(scene, attachment, layer_areas(mesh, model), model);
 }
 
-void add_contact(const scene::Scene& scene, const Foundation& on, Model& model) {
+void add_contact(const scene::Scene& scene, const ColumnLayout& layout, Model& model) {
   Contact& contact = model.contact;
-  const SkinMesh& mesh = on.mesh;
+  const SkinMesh& mesh = layout.mesh;
   const std::vector<double> area = layer_areas(mesh, model);
-  touch_bones(scene, on.attachment, area, model);
+  add_bone_contact(scene, layout.attachment, area, model);
   for (size_t i = 0; i < scene.instruments.size(); ++i)
     if (scene.instruments[i].slide || (scene.contact && scene.contact->bones))
-      touch_instrument(scene, i, area, model);
-  if (contact.touches.point.empty()) contact.bodies.clear();
-  contact.spacing = grid_spacing(scene, on);
+      add_instrument_contact(scene, i, area, model);
+  if (contact.pairs.point.empty()) contact.bodies.clear();
+  contact.spacing = grid_spacing(scene, layout);
   const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
   contact.stiffness = contact_stiffness(scene, column_sums(model, layers));
 }
 
-void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
-  Touches& touches = model.contact.touches;
+void share_pairs(const std::vector<std::array<int64_t, 2>>& twins, Model& model) {
+  ContactPairs& pairs = model.contact.pairs;
   std::map<int64_t, int64_t> twin_of;
-  for (const auto& [row, twin] : pairs) twin_of[row] = twin;
-  const size_t before = touches.point.size();
+  for (const auto& [row, twin] : twins) twin_of[row] = twin;
+  const size_t before = pairs.point.size();
   for (size_t c = 0; c < before; ++c) {
-    const auto twin = twin_of.find(touches.point[c]);
+    const auto twin = twin_of.find(pairs.point[c]);
     if (twin == twin_of.end()) continue;
-    touches.area[c] /= 2;
-    add(twin->second, touches.body[c], touches.binding[c], touches.area[c], touches);
+    pairs.area[c] /= 2;
+    add(twin->second, pairs.body[c], pairs.binding[c], pairs.area[c], pairs);
   }
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "foundation.h"
+#include "column_layout.h"
 #include "repose/model/model.h"
 
 namespace repose::model {
@@ -9,21 +9,21 @@ namespace repose::model {
 /// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
 /// its median thickness. Throws InputError naming the scene and an instrument that reaches no free
 /// point of the skin.
-void add_contact(const scene::Scene& scene, const Foundation& on, Model& model);
+void add_contact(const scene::Scene& scene, const ColumnLayout& layout, Model& model);
 
 /// Adds the bones alone, and the points that may reach them; also for a part of a model.
-void touch_bones(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                 Model& model);
+void add_bone_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                      Model& model);
 
 /// Returns the spacing of the grids of distances, mm: the scene's, or half the thickness of thin
 /// bone near the tissue, which a coarser grid would miss, but 0.5 mm at least and 1 mm at most.
-double grid_spacing(const scene::Scene& scene, const Foundation& on);
+double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout);
 
 /// Doubled points, whose pairs are given, touch what the points touched, with half the area each.
-void share_touches(const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
+void share_pairs(const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
 
 /// The sides of a cut made by cut_along, whose pairs of doubled points are given, do not pass one
 /// another any more.
-void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
+void add_cut_faces(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model);
 
 }  // namespace repose::model

@@ -15,18 +15,19 @@ namespace repose::model {
 
 /// Values that the numbers of an array may have.
 struct Limits {
-  double least, most;
+  double minimum, maximum;
   const char* unit;
   bool above = false;       ///< the least value is not allowed itself
   const char* remedy = "";  ///< behind the range
 
   bool contains(double value) const {
-    return std::isfinite(value) && value <= most && (above ? value > least : value >= least);
+    return std::isfinite(value) && value <= maximum && (above ? value > minimum : value >= minimum);
   }
   std::string text() const {
-    const std::string range = least == 0 ? fmt::format("a finite number{} and at most {:g}",
-                                                       above ? " above 0" : ", 0 or more", most)
-                                         : fmt::format("{} to {}", least, most);
+    const std::string range = minimum == 0
+                                  ? fmt::format("a finite number{} and at most {:g}",
+                                                above ? " above 0" : ", 0 or more", maximum)
+                                  : fmt::format("{} to {}", minimum, maximum);
     return *remedy ? fmt::format("{}: {}", range, remedy) : range;
   }
 };

@@ -15,12 +15,12 @@ constexpr double farthest = 1.5;            // mm
 constexpr double farthest_per_depth = 0.5;  // of the column's thickness
 
 /// Returns the requested attachment of each column, by region.
-std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& scene,
-                                  Attachment& attachment) {
+std::vector<scene::Attach> requested_attachments(const Columns& columns, const scene::Scene& scene,
+                                                 Attachment& attachment) {
   const scene::Tissue& tissue = scene.tissue;
   constexpr double near = 2;  // mm: columns end on the surface of what is segmented
-  constexpr std::array words = {"hold to it", "slide along it", "touch it", "do not know of it"};
-  std::vector<scene::Attach> wish(columns.deep.size(), tissue.attach);
+  constexpr std::array words = {"hold to it", "slide along it", "touch it", "ignore it"};
+  std::vector<scene::Attach> requested(columns.deep.size(), tissue.attach);
   for (size_t k = 0; k < tissue.attach_regions.size(); ++k) {
     const scene::Region& where = tissue.attach_regions[k].where;
     const scene::Attach how = tissue.attach_regions[k].attach;
@@ -30,7 +30,7 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& sc
     int64_t met = 0;
     for (size_t v = 0; v < columns.deep.size(); ++v) {
       if (attachment.bone[v] < 0 || !inside(columns.deep[v])) continue;
-      wish[v] = how;
+      requested[v] = how;
       ++met;
     }
     if (met == 0 && how == scene::Attach::slide)
@@ -43,13 +43,13 @@ std::vector<scene::Attach> wishes(const Columns& columns, const scene::Scene& sc
         fmt::format("attach region {}: {} columns end at bone there and {}", k, met,
                     words[static_cast<size_t>(how)]));
   }
-  return wish;
+  return requested;
 }
 
 }  // namespace
 
 void open_gaps(const std::vector<Vec3>& skin, const scene::Scene& scene, Columns& columns) {
-  constexpr double most = 1.0 / 3;  // of a column
+  constexpr double maximum = 1.0 / 3;  // of a column
   const auto& regions = scene.tissue.attach_regions;
   if (std::ranges::none_of(regions, [](const auto& region) { return region.gap > 0; })) return;
   std::vector<double> gaps(columns.deep.size(), 0);
@@ -59,7 +59,7 @@ void open_gaps(const std::vector<Vec3>& skin, const scene::Scene& scene, Columns
       if (columns.holds[v] && inside(columns.deep[v])) gaps[v] = region.gap;
   }
   for (size_t v = 0; v < gaps.size(); ++v) {
-    const double shorter = std::min(gaps[v], most * columns.thickness[v]);
+    const double shorter = std::min(gaps[v], maximum * columns.thickness[v]);
     if (!(shorter > 0)) continue;
     columns.deep[v] += shorter / columns.thickness[v] * (skin[v] - columns.deep[v]);
     columns.thickness[v] -= shorter;
@@ -88,9 +88,9 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];
   }
-  const std::vector<scene::Attach> wish = wishes(columns, scene, attachment);
-  for (size_t v = 0; v < wish.size(); ++v)
-    if (attachment.bone[v] >= 0) attachment.settle(v, wish[v]);
+  const std::vector<scene::Attach> requested = requested_attachments(columns, scene, attachment);
+  for (size_t v = 0; v < requested.size(); ++v)
+    if (attachment.bone[v] >= 0) attachment.settle(v, requested[v]);
   return attachment;
 }
 

@@ -7,7 +7,7 @@
 
 namespace repose::model {
 
-/// All bones at their initial position, asked together. Rows of `bones` are those of the scene.
+/// All bones at their initial position, queried together. Rows of `bones` are those of the scene.
 class BoneField {
  public:
   /// One tree a bone, O(T log T).

@@ -1,7 +1,7 @@
 #include "repose/model/build.h"
 
 #include "add_contact.h"
-#include "foundation.h"
+#include "column_layout.h"
 #include "layers.h"
 #include "load_entry.h"
 #include "loads.h"
@@ -40,7 +40,7 @@ void complete(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
   else
     set_stiffness(scene.tissue, mesh, model);
   set_masses(scene.tissue, mesh, model);
-  spread_forces(scene, mesh, model);
+  distribute_forces(scene, mesh, model);
   model.gravity = scene.gravity.value_or(Vec3::Zero());
 }
 
@@ -48,7 +48,7 @@ void complete(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
 
 BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones) {
-  Foundation on = lay_foundation(scene, skin, bones);
+  ColumnLayout on = lay_out_columns(scene, skin, bones);
   BuiltModel built;
   built.model =
       make_layers(on.mesh, on.columns.deep, layer_depths(scene.tissue), scene.tissue.depths_mm,
@@ -79,10 +79,10 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   anatomy.warnings = std::move(bones.warnings);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
   anatomy::complete(anatomy.skin, anatomy.bones, anatomy.scene, anatomy.remarks);
-  heed_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
+  resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
   report_initial_overlaps(anatomy.bones, scene, anatomy.warnings);
   if (scene.tissue.edge)
-    solve_remeshed(anatomy);
+    remesh_skin(anatomy);
   else if (!given.obstacle.empty() && !replace_given_skin(anatomy, given.obstacle))
     anatomy.skin = surface::accept_surface(anatomy.skin, surface::Role::skin);
   return anatomy;

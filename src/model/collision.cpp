@@ -62,7 +62,7 @@ struct Mover {
   }
 };
 
-void look_at_the_end(Mover& a, Mover& b, BonePair& pair) {
+void check_end_state(Mover& a, Mover& b, BonePair& pair) {
   const Mat4 pose = relative(a.motion, b.motion, 1);
   if (!surface::touch(a.tree, b.tree, pose)) return;
   pair.crossings = static_cast<int64_t>(
@@ -89,8 +89,8 @@ std::pair<surface::CollisionTree, surface::CollisionTree> finer(const Mover& a, 
   return {one(a, b), one(b, a)};
 }
 
-void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) {
-  const double touching = wanted.clearance + 2 * wanted.tolerance;
+void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pair) {
+  const double touching = requested.clearance + 2 * requested.tolerance;
   std::optional<std::pair<surface::CollisionTree, surface::CollisionTree>> fine;
   if (pair.gap <= touching) fine.emplace(finer(a, b, touching));
   surface::Encounter encounter(fine ? fine->first : a.tree, fine ? fine->second : b.tree,
@@ -98,15 +98,15 @@ void follow(Mover& a, Mover& b, const scene::Collision& wanted, BonePair& pair) 
   pair.ignored = encounter.ignored_triangles();
   constexpr double caution = 1 - 1e-9;  // of a step: twists are rounded
   for (double load = 0; load <= 1;) {
-    const auto next = encounter.next(relative(a.motion, b.motion, load), wanted.clearance);
-    if (next.approach.distance <= wanted.clearance + wanted.tolerance) {
+    const auto next = encounter.next(relative(a.motion, b.motion, load), requested.clearance);
+    if (next.approach.distance <= requested.clearance + requested.tolerance) {
       pair.load = load;
       pair.at = a.motion.apply(next.approach.at, load);
       break;
     }
     load += caution * next.load;
   }
-  if (pair.contact()) look_at_the_end(a, b, pair);
+  if (pair.contact()) check_end_state(a, b, pair);
 }
 
 std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
@@ -118,8 +118,8 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
 }
 
 /// Remarks on bones that end inside others, of a scene that has no key collision.
-void tell_of_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
-                      std::vector<std::string>& remarks) {
+void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
+                     std::vector<std::string>& remarks) {
   constexpr double worth_saying = 1;  // mm: segmented teeth overlap by some tenths
   const auto as_the_first = [&](const scene::RigidMotion& m) {
     return move_alike(m, scene.moves[0]);
@@ -130,12 +130,13 @@ void tell_of_overlaps(const std::vector<surface::Surface>& bones, const scene::S
     for (size_t j = i + 1; j < bones.size(); ++j) {
       if (move_alike(scene.moves[i], scene.moves[j])) continue;
       BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
-      look_at_the_end(movers[i], movers[j], pair);
+      check_end_state(movers[i], movers[j], pair);
       if (pair.depth > worth_saying)
-        remarks.push_back(fmt::format(
-            "bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide tells where they "
-            "meet, and collision: {{mode: clamp}} moves them no farther",
-            scene.bones[i].name, scene.bones[j].name, pair.depth));
+        remarks.push_back(
+            fmt::format("bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide "
+                        "reports where they "
+                        "meet, and collision: {{mode: clamp}} moves them no farther",
+                        scene.bones[i].name, scene.bones[j].name, pair.depth));
     }
 }
 
@@ -166,7 +167,7 @@ void report_initial_overlaps(const std::vector<surface::Surface>& bones, const s
 
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
-                             const scene::Collision& wanted) {
+                             const scene::Collision& requested) {
   std::vector<Mover> movers = movers_of(bones, moves);
   CollisionReport report;
   for (size_t i = 0; i < bones.size(); ++i)
@@ -174,7 +175,7 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
       if (move_alike(moves[i], moves[j])) continue;
       BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
       pair.gap = surface::nearest(movers[i].tree, movers[j].tree, Mat4::Identity())->distance;
-      follow(movers[i], movers[j], wanted, pair);
+      follow(movers[i], movers[j], requested, pair);
       report.safe_load = std::min(report.safe_load, pair.load);
       report.pairs.push_back(pair);
     }
@@ -182,7 +183,7 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
 }
 
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
-                                  const scene::Collision& wanted) {
+                                  const scene::Collision& requested) {
   std::vector<std::string> lines;
   for (const BonePair& pair : report.pairs) {
     const std::string start = pair.gap > 0 ? fmt::format("{:.2f} mm apart", pair.gap) : "touching";
@@ -190,26 +191,26 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
         fmt::format("bones '{}' and '{}', {} at the start: ", scene.bones[pair.a].name,
                     scene.bones[pair.b].name, start);
     if (!pair.contact())
-      line += wanted.clearance > 0 ? fmt::format("stay {} mm apart", wanted.clearance)
-                                   : std::string("do not come to touch");
+      line += requested.clearance > 0 ? fmt::format("stay {} mm apart", requested.clearance)
+                                      : std::string("do not come to touch");
     else
       line += fmt::format("come within {} mm at load {:.4f}, at ({:.1f}, {:.1f}, {:.1f})",
-                          wanted.clearance + wanted.tolerance, pair.load, pair.at.x(), pair.at.y(),
-                          pair.at.z());
+                          requested.clearance + requested.tolerance, pair.load, pair.at.x(),
+                          pair.at.y(), pair.at.z());
     if (pair.crossings > 0)
       line += fmt::format("; at the end {} pairs of triangles cross, {:.2f} mm deep",
                           pair.crossings, pair.depth);
     if (pair.ignored > 0)
       line += fmt::format("; {} triangles that touch from the start (within {} mm) are not counted",
-                          pair.ignored, wanted.clearance + 2 * wanted.tolerance);
+                          pair.ignored, requested.clearance + 2 * requested.tolerance);
     lines.push_back(line);
   }
   return lines;
 }
 
-void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                     std::vector<std::string>& remarks) {
-  if (!scene.collision) return tell_of_overlaps(bones, scene, remarks);
+void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
+                        std::vector<std::string>& remarks) {
+  if (!scene.collision) return report_overlaps(bones, scene, remarks);
   const CollisionReport report = follow_moves(bones, scene.moves, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
   remarks.insert(remarks.end(), lines.begin(), lines.end());

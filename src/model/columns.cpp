@@ -26,7 +26,7 @@ std::vector<double> smoothing_length(const std::vector<BoneField::Nearest>& near
   return length;
 }
 
-/// Bends columns that cross towards their neighbours, as long as that helps; returns how many.
+/// Bends columns that cross towards their neighbors, as long as that helps; returns how many.
 /// `lay` finds the thickness again after those given were bent.
 int64_t bend_folded(const SkinMesh& mesh, const std::vector<Cone>& cones,
                     const std::function<void(const std::vector<int64_t>&)>& lay,
@@ -48,9 +48,9 @@ int64_t bend_folded(const SkinMesh& mesh, const std::vector<Cone>& cones,
 
 }  // namespace
 
-Columns lay_columns(const SkinMesh& mesh, const BoneField& bones,
-                    const std::vector<BoneField::Nearest>& nearest, const scene::Tissue& tissue,
-                    const std::string& skin_name) {
+Columns compute_columns(const SkinMesh& mesh, const BoneField& bones,
+                        const std::vector<BoneField::Nearest>& nearest, const scene::Tissue& tissue,
+                        const std::string& skin_name) {
   const std::vector<Cone> cones = inward_cones(mesh, skin_name);
   std::vector<Vec3> directions = column_directions(mesh, cones, nearest, tissue.attach_within,
                                                    smoothing_length(nearest, tissue));
@@ -60,7 +60,7 @@ Columns lay_columns(const SkinMesh& mesh, const BoneField& bones,
               std::vector<char>(vertices)};
   std::vector<double> laid;
   const auto lay = [&](const std::vector<int64_t>& changed) {
-    cast_columns(mesh, skin, changed, directions, nearest, bones, tissue, reach);
+    trace_columns(mesh, skin, changed, directions, nearest, bones, tissue, reach);
     laid = column_thickness(mesh, reach, tissue.free_thickness);
   };
   std::vector<int64_t> all(vertices);

@@ -18,9 +18,9 @@ std::vector<Triangle> column_triangles(const Model& model) {
 }
 
 /// Parts a model along one cut.
-class Knife {
+class CutSplitter {
  public:
-  Knife(const Cut& cut, Model& model)
+  CutSplitter(const Cut& cut, Model& model)
       : model_(model),
         cut_(cut),
         sides_(cut.columns, column_triangles(model)),
@@ -121,7 +121,7 @@ class Knife {
     springs.reference.push_back(before.reference[row]);
   }
   /// The ends of a spring or edge that lies beside the cut, on its side.
-  void go_to_side(int64_t& p, int64_t& q) const {
+  void move_to_side(int64_t& p, int64_t& q) const {
     const int64_t a = column(p), b = column(q);
     if (doubled(p) && sides_.left_edge(a, b)) p = doubles_[p];
     if (doubled(q) && sides_.left_edge(b, a)) q = doubles_[q];
@@ -137,7 +137,7 @@ class Knife {
         add_spring(j, {double_of(p), double_of(q)}, share, springs);
         continue;
       }
-      go_to_side(p, q);
+      move_to_side(p, q);
       add_spring(j, {p, q}, 1, springs);
     }
     model_.springs = std::move(springs);
@@ -171,7 +171,7 @@ class Knife {
         add_to_edge(double_of(p), double_of(q), share * beyond[j]);
         continue;
       }
-      go_to_side(p, q);
+      move_to_side(p, q);
       add_to_edge(p, q, beyond[j]);
     }
   }
@@ -203,9 +203,9 @@ class Knife {
 }  // namespace
 
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model) {
-  std::vector<std::array<int64_t, 2>> pairs = Knife(cut, model).run();
-  share_touches(pairs, model);
-  if (cut.meets) add_walls(cut, pairs, model);
+  std::vector<std::array<int64_t, 2>> pairs = CutSplitter(cut, model).run();
+  share_pairs(pairs, model);
+  if (cut.meets) add_cut_faces(cut, pairs, model);
   return pairs;
 }
 

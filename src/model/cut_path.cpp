@@ -19,7 +19,7 @@ constexpr double spacing = 0.5;  // of an edge, between points of the path
 
 using Chain = std::vector<int64_t>;
 
-std::string shown(const Vec3& x) {
+std::string format_point(const Vec3& x) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", x[0], x[1], x[2]);
 }
 
@@ -63,7 +63,7 @@ class PathCutter {
     refuse(
         "the path from {} to {} is no longer than an edge of the skin there; lengthen it or "
         "refine the skin",
-        shown(path.front()), shown(path.back()));
+        format_point(path.front()), format_point(path.back()));
   }
 
   /// The points of the path, put on the skin, without those that lie too close together.
@@ -78,7 +78,7 @@ class PathCutter {
         refuse(
             "point {} of the path, {}, is {:.1f} mm from the skin, allowed are {} mm; put the "
             "path on the skin",
-            i, shown(path[i]), foot.distance, reach);
+            i, format_point(path[i]), foot.distance, reach);
       if (before) length += (foot.point - *before).norm();
       before = foot.point;
       edge = mesh_.edge_length(foot.triangle);
@@ -99,11 +99,11 @@ class PathCutter {
     const Triangle t = mesh_.triangle(row);
     const Vec3 weight =
         surface::barycentric({mesh_.point(t[0]), mesh_.point(t[1]), mesh_.point(t[2])}, x);
-    Eigen::Index largest = 0, least = 0;
+    Eigen::Index largest = 0, minimum = 0;
     if (weight.maxCoeff(&largest) > 1 - snap) return t[largest];
-    if (weight.minCoeff(&least) > snap) return mesh_.split_triangle(row, x);
-    const int64_t a = t[(least + 1) % 3], b = t[(least + 2) % 3];
-    const double w = weight[(least + 2) % 3] / (1 - weight[least]);
+    if (weight.minCoeff(&minimum) > snap) return mesh_.split_triangle(row, x);
+    const int64_t a = t[(minimum + 1) % 3], b = t[(minimum + 2) % 3];
+    const double w = weight[(minimum + 2) % 3] / (1 - weight[minimum]);
     return on_edge(a, b, std::clamp(w, 0.0, 1.0));
   }
 
@@ -119,18 +119,18 @@ class PathCutter {
     refuse(
         "the path leaves the skin near {} on its way to {}; keep it inside its rim, and give "
         "more points where the skin bends",
-        shown(from), shown(to));
+        format_point(from), format_point(to));
   }
 
   [[noreturn]] void refuse_meeting(const Vec3& at) const {
     refuse("the path meets itself or another incision near {}; cuts must not cross or touch",
-           shown(at));
+           format_point(at));
   }
 
   void append(int64_t vertex) {
     if (mesh_.on_border(vertex))
-      refuse("the path comes to the rim of the skin near {}; keep it inside",
-             shown(mesh_.point(vertex)));
+      refuse("the path reaches the rim of the skin near {}; keep it inside",
+             format_point(mesh_.point(vertex)));
     if (!taken_.insert(vertex).second) refuse_meeting(mesh_.point(vertex));
     if (!chain_.empty())
       edges_.insert({std::min(chain_.back(), vertex), std::max(chain_.back(), vertex)});
@@ -140,9 +140,9 @@ class PathCutter {
   /// Goes on along the skin from one vertex to another.
   void run(int64_t from, int64_t to) {
     const Vec3 normal = (vertex_normal(mesh_, from) + vertex_normal(mesh_, to)).normalized();
-    const size_t most = chain_.size() + skin_.triangles.size();
+    const size_t maximum = chain_.size() + skin_.triangles.size();
     while (!mesh_.has_edge(chain_.back(), to)) {
-      if (chain_.size() > most) refuse_lost(mesh_.point(from), mesh_.point(to));
+      if (chain_.size() > maximum) refuse_lost(mesh_.point(from), mesh_.point(to));
       append(next(chain_.back(), to, normal));
     }
     append(to);
@@ -150,8 +150,8 @@ class PathCutter {
 
   /// Where the plane through two vertices along `normal` leaves the triangles around the first.
   int64_t next(int64_t vertex, int64_t to, const Vec3& normal) {
-    const Vec3 &here = mesh_.point(vertex), way = mesh_.point(to) - here;
-    const Vec3 across = normal.cross(way), ahead = across.cross(normal);
+    const Vec3 &here = mesh_.point(vertex), heading = mesh_.point(to) - here;
+    const Vec3 across = normal.cross(heading), ahead = across.cross(normal);
     struct {
       double ahead = 0, w = 0;
       int64_t a = -1, b = -1;

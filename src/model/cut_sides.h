@@ -26,7 +26,7 @@ class CutSides {
   bool left_triangle(int64_t vertex, const Triangle& corners) const;
 
  private:
-  /// Finds what lies left of a parted vertex between its neighbours on the path.
+  /// Finds what lies left of a parted vertex between its neighbors on the path.
   void walk(int64_t before, int64_t vertex, int64_t after, const std::vector<Triangle>& triangles,
             const std::vector<int64_t>& around);
 

@@ -10,7 +10,7 @@
 namespace repose::model {
 namespace {
 
-constexpr double wanted_cosine = 0.3;     // 72.5° to each triangle's normal
+constexpr double target_cosine = 0.3;     // 72.5° to each triangle's normal
 constexpr double smallest_cosine = 0.02;  // of the cone's axis: below it the skin is folded
 constexpr int local_rounds = 4;
 
@@ -24,7 +24,7 @@ std::pair<Vec3, double> worst_normal(const SkinMesh& mesh, int64_t v, const Vec3
   return worst;
 }
 
-/// Centre of the smallest cap that holds all normals around `v` (Badoiu & Clarkson 2003: step
+/// Center of the smallest cap that holds all normals around `v` (Badoiu & Clarkson 2003: step
 /// towards the furthest by 1/k), the direction with the largest smallest cosine.
 Cone widest_cone(const SkinMesh& mesh, int64_t v) {
   Vec3 axis = mesh.vertex_normal[v];
@@ -78,7 +78,7 @@ std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_nam
   for (size_t v = 0; v < cones.size(); ++v) {
     cones[v] = widest_cone(mesh, v);
     if (!(cones[v].cosine >= smallest_cosine)) folded.push_back(static_cast<int64_t>(v));
-    cones[v].cosine = std::min(wanted_cosine, 0.7 * cones[v].cosine);
+    cones[v].cosine = std::min(target_cosine, 0.7 * cones[v].cosine);
   }
   if (!folded.empty())
     refuse_places(skin_name, mesh, folded,
@@ -91,16 +91,16 @@ std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone
                                     const std::vector<BoneField::Nearest>& nearest,
                                     double attach_within, const std::vector<double>& length) {
   const auto vertices = static_cast<int64_t>(mesh.points.size());
-  Eigen::MatrixXd wanted(vertices, 3);
+  Eigen::MatrixXd requested(vertices, 3);
   std::vector<double> weight(vertices);
   for (int64_t v = 0; v < vertices; ++v) {
     const Vec3& normal = mesh.vertex_normal[v];
     const Vec3 towards = (nearest[v].point - mesh.points[v]).normalized();
     const double t = trust(normal, towards, nearest[v].distance, attach_within);
-    wanted.row(v) = (t * towards + (1 - t) * normal).normalized();
+    requested.row(v) = (t * towards + (1 - t) * normal).normalized();
     weight[v] = 0.2 + 0.8 * t;
   }
-  const Eigen::MatrixXd smoothed = smooth_field(mesh, wanted, weight, length);
+  const Eigen::MatrixXd smoothed = smooth_field(mesh, requested, weight, length);
   std::vector<Vec3> directions(vertices);
   for (int64_t v = 0; v < vertices; ++v)
     directions[v] = into_cone(mesh, v, cones[v], smoothed.row(v).transpose().normalized());

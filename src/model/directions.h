@@ -24,7 +24,7 @@ std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone
                                     const std::vector<BoneField::Nearest>& nearest,
                                     double attach_within, const std::vector<double>& length);
 
-/// Averages the directions of `vertices` with their neighbours' and puts them back into their
+/// Averages the directions of `vertices` with their neighbors' and puts them back into their
 /// cones.
 void bend(const SkinMesh& mesh, const std::vector<Cone>& cones,
           const std::vector<int64_t>& vertices, std::vector<Vec3>& directions);

@@ -10,18 +10,18 @@
 namespace repose::model {
 namespace {
 
-constexpr double least_margin = 0.05;
+constexpr double min_margin = 0.05;
 constexpr double shortening = 0.9;
 constexpr double thinnest = 0.05;  // mm
 
 /// Least value of c[0] + c[1] s + c[2] s² for s in [0, 1].
-double least_on_unit_interval(const std::array<double, 3>& c) {
-  double least = std::min(c[0], c[0] + c[1] + c[2]);
+double min_on_unit_interval(const std::array<double, 3>& c) {
+  double minimum = std::min(c[0], c[0] + c[1] + c[2]);
   if (c[2] > 0) {
     const double s = std::clamp(-c[1] / (2 * c[2]), 0.0, 1.0);
-    least = std::min(least, c[0] + s * (c[1] + s * c[2]));
+    minimum = std::min(minimum, c[0] + s * (c[1] + s * c[2]));
   }
-  return least;
+  return minimum;
 }
 
 double margin_of(const SkinMesh& mesh, int64_t triangle, const std::vector<Vec3>& directions,
@@ -60,8 +60,8 @@ double fold_margin(const std::array<Vec3, 3>& skin, const std::array<Vec3, 3>& c
   const Vec3 n0 = a1.cross(a2), n1 = a1.cross(b2) + b1.cross(a2), n2 = b1.cross(b2);
   double margin = 1;
   for (const Vec3& w : column) {
-    const double least = least_on_unit_interval({n0.dot(w), n1.dot(w), n2.dot(w)});
-    margin = std::min(margin, least / (n0.norm() * w.norm()));
+    const double minimum = min_on_unit_interval({n0.dot(w), n1.dot(w), n2.dot(w)});
+    margin = std::min(margin, minimum / (n0.norm() * w.norm()));
   }
   return margin;
 }
@@ -70,7 +70,7 @@ std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Ve
                                       const std::vector<double>& thickness) {
   std::vector<int64_t> folded;
   for (size_t f = 0; f < mesh.triangles.size(); ++f)
-    if (!(margin_of(mesh, static_cast<int64_t>(f), directions, thickness) >= least_margin))
+    if (!(margin_of(mesh, static_cast<int64_t>(f), directions, thickness) >= min_margin))
       folded.push_back(static_cast<int64_t>(f));
   return folded;
 }
@@ -88,19 +88,18 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
     const std::vector<int64_t> drawn = limit_slope(mesh, steepest_depth, changed, thickness);
     changed.insert(changed.end(), drawn.begin(), drawn.end());
     folded = triangles_around(mesh, changed);
-    std::erase_if(folded, [&](int64_t f) {
-      return margin_of(mesh, f, directions, thickness) >= least_margin;
-    });
+    std::erase_if(
+        folded, [&](int64_t f) { return margin_of(mesh, f, directions, thickness) >= min_margin; });
   }
   std::erase_if(stuck, [&](int64_t v) {
     const auto around = triangles_around(mesh, {v});
     return std::all_of(around.begin(), around.end(), [&](int64_t f) {
-      return margin_of(mesh, f, directions, thickness) >= least_margin;
+      return margin_of(mesh, f, directions, thickness) >= min_margin;
     });
   });
   if (!stuck.empty())
     refuse_places(skin_name, mesh, stuck,
-                  fmt::format("no sound column of tissue fits (neighbouring ones cross even where "
+                  fmt::format("no sound column of tissue fits (neighboring ones cross even where "
                               "they are only {:g} mm long)",
                               thinnest),
                   "leave tissue.edge to the program, or smooth or coarsen the skin there");

@@ -4,7 +4,7 @@
 
 #include "repose/model/skin_mesh.h"
 
-/// Columns that cross: where tissue between neighbouring columns would be folded.
+/// Columns that cross: where tissue between neighboring columns would be folded.
 namespace repose::model {
 
 /// Returns the margin of the prisms between three columns from folding, for any layers. With the
@@ -14,11 +14,11 @@ namespace repose::model {
 /// Positive: every prism of every number of layers has positive volume and no folded corner.
 double fold_margin(const std::array<Vec3, 3>& skin, const std::array<Vec3, 3>& column);
 
-/// The triangles whose columns, directions[v] · thickness[v], have less than the margin wanted.
+/// The triangles whose columns, directions[v] · thickness[v], have less than the margin requested.
 std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Vec3>& directions,
                                       const std::vector<double>& thickness);
 
-/// Shortens columns (×0.9 at a time, neighbours with them so that the deep surface stays no steeper
+/// Shortens columns (×0.9 at a time, neighbors with them so that the deep surface stays no steeper
 /// than it was made) until no triangle is folded. Throws RefusedPlaces (places.h) where columns
 /// would become shorter than 0.05 mm.
 void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,

@@ -10,7 +10,7 @@
 namespace repose::model {
 namespace {
 
-constexpr int fewest = 2, most = 64;
+constexpr int fewest = 2, maximum = 64;
 
 /// Fractions of a column's thickness: those of `depths_mm`, but nowhere deeper than even ones, then
 /// even ones to the end.
@@ -120,8 +120,8 @@ void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {
 
 std::vector<double> layer_depths(const scene::Tissue& tissue) {
   const int layers = tissue.layers;
-  if (layers < fewest || layers > most)
-    base::refuse("tissue.layers is {}, allowed are {} to {}", layers, fewest, most);
+  if (layers < fewest || layers > maximum)
+    base::refuse("tissue.layers is {}, allowed are {} to {}", layers, fewest, maximum);
   std::vector<double> depths = tissue.depths;
   if (depths.empty())
     for (int a = 0; a < layers; ++a) depths.push_back(static_cast<double>(a) / (layers - 1));

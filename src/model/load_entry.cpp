@@ -7,17 +7,17 @@ namespace repose::model {
 namespace {
 
 imaging::Extraction extraction_of(const scene::VolumeEntry& entry) {
-  imaging::Extraction wanted;
-  wanted.level = entry.level;
-  if (entry.label) wanted.label = *entry.label;
-  wanted.otsu = !entry.level && !entry.label;
-  wanted.box = entry.box;
-  wanted.border = entry.open ? imaging::VolumeBorder::open : imaging::VolumeBorder::closed;
-  wanted.voxel = entry.voxel;
-  wanted.close_holes = entry.close_holes;
-  wanted.smooth = entry.smooth;
-  wanted.largest = true;
-  return wanted;
+  imaging::Extraction requested;
+  requested.level = entry.level;
+  if (entry.label) requested.label = *entry.label;
+  requested.otsu = !entry.level && !entry.label;
+  requested.box = entry.box;
+  requested.border = entry.open ? imaging::VolumeBorder::open : imaging::VolumeBorder::closed;
+  requested.voxel = entry.voxel;
+  requested.close_holes = entry.close_holes;
+  requested.smooth = entry.smooth;
+  requested.largest = true;
+  return requested;
 }
 
 std::string name_of(const scene::SurfaceEntry& entry, double level) {

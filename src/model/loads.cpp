@@ -42,7 +42,7 @@ void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model)
   set_layer_masses(tissue.mass, mesh, model);
 }
 
-void spread_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
+void distribute_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
   const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
   for (size_t k = 0; k < scene.forces.size(); ++k) {
     const scene::Force& force = scene.forces[k];

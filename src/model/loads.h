@@ -17,6 +17,6 @@ void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model)
 /// Adds each force (N) of the scene, shared over the soft-tissue points of layer 0 within its
 /// radius in proportion to the skin area around them, so that the shares sum to it exactly (to
 /// rounding). Throws InputError where there is none within, saying how far the nearest is.
-void spread_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model);
+void distribute_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model);
 
 }  // namespace repose::model

@@ -93,7 +93,7 @@ Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>&
   return {mean.shear + left * deep.shear, mean.volume + left * deep.volume};
 }
 
-void give_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
+void set_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
   prisms.shear_modulus[prism] = here.shear;
   prisms.modulus[prism] = here.volume;
 }
@@ -108,14 +108,14 @@ Place place_of(const Model& model, size_t m) {
 }
 
 /// [regions] how many prisms each holds.
-std::vector<int64_t> give_regions(const scene::Material& material, Model& model) {
+std::vector<int64_t> set_region_moduli(const scene::Material& material, Model& model) {
   std::vector<int64_t> found;
   for (const scene::MaterialRegion& region : material.regions) {
     const Inside inside = inside_of(region.where);
     found.push_back(0);
     for (size_t m = 0; m < model.prisms.points.size(); ++m) {
       if (!inside(place_of(model, m))) continue;
-      give_moduli(moduli(region.elasticity), m, model.prisms);
+      set_moduli(moduli(region.elasticity), m, model.prisms);
       ++found.back();
     }
   }
@@ -243,8 +243,8 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
   prisms.shear_modulus.resize(count);
   prisms.modulus.resize(count);
   for (size_t m = 0; m < count; ++m)
-    give_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
-  std::vector<int64_t> found = give_regions(material, model);
+    set_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
+  std::vector<int64_t> found = set_region_moduli(material, model);
   if (material.dilatation == scene::Dilatation::nodal)
     for (size_t m = 0; m < count; ++m)
       prisms.nodal_modulus.push_back(prisms.modulus[m] - prisms.shear_modulus[m]);

@@ -8,7 +8,7 @@ using Sparse = Multilevel::Sparse;
 constexpr int solved_directly = 500;  // rows
 constexpr double coarse_stiffness = 0.5;
 
-/// The aggregate of the neighbour a row is tied to most, −1 where none has one.
+/// The aggregate of the neighbor a row is tied to most, −1 where none has one.
 int strongest(const Sparse& matrix, const std::vector<int>& aggregate, int row) {
   int best = -1;
   double strength = 0;
@@ -21,7 +21,7 @@ int strongest(const Sparse& matrix, const std::vector<int>& aggregate, int row) 
 }
 
 /// Shares all rows out to aggregates and returns their number: first each row none of whose
-/// neighbours is taken, with all of them, then the rows left over.
+/// neighbors is taken, with all of them, then the rows left over.
 int make_aggregates(const Sparse& matrix, std::vector<int>& aggregate) {
   const auto rows = static_cast<int>(matrix.rows());
   aggregate.assign(rows, -1);

@@ -6,7 +6,7 @@
 namespace repose::model {
 
 /// Preconditioner of a matrix diag(d) + (graph Laplacian), d ≥ 0, for Eigen's conjugate gradients:
-/// one V-cycle over ever coarser graphs, whose vertices are a vertex with its neighbours on the
+/// one V-cycle over ever coarser graphs, whose vertices are a vertex with its neighbors on the
 /// finer one (plain aggregation), with Gauss–Seidel forwards on the way down and backwards on the
 /// way up, so that it is symmetric positive definite. Sums over aggregates make a Laplacian too
 /// stiff; the coarse one is halved (Braess, "Towards algebraic multigrid for elliptic problems of

@@ -14,7 +14,7 @@ void require_same_place(const SkinMesh& mesh, const std::string& skin_name,
                         const std::vector<surface::Surface>& bones, const BoneField& field);
 
 /// Turns the skin round where most of it, by area, has the nearest bone on its outer side: an open
-/// patch does not know which side is out. Returns whether it did.
+/// patch has no defined outside. Returns whether it did.
 bool face_outwards(const std::vector<BoneField::Nearest>& nearest, SkinMesh& mesh);
 
 }  // namespace repose::model

@@ -16,8 +16,8 @@ double nearest_skin(const SkinMesh& mesh, const BoneField& bones, int32_t bone) 
 }
 
 /// Why no tissue is attached to a bone, and what to do about it.
-std::string why_bare(const scene::Scene& scene, const SkinMesh& mesh, const BoneField& bones,
-                     int32_t bone, int64_t reached) {
+std::string explain_unattached(const scene::Scene& scene, const SkinMesh& mesh,
+                               const BoneField& bones, int32_t bone, int64_t reached) {
   if (reached > 0 && scene.tissue.attach != scene::Attach::fixed)
     return fmt::format(
         "tissue.attach or a region lets all {} columns go that reach it; attach some to be fixed "
@@ -89,7 +89,7 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
           std::accumulate(attachment.reached.begin(), attachment.reached.end(), int64_t{0});
   for (int32_t b = 0; b < bones.size(); ++b) {
     if (tied[b] > 0) continue;
-    const std::string why = why_bare(scene, mesh, bones, b, attachment.reached[b]);
+    const std::string why = explain_unattached(scene, mesh, bones, b, attachment.reached[b]);
     const bool planned = scene.plan && std::ranges::binary_search(scene.plan->pieces, size_t(b));
     if ((planned || !scene.moves[b].is_identity()) && !(touching && attachment.reached[b] > 0))
       base::refuse("{}: bone '{}' moves but no tissue is attached to it: {}", file,

@@ -78,7 +78,7 @@ std::vector<char> painted_vertices(const scene::PaintedRegion& region,
     if (const std::vector<double>* values = mesh.find(name)) return *values;
     base::refuse(
         "{}: its vertices have no property {}; they have {}", region.file.string(),
-        base::shown(name),
+        base::quote(name),
         mesh.names.empty() ? "x, y and z alone" : fmt::format("{}", fmt::join(mesh.names, ", ")));
   };
   std::vector<char> painted(mesh.points.size(), 1);

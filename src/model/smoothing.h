@@ -7,7 +7,7 @@
 /// Fields over the skin made smoother, independent of how finely it is meshed.
 namespace repose::model {
 
-/// Minimises Σ_v a_v w_v |f_v − g_v|² + Σ_e c_e ℓ_e² |f_p − f_q|² over the field f: `given` g is
+/// Minimizes Σ_v a_v w_v |f_v − g_v|² + Σ_e c_e ℓ_e² |f_p − f_q|² over the field f: `given` g is
 /// [V × k], `weight` w ≥ 0 [V] says how much each value is trusted, `length` ℓ (mm) [V] over what
 /// distance to smooth (averaged over an edge's ends), a_v is the vertex area and
 /// c_e = ⅔ edge_area / |e|² the positive form of the finite-element weights (equal to them on
@@ -20,7 +20,7 @@ Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
 constexpr double steepest_depth = 1.0;
 
 /// Lowers values until |f_p − f_q| ≤ slope · |e| on every edge: the largest such field below
-/// `values`. Only vertices in `seeds` may be out of order with their neighbours at first.
+/// `values`. Only vertices in `seeds` may be out of order with their neighbors at first.
 /// O(V log V) where all are seeds, else about proportional to what changes. Returns the vertices
 /// that were lowered (an entry for each time).
 std::vector<int64_t> limit_slope(const SkinMesh& mesh, double slope,

@@ -13,7 +13,7 @@
 namespace repose::model {
 namespace {
 
-constexpr size_t most_solved_triangles = 100'000;            // of a skin solved as it is given
+constexpr size_t max_solved_triangles = 100'000;             // of a skin solved as it is given
 constexpr double deepest_lifted = 3, thinnest_tissue = 0.3;  // mm
 
 meshtools::FaceRequest request_of(const Anatomy& anatomy) {
@@ -49,7 +49,7 @@ int64_t lift_off(const std::vector<surface::Surface>& bones, surface::Surface& s
 }
 
 /// Returns what of a refusal says what is wrong: "FILE: what; remedy" without file and remedy.
-std::string clause_of(const std::string& refusal, const std::string& file) {
+std::string refusal_reason(const std::string& refusal, const std::string& file) {
   std::string text = refusal.substr(0, refusal.find(';'));
   if (text.starts_with(file + ": ")) text.erase(0, file.size() + 2);
   return text;
@@ -59,8 +59,8 @@ std::string describe_remeshing(const meshtools::Face& face, const Anatomy& anato
   return fmt::format(
       "the skin that is solved has {} vertices with edges of {:.3g} mm, no angle below {:.0f}°; of "
       "them 95 % lie within {:.2f} mm of the given skin ({} triangles), all within {:.2f} mm",
-      face.skin.points.size(), edge, face.least_angle, face.off_95, anatomy.skin.triangles.size(),
-      face.off_most);
+      face.skin.points.size(), edge, face.min_angle, face.off_95, anatomy.skin.triangles.size(),
+      face.off_max);
 }
 
 }  // namespace
@@ -69,19 +69,19 @@ GivenSkin load_skin(const scene::Scene& scene) {
   if (scene.tissue.edge) return {load_entry(scene.skin, surface::Role::raw), ""};
   if (scene.tissue.keeps_given_skin) return {load_entry(scene.skin, surface::Role::skin), ""};
   surface::Surface raw = load_entry(scene.skin, surface::Role::raw);
-  if (raw.triangles.size() > most_solved_triangles)
-    return {std::move(raw), fmt::format("it has more than {} triangles", most_solved_triangles)};
+  if (raw.triangles.size() > max_solved_triangles)
+    return {std::move(raw), fmt::format("it has more than {} triangles", max_solved_triangles)};
   try {
     surface::Surface skin = surface::accept_surface(raw, surface::Role::skin);
     if (surface::inspect(skin, false).border_edges > 0) return {std::move(skin), ""};
     return {std::move(skin), "it is closed, as that of a whole head"};
   } catch (const base::InputError& refusal) {
-    std::string obstacle = clause_of(refusal.what(), raw.name);
+    std::string obstacle = refusal_reason(refusal.what(), raw.name);
     return {std::move(raw), std::move(obstacle)};
   }
 }
 
-void solve_remeshed(Anatomy& anatomy) {
+void remesh_skin(Anatomy& anatomy) {
   const meshtools::FaceRequest request = request_of(anatomy);
   meshtools::Face face = meshtools::solvable_face(anatomy.skin, request);
   anatomy.remarks.push_back(describe_remeshing(face, anatomy, request.edge));
@@ -104,7 +104,7 @@ bool replace_given_skin(Anatomy& anatomy, const std::string& obstacle) {
   tissue.edge = 0;
   const size_t first = anatomy.remarks.size();
   try {
-    solve_remeshed(anatomy);
+    remesh_skin(anatomy);
   } catch (const base::InputError&) {
     tissue.edge.reset();
     return false;

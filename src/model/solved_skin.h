@@ -18,6 +18,6 @@ GivenSkin load_skin(const scene::Scene& scene);
 /// over the bones that move, forces and incisions; of all that is given where instruments are
 /// pushed or nothing of these is. A remark says how near it is. Vertices that lie up to 3 mm inside
 /// bone are moved out of it, with a remark.
-void solve_remeshed(Anatomy& anatomy);
+void remesh_skin(Anatomy& anatomy);
 
 }  // namespace repose::model

@@ -22,12 +22,12 @@ std::set<Edge> torn_edges(const std::vector<char>& torn, const Springs& springs)
 /// Points that are held, and those that springs join to them.
 std::vector<char> joined_points(const Model& model, const std::vector<char>& torn) {
   const size_t n = model.points.position.size();
-  std::vector<std::vector<int64_t>> neighbours(n);
+  std::vector<std::vector<int64_t>> neighbors(n);
   for (size_t j = 0; j < torn.size(); ++j) {
     if (torn[j]) continue;
     const auto [p, q] = model.springs.points[j];
-    neighbours[p].push_back(q);
-    neighbours[q].push_back(p);
+    neighbors[p].push_back(q);
+    neighbors[q].push_back(p);
   }
   std::vector<char> joined(n, 0);
   std::vector<int64_t> front;
@@ -39,7 +39,7 @@ std::vector<char> joined_points(const Model& model, const std::vector<char>& tor
   while (!front.empty()) {
     const int64_t i = front.back();
     front.pop_back();
-    for (const int64_t k : neighbours[i])
+    for (const int64_t k : neighbors[i])
       if (!joined[k]) {
         joined[k] = 1;
         front.push_back(k);

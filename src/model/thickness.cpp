@@ -40,10 +40,10 @@ void cut_spikes(const SkinMesh& mesh, std::vector<double>& thickness) {
 
 }  // namespace
 
-void cast_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
-                  const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
-                  const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                  const scene::Tissue& tissue, Reach& reach) {
+void trace_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
+                   const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
+                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
+                   const scene::Tissue& tissue, Reach& reach) {
   const double farthest =
       std::max(tissue.attach_within, tissue.free_thickness / std::min(bone_room, skin_room));
   for (const int64_t v : columns) {

@@ -19,12 +19,12 @@ struct Reach {
 /// before the skin's own other side, and not much deeper than the nearest bone is away (1.6 times
 /// and 2 mm: a ray that slips between teeth or into an orbit finds no bone). A free column keeps to
 /// 0.95 of the way to bone and 0.45 of the way to the skin's other side.
-void cast_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
-                  const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
-                  const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                  const scene::Tissue& tissue, Reach& reach);
+void trace_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
+                   const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
+                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
+                   const scene::Tissue& tissue, Reach& reach);
 
-/// Thickness [V] in mm: down to the bone where it holds, elsewhere from the neighbouring bone's
+/// Thickness [V] in mm: down to the bone where it holds, elsewhere from the neighboring bone's
 /// depth to `free_thickness` over about that distance, within the room there is. Then lowered,
 /// never raised: until the deep surface is nowhere steeper than 45° to the skin, and where a single
 /// column stands out (one that grazes an edge of bone).

@@ -73,12 +73,12 @@ void check_edges(const Edges& edges, size_t points, const ArrayCheck& check) {
 }
 
 void check_elements(const std::vector<TermElements>& all, size_t points, const ArrayCheck& check) {
-  constexpr int64_t most_points = 32, most_numbers = 1024;
+  constexpr int64_t max_points = 32, max_numbers = 1024;
   for (size_t k = 0; k < all.size(); ++k) {
     const std::string name = fmt::format("element/{}", k);
     const TermElements& of = all[k];
-    check.integer(name, 0, of.points_each, 1, most_points);
-    check.integer(name, 0, of.numbers_each, 0, most_numbers);
+    check.integer(name, 0, of.points_each, 1, max_points);
+    check.integer(name, 0, of.numbers_each, 0, max_numbers);
     check.integers(name + "/points", of.points, of.size() * static_cast<size_t>(of.points_each), 0,
                    static_cast<int64_t>(points) - 1);
     check.numbers(name + "/numbers", of.numbers, of.size() * static_cast<size_t>(of.numbers_each),
@@ -103,16 +103,16 @@ void check_bones(const Model& m, const ArrayCheck& check) {
     check_surface(fmt::format("bone_surface/{}", b), m.bone_surfaces[b], check);
 }
 
-void check_touches(const Contact& contact, size_t points, size_t bones, const ArrayCheck& check) {
-  const Touches& touches = contact.touches;
-  const size_t n = touches.point.size(), bodies = contact.bodies.size();
+void check_pairs(const Contact& contact, size_t points, size_t bones, const ArrayCheck& check) {
+  const ContactPairs& pairs = contact.pairs;
+  const size_t n = pairs.point.size(), bodies = contact.bodies.size();
   constexpr double finest = 1e-3;  // mm, of a grid
   check.number("contact attribute stiffness", 0, contact.stiffness, positive("N/mm³", ""));
   check.number("contact attribute grid", 0, contact.spacing, {finest, farthest, "mm"});
-  check.integers("contact/point", touches.point, n, 0, static_cast<int64_t>(points) - 1);
-  check.integers("contact/body_row", touches.body, n, 0, static_cast<int64_t>(bodies) - 1);
-  check.integers("contact/binding", touches.binding, n, 0, 1);
-  check.numbers("contact/area", touches.area, n, at_least_zero("mm²"));
+  check.integers("contact/point", pairs.point, n, 0, static_cast<int64_t>(points) - 1);
+  check.integers("contact/body_row", pairs.body, n, 0, static_cast<int64_t>(bodies) - 1);
+  check.integers("contact/binding", pairs.binding, n, 0, 1);
+  check.numbers("contact/area", pairs.area, n, at_least_zero("mm²"));
   for (size_t k = 0; k < bodies; ++k) {
     check.integer("contact/body_bone", k, contact.bodies[k].bone, -1,
                   static_cast<int64_t>(bones) - 1);
@@ -121,34 +121,37 @@ void check_touches(const Contact& contact, size_t points, size_t bones, const Ar
   }
 }
 
-void check_walls(const Walls& walls, size_t point_count, const ArrayCheck& check) {
+void check_cut_faces(const CutFaces& cut_faces, size_t point_count, const ArrayCheck& check) {
   const auto points = static_cast<int64_t>(point_count);
   int64_t places = 0;
-  for (size_t k = 0; k < walls.size.size(); ++k) {
-    for (const int64_t n : walls.size[k]) check.integer("contact/wall/net", k, n, 2, points);
-    places += walls.size[k][0] * walls.size[k][1];
+  for (size_t k = 0; k < cut_faces.size.size(); ++k) {
+    for (const int64_t n : cut_faces.size[k]) check.integer("contact/wall/net", k, n, 2, points);
+    places += cut_faces.size[k][0] * cut_faces.size[k][1];
     check.integer("contact/wall/net", k, places, 4, points * points);
   }
-  const auto shares = static_cast<int64_t>(walls.point.size());
-  check.integers("contact/wall/begin", walls.begin,
-                 walls.empty() ? 0 : static_cast<size_t>(2 * places + 1), 0, shares);
-  for (size_t c = 1; c < walls.begin.size(); ++c)
-    check.integer("contact/wall/begin", c, walls.begin[c], walls.begin[c - 1] + 1, shares);
-  if (!walls.empty()) {
-    check.integer("contact/wall/begin", 0, walls.begin.front(), 0, 0);
-    check.integer("contact/wall/begin", walls.begin.size() - 1, walls.begin.back(), shares, shares);
+  const auto shares = static_cast<int64_t>(cut_faces.point.size());
+  check.integers("contact/wall/begin", cut_faces.begin,
+                 cut_faces.empty() ? 0 : static_cast<size_t>(2 * places + 1), 0, shares);
+  for (size_t c = 1; c < cut_faces.begin.size(); ++c)
+    check.integer("contact/wall/begin", c, cut_faces.begin[c], cut_faces.begin[c - 1] + 1, shares);
+  if (!cut_faces.empty()) {
+    check.integer("contact/wall/begin", 0, cut_faces.begin.front(), 0, 0);
+    check.integer("contact/wall/begin", cut_faces.begin.size() - 1, cut_faces.begin.back(), shares,
+                  shares);
   }
-  check.integers("contact/wall/point", walls.point, walls.point.size(), 0, points - 1);
-  check.numbers("contact/wall/weight", walls.weight, walls.point.size(), weight);
-  for (size_t c = 1; c < walls.begin.size(); ++c) {
-    const auto begin = walls.weight.begin() + walls.begin[c - 1];
-    const auto end = walls.weight.begin() + walls.begin[c];
+  check.integers("contact/wall/point", cut_faces.point, cut_faces.point.size(), 0, points - 1);
+  check.numbers("contact/wall/weight", cut_faces.weight, cut_faces.point.size(), weight);
+  for (size_t c = 1; c < cut_faces.begin.size(); ++c) {
+    const auto begin = cut_faces.weight.begin() + cut_faces.begin[c - 1];
+    const auto end = cut_faces.weight.begin() + cut_faces.begin[c];
     const double sum = std::accumulate(begin, end, 0.0);
     if (std::abs(sum - 1) > 1e-9)
-      check.refuse("contact/wall/weight", fmt::format("rows {} to {} have a sum of {}, expected 1",
-                                                      walls.begin[c - 1], walls.begin[c] - 1, sum));
+      check.refuse("contact/wall/weight",
+                   fmt::format("rows {} to {} have a sum of {}, expected 1", cut_faces.begin[c - 1],
+                               cut_faces.begin[c] - 1, sum));
   }
-  check.numbers("contact/wall/area", walls.area, static_cast<size_t>(places), at_least_zero("mm²"));
+  check.numbers("contact/wall/area", cut_faces.area, static_cast<size_t>(places),
+                at_least_zero("mm²"));
 }
 
 void check_arrays(const Model& m, const ArrayCheck& check) {
@@ -164,8 +167,8 @@ void check_arrays(const Model& m, const ArrayCheck& check) {
   check.indices("skin/points", m.skin, points);
   check_bones(m, check);
   if (m.contact.empty()) return;
-  check_touches(m.contact, points, bones, check);
-  check_walls(m.contact.walls, points, check);
+  check_pairs(m.contact, points, bones, check);
+  check_cut_faces(m.contact.cut_faces, points, check);
 }
 
 // What arrays must be to one another.

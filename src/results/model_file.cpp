@@ -134,20 +134,21 @@ model::Contact read_contact(const Reader& in) {
                               read_shape(in, k, kind[k], shape.data() + model::shape_numbers * k),
                               push[k]});
   }
-  model::Touches& touches = contact.touches;
-  touches.point = in.integers<int64_t>(group + "/point", Shape::any);
-  const auto c = static_cast<int64_t>(touches.point.size());
-  touches.body = in.integers<int32_t>(group + "/body_row", c);
+  model::ContactPairs& pairs = contact.pairs;
+  pairs.point = in.integers<int64_t>(group + "/point", Shape::any);
+  const auto c = static_cast<int64_t>(pairs.point.size());
+  pairs.body = in.integers<int32_t>(group + "/body_row", c);
   for (const int8_t binding : in.integers<int8_t>(group + "/binding", c))
-    touches.binding.push_back(static_cast<model::Binding>(binding));
-  touches.area = in.numbers(group + "/area", {c, {}});
+    pairs.binding.push_back(static_cast<model::Binding>(binding));
+  pairs.area = in.numbers(group + "/area", {c, {}});
   if (!in.has(group + "/wall")) return contact;
-  model::Walls& walls = contact.walls;
-  walls.size = in.tuples<2>(group + "/wall/net", Shape::any);
-  walls.begin = in.integers<int64_t>(group + "/wall/begin", Shape::any);
-  walls.point = in.integers<int64_t>(group + "/wall/point", Shape::any);
-  walls.weight = in.numbers(group + "/wall/weight", {static_cast<int64_t>(walls.point.size()), {}});
-  walls.area = in.numbers(group + "/wall/area", {Shape::any, {}});
+  model::CutFaces& cut_faces = contact.cut_faces;
+  cut_faces.size = in.tuples<2>(group + "/wall/net", Shape::any);
+  cut_faces.begin = in.integers<int64_t>(group + "/wall/begin", Shape::any);
+  cut_faces.point = in.integers<int64_t>(group + "/wall/point", Shape::any);
+  cut_faces.weight =
+      in.numbers(group + "/wall/weight", {static_cast<int64_t>(cut_faces.point.size()), {}});
+  cut_faces.area = in.numbers(group + "/wall/area", {Shape::any, {}});
   return contact;
 }
 

@@ -109,23 +109,23 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
 }
 
 void write_contact(hid_t model, const model::Contact& contact, const model::ModelRows* slabs) {
-  if (slabs ? slabs->touches == 0 : contact.empty()) return;
+  if (slabs ? slabs->contact_pairs == 0 : contact.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "contact");
   write_attribute(group, "stiffness", contact.stiffness);
   write_attribute(group, "grid", contact.spacing);
   write_bodies(group, contact.bodies);
   if (slabs)
-    write_arrays(group, slabs->touch, slabs->touches);
+    write_arrays(group, slabs->pairs, slabs->contact_pairs);
   else
-    write_arrays(group, contact.touches, {});
-  const model::Walls& walls = contact.walls;
-  if (walls.empty()) return;
+    write_arrays(group, contact.pairs, {});
+  const model::CutFaces& cut_faces = contact.cut_faces;
+  if (cut_faces.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
-  write_array(wall, "net", {walls.size.size(), 2}, flat(walls.size));
-  write_array(wall, "begin", {walls.begin.size()}, walls.begin.data());
-  write_array(wall, "point", {walls.point.size()}, walls.point.data());
-  write_array(wall, "weight", {walls.weight.size()}, walls.weight.data());
-  write_array(wall, "area", {walls.area.size()}, walls.area.data());
+  write_array(wall, "net", {cut_faces.size.size(), 2}, flat(cut_faces.size));
+  write_array(wall, "begin", {cut_faces.begin.size()}, cut_faces.begin.data());
+  write_array(wall, "point", {cut_faces.point.size()}, cut_faces.point.data());
+  write_array(wall, "weight", {cut_faces.weight.size()}, cut_faces.weight.data());
+  write_array(wall, "area", {cut_faces.area.size()}, cut_faces.area.data());
 }
 
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {
@@ -231,20 +231,20 @@ void fill_model(MPI_Comm comm, hid_t file, const model::ModelRows& slabs, const 
   write("/model/point", slabs.points, all.points);
   write("/model/prism", slabs.prisms, all.prisms);
   if (all.edges > 0) write("/model/edge", slabs.edges, all.edges);
-  if (slabs.touches > 0) write("/model/contact", slabs.touch, slabs.touches);
+  if (slabs.contact_pairs > 0) write("/model/contact", slabs.pairs, slabs.contact_pairs);
 }
 
 int64_t model_bytes(const model::Model& model, const model::ModelRows* slabs,
                     const MergedBones& bones) {
   const int64_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
   const model::Counts all = slabs ? slabs->counts : model::count(model);
-  const size_t touches = slabs ? slabs->touches : model.contact.touches.point.size();
+  const size_t pairs = slabs ? slabs->contact_pairs : model.contact.pairs.point.size();
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   size_t elements = 0;
   for (const model::TermElements& of : model.elements)
     elements += 8 * (of.points.size() + of.numbers.size());
-  const size_t bytes = descriptions + elements + touches * 21 +
-                       model.contact.walls.point.size() * 50 + model.skin.size() * 3 * 8 +
+  const size_t bytes = descriptions + elements + pairs * 21 +
+                       model.contact.cut_faces.point.size() * 50 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes) + all.points * point + all.springs * spring +
          all.prisms * 11 * 8 + all.edges * 3 * 8;

@@ -28,7 +28,7 @@ bool is_at(const std::filesystem::path& path, int descriptor) {
 }
 
 /// Who holds the lock, as it wrote into the file, or empty.
-std::string holder_of(int descriptor) {
+std::string lock_owner(int descriptor) {
   std::array<char, 200> text = {};
   const ssize_t length = pread(descriptor, text.data(), text.size(), 0);
   return {text.data(), static_cast<size_t>(std::max<ssize_t>(length, 0))};
@@ -70,7 +70,7 @@ bool is_ending(const std::string& rest) {
 
 }  // namespace
 
-bool may_live(const std::string& holder) {
+bool may_be_running(const std::string& holder) {
   static const std::regex words("process ([0-9]+) on (\\S+) since tick ([0-9]+)");
   std::smatch found;
   if (!std::regex_match(holder, found, words) || found[2] != this_host()) return true;
@@ -99,9 +99,9 @@ bool NameLock::acquire() {
     base::refuse("{}: cannot be written: {}; choose another -output", file_.string(),
                  std::strerror(errno));
   const bool held = flock(descriptor_, LOCK_EX | LOCK_NB) == 0, knows_locks = errno == EWOULDBLOCK;
-  const std::string holder = holder_of(descriptor_);
-  // Where the file system knows no locks, the file's text has to do.
-  if (!held && (knows_locks || (!holder.empty() && may_live(holder)))) {
+  const std::string holder = lock_owner(descriptor_);
+  // Where the file system has no locks, the file's text has to do.
+  if (!held && (knows_locks || (!holder.empty() && may_be_running(holder)))) {
     close(descriptor_);
     base::refuse(
         "{}.h5: {} is at work on it; choose another -output or wait for its end; where that "

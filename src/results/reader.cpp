@@ -8,12 +8,12 @@ using base::check_hdf5;
 
 namespace {
 
-std::string in_words(const std::vector<int64_t>& shape) {
+std::string describe_shape(const std::vector<int64_t>& shape) {
   return fmt::format("[{}]", fmt::join(shape, ","));
 }
 
 // Whether `path` exists and its last link leads to an object.
-bool leads_somewhere(hid_t file, const std::string& path) {
+bool link_resolves(hid_t file, const std::string& path) {
   for (size_t end = path.find('/', 1);; end = path.find('/', end + 1)) {
     const std::string part = path.substr(0, end);
     if (check_hdf5(H5Lexists(file, part.c_str(), H5P_DEFAULT)) == 0) return false;
@@ -30,7 +30,7 @@ base::Hdf5File open_result(const std::filesystem::path& file) {
   try {
     return base::open_hdf5(file);
   } catch (const base::Hdf5Error& reason) {
-    base::refuse("{}: cannot be read as an HDF5 file: {}; make it anew if it is truncated",
+    base::refuse("{}: cannot be read as an HDF5 file: {}; make it again if it is truncated",
                  file.string(), reason.what());
   }
 }
@@ -46,7 +46,7 @@ void Reader::refuse(const std::string& path, const std::string& what) const {
 
 bool Reader::has(const std::string& path) const {
   try {
-    return leads_somewhere(file_, path);
+    return link_resolves(file_, path);
   } catch (const base::Hdf5Error&) {
     return false;
   }
@@ -93,9 +93,10 @@ void require_shape(const Reader& reader, const std::string& path, const StoredAr
   expected.insert(expected.end(), shape.columns.begin(), shape.columns.end());
   if (shape.rows == Shape::any && !array.shape().empty()) expected[0] = array.shape()[0];
   if (array.shape() == expected) return;
-  std::string words = in_words(expected);
+  std::string words = describe_shape(expected);
   if (shape.rows == Shape::any) words.replace(1, words.find_first_of(",]") - 1, "rows");
-  reader.refuse(path, fmt::format("has shape {}, expected {}", in_words(array.shape()), words));
+  reader.refuse(path,
+                fmt::format("has shape {}, expected {}", describe_shape(array.shape()), words));
 }
 
 template <class Numbers>

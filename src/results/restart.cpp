@@ -26,7 +26,7 @@ bool is_rest(const model::StepNumbers& numbers) {
 
 Found find_step(const std::filesystem::path& file, const model::Model& model) {
   const int64_t count = step_count(file);
-  if (count == 0) base::refuse("{}: no step to go on from; start without -restart", file.string());
+  if (count == 0) base::refuse("{}: no step to resume from; start without -restart", file.string());
   Found found;
   for (int64_t step = count - 1; step >= 0 && !is_rest(found.step.numbers); --step) {
     found.step = read_step(file, step, model);
@@ -86,7 +86,7 @@ class Numbers {
 };
 
 void add_contact(const model::Contact& contact, Numbers& numbers) {
-  model::for_each_array(contact.touches, numbers);
+  model::for_each_array(contact.pairs, numbers);
   numbers("contact", std::vector{contact.stiffness, contact.spacing});
   for (const model::Body& body : contact.bodies) {
     numbers("push", std::vector{body.push});
@@ -121,7 +121,7 @@ Numbers numbers_of(const model::Model& m) {
 Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const model::Model& model) {
   Restart restart;
   std::vector<Vec3> all;
-  base::on_first_rank(comm, [&] {
+  base::on_root(comm, [&] {
     const model::Model stored = read_model(file);
     refuse_another_model(file, stored, model);
     Found found = find_step(file, model);

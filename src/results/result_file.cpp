@@ -28,7 +28,7 @@ std::filesystem::path with_ending(const std::filesystem::path& name, const std::
 
 /// Makes HDF5's failures the user's: the disk is full, or gone.
 template <class Work>
-void say_where(const std::filesystem::path& file, Work&& work) {
+void with_file_name(const std::filesystem::path& file, Work&& work) {
   try {
     work();
   } catch (const base::Hdf5Error& reason) {
@@ -71,7 +71,7 @@ struct UnpackNumbers {
 model::StepNumbers of_first_rank(MPI_Comm comm, const model::StepNumbers& mine) {
   PackNumbers packed;
   model::for_each_number(mine, packed);
-  base::share(comm, packed.text);
+  base::broadcast(comm, packed.text);
   MPI_Bcast(packed.values.data(), static_cast<int>(packed.values.size()), MPI_DOUBLE, 0, comm);
   model::StepNumbers numbers;
   model::for_each_number(numbers, UnpackNumbers{packed});
@@ -145,7 +145,7 @@ struct ResultFile::State {
   std::string part;  // the file that is written until commit
   /// Work on the open file that all ranks do, and all fail if one does.
   void on_disk(const std::function<void()>& work) const {
-    base::together(comm, [&] { say_where(with_ending(name, ".h5"), work); });
+    base::collective_try(comm, [&] { with_file_name(with_ending(name, ".h5"), work); });
   }
   /// Enough for a step, its descriptions included.
   int64_t step_bytes() const {
@@ -162,13 +162,14 @@ struct ResultFile::State {
   void write_elements(hid_t step, const model::StepRows& rows) const;
   bool write_bones(hid_t step, double load) const;
   void note_field(const std::string& field, bool vector, size_t step);
-  void go_on_with_copy();
+  void continue_in_copy();
   void open_part(int64_t room);
   void close_part();
   void settle_last();
   void write_step(const model::StepNumbers& numbers, const model::StepRows& rows);
   void mark_last(bool as_end);
-  void append(const model::StepNumbers& numbers, const model::StepRows& rows, bool under_way);
+  void append(const model::StepNumbers& numbers, const model::StepRows& rows,
+              bool provisional_step);
   void copy_steps(const std::filesystem::path& earlier, int64_t count);
   bool save();
   std::vector<XdmfBlock> views_of_steps() const;
@@ -183,7 +184,7 @@ void ResultFile::State::create(const model::Model& model, const model::ModelRows
   part = unfinished->part();
   bones = merge_bones(model.bone_surfaces);
   motion.emplace(model);
-  say_where(unfinished->file(), [&] {
+  with_file_name(unfinished->file(), [&] {
     base::Hdf5File whole = base::create_hdf5(part);
     unfinished->reserve(model_bytes(model, slabs, bones));
     write_model(whole, model, slabs, bones);
@@ -213,8 +214,8 @@ void ResultFile::State::require_rows(const model::StepRows& rows) const {
       !agrees(rows.residual_force.size(), counts.points) ||
       !agrees(rows.volume_ratio.size(), counts.prisms) ||
       !(rows.pressure.empty() || agrees(rows.pressure.size(), counts.prisms)) ||
-      !(rows.discretisation_error.empty() ||
-        agrees(rows.discretisation_error.size(), counts.points)) ||
+      !(rows.discretization_error.empty() ||
+        agrees(rows.discretization_error.size(), counts.points)) ||
       !std::all_of(rows.point_fields.begin(), rows.point_fields.end(),
                    [&](const model::PointField& field) {
                      return agrees(field.values.size() / (field.vector ? 3 : 1), counts.points);
@@ -274,10 +275,10 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
   for (size_t i = 0; i < displacement.size(); ++i)
     advance.values[i] = displacement[i].dot(outward[i]);
   if (counts.skin > 0) write_field(group, advance);
-  int estimated = !rows.discretisation_error.empty();
+  int estimated = !rows.discretization_error.empty();
   MPI_Allreduce(MPI_IN_PLACE, &estimated, 1, MPI_INT, MPI_MAX, comm);
   if (estimated != 0)
-    write_field(group, {"discretisation_error", false, rows.discretisation_error});
+    write_field(group, {"discretisation_error", false, rows.discretization_error});
   for (const model::PointField& field : rows.point_fields) write_field(group, field);
 }
 
@@ -321,7 +322,7 @@ void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
     if (block.cells > 0 && (shown.empty() || block.name == "bones")) shown.push_back(block);
   if (shown.empty() || loads.empty()) return;
   unfinished->reserve(vtkhdf_bytes(shown, loads.size()));
-  say_where(unfinished->file(), [&] {
+  with_file_name(unfinished->file(), [&] {
     base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
     write_vtkhdf(whole, shown, loads);
     whole.close();
@@ -359,7 +360,7 @@ void ResultFile::State::publish() {
 }
 
 /// On rank 0: what was saved is not touched any more.
-void ResultFile::State::go_on_with_copy() {
+void ResultFile::State::continue_in_copy() {
   if (unfinished) return;
   unfinished.emplace(with_ending(name, ".h5"));
   part = unfinished->part();
@@ -373,11 +374,11 @@ void ResultFile::State::go_on_with_copy() {
 
 void ResultFile::State::open_part(int64_t room) {
   is_whole = false;
-  base::on_first_rank(comm, [&] {
-    go_on_with_copy();
+  base::on_root(comm, [&] {
+    continue_in_copy();
     if (room > 0) unfinished->reserve(room);
   });
-  base::share(comm, part);
+  base::broadcast(comm, part);
   on_disk([&] { file = base::open_hdf5(part, comm); });
 }
 
@@ -426,14 +427,14 @@ void ResultFile::State::mark_last(bool as_end) {
 }
 
 void ResultFile::State::append(const model::StepNumbers& numbers, const model::StepRows& rows,
-                               bool under_way) {
+                               bool provisional_step) {
   const std::scoped_lock lock(mutex);
-  base::together(comm, [&] { require_rows(rows); });
+  base::collective_try(comm, [&] { require_rows(rows); });
   const model::StepNumbers same = of_first_rank(comm, numbers);
   open_part(step_bytes());
   settle_last();
   write_step(same, rows);
-  provisional = under_way;
+  provisional = provisional_step;
   reason = same.reason;
   if (savable && same.converged && same.load < 1) mark_last(true);
   close_part();
@@ -456,7 +457,7 @@ bool ResultFile::State::save() {
 void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t count) {
   const Reader in(earlier);
   unfinished->reserve(static_cast<int64_t>(std::filesystem::file_size(earlier)));
-  say_where(unfinished->file(), [&] {
+  with_file_name(unfinished->file(), [&] {
     const base::Hdf5File source = base::open_hdf5(earlier);
     base::Hdf5File whole = base::open_hdf5(part, MPI_COMM_SELF);
     const base::Hdf5Properties without(H5Pcreate(H5P_OBJECT_COPY));
@@ -482,8 +483,8 @@ void ResultFile::open(MPI_Comm comm, const std::filesystem::path& name, const mo
   s.comm = comm;
   // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
   s.name = std::filesystem::absolute(name);
-  base::on_first_rank(comm, [&] { s.create(model, slabs, kind); });
-  base::share(comm, s.part);
+  base::on_root(comm, [&] { s.create(model, slabs, kind); });
+  base::broadcast(comm, s.part);
   MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
   s.savable = kind == Kind::result;
   s.is_whole = true;
@@ -497,10 +498,11 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const m
   state_->outward = base::scatter(comm, model::outward_normals(model));
 }
 
-ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& frame,
-                       const model::ModelRows& slabs, Kind kind)
+ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name,
+                       const model::Model& global_metadata, const model::ModelRows& slabs,
+                       Kind kind)
     : state_(std::make_unique<State>()) {
-  open(comm, name, frame, &slabs, kind);
+  open(comm, name, global_metadata, &slabs, kind);
   state_->on_disk([&] { state_->file = base::open_hdf5(state_->part, comm); });
   fill_model(comm, state_->file, slabs, [this](const auto& work) { state_->on_disk(work); });
   state_->close_part();
@@ -515,7 +517,8 @@ void ResultFile::append(const model::StepNumbers& numbers, const model::StepRows
   state_->append(numbers, rows, false);
 }
 
-void ResultFile::append_under_way(const model::StepNumbers& numbers, const model::StepRows& rows) {
+void ResultFile::append_provisional(const model::StepNumbers& numbers,
+                                    const model::StepRows& rows) {
   const base::Logged logged(write_event());
   state_->append(numbers, rows, true);
 }
@@ -523,7 +526,7 @@ void ResultFile::append_under_way(const model::StepNumbers& numbers, const model
 void ResultFile::keep(const std::filesystem::path& earlier, int64_t count) {
   State& s = *state_;
   const std::scoped_lock lock(s.mutex);
-  base::on_first_rank(s.comm, [&] { s.copy_steps(earlier, count); });
+  base::on_root(s.comm, [&] { s.copy_steps(earlier, count); });
   s.loads.resize(count);
   MPI_Bcast(s.loads.data(), static_cast<int>(count), MPI_DOUBLE, 0, s.comm);
   s.moved.resize(count);
@@ -549,8 +552,8 @@ void ResultFile::commit() {
     s.close_part();
   }
   s.savable = false;
-  base::on_first_rank(s.comm, [&] {
-    s.go_on_with_copy();
+  base::on_root(s.comm, [&] {
+    s.continue_in_copy();
     s.publish();
   });
 }

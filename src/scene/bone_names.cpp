@@ -10,10 +10,10 @@ std::string read_new_name(const Value& value, const std::vector<BoneEntry>& bone
   std::string name = value.text();
   const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
   if (name.size() > 64 || !std::all_of(name.begin(), name.end(), printable))
-    value.refuse("{} must be printable ASCII, 64 characters at most", base::shown(name));
+    value.refuse("{} must be printable ASCII, 64 characters at most", base::quote(name));
   for (const BoneEntry& other : bones)
     if (other.name == name)
-      value.refuse("{} is the name of two bones; rename one", base::shown(name));
+      value.refuse("{} is the name of two bones; rename one", base::quote(name));
   return name;
 }
 
@@ -24,7 +24,7 @@ std::size_t find_bone(const std::string& name, const Value& value,
   if (found != bones.end()) return static_cast<std::size_t>(found - bones.begin());
   std::vector<std::string> names;
   for (const BoneEntry& bone : bones) names.push_back(bone.name);
-  value.refuse("{} is no bone of the scene; the nearest is '{}'", base::shown(name),
+  value.refuse("{} is no bone of the scene; the nearest is '{}'", base::quote(name),
                base::nearest(name, names));
 }
 

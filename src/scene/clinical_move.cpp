@@ -104,11 +104,11 @@ class ClinicalMove {
 
   /// The row of the bone that carries the other jaw's teeth: a piece of a template, or the whole.
   std::size_t opposite() const {
-    const Jaw wanted = jaw_ == Jaw::upper ? Jaw::lower : Jaw::upper;
+    const Jaw expected = jaw_ == Jaw::upper ? Jaw::lower : Jaw::upper;
     for (const Osteotomy& cut : scene_.osteotomies)
-      if (jaw_of(scene_, cut.piece) == wanted) return cut.piece;
+      if (jaw_of(scene_, cut.piece) == expected) return cut.piece;
     for (std::size_t b = 0; b < scene_.bones.size(); ++b)
-      if (jaw_of(scene_, b) == wanted) return b;
+      if (jaw_of(scene_, b) == expected) return b;
     for (std::size_t b = 0; b < scene_.bones.size(); ++b)
       if (!cut_of(scene_, b) && b != bone_) return b;
     return bone_;

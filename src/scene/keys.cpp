@@ -56,7 +56,7 @@ std::vector<Key> surface_keys() {
   return rows;
 }
 
-/// What tissue that ends at bone does.
+/// Keys of the attachment of tissue to bone.
 std::vector<Key> attach_keys() {
   return {{.path = "tissue.released",
            .kind = choice,
@@ -68,7 +68,7 @@ std::vector<Key> attach_keys() {
            .standard = "fixed",
            .sentence = "What tissue that ends at bone does: move with it, slide along it at its "
                        "distance, touch it "
-                       "(lift off, never pass), or not know of it.",
+                       "(lift off, never pass), or ignore it.",
            .choices = {"fixed", "slide", "contact", "free"}},
           {"tissue.attach_regions", list, "",
            "Where tissue that ends at bone does otherwise; later ones beat earlier ones."},
@@ -162,7 +162,7 @@ std::vector<Key> contact_keys() {
       {.path = "contact.cuts",
        .kind = choice,
        .standard = "on",
-       .sentence = "The sides of incisions and of the mouth do not pass each other; likewise.",
+       .sentence = "The sides of incisions and of the mouth do not pass each other.",
        .choices = {"on", "off"}},
       {"contact.grid", number, "",
        "Spacing of the grids from which distances to meshes are read, which round edges of bones "
@@ -402,7 +402,7 @@ std::vector<Key> solve_keys() {
       {.path = "solve.functional",
        .kind = choice,
        .standard = "energy",
-       .sentence = "What is minimised.",
+       .sentence = "What is minimized.",
        .choices = {"energy", "force"}},
       {"solve.volume", map, "", "How the tissue keeps its volume."},
       {.path = "solve.volume.form",
@@ -585,7 +585,7 @@ std::string last_word(std::string_view path) {
   return std::string(path.substr(path.rfind('.') + 1));
 }
 
-std::string wanted(const Key& key) {
+std::string expected(const Key& key) {
   switch (key.kind) {
     case map:
       return "a map";
@@ -593,9 +593,9 @@ std::string wanted(const Key& key) {
       return "a list";
     case number:
     case integer:
-      return base::wanted_number(key.kind == integer, key.unit, key.range, key.choices);
+      return base::expected_number(key.kind == integer, key.unit, key.range, key.choices);
     case numbers:
-      return fmt::format("a list, each {}", base::wanted_number(false, key.unit, key.range, {}));
+      return fmt::format("a list, each {}", base::expected_number(false, key.unit, key.range, {}));
     case vector:
       return fmt::format("three numbers [x, y, z]{}{}", key.unit.empty() ? "" : " of ", key.unit);
     case choice:
@@ -623,7 +623,7 @@ std::string wanted(const Key& key) {
 std::string describe_keys() {
   std::string text = "| key | value | default | meaning |\n|---|---|---|---|\n";
   for (const Key& key : all_keys())
-    text += fmt::format("| `{}` | {} | {} | {} |\n", key.path, wanted(key),
+    text += fmt::format("| `{}` | {} | {} | {} |\n", key.path, expected(key),
                         key.standard.empty() ? "–" : key.standard, key.sentence);
   return text;
 }

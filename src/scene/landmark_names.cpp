@@ -88,11 +88,11 @@ std::string plain(const std::string& text) {
 }  // namespace
 
 std::string standard_name(const std::string& spelling) {
-  const std::string wanted = plain(spelling);
+  const std::string expected = plain(spelling);
   for (const LandmarkName& landmark : landmark_names()) {
-    if (plain(landmark.name) == wanted) return landmark.name;
+    if (plain(landmark.name) == expected) return landmark.name;
     const auto& aliases = landmark.aliases;
-    if (std::find(aliases.begin(), aliases.end(), wanted) != aliases.end()) return landmark.name;
+    if (std::find(aliases.begin(), aliases.end(), expected) != aliases.end()) return landmark.name;
   }
   return "";
 }
@@ -106,7 +106,7 @@ Landmarks with_standard_names(const Landmarks& landmarks, const std::string& fil
     const auto [entry, added] = renamed.try_emplace(key, position);
     if (!added && (entry->second - position).norm() > same)
       base::refuse("{}: landmarks {} and {} are both {}, {:.1f} mm apart; remove one of them", file,
-                   base::shown(spelling[key]), base::shown(name), key,
+                   base::quote(spelling[key]), base::quote(name), key,
                    (entry->second - position).norm());
     spelling[key] = name;
   }

@@ -22,7 +22,7 @@ enum class Frame { lps, ras };
 Frame frame_of(const std::string& place, const std::string& word) {
   if (word == "LPS" || word == "1") return Frame::lps;
   if (word == "RAS" || word == "0") return Frame::ras;
-  base::refuse("{}: the coordinate system is {}; it must be LPS or RAS", place, base::shown(word));
+  base::refuse("{}: the coordinate system is {}; it must be LPS or RAS", place, base::quote(word));
 }
 
 Vec3 to_lps(Frame frame, const Vec3& position) {
@@ -32,8 +32,8 @@ Vec3 to_lps(Frame frame, const Vec3& position) {
 double coordinate(const std::string& place, const std::string& name, const std::string& word) {
   const auto number = base::parse_number(word);
   if (!number)
-    base::refuse("{}: landmark {}: {} is not a finite number of mm", place, base::shown(name),
-                 base::shown(word));
+    base::refuse("{}: landmark {}: {} is not a finite number of mm", place, base::quote(name),
+                 base::quote(word));
   return *number;
 }
 
@@ -46,7 +46,7 @@ std::string read_text(const std::filesystem::path& file) {
   if (std::filesystem::file_size(file, error) > largest)
     base::refuse("{}: too large for a file of landmarks (16 MiB allowed)", name);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) base::refuse("{}: cannot be read; look at its permissions", name);
+  if (!stream) base::refuse("{}: cannot be read; check its permissions", name);
   base::record_input(file);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -77,7 +77,7 @@ Landmark control_point(const std::string& file, const YAML::Node& point, Frame f
   const YAML::Node position = point["position"];
   if (!position.IsDefined() || !position.IsSequence() || position.size() != 3)
     base::refuse("{}: landmark {} has no position of three numbers", place_of(file, point),
-                 base::shown(landmark.name));
+                 base::quote(landmark.name));
   for (int axis = 0; axis < 3; ++axis)
     landmark.position[axis] =
         coordinate(place_of(file, position), landmark.name, scalar(position[axis]));
@@ -137,7 +137,7 @@ std::vector<Landmark> read_markups(const std::string& file, const std::string& t
     for (const YAML::Node& markup : markups) add_markup(file, markup, found);
     return found;
   } catch (const YAML::Exception& error) {
-    std::string reason = base::shown(error.msg);
+    std::string reason = base::quote(error.msg);
     base::refuse("{}:{}:{}: not valid JSON: {}", file, error.mark.line + 1, error.mark.column + 1,
                  reason.substr(1, reason.size() - 2));
   }

@@ -31,9 +31,9 @@ void place_le_fort(const TemplatePlacement& head, double level, Osteotomy& cut) 
   constexpr double behind = 0.57;  // of the way from the incisors to the condyles
   const Vec3 point = head.at("nasal_spine") + level * head.axes().up;
   const Vec3 edge = head.at("upper_incisor_edge");
-  const double way = behind * (head.hinge() - edge).dot(head.axes().back);
+  const double distance = behind * (head.hinge() - edge).dot(head.axes().back);
   cut.planes = {{point, -head.axes().up, {}},
-                {edge + way * head.axes().back, -head.axes().back, {}}};
+                {edge + distance * head.axes().back, -head.axes().back, {}}};
 }
 
 void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& cut) {

@@ -27,16 +27,16 @@ MaterialRegion read_material_region(const Map& map, double poisson) {
 void read_dilatation(const Value& value, Material& material) {
   material.dilatation = static_cast<Dilatation>(value.choice());
   if (material.dilatation == Dilatation::prism) return;
-  double least = material.deep.poisson;
+  double minimum = material.deep.poisson;
   for (const Stratum& stratum : material.strata)
-    least = std::min(least, stratum.elasticity.poisson);
+    minimum = std::min(minimum, stratum.elasticity.poisson);
   for (const MaterialRegion& region : material.regions)
-    least = std::min(least, region.elasticity.poisson);
-  if (!(least > 0))
+    minimum = std::min(minimum, region.elasticity.poisson);
+  if (!(minimum > 0))
     value.refuse(
         "nodal averages what resists changes of volume: every poisson must be above 0, one is {}; "
         "raise it or remove dilatation",
-        least);
+        minimum);
 }
 
 }  // namespace

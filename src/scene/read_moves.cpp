@@ -156,10 +156,10 @@ class Forms {
     if (const auto found = landmarks_.find(name); found != landmarks_.end()) return found->second;
     if (landmarks_.empty())
       value.refuse("names landmark {}, but the scene has none; give landmarks: FILE or [x, y, z]",
-                   base::shown(name));
+                   base::quote(name));
     std::vector<std::string> known;
     for (const auto& [other, position] : landmarks_) known.push_back(other);
-    value.refuse("{} is no landmark of the scene; the nearest is '{}'", base::shown(name),
+    value.refuse("{} is no landmark of the scene; the nearest is '{}'", base::quote(name),
                  base::nearest(name, known));
   }
 

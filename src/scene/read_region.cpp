@@ -16,9 +16,9 @@ PaintedRegion read_painted(const Value& value) {
   PaintedRegion region;
   region.file = map.at("mesh").file();
   if (property) region.property = property->text();
-  if (const auto least = map.find("at_least")) {
-    if (color) least->refuse("is of property, and color is given; remove one");
-    region.at_least = least->number();
+  if (const auto minimum = map.find("at_least")) {
+    if (color) minimum->refuse("is of property, and color is given; remove one");
+    region.at_least = minimum->number();
   }
   if (color) {
     const std::vector<double> given = color->numbers();

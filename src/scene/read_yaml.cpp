@@ -32,7 +32,7 @@ std::string read_scene_text(const std::filesystem::path& file) {
   if (std::filesystem::file_size(file, error) > largest)
     base::refuse("{}: too large for a scene file (1 MiB allowed); give a scene file (.yaml)", name);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) base::refuse("{}: cannot be read; look at its permissions", name);
+  if (!stream) base::refuse("{}: cannot be read; check its permissions", name);
   base::record_input(file);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   const auto control = std::find_if(text.begin(), text.end(), is_control);
@@ -85,7 +85,7 @@ YAML::Node read_yaml(const std::filesystem::path& file) {
                    second);
     return document;
   } catch (const YAML::Exception& error) {
-    std::string reason = base::shown(error.msg);
+    std::string reason = base::quote(error.msg);
     base::refuse("{}:{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1,
                  error.mark.column + 1, reason.substr(1, reason.size() - 2));
   }

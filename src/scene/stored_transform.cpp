@@ -9,9 +9,9 @@
 namespace repose::scene {
 namespace {
 
-void need(const Line& line, const char* what, std::size_t least, std::size_t most) {
-  if (line.numbers.size() < least || line.numbers.size() > most)
-    base::refuse("{}: {} needs {} numbers, it has {}", line.place, what, least,
+void need(const Line& line, const char* what, std::size_t minimum, std::size_t maximum) {
+  if (line.numbers.size() < minimum || line.numbers.size() > maximum)
+    base::refuse("{}: {} needs {} numbers, it has {}", line.place, what, minimum,
                  line.numbers.size());
 }
 
@@ -79,7 +79,7 @@ void check_kind(const Line& kind) {
   base::refuse(
       "{}: a transform {} is not supported; save a linear rigid one (AffineTransform_double_3_3, "
       "Euler3DTransform_double_3_3 or VersorRigid3DTransform_double_3_3)",
-      kind.place, base::shown(kind.value));
+      kind.place, base::quote(kind.value));
 }
 
 }  // namespace repose::scene

@@ -20,7 +20,7 @@ void read_numbers(Line& line) {
   std::istringstream words(line.value);
   for (std::string word; words >> word;) {
     const auto number = base::parse_number(word);
-    if (!number) base::refuse("{}: {} is not a finite number", line.place, base::shown(word));
+    if (!number) base::refuse("{}: {} is not a finite number", line.place, base::quote(word));
     line.numbers.push_back(*number);
   }
 }
@@ -45,7 +45,7 @@ void read_line(const std::string& text, const std::string& place, Stored& stored
     store(key == "Parameters" ? stored.parameters : stored.fixed, std::move(line));
   } else {
     base::refuse("{}: expected Transform, Parameters or FixedParameters, got {}", place,
-                 base::shown(text));
+                 base::quote(text));
   }
 }
 

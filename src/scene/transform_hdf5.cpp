@@ -7,14 +7,14 @@
 namespace repose::scene {
 namespace {
 
-/// ITK once misspelt its own names, and still reads both.
+/// ITK once misspelled its own names, and still reads both.
 Line read_numbers(hid_t file, const std::string& group, const std::string& place, const char* name,
-                  const char* misspelt) {
-  for (const char* spelling : {name, misspelt}) {
+                  const char* misspelled) {
+  for (const char* spelling : {name, misspelled}) {
     const std::string path = group + "/" + spelling;
     if (base::hdf5_has(file, path)) return {place, "", base::read_hdf5_numbers(file, path)};
   }
-  base::refuse("{}: holds no {}; save the transform anew", place, name);
+  base::refuse("{}: holds no {}; save the transform again", place, name);
 }
 
 Stored read_group(hid_t file, const std::string& group, const std::string& name) {
@@ -42,7 +42,7 @@ Mat4 read_open(hid_t file, const std::string& name) {
   int part = 1;
   for (; base::hdf5_has(file, group_of(part)); ++part)
     whole = whole * matrix_of(read_group(file, group_of(part), name));
-  if (part == 1) base::refuse("{}: a composite transform without parts; save it anew", name);
+  if (part == 1) base::refuse("{}: a composite transform without parts; save it again", name);
   return whole;
 }
 

@@ -38,15 +38,15 @@ void Value::refuse_at(const YAML::Mark& mark, const std::string& text) const {
 }
 
 void Value::refuse_kind() const {
-  refuse("must be {}, it is {}", wanted(find_key(path_)), shown());
+  refuse("must be {}, it is {}", expected(find_key(path_)), quote());
 }
 
-double Value::number_as(const std::string& wanted) const {
+double Value::number_as(const std::string& expected) const {
   const auto value = node_.IsScalar() ? base::parse_number(node_.Scalar()) : std::nullopt;
   const Key& key = find_key(path_);
   if (!value || !key.range.contains(*value)) {
     const bool turns = value && key.unit == "degrees" && std::isfinite(*value);
-    refuse("must be {}, it is {}{}", wanted, shown(),
+    refuse("must be {}, it is {}{}", expected, quote(),
            turns ? fmt::format("; write {:g}, which ends in the same place",
                                std::remainder(*value, 360.0))
                  : "");
@@ -54,13 +54,13 @@ double Value::number_as(const std::string& wanted) const {
   return *value;
 }
 
-std::string Value::shown() const {
+std::string Value::quote() const {
   if (is_map()) return "a map";
   if (is_list()) return "a list";
-  return node_.IsScalar() ? base::shown(node_.Scalar()) : "empty";
+  return node_.IsScalar() ? base::quote(node_.Scalar()) : "empty";
 }
 
-double Value::number() const { return number_as(wanted(find_key(path_))); }
+double Value::number() const { return number_as(expected(find_key(path_))); }
 
 int Value::integer() const {
   const auto value = node_.IsScalar() ? base::parse_integer(node_.Scalar()) : std::nullopt;
@@ -88,7 +88,7 @@ int Value::choice() const {
     refuse("no longer takes {}; {}", word, old->second);
   const auto found = std::find(choices.begin(), choices.end(), word);
   if (found == choices.end())
-    refuse("must be {}, it is {}; the nearest is {}", wanted(find_key(path_)), shown(),
+    refuse("must be {}, it is {}; the nearest is {}", expected(find_key(path_)), quote(),
            base::nearest(word, choices));
   return static_cast<int>(found - choices.begin());
 }
@@ -101,13 +101,13 @@ Vec3 Value::vector() const {
 
 std::vector<double> Value::numbers() const {
   const Key& key = find_key(path_);
-  const std::string wanted = base::wanted_number(false, key.unit, key.range, {});
+  const std::string expected = base::expected_number(false, key.unit, key.range, {});
   std::vector<double> result;
   for (const Value& element : elements()) {
-    result.push_back(element.number_as(wanted));
+    result.push_back(element.number_as(expected));
     if (std::abs(result.back()) > largest_component)
-      refuse("must be {} of no more than {:g}, one is {}", wanted, largest_component,
-             element.shown());
+      refuse("must be {} of no more than {:g}, one is {}", expected, largest_component,
+             element.quote());
   }
   return result;
 }
@@ -121,9 +121,9 @@ std::filesystem::path Value::file() const {
   auto path = absolute_path();
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
-    refuse("names the folder {}; a file is needed", shown());
+    refuse("names the folder {}; a file is needed", quote());
   if (!std::filesystem::is_regular_file(path, error))
-    refuse("names {}, which is no file (paths are relative to the scene's folder)", shown());
+    refuse("names {}, which is no file (paths are relative to the scene's folder)", quote());
   return path;
 }
 
@@ -132,7 +132,7 @@ std::filesystem::path Value::file_or_folder() const {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     refuse("names {}, which is no file or folder (paths are relative to the scene's folder)",
-           shown());
+           quote());
   return path;
 }
 
@@ -168,7 +168,7 @@ std::string Value::hint_of_map() const {
 
 std::vector<Value::Entry> Value::entries() const {
   std::vector<Entry> found;
-  if (!is_map()) refuse("must be a map, it is {}{}", shown(), hint_of_map());
+  if (!is_map()) refuse("must be a map, it is {}{}", quote(), hint_of_map());
   add_entries(node_, false, 0, found);
   return found;
 }
@@ -200,7 +200,7 @@ void Value::add_entry(Entry entry, std::vector<Entry>& found) const {
     found.push_back(std::move(entry));
   else if (!entry.merged && !same->merged)
     refuse_at(entry.mark, fmt::format("has the key {} twice (first in line {}); remove one",
-                                      base::shown(entry.name), same->mark.line + 1));
+                                      base::quote(entry.name), same->mark.line + 1));
   else if (!entry.merged)
     *same = std::move(entry);
 }
@@ -219,7 +219,7 @@ void Map::check_known(const Value::Entry& entry) const {
     if (last_word(key->path) != entry.name) continue;
     if (!entry.value.IsNull() || key->path == "bones") return;
     itself_.refuse_at(entry.mark, fmt::format("has no value for '{}': give {}, or remove the key",
-                                              entry.name, wanted(*key)));
+                                              entry.name, expected(*key)));
   }
   refuse_unknown(entry);
 }
@@ -252,7 +252,7 @@ void Map::refuse_unknown(const Value::Entry& entry) const {
   if (base::edit_distance(entry.name, sibling) > 2) best = key_elsewhere(entry.name);
   if (best.empty()) best = fmt::format("'{}'", sibling);
   itself_.refuse_at(entry.mark, fmt::format("has an unknown key {}; the nearest known one is {}",
-                                            base::shown(entry.name), best));
+                                            base::quote(entry.name), best));
 }
 
 std::optional<Value> Map::find(const std::string& name) const {
@@ -265,7 +265,7 @@ std::optional<Value> Map::find(const std::string& name) const {
 
 Value Map::at(const std::string& name) const {
   if (auto value = find(name)) return *value;
-  itself_.refuse("lacks the key '{}': {}", name, wanted(find_key(joined(itself_.path_, name))));
+  itself_.refuse("lacks the key '{}': {}", name, expected(find_key(joined(itself_.path_, name))));
 }
 
 }  // namespace repose::scene

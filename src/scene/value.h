@@ -78,9 +78,9 @@ class Value {
   [[noreturn]] void refuse_at(const YAML::Mark& mark, const std::string& text) const;
   [[noreturn]] void refuse_kind() const;
   std::filesystem::path absolute_path() const;
-  std::string shown() const;
+  std::string quote() const;
   std::string hint_of_map() const;
-  double number_as(const std::string& wanted) const;
+  double number_as(const std::string& expected) const;
 
   std::shared_ptr<const std::filesystem::path> file_;
   YAML::Node node_;

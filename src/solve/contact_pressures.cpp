@@ -7,25 +7,26 @@
 namespace repose::solve {
 
 void set_pressures(discrete::Objective& objective, const std::vector<Vec3>& pressure) {
-  mechanics::TouchLoop& touches = objective.touches();
+  mechanics::BodyContact& body_contact = objective.body_contact();
   const auto position = objective.positions().local();
-  std::vector<double> least(pressure.size(), std::numeric_limits<double>::infinity());
+  std::vector<double> minimum(pressure.size(), std::numeric_limits<double>::infinity());
   std::vector<double*> nearest(pressure.size(), nullptr);
-  std::vector<double> multiplier(touches.multipliers().size(), 0.0);
+  std::vector<double> multiplier(body_contact.multipliers().size(), 0.0);
   const auto offer = [&](int64_t point, double gap, double& to) {
-    if (gap < least[point]) std::tie(least[point], nearest[point]) = std::pair(gap, &to);
+    if (gap < minimum[point]) std::tie(minimum[point], nearest[point]) = std::pair(gap, &to);
   };
-  touches.look_at_all(position);
+  body_contact.update_all_gaps(position);
   for (size_t c = 0; c < multiplier.size(); ++c)
-    offer(touches.touches().point[c], touches.gaps()[c], multiplier[c]);
-  mechanics::WallLoop& walls = objective.walls();
-  std::vector<double> wall_multiplier(walls.size(), 0.0);
-  walls.look(position);
-  for (size_t w = 0; w < walls.size(); ++w) offer(walls.point(w), walls.gap(w), wall_multiplier[w]);
+    offer(body_contact.pairs().point[c], body_contact.gaps()[c], multiplier[c]);
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  std::vector<double> wall_multiplier(cut_faces.size(), 0.0);
+  cut_faces.update_gaps(position);
+  for (size_t w = 0; w < cut_faces.size(); ++w)
+    offer(cut_faces.point(w), cut_faces.gap(w), wall_multiplier[w]);
   for (size_t i = 0; i < pressure.size(); ++i)
     if (nearest[i]) *nearest[i] = pressure[i].x();
-  touches.set_multipliers(multiplier);
-  walls.set_multipliers(wall_multiplier);
+  body_contact.set_multipliers(multiplier);
+  cut_faces.set_multipliers(wall_multiplier);
 }
 
 }  // namespace repose::solve

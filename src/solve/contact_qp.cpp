@@ -38,63 +38,65 @@ ContactQp::ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
 void ContactQp::linearize(Vec displacement) {
   objective_.positions().update(displacement);
   objective_.place_bodies();
-  gaps_ = objective_.touches().linear_gaps(objective_.positions().local(), farthest, smoothed_to);
+  gaps_ =
+      objective_.body_contact().linear_gaps(objective_.positions().local(), farthest, smoothed_to);
   add_gaps();
 }
 
-void ContactQp::linearize(Vec displacement, double load, std::span<const Vec3> way) {
+void ContactQp::linearize(Vec displacement, double load, std::span<const Vec3> travel) {
   discrete::Positions& positions = objective_.positions();
   const double before = positions.load();
   positions.update(displacement);
   objective_.place_bodies();
-  gaps_ = objective_.touches().linear_gaps(positions.local(), farthest, smoothed_to);
-  const std::vector<mechanics::RigidBody> bodies = objective_.touches().bodies();
+  gaps_ = objective_.body_contact().linear_gaps(positions.local(), farthest, smoothed_to);
+  const std::vector<mechanics::RigidBody> bodies = objective_.body_contact().bodies();
   positions.set_load(load);
   objective_.place_bodies();
   positions.set_load(before);
   positions.update(displacement);
-  objective_.touches().carry(positions.local(), bodies, gaps_);
+  objective_.body_contact().carry(positions.local(), bodies, gaps_);
   objective_.place_bodies();
   add_gaps();
   for (size_t k = touching_; k < gaps_.size(); ++k)
-    for (const auto& [p, gradient] : gaps_[k].gradient) gaps_[k].gap += gradient.dot(way[p]);
+    for (const auto& [p, gradient] : gaps_[k].gradient) gaps_[k].gap += gradient.dot(travel[p]);
 }
 
 void ContactQp::add_gaps() {
   touching_ = gaps_.size();
-  objective_.walls().look(objective_.positions().local());
-  std::ranges::copy(objective_.walls().linear_gaps(farthest), std::back_inserter(gaps_));
+  objective_.cut_face_contact().update_gaps(objective_.positions().local());
+  std::ranges::copy(objective_.cut_face_contact().linear_gaps(farthest), std::back_inserter(gaps_));
   take_multipliers();
   curvature_.clear(), convex_curvature_.clear();
   const double scale = objective_.weights().elastic;
   const auto touching = std::span(gaps_).first(touching_);
   for (const bool exact : {true, false})
-    objective_.touches().for_each_curvature(touching, exact, [&](int64_t point, const Mat3& block) {
-      const auto p = static_cast<int32_t>(point);
-      (exact ? curvature_ : convex_curvature_).push_back({p, p, scale * block});
-    });
-  objective_.walls().for_each_curvature(std::span(gaps_).subspan(touching_),
-                                        [&](int32_t p, int32_t q, const Mat3& block) {
-                                          curvature_.push_back({p, q, scale * block});
-                                        });
+    objective_.body_contact().for_each_curvature(
+        touching, exact, [&](int64_t point, const Mat3& block) {
+          const auto p = static_cast<int32_t>(point);
+          (exact ? curvature_ : convex_curvature_).push_back({p, p, scale * block});
+        });
+  objective_.cut_face_contact().for_each_curvature(std::span(gaps_).subspan(touching_),
+                                                   [&](int32_t p, int32_t q, const Mat3& block) {
+                                                     curvature_.push_back({p, q, scale * block});
+                                                   });
 }
 
 void ContactQp::take_multipliers() {
   multiplier_.clear();
   for (size_t k = 0; k < gaps_.size(); ++k) {
-    const auto from =
-        k < touching_ ? objective_.touches().multipliers() : objective_.walls().multipliers();
+    const auto from = k < touching_ ? objective_.body_contact().multipliers()
+                                    : objective_.cut_face_contact().multipliers();
     multiplier_.push_back(from[gaps_[k].constraint]);
   }
 }
 
 void ContactQp::give_multipliers() {
-  std::vector<double> touches(objective_.touches().multipliers().size(), 0.0),
-      walls(objective_.walls().size(), 0.0);
+  std::vector<double> body_contact(objective_.body_contact().multipliers().size(), 0.0),
+      cut_faces(objective_.cut_face_contact().size(), 0.0);
   for (size_t k = 0; k < gaps_.size(); ++k)
-    (k < touching_ ? touches : walls)[gaps_[k].constraint] = multiplier_[k];
-  objective_.touches().set_multipliers(touches);
-  objective_.walls().set_multipliers(walls);
+    (k < touching_ ? body_contact : cut_faces)[gaps_[k].constraint] = multiplier_[k];
+  objective_.body_contact().set_multipliers(body_contact);
+  objective_.cut_face_contact().set_multipliers(cut_faces);
 }
 
 double ContactQp::pressure(size_t k) const {
@@ -140,27 +142,27 @@ void ContactQp::add_pushes(std::span<const double> pressure, Vec to) {
     const double weight = objective_.weights().elastic * gaps_[k].area * pressure[k];
     for (const auto& [p, gradient] : gaps_[k].gradient) push[p] += weight * gradient;
   }
-  objective_.positions().keep_owned(push, response_);
+  objective_.positions().restrict_to_owned(push, response_);
   check(VecAXPY(to, 1.0, response_));
 }
 
 double ContactQp::move_multipliers() {
-  double most = 0;
+  double maximum = 0;
   for (size_t k = 0; k < gaps_.size(); ++k) {
     const double now = gaps_[k].slides ? pressure(k) : std::max(0.0, pressure(k));
-    most = std::max(most, std::abs(now - multiplier_[k]));
+    maximum = std::max(maximum, std::abs(now - multiplier_[k]));
     multiplier_[k] = now;
   }
-  return largest(objective_.positions().comm(), most / stiffness_);
+  return largest(objective_.positions().comm(), maximum / stiffness_);
 }
 
 /// Where the function is least along the direction: a piecewise quadratic one, `slope` and
 /// `curvature` without its gaps.
 double ContactQp::line_search(double slope, double curvature) {
-  constexpr int most_pieces = 30;
+  constexpr int max_pieces = 30;
   constexpr double flat = 1e-3;
   double share = 0, low = 0, high = std::numeric_limits<double>::infinity(), first = 0;
-  for (int n = 0; n < most_pieces; ++n) {
+  for (int n = 0; n < max_pieces; ++n) {
     double sums[2] = {0, 0};
     for (size_t k = 0; k < gaps_.size(); ++k) {
       const double now = pressure(k) - share * stiffness_ * closing_[k];
@@ -183,10 +185,10 @@ double ContactQp::line_search(double slope, double curvature) {
 /// Minimizes the augmented Lagrangian of the present multipliers from `step`: Newton steps on its
 /// active sets, with the least along each.
 bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
-  constexpr int most_sets = 30;
+  constexpr int max_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
   bool full = false;                                // the latest step was not shortened
-  for (int set = 0; set < most_sets; ++set) {
+  for (int set = 0; set < max_sets; ++set) {
     const bool changed = choose_active();
     if (full && !changed) return true;
     if (changed) set_blocks();
@@ -199,7 +201,7 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
     add_pushes(acting, left_);
     const bool convex = solver_.solve(displacement, left_, direction_, coarse);
     if (!convex || !solver_.finished()) return false;
-    objective_.positions().spread(direction_, moved_);
+    objective_.positions().scatter_to_local(direction_, moved_);
     for (size_t k = 0; k < gaps_.size(); ++k) {
       closing_[k] = change(gaps_[k], moved_);
       acting[k] = -stiffness_ * closing_[k];
@@ -223,15 +225,15 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
 
 /// Rounds of minimizations and new multipliers.
 bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
-  constexpr int most_rounds = 3;  // the next program goes on with the multipliers
-  constexpr double share = 0.1;   // of the step
+  constexpr int max_rounds = 3;  // the next program goes on with the multipliers
+  constexpr double share = 0.1;  // of the step
   check(VecSet(step, 0));
   check(VecSet(force_, 0));
   closed_.assign(gaps_.size(), 0.0);
   closing_.assign(gaps_.size(), 0.0);
   active_.assign(gaps_.size(), 2);  // none chosen yet
   tangent_.assemble(displacement);
-  for (int round = 0; round < most_rounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
     if (!minimize(displacement, slope, tolerance, step)) return false;
     const double changed = move_multipliers();
     if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;

@@ -21,9 +21,9 @@ class ContactQp {
 
   /// Takes the gaps at `displacement` to first order. Collective.
   void linearize(Vec displacement);
-  /// The same where bodies and fixed points go on to `load`: each point stays beside the place of
-  /// its body that it is beside. `way` [local points] mm, of fixed points. Collective.
-  void linearize(Vec displacement, double load, std::span<const Vec3> way);
+  /// Linearizes where bodies and fixed points move on to `load`: each point stays beside the place
+  /// of its body that it is beside. `travel` [local points] mm, of fixed points. Collective.
+  void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
   /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Where negative
   /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a

@@ -18,7 +18,8 @@ constexpr double contact_safety = 2;  // the estimate is so many times what is l
 constexpr double predicted_to = 0.1;  // mm
 // Bodies with rounded edges have one rest position where sharper ones catch single points on either
 // side: it decides the side.
-constexpr ContactSearch::Approach to_rounded{true, 0.1, 0.05, 0.3}, to_exact{false, 0.1, 0.05, 0.1};
+constexpr ContactSearch::PresolveStage to_rounded{true, 0.1, 0.05, 0.3},
+    to_exact{false, 0.1, 0.05, 0.1};
 
 double largest_of_ranks(MPI_Comm comm, double value) {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
@@ -28,11 +29,11 @@ double largest_of_ranks(MPI_Comm comm, double value) {
 }  // namespace
 
 ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                             linear::TangentSolver& solver, Minimiser& minimiser,
-                             Minimiser::Watch watch)
+                             linear::TangentSolver& solver, Minimizer& minimizer,
+                             Minimizer::Watch watch)
     : objective_(objective),
       tangent_(tangent),
-      minimiser_(minimiser),
+      minimizer_(minimizer),
       watch_(std::move(watch)),
       qp_(objective, tangent, solver),
       stiffness_(objective_.positions().part().model.contact.stiffness),
@@ -43,13 +44,14 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
       start_(objective.positions().make_vector()) {}
 
 ContactPressures ContactSearch::pressures() const {
-  const auto p = objective_.touches().multipliers(), q = objective_.walls().multipliers();
+  const auto p = objective_.body_contact().multipliers(),
+             q = objective_.cut_face_contact().multipliers();
   return {{p.begin(), p.end()}, {q.begin(), q.end()}};
 }
 
 void ContactSearch::set_pressures(const ContactPressures& to) {
-  objective_.touches().set_multipliers(to.bodies);
-  objective_.walls().set_multipliers(to.cut_faces);
+  objective_.body_contact().set_multipliers(to.bodies);
+  objective_.cut_face_contact().set_multipliers(to.cut_faces);
   tangent_.forget_contact();
 }
 
@@ -62,35 +64,36 @@ void ContactSearch::stiffen(int times) {
 }
 
 void ContactSearch::set_stiffness(double stiffness) {
-  objective_.touches().set_stiffness(stiffness);
-  objective_.walls().set_stiffness(stiffness);
+  objective_.body_contact().set_stiffness(stiffness);
+  objective_.cut_face_contact().set_stiffness(stiffness);
   tangent_.forget_contact();
 }
 
 /// mm, by which pressures differ from multipliers, over the penalty's stiffness: the gap where a
 /// point presses or slides, what a multiplier still pretends where it does not.
 double ContactSearch::violation() {
-  mechanics::TouchLoop& touches = objective_.touches();
-  touches.look(objective_.positions().local());
-  double most = 0;
-  for (size_t c = 0; c < touches.multipliers().size(); ++c)
-    most = std::max(most, std::abs(touches.pressure(c) - touches.multipliers()[c]));
-  mechanics::WallLoop& walls = objective_.walls();
-  walls.look(objective_.positions().local());
-  for (size_t w = 0; w < walls.size(); ++w)
-    most = std::max(most, std::abs(walls.pressure(w) - walls.multipliers()[w]));
-  return largest_of_ranks(objective_.positions().comm(), most / objective_.touches().stiffness());
+  mechanics::BodyContact& body_contact = objective_.body_contact();
+  body_contact.update_gaps(objective_.positions().local());
+  double maximum = 0;
+  for (size_t c = 0; c < body_contact.multipliers().size(); ++c)
+    maximum = std::max(maximum, std::abs(body_contact.pressure(c) - body_contact.multipliers()[c]));
+  mechanics::CutFaceContact& cut_faces = objective_.cut_face_contact();
+  cut_faces.update_gaps(objective_.positions().local());
+  for (size_t w = 0; w < cut_faces.size(); ++w)
+    maximum = std::max(maximum, std::abs(cut_faces.pressure(w) - cut_faces.multipliers()[w]));
+  return largest_of_ranks(objective_.positions().comm(),
+                          maximum / objective_.body_contact().stiffness());
 }
 
 void ContactSearch::move_multipliers() {
-  mechanics::TouchLoop& touches = objective_.touches();
-  std::vector<double> pressure(touches.multipliers().size());
-  for (size_t c = 0; c < pressure.size(); ++c) pressure[c] = touches.pressure(c);
-  touches.set_multipliers(pressure);
-  mechanics::WallLoop& walls = objective_.walls();
-  pressure.resize(walls.size());
-  for (size_t w = 0; w < pressure.size(); ++w) pressure[w] = walls.pressure(w);
-  walls.set_multipliers(pressure);
+  mechanics::BodyContact& body_contact = objective_.body_contact();
+  std::vector<double> pressure(body_contact.multipliers().size());
+  for (size_t c = 0; c < pressure.size(); ++c) pressure[c] = body_contact.pressure(c);
+  body_contact.set_multipliers(pressure);
+  mechanics::CutFaceContact& cut_faces = objective_.cut_face_contact();
+  pressure.resize(cut_faces.size());
+  for (size_t w = 0; w < pressure.size(); ++w) pressure[w] = cut_faces.pressure(w);
+  cut_faces.set_multipliers(pressure);
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
@@ -99,18 +102,18 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   objective_.place_bodies();
-  if (places_.empty()) places_ = objective_.touches().places(positions.local());
+  if (places_.empty()) places_ = objective_.body_contact().places(positions.local());
   const discrete::Part& part = positions.part();
-  std::vector<Vec3> way(positions.local().size(), Vec3::Zero());
-  for (size_t i = 0; i < way.size(); ++i)
+  std::vector<Vec3> travel(positions.local().size(), Vec3::Zero());
+  for (size_t i = 0; i < travel.size(); ++i)
     if (part.unknown[i] < 0)
-      way[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+      travel[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
   objective_.round_bodies(true);
   set_stiffness(stiffness_);
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
-  qp_.linearize(displacement, load, way);
-  objective_.hessian_action(way, trial_, false);
+  qp_.linearize(displacement, load, travel);
+  objective_.hessian_action(travel, trial_, false);
   check(VecAXPY(slope_, 1.0, trial_));
   const bool found = qp_.solve(displacement, slope_, predicted_to, increment);
   tangent_.forget_contact();
@@ -124,23 +127,23 @@ void ContactSearch::subtract_contact() {
   std::vector<Vec3> force = objective_.contact_force();
   for (Vec3& f : force) f *= objective_.weights().elastic;
   force.resize(part.point_row.size(), Vec3::Zero());
-  objective_.positions().keep_owned(force, slope_);
+  objective_.positions().restrict_to_owned(force, slope_);
   check(VecAXPY(slope_, 1.0, gradient_));
 }
 
 /// Searches on the augmented Lagrangian, each followed by new multipliers. A soft penalty lets
 /// points change sides a few at a time.
-Outcome ContactSearch::approach(Vec displacement, double accuracy, const Approach& to) {
-  constexpr int most = 5;
+Outcome ContactSearch::presolve(Vec displacement, double accuracy, const PresolveStage& to) {
+  constexpr int maximum = 5;
   constexpr double softened = 0.25;  // of the penalty's stiffness
   Outcome outcome;
   int64_t iterations = 0;
   objective_.round_bodies(to.rounded);
   set_stiffness(softened * stiffness_);
-  for (int n = 0; n < most; ++n) {
+  for (int n = 0; n < maximum; ++n) {
     const bool near = n > 0 || !to.rounded;
     outcome =
-        minimiser_.approach(displacement, std::max(near ? to.finer : to.rough, accuracy), near);
+        minimizer_.presolve(displacement, std::max(near ? to.finer : to.rough, accuracy), near);
     iterations += outcome.iterations;
     if (outcome.stopped) break;
     objective_.positions().update(displacement);
@@ -158,7 +161,7 @@ Outcome ContactSearch::approach(Vec displacement, double accuracy, const Approac
 /// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
 /// from `tissue`, the value without contact. Its full length is tried first.
 bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
-  constexpr int most_halved = 6;
+  constexpr int max_halved = 6;
   constexpr double rounding = 1e-12;
   const auto try_step = [&](double share) {
     check(VecCopy(displacement, trial_));
@@ -169,7 +172,7 @@ bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
   const double largest = merit + rounding * std::abs(merit);
   double share = 1;
   value = try_step(share);
-  for (int k = 0; k < most_halved && value > largest; ++k) value = try_step(share /= 2);
+  for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
   if (value > largest) return false;
   check(VecCopy(trial_, displacement));
   return true;
@@ -177,11 +180,11 @@ bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
 
 /// Steps of quadratic programs until one is shorter than half of `accuracy`.
 ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
-  constexpr int most_steps = 12;
+  constexpr int max_steps = 12;
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   double value = objective_.evaluate(displacement, gradient_);
-  for (int n = 0; n < most_steps; ++n) {
+  for (int n = 0; n < max_steps; ++n) {
     subtract_contact();
     const double tissue = value - objective_.weights().elastic * objective_.contact_value();
     qp_.linearize(displacement);
@@ -202,7 +205,7 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
 /// Ends the search where a strict estimate says that it is over.
 Outcome ContactSearch::finish(Vec displacement, double accuracy) {
   tangent_.forget_contact();
-  Outcome outcome = minimiser_.finish(displacement, (1 - missed) * accuracy);
+  Outcome outcome = minimizer_.finish(displacement, (1 - missed) * accuracy);
   objective_.positions().update(displacement);
   outcome.displacement_error += contact_safety * violation();
   outcome.converged = outcome.converged && outcome.displacement_error <= accuracy;
@@ -222,7 +225,7 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
 bool ContactSearch::gone_round(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  int found = objective_.touches().changed_side(places_, positions.local());
+  int found = objective_.body_contact().changed_side(places_, positions.local());
   MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, positions.comm());
   return found;
 }
@@ -267,7 +270,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
   set_pressures(at_prediction_);
   int64_t iterations = 0;
   const Outcome near =
-      approach(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
+      presolve(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
   bool taken = false;
   if (!near.stopped && newton(start_, accuracy, iterations) == End::reached) {
     const OtherRest other = compare_skins(displacement, start_);
@@ -289,7 +292,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
-  constexpr int most_rounds = 8, stiffest = 16;
+  constexpr int max_rounds = 8, stiffest = 16;
   Outcome outcome;
   if (!predicted_) {
     before_ = pressures();
@@ -303,11 +306,11 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   stiffen(1);
   int64_t iterations = 0;
   double finer = accuracy;
-  const Approach to_fine{false, accuracy, accuracy, to_exact.finer};
-  for (int round = 0; round < most_rounds; ++round) {
+  const PresolveStage to_fine{false, accuracy, accuracy, to_exact.finer};
+  for (int round = 0; round < max_rounds; ++round) {
     const auto stages = round == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
-    for (const Approach& to : stages) {
-      const Outcome near = approach(displacement, accuracy, to);
+    for (const PresolveStage& to : stages) {
+      const Outcome near = presolve(displacement, accuracy, to);
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
     }
@@ -327,8 +330,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 }
 
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
-  before_ = {std::vector<double>(objective_.touches().multipliers().size(), 0.0),
-             std::vector<double>(objective_.walls().size(), 0.0)};
+  before_ = {std::vector<double>(objective_.body_contact().multipliers().size(), 0.0),
+             std::vector<double>(objective_.cut_face_contact().size(), 0.0)};
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
   stiffen(1);
@@ -353,14 +356,14 @@ void ContactSearch::go_back(Vec) {
 }
 
 double penetration(discrete::Objective& objective) {
-  mechanics::TouchLoop& touches = objective.touches();
+  mechanics::BodyContact& body_contact = objective.body_contact();
   const auto position = objective.positions().local();
-  touches.look(position);
+  body_contact.update_gaps(position);
   double deepest = 0;
-  for (const double gap : touches.gaps()) deepest = std::max(deepest, -gap);
-  mechanics::WallLoop& walls = objective.walls();
-  walls.look(position);
-  for (size_t w = 0; w < walls.size(); ++w) deepest = std::max(deepest, -walls.gap(w));
+  for (const double gap : body_contact.gaps()) deepest = std::max(deepest, -gap);
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  cut_faces.update_gaps(position);
+  for (size_t w = 0; w < cut_faces.size(); ++w) deepest = std::max(deepest, -cut_faces.gap(w));
   return largest_of_ranks(objective.positions().comm(), deepest);
 }
 

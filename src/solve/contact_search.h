@@ -1,6 +1,6 @@
 #pragma once
 #include "contact_qp.h"
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 namespace repose::solve {
 
@@ -14,18 +14,18 @@ namespace repose::solve {
 /// the rest position of less energy is taken, and the outcome states the distance of the other.
 class ContactSearch : public RestSearch {
  public:
-  struct Approach {
+  struct PresolveStage {
     bool rounded;         ///< edges of bodies (discrete::Objective::round_bodies)
     double rough, finer;  ///< mm, to which the first search goes, and those near it
     double left;          ///< mm of gaps, from where on the next stage leads
   };
 
-  /// `tangent` is the objective's Hessian, `solver` solves with it, `minimiser` minimises
+  /// `tangent` is the objective's Hessian, `solver` solves with it, `minimizer` minimizes
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                linear::TangentSolver& solver, Minimiser& minimiser, Minimiser::Watch watch);
+                linear::TangentSolver& solver, Minimizer& minimizer, Minimizer::Watch watch);
   /// Sets if another rest position is searched for at load 1 (the default).
-  void find_other_rest(bool wanted) { finds_other_ = wanted; }
+  void find_other_rest(bool requested) { finds_other_ = requested; }
   /// Evaluations that this search took.
   int64_t evaluations_for_other() const { return evaluations_for_other_; }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
@@ -42,7 +42,7 @@ class ContactSearch : public RestSearch {
   double violation();
   void move_multipliers();
   void subtract_contact();
-  Outcome approach(Vec displacement, double accuracy, const Approach& to);
+  Outcome presolve(Vec displacement, double accuracy, const PresolveStage& to);
   enum class End { reached, failed, stopped };
   End newton(Vec displacement, double accuracy, int64_t& iterations);
   bool take_step(Vec displacement, double tissue, double& value);
@@ -55,8 +55,8 @@ class ContactSearch : public RestSearch {
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
-  Minimiser& minimiser_;
-  Minimiser::Watch watch_;
+  Minimizer& minimizer_;
+  Minimizer::Watch watch_;
   ContactQp qp_;
   double stiffness_;  // N/mm³, of the penalty
   int times_ = 1;     // it is so many times the model's

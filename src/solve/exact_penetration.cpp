@@ -34,16 +34,16 @@ double ExactPenetration::depth(size_t body, const mechanics::RigidBody& shape, c
 
 void ExactPenetration::measure_own(discrete::Objective& objective,
                                    std::vector<PenetrationDepth>& depths) {
-  const std::vector<mechanics::RigidBody>& bodies = objective.touches().bodies();
-  const model::Touches& touches = part_.model.contact.touches;
-  for (size_t c = 0; c < touches.point.size(); ++c) {
-    const int32_t body = touches.body[c];
-    const Vec3& now = objective.positions().local()[touches.point[c]];
+  const std::vector<mechanics::RigidBody>& bodies = objective.body_contact().bodies();
+  const model::ContactPairs& body_contact = part_.model.contact.pairs;
+  for (size_t c = 0; c < body_contact.point.size(); ++c) {
+    const int32_t body = body_contact.body[c];
+    const Vec3& now = objective.positions().local()[body_contact.point[c]];
     const Vec3 beside = bodies[body].beside(now);
     if (bodies[body].lower_bound(beside, 0) > 0) continue;
     double deeper = depth(body, bodies[body], beside);
     if (deeper > 0)
-      deeper -= depth(body, bodies[body], part_.model.points.position[touches.point[c]]);
+      deeper -= depth(body, bodies[body], part_.model.points.position[body_contact.point[c]]);
     PenetrationDepth& on = depths[body];
     on.points += deeper > PenetrationDepth::reported;
     if (deeper <= on.deepest) continue;
@@ -55,7 +55,7 @@ void ExactPenetration::measure_own(discrete::Objective& objective,
 std::vector<PenetrationDepth> ExactPenetration::measure(discrete::Objective& objective) {
   MPI_Comm comm = objective.positions().comm();
   std::vector<PenetrationDepth> depths(part_.bodies.size());
-  base::together(comm, [&] { measure_own(objective, depths); });
+  base::collective_try(comm, [&] { measure_own(objective, depths); });
   for (PenetrationDepth& on : depths) combine_ranks(comm, on);
   return depths;
 }

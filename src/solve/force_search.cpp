@@ -6,22 +6,22 @@ namespace repose::solve {
 
 using base::check;
 
-ForceSearch::ForceSearch(discrete::ForceFunctional& functional, Minimiser& minimiser)
+ForceSearch::ForceSearch(discrete::ForceFunctional& functional, Minimizer& minimizer)
     : functional_(functional),
-      minimiser_(minimiser),
+      minimizer_(minimizer),
       before_(functional.positions().make_vector()) {}
 
 Outcome ForceSearch::run(Vec displacement, double accuracy) {
-  constexpr int most_stages = 10;
-  constexpr double shrink = 0.1, least = 1e-6;  // of ε, at each stage and N at last
+  constexpr int max_stages = 10;
+  constexpr double shrink = 0.1, minimum = 1e-6;  // of ε, at each stage and N at last
   const bool same_minimum = functional_.weights().volume == mechanics::VolumeTerm::none;
-  double epsilon = std::max(functional_.largest_force(displacement), least);
+  double epsilon = std::max(functional_.largest_force(displacement), minimum);
   Outcome outcome;
   int64_t iterations = 0;
-  for (int stage = 0; stage < most_stages; ++stage, epsilon *= shrink) {
+  for (int stage = 0; stage < max_stages; ++stage, epsilon *= shrink) {
     functional_.set_epsilon(epsilon);
     check(VecCopy(displacement, before_));
-    outcome = minimiser_.run(displacement, accuracy);
+    outcome = minimizer_.run(displacement, accuracy);
     iterations += outcome.iterations;
     if (outcome.stopped) outcome.converged = outcome.converged && same_minimum;
     if (outcome.stopped || (outcome.converged && same_minimum)) break;

@@ -17,24 +17,24 @@ struct Wanted {
 };
 
 /// PETSc's way, so that `-help petsc` lists them.
-PetscErrorCode read_options(MPI_Comm comm, Wanted& wanted) {
+PetscErrorCode read_options(MPI_Comm comm, Wanted& requested) {
   const char* const choices[] = {"diagonal", "stiffness"};
   PetscFunctionBegin;
   PetscOptionsBegin(comm, nullptr, "Initial Hessian of limited-memory BFGS", "");
   PetscCall(PetscOptionsEList("-tao_lmvm_initial", "What it begins with", "", choices, 2,
-                              choices[wanted.initial], &wanted.initial, nullptr));
+                              choices[requested.initial], &requested.initial, nullptr));
   PetscCall(PetscOptionsReal("-tao_lmvm_renewal_price",
                              "Iterations that the stiffness may cost before it is renewed", "",
-                             wanted.price, &wanted.price, nullptr));
+                             requested.price, &requested.price, nullptr));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-Wanted wanted_by_options(MPI_Comm comm, bool solid = false) {
-  Wanted wanted;
-  if (solid) wanted.initial = 1;
-  base::check_options(read_options(comm, wanted));
-  return wanted;
+Wanted requested_by_options(MPI_Comm comm, bool solid = false) {
+  Wanted requested;
+  if (solid) requested.initial = 1;
+  base::check_options(read_options(comm, requested));
+  return requested;
 }
 
 MPI_Comm comm_of(Mat matrix) { return PetscObjectComm(reinterpret_cast<PetscObject>(matrix)); }
@@ -61,7 +61,7 @@ bool StepLag::observe(double force, double length) {
 }
 
 InitialHessian::InitialHessian(Tao tao, linear::TangentSolver& solver)
-    : solver_(solver), lag_(wanted_by_options(comm_of(solver.hessian().action())).price) {
+    : solver_(solver), lag_(requested_by_options(comm_of(solver.hessian().action())).price) {
   const Mat action = solver.hessian().action();
   PetscInt rows = 0, all_rows = 0;
   check(MatGetLocalSize(action, &rows, nullptr));
@@ -90,13 +90,13 @@ void InitialHessian::refresh(Vec displacement) {
 }
 
 bool InitialHessian::needs_renewal(double force, double length) {
-  if (renewals_ != solver_.renewals()) lag_.renew();  // by a look at the distance from rest
+  if (renewals_ != solver_.renewals()) lag_.renew();  // by an estimate of the distance from rest
   renewals_ = solver_.renewals();
   return lag_.observe(force, length);
 }
 
 bool begins_with_stiffness(const discrete::Positions& positions) {
-  return wanted_by_options(positions.comm(), positions.part().solid).initial == 1;
+  return requested_by_options(positions.comm(), positions.part().solid).initial == 1;
 }
 
 }  // namespace repose::solve

@@ -48,7 +48,7 @@ class InitialHessian {
   linear::TangentSolver& solver_;
   base::MatHandle inverse_;  // MATSHELL whose solution is the preconditioner's
   StepLag lag_;
-  int64_t renewals_ = 0;  // of the preconditioner, when last looked at
+  int64_t renewals_ = 0;  // of the preconditioner, at the last check
 };
 
 /// Returns whether limited-memory BFGS is to begin with the stiffness (`-tao_lmvm_initial

@@ -11,15 +11,15 @@ using base::check;
 
 namespace {
 
-constexpr int most_halvings = 5;  // of a step that fails or strays
+constexpr int max_halvings = 5;  // of a step that fails or strays
 // Evaluations of steps that are made again, at most, and so many more for each of a step taken.
-constexpr int64_t most_refused = 2000, refused_a_taken = 2;
+constexpr int64_t max_refused = 2000, refused_a_taken = 2;
 constexpr double trusted_miss = 0.5;  // of the predicted increment; beyond, a step is halved
 
 // The way of the fastest point in an automatic step, mm, at most: longer steps may jump between the
 // rest positions that springs have; a solid's searches end at one from as far.
 constexpr double spring_stride = 5, solid_stride = 20;
-constexpr double most_steps = 1000;  // without halvings: a motion of kilometres is no longer path
+constexpr double max_steps = 1000;  // without halvings: a motion of kilometers is no longer path
 
 /// A state whose energy overflows is none to write.
 void require_value(const Outcome& outcome, double load) {
@@ -41,7 +41,7 @@ class Stopwatch {
 Halvings& Halvings::operator+=(const Halvings& more) {
   failed += more.failed;
   folded += more.folded;
-  strayed += more.strayed;
+  off_prediction += more.off_prediction;
   return *this;
 }
 
@@ -57,7 +57,7 @@ LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& set
 double LoadPath::automatic_step() const {
   const discrete::Positions& positions = objective_.positions();
   const double stride = positions.part().solid ? solid_stride : spring_stride;
-  return 1.0 / std::clamp(std::ceil(positions.largest_travel() / stride), 1.0, most_steps);
+  return 1.0 / std::clamp(std::ceil(positions.largest_travel() / stride), 1.0, max_steps);
 }
 
 double LoadPath::requested_step() const {
@@ -97,7 +97,7 @@ LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
 
 bool LoadPath::follows(const Attempt& now, const std::optional<Attempt>& coarser) const {
   if (!now.outcome.converged) return false;
-  // No prediction knows what will be touched.
+  // No prediction includes contact that begins in the step.
   const bool touching = objective_.positions().part().contact;
   const bool near = touching || now.miss <= trusted_miss * now.expected + settings_.accuracy;
   if (near && !now.folded) return true;
@@ -127,15 +127,15 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   objective_.positions().update(displacement);
 }
 
-void LoadPath::take_back(const Attempt& tried, Vec displacement) {
+void LoadPath::reject_step(const Attempt& tried, Vec displacement) {
   objective_.positions().set_load(result_.load);
   search_.go_back(displacement);
   refused_ += tried.evaluations;
   Halvings& h = result_.halvings;
-  ++(!tried.outcome.converged ? h.failed : tried.folded ? h.folded : h.strayed);
+  ++(!tried.outcome.converged ? h.failed : tried.folded ? h.folded : h.off_prediction);
 }
 
-void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
+void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   const Stopwatch watch;
   const double before = result_.load;
   const int64_t folded_before = inverted(displacement);
@@ -157,7 +157,7 @@ void LoadPath::leap(Vec displacement, Vec guess, const OnStep& on_step) {
 
 bool LoadPath::in_vain(const Attempt& tried) const {
   const int64_t taken = function_.evaluations() - tried.evaluations - begun_ - refused_;
-  return refused_ > most_refused + refused_a_taken * taken;
+  return refused_ > max_refused + refused_a_taken * taken;
 }
 
 /// Explains the step that ends the path without rest.
@@ -175,13 +175,13 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   if (guess && settings_.near_guess && result_.load < 1) {
     positions.set_load(result_.load);
-    leap(displacement, guess, on_step);
+    try_guess(displacement, guess, on_step);
     if (result_.leapt) return result_;
   }
   settle(displacement, on_step);
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
       result_.load < 1)
-    leap(displacement, guess, on_step);
+    try_guess(displacement, guess, on_step);
   if (!ends_in_automatic_steps()) {
     follow(displacement, requested_step(), 1, on_step);
     return result_;
@@ -206,7 +206,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
     const double target = result_.load + step;
     const double load = target > 1 - nearly ? 1 : target;
     const Attempt tried = attempt(displacement, load);
-    const bool last = halvings == most_halvings || in_vain(tried);
+    const bool last = halvings == max_halvings || in_vain(tried);
     if (tried.outcome.stopped || last || follows(tried, coarser)) {
       accept(tried.outcome, load, displacement);
       explain_failure();
@@ -215,7 +215,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
       coarser.reset();
       on_step(result_.last, result_.load, watch.seconds());
     } else {
-      take_back(tried, displacement);
+      reject_step(tried, displacement);
       step /= 2;
       ++halvings;
       coarser = tried;

@@ -17,22 +17,23 @@ constexpr double apart = 1;          // mm that what does not press would have t
 /// present gap and is held there by a stiffer penalty, all else stays off.
 class FrozenContact {
  public:
-  explicit FrozenContact(Problem& problem) : problem_(problem), stiffness_(touches().stiffness()) {
-    const auto p = touches().multipliers(), q = walls().multipliers();
+  explicit FrozenContact(Problem& problem)
+      : problem_(problem), stiffness_(body_contact().stiffness()) {
+    const auto p = body_contact().multipliers(), q = cut_face_contact().multipliers();
     touch_multipliers_.assign(p.begin(), p.end());
     wall_multipliers_.assign(q.begin(), q.end());
     const auto position = problem.objective().positions().local();
-    touches().look_at_all(position);
-    walls().look(position);
+    body_contact().update_all_gaps(position);
+    cut_face_contact().update_gaps(position);
     const double stiff = stiffer * stiffness_;
     const auto frozen = [&](double pressure, double gap) {
       return pressure != 0 ? pressure + stiff * gap : stiff * (gap - apart);
     };
     std::vector<double> pressing(touch_multipliers_.size()), parting(wall_multipliers_.size());
     for (size_t c = 0; c < pressing.size(); ++c)
-      pressing[c] = frozen(touches().pressure(c), touches().gaps()[c]);
+      pressing[c] = frozen(body_contact().pressure(c), body_contact().gaps()[c]);
     for (size_t w = 0; w < parting.size(); ++w)
-      parting[w] = frozen(walls().pressure(w), walls().gap(w));
+      parting[w] = frozen(cut_face_contact().pressure(w), cut_face_contact().gap(w));
     set(stiff, pressing, parting);
   }
   ~FrozenContact() { set(stiffness_, touch_multipliers_, wall_multipliers_); }
@@ -40,13 +41,13 @@ class FrozenContact {
   FrozenContact& operator=(const FrozenContact&) = delete;
 
  private:
-  mechanics::TouchLoop& touches() { return problem_.objective().touches(); }
-  mechanics::WallLoop& walls() { return problem_.objective().walls(); }
+  mechanics::BodyContact& body_contact() { return problem_.objective().body_contact(); }
+  mechanics::CutFaceContact& cut_face_contact() { return problem_.objective().cut_face_contact(); }
   void set(double stiffness, std::span<const double> pressing, std::span<const double> parting) {
-    touches().set_stiffness(stiffness);
-    walls().set_stiffness(stiffness);
-    touches().set_multipliers(pressing);
-    walls().set_multipliers(parting);
+    body_contact().set_stiffness(stiffness);
+    cut_face_contact().set_stiffness(stiffness);
+    body_contact().set_multipliers(pressing);
+    cut_face_contact().set_multipliers(parting);
     problem_.tangent().forget_contact();
   }
 
@@ -73,12 +74,12 @@ std::vector<Vec3> differentiate(discrete::Objective& objective, Vec displacement
     return std::vector<Vec3>(positions.local().begin(), positions.local().end());
   };
   const std::vector<Vec3> from = evaluate(-difference, before);
-  std::vector<Vec3> way = evaluate(difference, slope);
+  std::vector<Vec3> travel = evaluate(difference, slope);
   check(VecAXPY(slope, -1.0, before));
   check(VecScale(slope, 1 / (2 * difference)));
-  for (size_t i = 0; i < way.size(); ++i) way[i] = (way[i] - from[i]) / (2 * difference);
+  for (size_t i = 0; i < travel.size(); ++i) travel[i] = (travel[i] - from[i]) / (2 * difference);
   evaluate(0, before);
-  return way;
+  return travel;
 }
 
 }  // namespace
@@ -109,7 +110,7 @@ std::vector<model::PointField> plan_tangents(Problem& problem, const discrete::N
           check(VecSet(column, 0));
           std::ranges::fill(values, Vec3::Zero());
         }
-        positions.spread(column, values);
+        positions.scatter_to_local(column, values);
         model::PointField& field = fields.emplace_back(
             natural.field(fmt::format("tangent_{}_{}{}", piece.bone, component < 3 ? 't' : 'r',
                                       axes[component % 3]),

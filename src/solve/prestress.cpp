@@ -134,13 +134,13 @@ class Stiffness {
 
   /// Solves (A K Aᵀ) μ = −`force` to that part of the force which is left to balance.
   void solve(Vec force, const Prestress& so_far) {
-    constexpr double least = 1e-10, below = 1e-2;
+    constexpr double minimum = 1e-10, below = 1e-2;
     const double left = below * balanced * so_far.largest_force / so_far.residual;
     base::VecHandle multiplier = positions_.make_vector();
     const base::VecHandle initial = positions_.make_vector();
     check(VecScale(force, -1));
-    solver_.solve(initial, force, multiplier, std::max(least, left));
-    positions_.spread(multiplier, multiplier_);
+    solver_.solve(initial, force, multiplier, std::max(minimum, left));
+    positions_.scatter_to_local(multiplier, multiplier_);
   }
   /// Returns a spring's component of K Aᵀ μ, N.
   double tension(size_t spring) const {
@@ -178,7 +178,7 @@ base::VecHandle initial_forces(MPI_Comm comm, const discrete::Part& part) {
   const base::VecHandle at_rest = positions.make_vector();
   base::VecHandle forces = positions.make_vector();
   positions.update(at_rest);
-  positions.keep_owned(objective.residual_force(), forces);
+  positions.restrict_to_owned(objective.residual_force(), forces);
   return forces;
 }
 
@@ -237,7 +237,7 @@ double rounding_force(MPI_Comm comm, const discrete::Part& part) {
   const auto& [p, q] = whole.springs.points[spring];
   const Vec3& at = whole.points.position[p];
   base::refuse(
-      "the initial equilibrium asks {} springs to be shorter than nothing at rest; the first is "
+      "the initial equilibrium requires negative rest lengths of {} springs; the first is "
       "spring {} ({}, points {} and {} near ({:.2f}, {:.2f}, {:.2f}) mm): it would have to carry "
       "{:.3g} N over {:.3g} mm; lower tissue.turgor or the mass, or raise the stiffness of that "
       "set",
@@ -264,7 +264,7 @@ void require_rest_lengths(MPI_Comm comm, const Model& whole, const discrete::Par
   if (impossible == 0) return;
   MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, comm);
   MPI_Bcast(&worst, 1, MPI_DOUBLE, first.rank, comm);
-  base::on_first_rank(
+  base::on_root(
       comm, [&] { refuse_rest_length(whole, static_cast<int64_t>(first.row), worst, impossible); });
 }
 
@@ -317,12 +317,12 @@ void collect(MPI_Comm comm, std::vector<int64_t> row, std::vector<double> values
   }
 }
 
-double least_rest_ratio(const Model& model) {
-  double least = 1;
+double min_rest_ratio(const Model& model) {
+  double minimum = 1;
   for (size_t j = 0; j < model.springs.points.size(); ++j)
     if (length(model, j) > 0)
-      least = std::min(least, model.springs.rest_length[j] / length(model, j));
-  return least;
+      minimum = std::min(minimum, model.springs.rest_length[j] / length(model, j));
+  return minimum;
 }
 
 /// Adds what balances the force to the solid's edges and prisms; returns the largest pressure
@@ -348,13 +348,13 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
   Prestress result;
   result.solid = true;
   Stiffness stiffness(comm, solid_stiffness_part(part));
-  constexpr int most_refinements = 6;
-  for (int pass = 0; pass <= most_refinements; ++pass) {
+  constexpr int max_refinements = 6;
+  for (int pass = 0; pass <= max_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
     result.residual = discrete::largest_block(force);
     if (pass == 0) result.largest_force = result.residual;
     if (result.residual <= balanced * result.largest_force) break;
-    if (pass == most_refinements) {
+    if (pass == max_refinements) {
       if (result.residual <= rounding_force(comm, part)) break;
       refuse_unbalanced(comm, part, force, result);
     }
@@ -375,7 +375,7 @@ Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
   return result;
 }
 
-Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
+Prestress balance_springs(MPI_Comm comm, Model& model, const ReferenceState& as) {
   discrete::Part part = discrete::distribute(comm, model);
   const std::vector<char> skin = skin_springs(comm, model, part);
   for (size_t j = 0; j < skin.size(); ++j)
@@ -386,13 +386,13 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
   Prestress result;
   Stiffness stiffness(comm, stiffness_part(part, skin));
   std::vector<double> tension(skin.size(), 0.0);
-  constexpr int most_refinements = 6;
-  for (int pass = 0; pass <= most_refinements; ++pass) {
+  constexpr int max_refinements = 6;
+  for (int pass = 0; pass <= max_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
     result.residual = discrete::largest_block(force);
     if (pass == 0) result.largest_force = result.residual;
     if (result.residual <= balanced * result.largest_force) break;
-    if (pass == most_refinements) {
+    if (pass == max_refinements) {
       if (result.residual <= rounding_force(comm, part)) break;
       refuse_unbalanced(comm, part, force, result);
     }
@@ -403,14 +403,14 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const Recording& as) {
     require_rest_lengths(comm, model, part, tension);
   }
   collect(comm, part.spring_row, part.model.springs.rest_length, model.springs.rest_length);
-  result.least_rest_ratio = least_rest_ratio(part.model);
-  MPI_Allreduce(MPI_IN_PLACE, &result.least_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
+  result.min_rest_ratio = min_rest_ratio(part.model);
+  MPI_Allreduce(MPI_IN_PLACE, &result.min_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
   return result;
 }
 
 }  // namespace
 
-Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
+Prestress prestress(MPI_Comm comm, Model& model, ReferenceState as) {
   static const PetscLogEvent event = base::log_event("RpPrestress");
   const base::Logged logged(event);
   MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
@@ -419,7 +419,7 @@ Prestress prestress(MPI_Comm comm, Model& model, Recording as) {
   return solid ? balance_solid(comm, model, as.gravity) : balance_springs(comm, model, as);
 }
 
-Prestress prestress(MPI_Comm comm, discrete::Part& part, Recording as) {
+Prestress prestress(MPI_Comm comm, discrete::Part& part, ReferenceState as) {
   static const PetscLogEvent event = base::log_event("RpPrestress");
   const base::Logged logged(event);
   MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);

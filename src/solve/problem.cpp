@@ -26,7 +26,7 @@ linear::TangentSolver& Problem::solver() {
 }
 
 ErrorEstimate Problem::error_estimate() {
-  // Without volume term rest is F = 0, of which the energy's Newton step knows more.
+  // Without volume term rest is F = 0, for which the energy's Newton step is the better estimate.
   if (force_ && !force_->volume()) return {objective_, elastic_solver_};
   return {function(), solver()};
 }

@@ -100,9 +100,9 @@ void add_prisms(const model::Model& model, const std::vector<double>& x,
 std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
                             const std::vector<std::vector<int64_t>>& held,
                             const model::StepNumbers& numbers, const model::StepRows& rows) {
-  auto wanted = static_cast<int64_t>(held.size());
-  MPI_Bcast(&wanted, 1, MPI_INT64_T, 0, comm);
-  if (wanted == 0) return {};
+  auto requested = static_cast<int64_t>(held.size());
+  MPI_Bcast(&requested, 1, MPI_INT64_T, 0, comm);
+  if (requested == 0) return {};
   const std::vector<double> x =
       discrete::gather(comm, rows.position.empty() ? nullptr : rows.position.data()->data(),
                        3 * rows.position.size());

@@ -58,7 +58,7 @@ model::StepNumbers numbers_of(discrete::Objective& objective, const Settings& se
   n.volume = settings.weights.volume;
   n.lambda = settings.weights.elastic;
   measure(objective, n);
-  // What is fixed stores energy, too, that no search knows of.
+  // What is fixed stores energy, too, that no search includes.
   const bool whole = objective.positions().part().solid;
   const double contact = std::isfinite(n.contact_energy) ? n.contact_energy : 0;
   n.objective = whole ? n.f_e + n.potential + contact : outcome.objective;
@@ -82,8 +82,8 @@ class Watcher {
         activity_(settings.activity),
         prints_(settings.monitor && base::rank(comm) == 0) {}
   bool operator()(const Iteration& i) {
-    const std::string to_go = std::isfinite(i.millimetres_to_go) && i.millimetres_to_go > 0
-                                  ? fmt::format("{:.3g} mm to go", i.millimetres_to_go)
+    const std::string to_go = std::isfinite(i.millimeters_to_go) && i.millimeters_to_go > 0
+                                  ? fmt::format("{:.3g} mm to go", i.millimeters_to_go)
                                   : std::string("far from rest");
     if (prints_) print(i, to_go);
     progress_.show(fmt::format("{}load {:.3f}  iteration {}  objective {:.6g} N mm  largest force "
@@ -92,7 +92,7 @@ class Watcher {
                    done(i));
     if (on_iteration_) on_iteration_(i);
     if (abandoned_ && abandoned_()) return false;
-    return !(interrupt_ && interrupt_->wanted());
+    return !(interrupt_ && interrupt_->requested());
   }
   void on_iteration(std::function<void(const Iteration&)> work) { on_iteration_ = std::move(work); }
 
@@ -103,10 +103,10 @@ class Watcher {
     if (i.load != load_ || i.number == 0) {
       if (i.load > load_) reached_ = load_;  // else a step was refused
       load_ = i.load;
-      farthest_ = nearest_ = i.millimetres_to_go;
+      farthest_ = nearest_ = i.millimeters_to_go;
     }
-    if (!std::isfinite(farthest_)) farthest_ = i.millimetres_to_go;
-    nearest_ = std::min(nearest_, i.millimetres_to_go);
+    if (!std::isfinite(farthest_)) farthest_ = i.millimeters_to_go;
+    nearest_ = std::min(nearest_, i.millimeters_to_go);
     const bool known = std::isfinite(farthest_) && farthest_ > accuracy_ && nearest_ > 0;
     const double searched =
         known ? std::log(farthest_ / nearest_) / std::log(farthest_ / accuracy_) : 0;
@@ -139,19 +139,19 @@ class Searcher {
   Searcher(discrete::Positions& positions, const Settings& settings)
       : problem_(positions, settings.weights, settings.functional == model::Functional::force),
         watcher_(positions.comm(), settings),
-        minimiser_(problem_.function(), problem_.solver(), problem_.error_estimate(),
+        minimizer_(problem_.function(), problem_.solver(), problem_.error_estimate(),
                    std::ref(watcher_)) {
-    if (problem_.force()) force_search_.emplace(*problem_.force(), minimiser_);
+    if (problem_.force()) force_search_.emplace(*problem_.force(), minimizer_);
     if (positions.part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
-                       minimiser_, std::ref(watcher_));
+                       minimizer_, std::ref(watcher_));
     if (contact_) contact_->find_other_rest(settings.finds_other_rest);
   }
 
   RestSearch& search() {
     if (force_search_) return *force_search_;
     if (contact_) return *contact_;
-    return minimiser_;
+    return minimizer_;
   }
   discrete::Objective& objective() { return problem_.objective(); }
   linear::TangentSolver& elastic_solver() { return problem_.elastic_solver(); }
@@ -159,30 +159,30 @@ class Searcher {
   Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   /// Returns the evaluations of the searches alone.
-  int64_t evaluations() { return problem_.function().evaluations() - looks_; }
+  int64_t evaluations() { return problem_.function().evaluations() - inspections_; }
   int64_t evaluations_for_other() const { return contact_ ? contact_->evaluations_for_other() : 0; }
-  void count_look() { ++looks_; }
+  void count_inspection() { ++inspections_; }
   int64_t assemblies() const { return problem_.assemblies(); }
 
  private:
   Problem problem_;
   Watcher watcher_;
-  Minimiser minimiser_;
+  Minimizer minimizer_;
   std::optional<ForceSearch> force_search_;
   std::optional<ContactSearch> contact_;
-  int64_t looks_ = 0;  // evaluations for those who look at a state
+  int64_t inspections_ = 0;  // evaluations for those who inspect a state
 };
 
 /// Lets the caller inspect the state of each iteration.
-void show_states(Searcher& searcher, const Settings& settings,
-                 const discrete::NaturalRows& natural) {
+void report_iterates(Searcher& searcher, const Settings& settings,
+                     const discrete::NaturalRows& natural) {
   searcher.watcher().on_iteration([&](const Iteration& i) {
-    settings.under_way(i.load, [&](const Receiver& receive) {
+    settings.on_iterate(i.load, [&](const Receiver& receive) {
       discrete::Objective& objective = searcher.objective();
       const base::VecHandle gradient = objective.positions().make_vector();
       Outcome outcome;
       outcome.objective = searcher.problem().function().evaluate(i.displacement, gradient);
-      searcher.count_look();
+      searcher.count_inspection();
       outcome.gradient_max = discrete::largest_block(gradient);
       outcome.displacement_error = std::numeric_limits<double>::infinity();
       outcome.iterations = i.number;
@@ -195,21 +195,21 @@ void show_states(Searcher& searcher, const Settings& settings,
 }
 
 /// Points of this rank that were inside bodies at the start.
-void add_inside(const discrete::Part& part, const model::Touches& touches,
-                std::vector<BodyContact>& contacts) {
-  constexpr double told = 0.1;  // mm
-  for (size_t c = 0; c < touches.point.size(); ++c) {
-    const double depth = -touches.offset[c];
-    if (touches.binding[c] == model::Binding::slides || depth < told) continue;
-    BodyContact& on = contacts[touches.body[c]];
+void add_inside(const discrete::Part& part, const model::ContactPairs& body_contact,
+                std::vector<ContactSummary>& contacts) {
+  constexpr double reported_depth = 0.1;  // mm
+  for (size_t c = 0; c < body_contact.point.size(); ++c) {
+    const double depth = -body_contact.offset[c];
+    if (body_contact.binding[c] == model::Binding::slides || depth < reported_depth) continue;
+    ContactSummary& on = contacts[body_contact.body[c]];
     ++on.inside;
     if (depth <= on.deepest) continue;
     on.deepest = depth;
-    on.where = part.model.points.position[touches.point[c]];
+    on.where = part.model.points.position[body_contact.point[c]];
   }
 }
 
-void sum_over_ranks(MPI_Comm comm, BodyContact& on) {
+void sum_over_ranks(MPI_Comm comm, ContactSummary& on) {
   MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
   MPI_Allreduce(MPI_IN_PLACE, on.force.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
   MPI_Allreduce(MPI_IN_PLACE, &on.inside, 1, MPI_INT64_T, MPI_SUM, comm);
@@ -223,28 +223,28 @@ void sum_over_ranks(MPI_Comm comm, BodyContact& on) {
 }
 
 /// At the objective's last update. Collective.
-std::vector<BodyContact> contacts_of(discrete::Objective& objective) {
+std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
   if (!part.contact) return {};
-  std::vector<BodyContact> contacts(part.bodies.size() + 1);
-  mechanics::TouchLoop& touches = objective.touches();
-  touches.look(objective.positions().local());
-  for (size_t c = 0; c < touches.gaps().size(); ++c) {
-    const double pressure = touches.pressure(c);
+  std::vector<ContactSummary> contacts(part.bodies.size() + 1);
+  mechanics::BodyContact& body_contact = objective.body_contact();
+  body_contact.update_gaps(objective.positions().local());
+  for (size_t c = 0; c < body_contact.gaps().size(); ++c) {
+    const double pressure = body_contact.pressure(c);
     if (pressure == 0) continue;
-    BodyContact& on = contacts[touches.touches().body[c]];
+    ContactSummary& on = contacts[body_contact.pairs().body[c]];
     ++on.points;
-    on.force -= pressure * touches.touches().area[c] * touches.normal(c);
+    on.force -= pressure * body_contact.pairs().area[c] * body_contact.normal(c);
   }
-  mechanics::WallLoop& walls = objective.walls();
-  walls.look(objective.positions().local());
-  for (size_t w = 0; w < walls.size(); ++w) {
-    if (walls.pressure(w) == 0) continue;
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  cut_faces.update_gaps(objective.positions().local());
+  for (size_t w = 0; w < cut_faces.size(); ++w) {
+    if (cut_faces.pressure(w) == 0) continue;
     ++contacts.back().points;
-    contacts.back().force -= walls.pressure(w) * walls.area(w) * walls.normal(w);
+    contacts.back().force -= cut_faces.pressure(w) * cut_faces.area(w) * cut_faces.normal(w);
   }
-  add_inside(part, touches.touches(), contacts);
-  for (BodyContact& on : contacts) sum_over_ranks(objective.positions().comm(), on);
+  add_inside(part, body_contact.pairs(), contacts);
+  for (ContactSummary& on : contacts) sum_over_ranks(objective.positions().comm(), on);
   return contacts;
 }
 
@@ -261,7 +261,7 @@ Stability stability_of(linear::TangentSolver& solver, const discrete::Positions&
   found.spectrum.smallest = smallest_eigenvalue(solver, displacement, mode);
   found.spectrum.largest = largest_eigenvalue(solver.hessian().exact());
   found.mode.assign(positions.local().size(), Vec3::Zero());
-  positions.spread(mode, found.mode);
+  positions.scatter_to_local(mode, found.mode);
   return found;
 }
 
@@ -356,7 +356,7 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
 
   const base::LogStage stage("Search");
   Searcher searcher(positions, settings);
-  if (settings.under_way) show_states(searcher, settings, natural);
+  if (settings.on_iterate) report_iterates(searcher, settings, natural);
   Summary summary;
   Steps steps(searcher, settings, natural, receive, summary);
   PathSettings along = settings.path;

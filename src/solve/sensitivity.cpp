@@ -28,13 +28,13 @@ model::Model held_at(model::Model model, const std::vector<Vec3>& position) {
 }
 
 /// [N] mm from `position` to where a model has fixed points at load 1; 0 for the others.
-std::vector<Vec3> ways_of_fixed(const model::Model& model, const std::vector<Vec3>& position) {
+std::vector<Vec3> travel_of_fixed(const model::Model& model, const std::vector<Vec3>& position) {
   const model::PrescribedMotion motion(model);
-  std::vector<Vec3> way(position.size(), Vec3::Zero());
-  for (size_t i = 0; i < way.size(); ++i)
+  std::vector<Vec3> travel(position.size(), Vec3::Zero());
+  for (size_t i = 0; i < travel.size(); ++i)
     if (model.points.set[i] != PointSet::soft_tissue)
-      way[i] = motion.at(model, static_cast<int64_t>(i), 1) - position[i];
-  return way;
+      travel[i] = motion.at(model, static_cast<int64_t>(i), 1) - position[i];
+  return travel;
 }
 
 /// Rank 0's rows, on all ranks.
@@ -53,47 +53,48 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
   if (base::rank(comm) == 0) rows.resize(rest.position.size(), Vec3::Zero());
   const std::vector<Vec3> pressure = natural.owned(base::scatter(comm, rows));
   set_pressures(objective, pressure);
-  problem.tangent().forget();
+  problem.tangent().invalidate();
 }
 
 /// Lets points press that a step takes into bodies, and those go that it takes off them; whether
 /// there are any. Collective.
 bool flip_contacts(Problem& problem, Vec displacement, Vec step) {
   discrete::Positions& positions = problem.objective().positions();
-  mechanics::TouchLoop& touches = problem.objective().touches();
-  const double stiffness = touches.stiffness(), slight = 1e-9 * stiffness;
+  mechanics::BodyContact& body_contact = problem.objective().body_contact();
+  const double stiffness = body_contact.stiffness(), slight = 1e-9 * stiffness;
   const auto gaps_at = [&](Vec state) {
     positions.update(state);
-    touches.look_at_all(positions.local());
-    return std::vector<double>(touches.gaps().begin(), touches.gaps().end());
+    body_contact.update_all_gaps(positions.local());
+    return std::vector<double>(body_contact.gaps().begin(), body_contact.gaps().end());
   };
   base::VecHandle moved = positions.make_vector();
   check(VecWAXPY(moved, 1.0, displacement, step));
   const std::vector<double> after = gaps_at(moved), before = gaps_at(displacement);
-  std::vector<double> multiplier(touches.multipliers().begin(), touches.multipliers().end());
+  std::vector<double> multiplier(body_contact.multipliers().begin(),
+                                 body_contact.multipliers().end());
   int flipped = 0;
   for (size_t c = 0; c < multiplier.size(); ++c) {
-    if (touches.touches().binding[c] == model::Binding::slides) continue;
+    if (body_contact.pairs().binding[c] == model::Binding::slides) continue;
     const bool pressed = multiplier[c] > stiffness * before[c],
                presses = multiplier[c] > stiffness * after[c];
     if (presses == pressed) continue;
     multiplier[c] = stiffness * before[c] + (presses ? slight : 0);
     flipped = 1;
   }
-  touches.set_multipliers(multiplier);
+  body_contact.set_multipliers(multiplier);
   MPI_Allreduce(MPI_IN_PLACE, &flipped, 1, MPI_INT, MPI_MAX, positions.comm());
-  if (flipped) problem.tangent().forget();
+  if (flipped) problem.tangent().invalidate();
   return flipped != 0;
 }
 
 /// −∇Φ − H_sb Δx_b, into `force`.
-void load_on(Problem& problem, Vec displacement, const std::vector<Vec3>& way, Vec force) {
+void load_on(Problem& problem, Vec displacement, const std::vector<Vec3>& travel, Vec force) {
   discrete::Objective& objective = problem.objective();
   const discrete::Part& part = objective.positions().part();
   base::VecHandle gradient = objective.positions().make_vector();
   objective.evaluate(displacement, gradient);
   std::vector<Vec3> direction(part.point_row.size());
-  for (size_t i = 0; i < direction.size(); ++i) direction[i] = way[part.point_row[i]];
+  for (size_t i = 0; i < direction.size(); ++i) direction[i] = travel[part.point_row[i]];
   objective.hessian_action(direction, force);
   check(VecAXPBY(force, -1.0, -1.0, gradient));
 }
@@ -105,15 +106,15 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
   constexpr double close = 1e-3;  // relative residual
   constexpr int contact_rounds = 4;
   model::Model held;
-  std::vector<Vec3> way;
-  base::on_first_rank(comm, [&] {
+  std::vector<Vec3> travel;
+  base::on_root(comm, [&] {
     held = held_at(other, rest.position);
-    way = ways_of_fixed(other, rest.position);
+    travel = travel_of_fixed(other, rest.position);
   });
   const discrete::Part part = discrete::distribute(comm, held);
   discrete::Positions positions(comm, part);
   const discrete::NaturalRows natural(comm, part);
-  share_rows(comm, way, part.total_points);
+  share_rows(comm, travel, part.total_points);
   const base::VecHandle displacement = positions.make_vector(), force = positions.make_vector(),
                         step = positions.make_vector();
   natural.set_unknowns(base::scatter(comm, rest.position), positions, displacement);
@@ -122,14 +123,14 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
   problem.function().evaluate(displacement, force);
   if (part.contact) bring_to_contact(natural, rest, problem);
   for (int left = contact_rounds; left > 0; --left) {
-    load_on(problem, displacement, way, force);
+    load_on(problem, displacement, travel, force);
     linear::TangentSolver& solver = problem.solver();
     if (!solver.solve(displacement, force, step, close) || !solver.finished()) return {};
     if (!part.contact || !flip_contacts(problem, displacement, step)) break;
   }
   std::vector<Vec3> change(part.point_row.size());
-  for (size_t i = 0; i < change.size(); ++i) change[i] = way[part.point_row[i]];
-  positions.spread(step, change);
+  for (size_t i = 0; i < change.size(); ++i) change[i] = travel[part.point_row[i]];
+  positions.scatter_to_local(step, change);
   return discrete::gather_points(comm, natural.natural(change));
 }
 

@@ -101,13 +101,13 @@ void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
   check(EPSSetFromOptions(eps));
 }
 
-EpsHandle symmetric_problem(Mat matrix, double tolerance, int most) {
+EpsHandle symmetric_problem(Mat matrix, double tolerance, int maximum) {
   start_slepc();
   EpsHandle eps;
   check(EPSCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), eps.out()));
   check(EPSSetOperators(eps, matrix, nullptr));
   check(EPSSetProblemType(eps, EPS_HEP));
-  check(EPSSetTolerances(eps, tolerance, most));
+  check(EPSSetTolerances(eps, tolerance, maximum));
   return eps;
 }
 
@@ -122,10 +122,10 @@ double first_eigenvalue(EPS eps) {
 }
 
 void scale_mode(Vec mode) {
-  PetscReal most = 0, least = 0;
-  check(VecMax(mode, nullptr, &most));
-  check(VecMin(mode, nullptr, &least));
-  check(VecScale(mode, (most >= -least ? 1 : -1) / discrete::largest_block(mode)));
+  PetscReal maximum = 0, minimum = 0;
+  check(VecMax(mode, nullptr, &maximum));
+  check(VecMin(mode, nullptr, &minimum));
+  check(VecScale(mode, (maximum >= -minimum ? 1 : -1) / discrete::largest_block(mode)));
 }
 
 }  // namespace
@@ -139,12 +139,12 @@ double largest_eigenvalue(Mat hessian) {
 double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
                            int64_t direct_limit) {
   constexpr double tolerance = 1e-8;  // of the eigenvalue
-  constexpr int most = 2000;          // iterations
+  constexpr int maximum = 2000;       // iterations
   solver.prepare(displacement);
   const Mat exact = solver.hessian().exact();
   PetscInt unknowns = 0;
   check(MatGetSize(exact, &unknowns, nullptr));
-  const EpsHandle eps = symmetric_problem(exact, tolerance, most);
+  const EpsHandle eps = symmetric_problem(exact, tolerance, maximum);
   if (unknowns <= direct_limit)
     choose_shift_and_invert(eps, exact);
   else

@@ -10,7 +10,7 @@
 namespace repose::solve {
 namespace {
 
-constexpr int most_rounds = 100;
+constexpr int max_rounds = 100;
 
 /// The springs that may tear and those that have, on rank 0.
 class Rupture {
@@ -74,7 +74,7 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
   search.stages = nullptr;
   std::vector<Vec3> position = start;
   bool more = true;
-  for (result.settled = false; more && result.rounds < most_rounds;) {
+  for (result.settled = false; more && result.rounds < max_rounds;) {
     std::vector<double> tension;
     const Summary rest = find_repose(comm, model, search, {position},
                                      [&](const model::StepNumbers&, const model::StepRows& rows) {
@@ -85,7 +85,7 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
     result.stopped = rest.path.last.stopped;
     if (result.stopped || !rest.path.complete()) break;
     tension = discrete::gather(comm, tension.data(), tension.size());
-    base::on_first_rank(comm, [&] { more = rupture.tear(tension); });
+    base::on_root(comm, [&] { more = rupture.tear(tension); });
     MPI_Bcast(&more, 1, MPI_C_BOOL, 0, comm);
     if (more) {
       result.torn = true;

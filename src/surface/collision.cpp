@@ -27,7 +27,7 @@ struct Placement {
   }
   /// Distance between box a and a box b placed so, at most the true one: the greater of those to
   /// the upright boxes around one in the frame of the other.
-  double least(const Node& a, const Node& b) const {
+  double minimum(const Node& a, const Node& b) const {
     const Vec3 between = turn * b.center + shift - a.center;
     const Vec3 in_a = between.cwiseAbs() - a.half - spread * b.half;
     const Vec3 in_b =
@@ -41,10 +41,10 @@ struct Placement {
 };
 
 /// Between the triangles of leaf i of a and leaf j of b.
-ShortestWay between(const CollisionTree& a, int64_t i, const CollisionTree& b, int64_t j,
-                    const Placement& place) {
-  return shortest_way(a.corners(a.nodes()[i].triangle),
-                      place.apply(b.corners(b.nodes()[j].triangle)));
+ShortestSegment between(const CollisionTree& a, int64_t i, const CollisionTree& b, int64_t j,
+                        const Placement& place) {
+  return shortest_segment(a.corners(a.nodes()[i].triangle),
+                          place.apply(b.corners(b.nodes()[j].triangle)));
 }
 
 /// Visits pairs of nodes, the more promising of two first. `visitor.key(i, j, least distance)` is
@@ -58,7 +58,7 @@ void traverse(const CollisionTree& a, const CollisionTree& b, const Placement& p
     double key;
   };
   const auto task = [&](int64_t i, int64_t j) -> Task {
-    return {i, j, visitor.key(i, j, place.least(a.nodes()[i], b.nodes()[j]))};
+    return {i, j, visitor.key(i, j, place.minimum(a.nodes()[i], b.nodes()[j]))};
   };
   std::vector<Task> stack{task(0, 0)};
   while (!stack.empty()) {
@@ -84,7 +84,7 @@ struct TouchVisitor {
   const Placement& place;
   bool found = false;
 
-  double key(int64_t, int64_t, double least) const { return least; }
+  double key(int64_t, int64_t, double minimum) const { return minimum; }
   double bound() const { return found ? -1 : contact_margin; }
   void leaf(int64_t i, int64_t j) {
     const double squared = between(a, i, b, j, place).squared;
@@ -95,15 +95,15 @@ struct TouchVisitor {
 struct NearestVisitor {
   const CollisionTree &a, &b;
   const Placement& place;
-  Approach best;
+  ClosestApproach best;
 
-  double key(int64_t, int64_t, double least) const { return least; }
+  double key(int64_t, int64_t, double minimum) const { return minimum; }
   double bound() const { return best.distance; }
   void leaf(int64_t i, int64_t j) {
-    const ShortestWay way = between(a, i, b, j, place);
-    const double distance = std::sqrt(way.squared);
+    const ShortestSegment pair = between(a, i, b, j, place);
+    const double distance = std::sqrt(pair.squared);
     if (distance < best.distance || (best.triangles[0] < 0 && distance <= best.distance))
-      best = {distance, {a.nodes()[i].triangle, b.nodes()[j].triangle}, way.middle};
+      best = {distance, {a.nodes()[i].triangle, b.nodes()[j].triangle}, pair.middle};
   }
 };
 
@@ -113,7 +113,7 @@ struct AllVisitor {
   double limit;
   std::vector<std::pair<int64_t, int64_t>> pairs;
 
-  double key(int64_t, int64_t, double least) const { return least; }
+  double key(int64_t, int64_t, double minimum) const { return minimum; }
   double bound() const { return limit; }
   void leaf(int64_t i, int64_t j) {
     if (between(a, i, b, j, place).squared <= limit * limit)
@@ -164,8 +164,8 @@ bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose) {
   return visitor.found;
 }
 
-std::optional<Approach> nearest(const CollisionTree& a, const CollisionTree& b, const Mat4& pose,
-                                double limit) {
+std::optional<ClosestApproach> nearest(const CollisionTree& a, const CollisionTree& b,
+                                       const Mat4& pose, double limit) {
   const Placement place(pose);
   NearestVisitor visitor{a, b, place, {}};
   visitor.best.distance = limit;
@@ -235,18 +235,18 @@ class Encounter::Sweep {
   Sweep(const Side& a, const Side& b, const Placement& place, double clearance)
       : a_(a), b_(b), place_(place), clearance_(clearance) {}
 
-  double key(int64_t i, int64_t j, double least) const {
+  double key(int64_t i, int64_t j, double minimum) const {
     if (a_.only_such[i] && b_.only_such[j]) return never;
-    return time(least, a_.speed[i] + b_.speed[j]);
+    return time(minimum, a_.speed[i] + b_.speed[j]);
   }
   double bound() const { return std::min(next.load, 2.0); }
   void leaf(int64_t i, int64_t j) {
-    const ShortestWay way = between(*a_.tree, i, *b_.tree, j, place_);
-    const double distance = std::sqrt(way.squared);
+    const ShortestSegment pair = between(*a_.tree, i, *b_.tree, j, place_);
+    const double distance = std::sqrt(pair.squared);
     const double load = time(distance, a_.speed[i] + b_.speed[j]);
     if (!(load < next.load)) return;
     next = {load,
-            {distance, {a_.tree->nodes()[i].triangle, b_.tree->nodes()[j].triangle}, way.middle}};
+            {distance, {a_.tree->nodes()[i].triangle, b_.tree->nodes()[j].triangle}, pair.middle}};
     leaves = {i, j};
   }
 
@@ -273,7 +273,7 @@ Encounter::Side Encounter::make_side(const CollisionTree& tree, const Twist& twi
   return side;
 }
 
-void Encounter::summarise(Side& side) {
+void Encounter::summarize(Side& side) {
   const auto& nodes = side.tree->nodes();
   side.only_such.assign(nodes.size(), 0);
   for (size_t i = nodes.size(); i-- > 0;)
@@ -289,8 +289,8 @@ Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist
     ignored_ += !a_.ignored[s] + !b_.ignored[t];
     a_.ignored[s] = b_.ignored[t] = 1;
   }
-  summarise(a_);
-  summarise(b_);
+  summarize(a_);
+  summarize(b_);
 }
 
 Encounter::Next Encounter::next(const Mat4& pose, double clearance) {

@@ -49,11 +49,11 @@ Content read_content(const std::filesystem::path& file) {
   Content content{file, {std::istreambuf_iterator<char>(in), {}}};
   if (in.bad()) base::refuse("{}: cannot be read: {}", file.string(), std::strerror(errno));
   if (content.bytes.starts_with("\xEF\xBB\xBF")) content.bytes.erase(0, 3);
-  if (content.bytes.empty()) base::refuse("{}: the file is empty; export it anew", file.string());
+  if (content.bytes.empty()) base::refuse("{}: the file is empty; export it again", file.string());
   return content;
 }
 
-Format recognise(const Content& content) {
+Format recognize(const Content& content) {
   const std::string& bytes = content.bytes;
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return Format::ply;
   if (stl_size(bytes) == bytes.size()) return Format::stl_binary;

@@ -64,7 +64,7 @@ class Leaf {
 
 enum class Crossing { through, beside_edge, at_start };
 
-/// How the segment from `start` to `end` meets a triangle that it is known to intersect.
+/// Classifies where the segment from `start` to `end` meets a triangle that it intersects.
 Crossing crossing(const Triangle3& t, const Point3& start, const Point3& end) {
   if (CGAL::orientation(t[0], t[1], t[2], start) == CGAL::COPLANAR)
     return t.has_on(start) ? Crossing::at_start : Crossing::beside_edge;
@@ -76,7 +76,7 @@ Crossing crossing(const Triangle3& t, const Point3& start, const Point3& end) {
 
 /// Directions to look along, one after the other: x, for which boxes are quickest, then others
 /// spread over the sphere (a golden-angle spiral), none along an axis.
-Vec3 look_along(int i) {
+Vec3 ray_direction(int i) {
   if (i == 0) return Vec3::UnitX();
   const double z = 2 * std::fmod(0.37 + i * (std::numbers::phi - 1), 1.0) - 1;
   const double angle = 0.7 + i * 2.399963229728653, radius = std::sqrt(1 - z * z);
@@ -84,7 +84,7 @@ Vec3 look_along(int i) {
 }
 
 void require_finite(const Vec3& query) {
-  if (!query.allFinite()) throw base::InternalError("distance asked of a point that is not finite");
+  if (!query.allFinite()) throw base::InternalError("distance to a point that is not finite");
 }
 
 }  // namespace
@@ -192,9 +192,9 @@ bool DistanceTree::contains(const Vec3& query) const {
   require_finite(query);
   const Point3 start = to_cgal(query);
   if (!CGAL::do_overlap(start.bbox(), tree_->box)) return false;
-  constexpr int most_directions = 64;
-  for (int i = 0; i < most_directions; ++i) {
-    const Point3 end = to_cgal(query + tree_->reach(query) * look_along(i));
+  constexpr int max_directions = 64;
+  for (int i = 0; i < max_directions; ++i) {
+    const Point3 end = to_cgal(query + tree_->reach(query) * ray_direction(i));
     bool odd = false, sure = true;
     const Segment3 ray(start, end);
     for (const auto id : i == 0 ? tree_->meeting_along_axis(ray) : tree_->meeting(ray)) {

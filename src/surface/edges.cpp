@@ -25,7 +25,7 @@ struct CellHash {
   }
 };
 
-/// Points put into cubes four tolerances wide, so that few neighbours need a look.
+/// Points put into cubes four tolerances wide, so that few neighbors need a look.
 class PointGrid {
  public:
   PointGrid(const std::vector<Vec3>& points, const Vec3& origin, double tolerance)
@@ -38,7 +38,7 @@ class PointGrid {
     int64_t found = -1;
     for (int64_t x = from.x; x <= to.x; ++x)
       for (int64_t y = from.y; y <= to.y; ++y)
-        for (int64_t z = from.z; z <= to.z; ++z) look_into({x, y, z}, query, found);
+        for (int64_t z = from.z; z <= to.z; ++z) search_cell({x, y, z}, query, found);
     return found;
   }
 
@@ -56,7 +56,7 @@ class PointGrid {
             static_cast<int64_t>(scaled.z())};
   }
 
-  void look_into(const Cell& cell, const Vec3& query, int64_t& found) const {
+  void search_cell(const Cell& cell, const Vec3& query, int64_t& found) const {
     const auto head = heads_.find(cell);
     if (head == heads_.end()) return;
     for (int64_t i = head->second; i >= 0; i = next_[i])
@@ -102,14 +102,14 @@ EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
 }
 
 bool EdgeTable::contains(int64_t a, int64_t b) const {
-  const std::pair wanted(std::min(a, b), std::max(a, b));
+  const std::pair requested(std::min(a, b), std::max(a, b));
   const auto found = std::lower_bound(
-      half_edges_.begin(), half_edges_.end(), wanted,
+      half_edges_.begin(), half_edges_.end(), requested,
       [](const HalfEdge& h, const auto& pair) { return std::pair(h.low, h.high) < pair; });
-  return found != half_edges_.end() && std::pair(found->low, found->high) == wanted;
+  return found != half_edges_.end() && std::pair(found->low, found->high) == requested;
 }
 
-VertexNeighbours::VertexNeighbours(const EdgeTable& edges, size_t vertices)
+VertexNeighbors::VertexNeighbors(const EdgeTable& edges, size_t vertices)
     : begin_(vertices + 1, 0), vertex_(2 * edges.edges()) {
   for (int64_t e = 0; e < edges.edges(); ++e) {
     ++begin_[edges[e].front().low + 1];
@@ -142,10 +142,10 @@ std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
 std::vector<int64_t> coincident_points(const std::vector<Vec3>& points) {
   std::vector<int64_t> first(points.size());
   if (points.empty()) return first;
-  Vec3 least = points[0];
-  for (const auto& point : points) least = least.cwiseMin(point);
+  Vec3 minimum = points[0];
+  for (const auto& point : points) minimum = minimum.cwiseMin(point);
   const double tolerance = std::max(1e-9 * bounding_diagonal(points), 1e-300);
-  PointGrid grid(points, least, tolerance);
+  PointGrid grid(points, minimum, tolerance);
   for (size_t i = 0; i < points.size(); ++i) {
     const auto number = static_cast<int64_t>(i);
     const int64_t found = grid.find(points[i]);
@@ -157,12 +157,12 @@ std::vector<int64_t> coincident_points(const std::vector<Vec3>& points) {
 
 double bounding_diagonal(const std::vector<Vec3>& points) {
   if (points.empty()) return 0;
-  Vec3 least = points[0], most = points[0];
+  Vec3 minimum = points[0], maximum = points[0];
   for (const auto& point : points) {
-    least = least.cwiseMin(point);
-    most = most.cwiseMax(point);
+    minimum = minimum.cwiseMin(point);
+    maximum = maximum.cwiseMax(point);
   }
-  return (most - least).norm();
+  return (maximum - minimum).norm();
 }
 
 double six_volumes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {

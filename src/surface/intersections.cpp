@@ -43,7 +43,7 @@ int shared_first(Numbered& a, Numbered& b) {
   return shared;
 }
 
-/// Neighbours over an edge overlap only when they lie in one plane, on one side of the edge.
+/// Neighbors over an edge overlap only when they lie in one plane, on one side of the edge.
 bool folded(const Numbered& a, const Numbered& b) {
   const auto& [p, q, r] = a.points;
   const Point3& s = b.points[2];

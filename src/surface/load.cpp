@@ -6,7 +6,7 @@
 namespace repose::surface {
 namespace {
 
-constexpr double least_size = 20, largest_size = 2000;  // mm, bounding diagonal
+constexpr double min_size = 20, largest_size = 2000;  // mm, bounding diagonal
 
 const char* noun(Role role) {
   return role == Role::skin ? "skin" : role == Role::bone ? "bone" : "mesh";
@@ -19,12 +19,12 @@ std::string position(const Surface& surface, int64_t vertex) {
 
 void check_size(const Surface& surface) {
   const double size = bounding_diagonal(surface.points);
-  if (size >= least_size && size <= largest_size) return;
-  const bool small = size < least_size;
+  if (size >= min_size && size <= largest_size) return;
+  const bool small = size < min_size;
   base::refuse(
       "{}: {:.4g} mm across (bounding diagonal), expected {} to {} mm: it seems to be in "
-      "{}; scale the mesh to millimetres ({})",
-      surface.name, size, least_size, largest_size, small ? "metres" : "micrometres",
+      "{}; scale the mesh to millimeters ({})",
+      surface.name, size, min_size, largest_size, small ? "meters" : "micrometers",
       small ? "times 1000" : "divided by 1000");
 }
 
@@ -79,7 +79,7 @@ Surface accept_surface(const Surface& raw, Role role) {
   if (role == Role::raw) return raw;
   Surface surface = weld_and_orient(raw);
   if (surface.triangles.empty())
-    base::refuse("{}: none of its {} triangles has an area; export the mesh anew", surface.name,
+    base::refuse("{}: none of its {} triangles has an area; export the mesh again", surface.name,
                  raw.triangles.size());
   Defects defects = inspect(surface, false);
   if (role == Role::mesh && defects.non_manifold_edges == 0 && defects.non_manifold_vertices > 0) {

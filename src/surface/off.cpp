@@ -5,12 +5,12 @@
 #include "soup.h"
 
 /// OFF, text and binary. Not read by CGAL, whose reader (5.5) allocates what a header claims, reads
-/// beyond a face's colours and cannot step over those of a binary file.
+/// beyond a face's colors and cannot step over those of a binary file.
 namespace repose::surface {
 namespace {
 
 [[noreturn]] void fail(const Content& content, int64_t line, const std::string& reason) {
-  base::refuse("{}:{}: {}; export the mesh anew as OFF", content.file.string(), line, reason);
+  base::refuse("{}:{}: {}; export the mesh again as OFF", content.file.string(), line, reason);
 }
 
 /// The lines of a text file that say something, comments removed.
@@ -30,13 +30,13 @@ class Lines {
 
   double number(std::string_view word) const {
     const auto value = base::parse_number(word);
-    if (!value) fail(content_, number_, base::shown(word) + " is not a finite number");
+    if (!value) fail(content_, number_, base::quote(word) + " is not a finite number");
     return *value;
   }
 
   int64_t integer(std::string_view word) const {
     const auto value = base::parse_integer(word);
-    if (!value) fail(content_, number_, base::shown(word) + " is not a whole number");
+    if (!value) fail(content_, number_, base::quote(word) + " is not a whole number");
     return *value;
   }
 
@@ -92,7 +92,7 @@ class Binary {
     if (content_.bytes.size() - position_ < 4)
       base::refuse(
           "{}: truncated or damaged: the file ends within its data ({} bytes); export it "
-          "anew",
+          "again",
           content_.file.string(), content_.bytes.size());
     uint32_t word = 0;
     for (int i = 0; i < 4; ++i)
@@ -120,8 +120,8 @@ Soup parse_binary(const Content& content, const Lines& lines) {
     auto& polygon = soup.polygons.emplace_back();
     const int32_t corners = data.next<int32_t>();
     for (int32_t k = 0; k < corners; ++k) polygon.push_back(data.next<int32_t>());
-    const int32_t colours = data.next<int32_t>();
-    for (int32_t k = 0; k < colours; ++k) data.next<int32_t>();
+    const int32_t colors = data.next<int32_t>();
+    for (int32_t k = 0; k < colors; ++k) data.next<int32_t>();
   }
   return soup;
 }
@@ -135,10 +135,10 @@ Soup parse_off(Content content) {
   first.erase(first.begin());
   if (keyword.find_first_of("4n") != keyword.npos)
     fail(content, lines.line(),
-         base::shown(keyword) + " has points of another dimension than three");
+         base::quote(keyword) + " has points of another dimension than three");
   if (first.empty() || first[0] != "BINARY") return parse_text(content, lines, std::move(first));
   if (keyword != "OFF")
-    fail(content, lines.line(), "binary " + base::shown(keyword) + " is not read, only binary OFF");
+    fail(content, lines.line(), "binary " + base::quote(keyword) + " is not read, only binary OFF");
   return parse_binary(content, lines);
 }
 

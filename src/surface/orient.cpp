@@ -9,7 +9,7 @@
 namespace repose::surface {
 namespace {
 
-struct Neighbour {
+struct Neighbor {
   int64_t triangle;
   bool agrees;  ///< with the orientation of this one
 };
@@ -24,7 +24,7 @@ class Orienter {
  public:
   explicit Orienter(Surface& surface)
       : surface_(surface),
-        neighbours_(surface.triangles.size()),
+        neighbors_(surface.triangles.size()),
         closed_(surface.triangles.size(), true),
         part_of_(surface.triangles.size(), -1) {
     const EdgeTable edges(surface.triangles);
@@ -45,8 +45,8 @@ class Orienter {
       return;
     }
     const bool agree = edge[0].rising != edge[1].rising;
-    neighbours_[edge[0].triangle].push_back({edge[1].triangle, agree});
-    neighbours_[edge[1].triangle].push_back({edge[0].triangle, agree});
+    neighbors_[edge[0].triangle].push_back({edge[1].triangle, agree});
+    neighbors_[edge[1].triangle].push_back({edge[0].triangle, agree});
   }
 
   void turn(int64_t triangle) {
@@ -68,7 +68,7 @@ class Orienter {
     };
     add(seed, false);
     for (size_t i = 0; i < part.triangles.size(); ++i)
-      for (const auto& next : neighbours_[part.triangles[i]])
+      for (const auto& next : neighbors_[part.triangles[i]])
         if (part_of_[next.triangle] < 0) add(next.triangle, turned[i] == next.agrees);
     const auto count = std::count(turned.begin(), turned.end(), true);
     const bool majority = 2 * count > static_cast<std::ptrdiff_t>(turned.size());
@@ -113,7 +113,7 @@ class Orienter {
   }
 
   Surface& surface_;
-  std::vector<std::vector<Neighbour>> neighbours_;
+  std::vector<std::vector<Neighbor>> neighbors_;
   std::vector<bool> closed_;
   std::vector<int64_t> part_of_;
   std::vector<Part> parts_;

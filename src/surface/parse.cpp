@@ -44,7 +44,7 @@ bool read_stl(std::istream& in, Points& points, Polygons& polygons) {
 
 Complaint damaged_binary(const std::string& file) {
   return [file](std::string_view bytes, size_t stop) {
-    base::refuse("{}: damaged near byte {} of {}; export it anew", file, stop, bytes.size());
+    base::refuse("{}: damaged near byte {} of {}; export it again", file, stop, bytes.size());
   };
 }
 
@@ -54,8 +54,8 @@ Complaint damaged_text(const std::string& file) {
     const size_t last = stop > 0 ? stop - 1 : 0;
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<int64_t>(last), '\n');
     size_t begin = last > 0 ? text.rfind('\n', last - 1) + 1 : 0;  // npos + 1 is the beginning
-    base::refuse("{}:{}: truncated, or not a number where one belongs, near {}; export it anew",
-                 file, line, base::shown(base::next_line(text, begin)));
+    base::refuse("{}:{}: truncated, or not a number where one belongs, near {}; export it again",
+                 file, line, base::quote(base::next_line(text, begin)));
   };
 }
 
@@ -76,11 +76,11 @@ std::string rewrite_lines(const std::string& text, Rewrite rewrite) {
 void check_point(const std::vector<std::string_view>& line, const std::string& file,
                  int64_t number) {
   if (line.size() < 4)
-    base::refuse("{}:{}: three coordinates expected; export it anew", file, number);
+    base::refuse("{}:{}: three coordinates expected; export it again", file, number);
   for (int k = 1; k <= 3; ++k)
     if (!base::parse_number(line[k]))
-      base::refuse("{}:{}: {} is not a finite number; export it anew", file, number,
-                   base::shown(line[k]));
+      base::refuse("{}:{}: {} is not a finite number; export it again", file, number,
+                   base::quote(line[k]));
 }
 
 /// Lower case; solids lose their names, which could be keywords.
@@ -116,7 +116,7 @@ Soup parse_stl_text(Content content) {
   const Complaint complain = [&](std::string_view, size_t) {
     base::refuse(
         "{}: truncated or damaged: a facet without three vertices, or no endsolid; export "
-        "it anew",
+        "it again",
         content.file.string());
   };
   // The reader takes a text it does not understand for a binary file, and one shorter than the
@@ -129,12 +129,12 @@ Soup parse_stl_binary(Content content) {
   const std::string file = content.file.string();
   const auto triangles = stl_triangles(content.bytes);
   if (!triangles)
-    base::refuse("{}: truncated: {} bytes, and a binary STL has at least {}; export it anew", file,
+    base::refuse("{}: truncated: {} bytes, and a binary STL has at least {}; export it again", file,
                  content.bytes.size(), stl_header_bytes);
   if (stl_size(content.bytes) != content.bytes.size())
     base::refuse(
         "{}: truncated or damaged: {} bytes, but the {} triangles it promises take {}; "
-        "export it anew",
+        "export it again",
         file, content.bytes.size(), *triangles, stl_size(content.bytes));
   content.bytes.replace(0, 5, "plain");  // "solid" would have it read as text
   return read_with(read_stl, std::move(content.bytes), damaged_binary(file));

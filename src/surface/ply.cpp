@@ -65,7 +65,7 @@ class HeaderParser {
     else if (keyword == "property" && line.size() == 5 && line[1] == "list")
       add({std::string(line[4]), type(line[3]), type(line[2])});
     else
-      fail(base::shown(keyword) + " does not begin a line of a PLY header");
+      fail(base::quote(keyword) + " does not begin a line of a PLY header");
   }
 
   void add(PlyProperty property) {
@@ -75,7 +75,7 @@ class HeaderParser {
 
   uint64_t count(std::string_view word) const {
     const auto value = base::parse_integer(word);
-    if (!value || *value < 0) fail(base::shown(word) + " is not a number of rows");
+    if (!value || *value < 0) fail(base::quote(word) + " is not a number of rows");
     return static_cast<uint64_t>(*value);
   }
 
@@ -83,11 +83,11 @@ class HeaderParser {
     for (const auto& [known, alias] : known_types())
       if (word == known.name || word == alias) return known;
     fail(fmt::format("unknown type {} (char, uchar, short, ushort, int, uint, float, double)",
-                     base::shown(word)));
+                     base::quote(word)));
   }
 
   [[noreturn]] void fail(const std::string& reason) const {
-    base::refuse("{}:{}: {}; export the mesh anew as PLY", content_.file.string(), header_.lines,
+    base::refuse("{}:{}: {}; export the mesh again as PLY", content_.file.string(), header_.lines,
                  reason);
   }
 
@@ -135,8 +135,8 @@ void check_text_size(const PlyHeader& header, const Content& content) {
     if (element.count > room / values)
       base::refuse(
           "{}: truncated or damaged: the header promises {} rows of element {}, more than "
-          "the file can hold ({} bytes); export it anew",
-          content.file.string(), element.count, base::shown(element.name), content.bytes.size());
+          "the file can hold ({} bytes); export it again",
+          content.file.string(), element.count, base::quote(element.name), content.bytes.size());
     room -= element.count * values;
   }
 }
@@ -150,11 +150,11 @@ void check_ply(const PlyHeader& header, const Content& content) {
   const bool text = header.format == "ascii";
   if (!text && header.format != "binary_little_endian" && header.format != "binary_big_endian")
     base::refuse("{}: format {} is none of ascii, binary_little_endian, binary_big_endian", file,
-                 base::shown(header.format));
+                 base::quote(header.format));
   const PlyElement* vertex = find_element(header, &PlyElement::is_vertex);
   const PlyElement* face = find_element(header, &PlyElement::is_face);
   if (!vertex || vertex->count == 0)
-    base::refuse("{}: holds no vertices; export the mesh anew", file);
+    base::refuse("{}: holds no vertices; export the mesh again", file);
   if (!face || face->count == 0)
     base::refuse("{}: holds no faces (a point cloud?); export a triangle mesh", file);
   check_coordinates(*vertex, file);

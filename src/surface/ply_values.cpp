@@ -18,7 +18,7 @@ void PlyValues::read(const PlyElement& element,
                      const std::function<void(uint64_t row, const Row&)>& receive) {
   Row row(element.properties.size());
   for (uint64_t number = 0; number < element.count; ++number) {
-    place_ = fmt::format("{} {} of {}", base::shown(element.name), number, element.count);
+    place_ = fmt::format("{} {} of {}", base::quote(element.name), number, element.count);
     for (size_t p = 0; p < row.size(); ++p) {
       const PlyProperty& property = element.properties[p];
       const double entries = property.list_size ? value(*property.list_size) : 1;
@@ -56,11 +56,11 @@ void PlyValues::fail() const {
     const std::string_view all = content_.bytes;
     const auto line =
         1 + std::count(all.begin(), all.begin() + static_cast<int64_t>(position_), '\n');
-    base::refuse("{}:{}: truncated or damaged: {} holds no number here; export it anew",
+    base::refuse("{}:{}: truncated or damaged: {} holds no number here; export it again",
                  content_.file.string(), line, place_);
   }
   base::refuse(
-      "{}: truncated or damaged: {} lies beyond the end of the file ({} bytes); export it anew",
+      "{}: truncated or damaged: {} lies beyond the end of the file ({} bytes); export it again",
       content_.file.string(), place_, content_.bytes.size());
 }
 

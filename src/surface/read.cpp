@@ -8,10 +8,10 @@ namespace repose::surface {
 namespace {
 
 constexpr double largest_coordinate = 1e12;  // mm; far beyond any body, far from overflow
-constexpr size_t most_corners = 1000;        // of one polygon
+constexpr size_t max_corners = 1000;         // of one polygon
 
 Soup parse(Content content) {
-  switch (recognise(content)) {
+  switch (recognize(content)) {
     case Format::ply:
       return parse_ply(content);
     case Format::stl_text:
@@ -39,14 +39,14 @@ void check_points(const std::vector<Vec3>& points, const std::string& file) {
 
 void check_polygon(const std::vector<int64_t>& polygon, size_t number, size_t points,
                    const std::string& file) {
-  if (polygon.size() < 3 || polygon.size() > most_corners)
+  if (polygon.size() < 3 || polygon.size() > max_corners)
     base::refuse("{}: face {} has {} corners, not 3 to {}; export a triangle mesh", file, number,
-                 polygon.size(), most_corners);
+                 polygon.size(), max_corners);
   for (const int64_t vertex : polygon)
     if (vertex < 0 || vertex >= static_cast<int64_t>(points))
       base::refuse(
           "{}: face {} names vertex {} (counted from 0), but there are {} vertices; the "
-          "file is damaged, export it anew",
+          "file is damaged, export it again",
           file, number, vertex, points);
 }
 

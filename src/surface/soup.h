@@ -18,7 +18,7 @@ enum class Format { ply, stl_text, stl_binary, obj, off };
 
 /// The format by content; the ending decides only where the content does not. Throws InputError
 /// when it is none of the known ones.
-Format recognise(const Content& content);
+Format recognize(const Content& content);
 
 /// Readers of one format each; they refuse what is damaged, truncated or promises more than the
 /// file can hold, in one line. Indices and coordinates are left to read_surface.

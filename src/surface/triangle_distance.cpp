@@ -9,7 +9,7 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-void offer(const Vec3& p, const Vec3& q, ShortestWay& best) {
+void offer(const Vec3& p, const Vec3& q, ShortestSegment& best) {
   const double squared = (p - q).squaredNorm();
   if (squared < best.squared) best = {squared, (p + q) / 2};
 }
@@ -17,7 +17,7 @@ void offer(const Vec3& p, const Vec3& q, ShortestWay& best) {
 double clamped(double value) { return std::clamp(value, 0.0, 1.0); }
 
 /// Nearest points of the segments p + s d, q + t e.
-void sides(const Vec3& p, const Vec3& d, const Vec3& q, const Vec3& e, ShortestWay& best) {
+void sides(const Vec3& p, const Vec3& d, const Vec3& q, const Vec3& e, ShortestSegment& best) {
   const Vec3 r = p - q;
   const double dd = d.squaredNorm(), ee = e.squaredNorm(), de = d.dot(e), dr = d.dot(r),
                er = e.dot(r), determinant = dd * ee - de * de;
@@ -38,7 +38,7 @@ bool above(const Vec3& p, const Corners& t, const Vec3& n) {
 }
 
 /// Corners of `a` over triangle `b`, and sides of `a` that cross it.
-void corners_and_crossings(const Corners& a, const Corners& b, ShortestWay& best) {
+void corners_and_crossings(const Corners& a, const Corners& b, ShortestSegment& best) {
   const Vec3 n = (b[1] - b[0]).cross(b[2] - b[0]);
   const double nn = n.squaredNorm();
   if (!(nn > 0)) return;
@@ -58,8 +58,8 @@ void corners_and_crossings(const Corners& a, const Corners& b, ShortestWay& best
 
 }  // namespace
 
-ShortestWay shortest_way(const Corners& a, const Corners& b) {
-  ShortestWay best{std::numeric_limits<double>::infinity(), a[0]};
+ShortestSegment shortest_segment(const Corners& a, const Corners& b) {
+  ShortestSegment best{std::numeric_limits<double>::infinity(), a[0]};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       sides(a[i], a[(i + 1) % 3] - a[i], b[j], b[(j + 1) % 3] - b[j], best);

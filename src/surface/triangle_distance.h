@@ -6,7 +6,7 @@
 namespace repose::surface {
 
 /// The shortest way between two triangles.
-struct ShortestWay {
+struct ShortestSegment {
   double squared;  ///< mm², 0 where they intersect
   Vec3 middle;     ///< mm, its middle
 };
@@ -14,6 +14,6 @@ struct ShortestWay {
 /// From the nine pairs of sides, the six of a corner and the other triangle, and the crossings of a
 /// side and the other triangle (Ericson, Real-Time Collision Detection, 2005, ch. 5). Where
 /// rounding hides a crossing, a side or a corner is within rounding of the other triangle.
-ShortestWay shortest_way(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b);
+ShortestSegment shortest_segment(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b);
 
 }  // namespace repose::surface

@@ -76,15 +76,15 @@ TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
 
 TriangleTree::TriangleTree(const Surface& surface)
     : order_(surface.triangles.size()), row_(order_.size()), leaf_of_(order_.size()) {
-  std::vector<Vec3> centres;
-  centres.reserve(order_.size());
+  std::vector<Vec3> centers;
+  centers.reserve(order_.size());
   for (const auto& triangle : surface.triangles) {
     const auto [a, b, c] = corners(surface, triangle);
-    centres.push_back((a + b + c) / 3);
+    centers.push_back((a + b + c) / 3);
   }
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
-  build(0, static_cast<int64_t>(order_.size()), -1, centres);
+  build(0, static_cast<int64_t>(order_.size()), -1, centers);
   sorted_.reserve(order_.size());
   for (const int64_t t : order_) {
     row_[t] = static_cast<int64_t>(sorted_.size());
@@ -94,7 +94,7 @@ TriangleTree::TriangleTree(const Surface& surface)
 }
 
 int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
-                            const std::vector<Vec3>& centres) {
+                            const std::vector<Vec3>& centers) {
   const auto number = static_cast<int64_t>(nodes_.size());
   nodes_.push_back({{}, first, end - first, -1, parent});
   if (end - first <= leaf_size) {
@@ -102,14 +102,14 @@ int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
     return number;
   }
   Box box;
-  for (int64_t i = first; i < end; ++i) box.extend(centres[order_[i]]);
+  for (int64_t i = first; i < end; ++i) box.extend(centers[order_[i]]);
   Eigen::Index axis = 0;
   (box.high - box.low).maxCoeff(&axis);
   const auto middle = first + (end - first) / 2;
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
-                   [&](int64_t s, int64_t t) { return centres[s][axis] < centres[t][axis]; });
-  build(first, middle, number, centres);
-  const int64_t right = build(middle, end, number, centres);
+                   [&](int64_t s, int64_t t) { return centers[s][axis] < centers[t][axis]; });
+  build(first, middle, number, centers);
+  const int64_t right = build(middle, end, number, centers);
   nodes_[number].right = right;
   nodes_[number].count = 0;
   return number;
@@ -161,8 +161,7 @@ int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) 
   return -1;
 }
 
-double TriangleTree::least_greatest(std::span<const Vec3> points, double limit,
-                                    double enough) const {
+double TriangleTree::min_max(std::span<const Vec3> points, double limit, double enough) const {
   double best = limit;
   const auto to_box = [&](int64_t number) {
     double greatest = 0;

@@ -47,11 +47,11 @@ std::string point_data(const PointData& data) {
       for (int axis = 0; axis < 3; ++axis) append(bytes, value[axis]);
     text += array("Float64", field.name, 3, bytes);
   }
-  if (!data.colours.empty()) {
+  if (!data.colors.empty()) {
     std::string bytes;
-    for (const auto& colour : data.colours)
-      for (const uint8_t part : colour) append(bytes, part);
-    text += array("UInt8", "colour", 3, bytes);
+    for (const auto& color : data.colors)
+      for (const uint8_t part : color) append(bytes, part);
+    text += array("UInt8", "color", 3, bytes);
   }
   return text + "</PointData>\n";
 }

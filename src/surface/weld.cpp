@@ -27,11 +27,11 @@ void drop_duplicates(std::vector<Triangle>& triangles) {
 
 int longest_side(const Surface& surface, const Triangle& t) {
   int longest = 0;
-  double most = -1;
+  double maximum = -1;
   for (int k = 0; k < 3; ++k) {
     const double length = (surface.points[t[(k + 1) % 3]] - surface.points[t[k]]).squaredNorm();
-    if (length > most) longest = k;
-    most = std::max(most, length);
+    if (length > maximum) longest = k;
+    maximum = std::max(maximum, length);
   }
   return longest;
 }
@@ -64,8 +64,8 @@ bool flip_flat_triangles(Surface& surface) {
 
 /// Flips what can be flipped (a flip can leave another flat triangle to flip), drops the rest.
 void remove_flat_triangles(Surface& surface) {
-  constexpr int most_passes = 20;
-  for (int pass = 0; pass < most_passes && flip_flat_triangles(surface);) ++pass;
+  constexpr int max_passes = 20;
+  for (int pass = 0; pass < max_passes && flip_flat_triangles(surface);) ++pass;
   const auto flat = without_area(surface);
   size_t row = 0;
   std::erase_if(surface.triangles, [&](const Triangle&) { return flat[row++]; });

@@ -19,7 +19,7 @@ std::string ply_header(const Surface& surface, const PointData& data) {
       "ply\nformat binary_little_endian 1.0\ncomment mm\n"
       "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
       surface.points.size());
-  if (!data.colours.empty())
+  if (!data.colors.empty())
     header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   for (const auto& field : data.fields) header += fmt::format("property double {}\n", field.name);
   return header +
@@ -29,12 +29,12 @@ std::string ply_header(const Surface& surface, const PointData& data) {
 
 std::string ply_bytes(const Surface& surface, const PointData& data) {
   std::string bytes = ply_header(surface, data);
-  const size_t row = 24 + (data.colours.empty() ? 0 : 3) + 8 * data.fields.size();
+  const size_t row = 24 + (data.colors.empty() ? 0 : 3) + 8 * data.fields.size();
   bytes.reserve(bytes.size() + row * surface.points.size() + 13 * surface.triangles.size());
   for (size_t p = 0; p < surface.points.size(); ++p) {
     for (int axis = 0; axis < 3; ++axis) append(bytes, surface.points[p][axis]);
-    if (!data.colours.empty())
-      for (const uint8_t part : data.colours[p]) append(bytes, part);
+    if (!data.colors.empty())
+      for (const uint8_t part : data.colors[p]) append(bytes, part);
     for (const auto& field : data.fields) append(bytes, field.values[p]);
   }
   for (const auto& triangle : surface.triangles) {
@@ -63,8 +63,8 @@ std::string obj_bytes(const Surface& surface, const PointData& data) {
   for (size_t p = 0; p < surface.points.size(); ++p) {
     const Vec3& point = surface.points[p];
     text += fmt::format("v {} {} {}", point.x(), point.y(), point.z());
-    if (!data.colours.empty())
-      for (const uint8_t part : data.colours[p]) text += fmt::format(" {:.4f}", part / 255.0);
+    if (!data.colors.empty())
+      for (const uint8_t part : data.colors[p]) text += fmt::format(" {:.4f}", part / 255.0);
     text += '\n';
   }
   for (const auto& [a, b, c] : surface.triangles)

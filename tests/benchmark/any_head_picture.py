@@ -33,10 +33,10 @@ def read_given(file):
 
 
 def columns(name):
-    """[(title, actor, colour table or None)] and the given points."""
+    """[(title, actor, color table or None)] and the given points."""
     points, corners, displacement = read_given(f"{name}_given_skin.vtp")
     way = np.linalg.norm(displacement, axis=1)
-    table = render.colours("movement", way)
+    table = render.colors("movement", way)
     solved = render.Result(f"{name}.h5")
     mesh = render.actor(render.surface(solved.before, solved.corners), render.SKIN)
     mesh.GetProperty().EdgeVisibilityOn()
@@ -59,7 +59,7 @@ def main():
         scene = render.renderer([actor])
         sheet.put(scene, i * wide, render.TITLE, wide, high)
         render.look(scene, VIEW, middle, half)
-        bar = render.colour_bar(table) if table else render.renderer([])
+        bar = render.color_bar(table) if table else render.renderer([])
         sheet.put(bar, i * wide, render.TITLE + high, wide, render.BAR)
     render.write_picture(sheet.pixels(), out)
 

@@ -35,7 +35,7 @@ def solve(chosen, folder, head, more):
     (folder / "scene.yaml").write_text(scene_of(head, more))
     done = run([chosen.bin / "repose-solve", "scene.yaml", "-output", "face", "-accuracy",
                 chosen.accuracy], folder, ends=[0])
-    released = done.said["columns"].partition("(")[2].partition(" ")[0]
+    released = done.message["columns"].partition("(")[2].partition(" ")[0]
     on_skin = model_of(folder / "face.h5")["point/layer"] == 0
     return released, last(folder / "face.h5")["point/displacement"][on_skin]
 

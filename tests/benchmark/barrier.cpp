@@ -60,8 +60,8 @@ class BarrierSearch {
   BarrierSearch(solve::Problem& problem, const Parameters& parameters)
       : parameters_(parameters), problem_(problem) {
     constexpr double negligible = 1e-12;  // N/mm³, so that the barrier alone acts
-    objective_.touches().set_stiffness(negligible);
-    objective_.walls().set_stiffness(negligible);
+    objective_.body_contact().set_stiffness(negligible);
+    objective_.cut_face_contact().set_stiffness(negligible);
   }
 
   /// Finds the rest position. Returns how the search ended and its load steps.
@@ -88,9 +88,9 @@ class BarrierSearch {
   double evaluate() {
     double value = objective_.evaluate(displacement_, gradient_);
     const double reach = range_ - parameters_.standoff;
-    gaps_ = objective_.touches().linear_gaps(positions_.local(), reach);
+    gaps_ = objective_.body_contact().linear_gaps(positions_.local(), reach);
     touching_ = gaps_.size();
-    std::ranges::move(objective_.walls().linear_gaps(reach), std::back_inserter(gaps_));
+    std::ranges::move(objective_.cut_face_contact().linear_gaps(reach), std::back_inserter(gaps_));
     std::vector<Vec3> push(moved_.size(), Vec3::Zero());
     for (const LinearGap& gap : gaps_) {
       if (!(gap.gap + parameters_.standoff > 0)) return std::numeric_limits<double>::infinity();
@@ -98,7 +98,7 @@ class BarrierSearch {
       for (const auto& [p, normal] : gap.gradient)
         push[p] += stiffness() * gap.area * barrier(gap).slope * normal;
     }
-    positions_.keep_owned(push, push_);
+    positions_.restrict_to_owned(push, push_);
     check(VecAXPY(gradient_, 1.0, push_));
     return value;
   }
@@ -130,7 +130,7 @@ class BarrierSearch {
     PetscReal along = 0;
     check(VecDot(slope, step_, &along));
     if (!(along > 0)) check(PCApply(problem_.elastic_solver().preconditioner(), slope, step_));
-    positions_.spread(step_, moved_);
+    positions_.scatter_to_local(step_, moved_);
     return convex;
   }
 
@@ -139,17 +139,17 @@ class BarrierSearch {
     constexpr double steepest = 1.1, kept_share = 0.1,
                      tolerance_share = 0.05;  // a slope; of the distance
     constexpr int max_advances = 400;
-    const mechanics::TouchLoop& loop = objective_.touches();
-    const model::Touches& touches = loop.touches();
+    const mechanics::BodyContact& loop = objective_.body_contact();
+    const model::ContactPairs& pairs = loop.pairs();
     double share = 1;
-    for (size_t c = 0; c < touches.point.size(); ++c) {
-      const RigidBody& body = objective_.touches().bodies()[touches.body[c]];
-      const Vec3 now = positions_.local()[touches.point[c]], from = body.beside(now),
-                 path = next[touches.body[c]].beside(now + moved_[touches.point[c]]) - from;
+    for (size_t c = 0; c < pairs.point.size(); ++c) {
+      const RigidBody& body = objective_.body_contact().bodies()[pairs.body[c]];
+      const Vec3 now = positions_.local()[pairs.point[c]], from = body.beside(now),
+                 path = next[pairs.body[c]].beside(now + moved_[pairs.point[c]]) - from;
       const double speed = steepest * path.norm(), standoff = parameters_.standoff;
       if (share * speed < (1 - kept_share) * (loop.gaps()[c] + standoff)) continue;
       const auto distance = [&](double at) {
-        return body.distance(from + at * path).value - touches.offset[c] + standoff;
+        return body.distance(from + at * path).value - pairs.offset[c] + standoff;
       };
       const double first = distance(0), lowest = kept_share * first;
       double at = 0, left = first - lowest;
@@ -174,7 +174,7 @@ class BarrierSearch {
       check(VecCopy(gradient_, before_));
       const bool convex = solve(before_, forcing);
       check(VecDot(gradient_, step_, &slope));
-      double share = feasible_share(objective_.touches().bodies()), trial = 0;
+      double share = feasible_share(objective_.body_contact().bodies()), trial = 0;
       check(VecCopy(displacement_, before_));
       for (int halvings = 0; halvings <= max_halvings; ++halvings, share /= 2) {
         check(VecWAXPY(displacement_, share, step_, before_));
@@ -195,7 +195,7 @@ class BarrierSearch {
     constexpr double longest = 20;                      // mm, as repose-solve
     const double load = positions_.load(),
                  whole = std::min(1 - load, longest / positions_.largest_travel());
-    const std::vector<RigidBody>& bodies = objective_.touches().bodies();
+    const std::vector<RigidBody>& bodies = objective_.body_contact().bodies();
     const auto place_at = [&](double to) {
       positions_.set_load(to);
       positions_.update(displacement_);
@@ -211,12 +211,12 @@ class BarrierSearch {
     Objective::add_blocks(blocks_, path, push);
     for (const LinearGap& gap : std::span(gaps_).first(touching_)) {
       const auto& [p, normal] = gap.gradient.front();
-      const int32_t b = objective_.touches().touches().body[gap.constraint];
+      const int32_t b = objective_.body_contact().pairs().body[gap.constraint];
       const Vec3 now = positions_.local()[p], carried = next[b].in_space(bodies[b].beside(now));
       push[p] -=
           stiffness() * gap.area * barrier(gap).curvature * normal.dot(carried - now) * normal;
     }
-    positions_.keep_owned(push, push_);
+    positions_.restrict_to_owned(push, push_);
     objective_.hessian_action(path, before_, false);
     check(VecAXPY(before_, 1.0, push_));
     check(VecAXPY(before_, 1.0, gradient_));
@@ -307,13 +307,13 @@ base::Exit run(const base::Options& options) {
   check(PetscLogDefaultBegin());
   const app::Job job = app::read_job(comm, options.arguments()[0], "");
   if (!job.solid) base::refuse("tissue.springs: the barrier is for solids");
-  solve::Settings settings = app::settings_of(job.wanted, true);
+  solve::Settings settings = app::settings_of(job.requested, true);
   settings.path.accuracy = options.number("accuracy");
   Comparison comparison(job.model, read_positions(options.text("result"), job.model));
   comparison.run("present", settings, [&](solve::Problem& problem) {
-    solve::Minimiser minimiser(problem.function(), problem.solver(), nullptr);
+    solve::Minimizer minimizer(problem.function(), problem.solver(), nullptr);
     solve::ContactSearch contact(problem.objective(), problem.tangent(), problem.elastic_solver(),
-                                 minimiser, nullptr);
+                                 minimizer, nullptr);
     contact.find_other_rest(false);
     const base::VecHandle displacement = problem.objective().positions().make_vector();
     const auto found = solve::LoadPath(problem, contact, settings.path)

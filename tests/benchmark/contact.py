@@ -144,14 +144,14 @@ def compare_ways(chosen, folder, faces):
         found = {}
         for way in WAYS:
             done, file = solve(scene_of(case, way), chosen, folder, options=["-skip_other_rest"])
-            said = done.said.get("penetration", "–").split()[0]
-            found[way] = (done.evaluations, done.stages["solve"][0], inside_bone(file), said,
+            message = done.message.get("penetration", "–").split()[0]
+            found[way] = (done.evaluations, done.stages["solve"][0], inside_bone(file), message,
                           *skin(file))
             faces[case, way] = found[way][4:]
         places, reference = found["contact"][4:]
-        for way, (work, seconds, (count, deepest), said, _, moved) in found.items():
+        for way, (work, seconds, (count, deepest), message, _, moved) in found.items():
             yield (f"| {case} | {way} | {work[0]} | {work[1]} | "
-                   f"{seconds / found['let go'][1]:.1f} | {count}, {deepest:.2f} | {said} | "
+                   f"{seconds / found['let go'][1]:.1f} | {count}, {deepest:.2f} | {message} | "
                    f"{by_region(places, moved - reference) if way != 'contact' else '–'} |")
 
 
@@ -163,7 +163,7 @@ def compare_cost(chosen, folder):
             full, _ = solve(text, chosen, folder)
             off, _ = solve(text + OFF, chosen, folder)
             count, deepest = inside_bone(file)
-            other = re.search(r"up to (\S+) mm", full.said.get("other rest position", ""))
+            other = re.search(r"up to (\S+) mm", full.message.get("other rest position", ""))
             least = off.stages["solve"][0]
             yield (f"| {case} | {lips} | {alone.evaluations[0]}, {alone.evaluations[1]} | "
                    f"{off.evaluations[0]}, {off.evaluations[1]} | "

@@ -1,4 +1,4 @@
-/// One method of the contest of docs/measurements/minimisers.md, which tests/benchmark/contest.py
+/// One method of the contest of docs/measurements/minimizers.md, which tests/benchmark/contest.py
 /// runs:
 ///     benchmark_contest RESULT.h5 METHOD [-scene SCENE.yaml] [-accuracy 0.01] [-count]
 /// Takes model, volume term and rest position from a result of repose-solve, starts from the
@@ -53,7 +53,7 @@ class Liblbfgs {
         at_(function.positions().make_vector()),
         gradient_(function.positions().make_vector()) {}
 
-  void minimise(Vec displacement) {
+  void minimize(Vec displacement) {
     PetscInt size = 0;
     check(VecGetSize(displacement, &size));
     std::vector<double> x(size);
@@ -109,7 +109,7 @@ class Liblbfgs {
 };
 #endif
 
-/// A result file's model, what was minimised and where it came to rest.
+/// A result file's model, what was minimized and where it came to rest.
 struct Task {
   model::Model model;
   mechanics::Weights weights;
@@ -229,7 +229,7 @@ class Runner {
   void run_liblbfgs() {
 #ifdef REPOSE_LIBLBFGS
     print({contest_.run("liblbfgs", [](discrete::Function& function, Vec displacement) {
-      Liblbfgs(function).minimise(displacement);
+      Liblbfgs(function).minimize(displacement);
     })});
 #else
     base::refuse("liblbfgs is not built in: apt-get install liblbfgs-dev, then cmake again");
@@ -243,15 +243,15 @@ class Runner {
 
 /// CPU seconds of `work`, the least of several goes.
 double seconds_of(const std::function<void()>& work) {
-  double least = 1e300, total = 0;
+  double minimum = 1e300, total = 0;
   for (int go = 0; go < 5 || total < 0.2; ++go) {
     const double begin = base::cpu_seconds();
     work();
     const double took = base::cpu_seconds() - begin;
-    least = std::min(least, took);
+    minimum = std::min(minimum, took);
     total += took;
   }
-  return least;
+  return minimum;
 }
 
 /// What one evaluation, one new preconditioner, and an action of the Hessian with one application

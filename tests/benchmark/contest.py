@@ -2,7 +2,7 @@
 """Evaluations and time of several methods to a known rest position; writes a page.
 
     tests/benchmark/contest.py [-bin build/bin] [-cases forward,large] [-methods default,lmvm]
-                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/measurements/minimisers.md]
+                               [-accuracy 0.01] [-rounds 3] [-seconds 60] [-output docs/measurements/minimizers.md]
 
 Each case is solved by repose-solve to 1e-9 mm; its result is the model file and the rest position
 of all methods. The methods in C++ are run by benchmark_contest, SciPy's here, with an evaluation in
@@ -343,12 +343,12 @@ def verdict(contest, own, rival, what, times):
     if not entry or not own:
         return "not measured"
     ratio = entry[what] / own[what]
-    said = f"{ratio:.0f}×" if ratio >= 10 else f"{ratio:.2g}×"
+    message = f"{ratio:.0f}×" if ratio >= 10 else f"{ratio:.2g}×"
     reached = "**reached**" if ratio >= times else "missed"
     if entry["end"] in ("limit", "elsewhere"):
-        return f"≥ {said}: " + (reached if ratio >= times else "not known")
+        return f"≥ {message}: " + (reached if ratio >= times else "not known")
     other = ", to another minimum" if "own_minimum" in (entry["end"], own["end"]) else ""
-    return f"{said}: {reached}{other}"
+    return f"{message}: {reached}{other}"
 
 
 def verdicts(contests, own, name):
@@ -400,7 +400,7 @@ def page(contests, chosen, where):
     accuracy = f"{chosen.accuracy:g} mm"
     words = [f"-{name} {getattr(chosen, name)}" for name, default in SETTINGS.items()
              if getattr(chosen, name) != default]
-    text = f"""# Other minimisers, to {accuracy}
+    text = f"""# Other minimizers, to {accuracy}
 
 Evaluations and CPU time of Repose, the paper's methods, liblbfgs and SciPy on the paper's springs.
 Made by `{" ".join(["tests/benchmark/contest.py", *words])}` in one run, on
@@ -421,7 +421,7 @@ the default, the least of {chosen.rounds} rounds, or of fewer where they take ov
   have to find first; one evaluation of the forces per step (Euler) or three (Runge–Kutta); a run
   that takes {PATIENCE} times the default's time is stopped.
 - liblbfgs: its defaults (m = 6, Moré–Thuente), without its own stopping tests, with Repose's kernel.
-- SciPy {scipy.__version__ if scipy else ""}: an evaluation of the model file in NumPy, vectorised over springs and
+- SciPy {scipy.__version__ if scipy else ""}: an evaluation of the model file in NumPy, vectorized over springs and
   prisms, sums by sparse matrices; L-BFGS-B with m = 10; Newton-CG with Hessian products by differences
   of gradients.
 - Distance: of the last state. "Another minimum": evaluations and time are to {accuracy} of that minimum.
@@ -436,7 +436,7 @@ the default, the least of {chosen.rounds} rounds, or of fewer where they take ov
 
 
 def arguments():
-    parser = option_parser(__doc__, PROJECT / "docs/measurements/minimisers.md", **SETTINGS)
+    parser = option_parser(__doc__, PROJECT / "docs/measurements/minimizers.md", **SETTINGS)
     chosen = parser.parse_args()
     for given, known in ((chosen.cases, CASES), (chosen.methods, METHODS)):
         for word in set(given.split(",")) - set(known):

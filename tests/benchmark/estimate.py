@@ -70,7 +70,7 @@ solve:
 
 @dataclasses.dataclass
 class Problem:
-    """A scene and what is minimised."""
+    """A scene and what is minimized."""
     name: str
     scene: pathlib.Path
     options: list
@@ -211,12 +211,12 @@ class Study:
         for problem in weak_problems(self.chosen, self.folder):
             yield from self.runs_of(problem, [(*way, None) for way in itertools.product(*WEAK[1:])])
 
-    def runs_of(self, problem, wanted):
+    def runs_of(self, problem, expected):
         begin, rest = time.time(), self.rest(problem)
         if not rest:
             self.left_out.append(f"{problem.name}: no rest position to {KNOWN:g} mm")
             return
-        for task in wanted:
+        for task in expected:
             run = self.run(problem, rest, *task)
             if run:
                 yield run

@@ -53,7 +53,7 @@ EDGES = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])  # of a quadr
 
 def tetrahedra(x, prisms):
     """Three tetrahedra a prism, [3 M, 4]: each side is cut from the point of least number
-    (Dompierre and others, 1999), so that neighbours agree."""
+    (Dompierre and others, 1999), so that neighbors agree."""
     turned = np.take_along_axis(prisms, TURNED[prisms.argmin(1)], 1)
     first = turned[:, [1, 5]].min(1) < turned[:, [2, 4]].min(1)
     rows = np.arange(len(prisms))[:, None, None]

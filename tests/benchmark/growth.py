@@ -67,11 +67,11 @@ def rows_of(size, layers, chosen):
             found, position = measure(command, folder, method, chosen.ranks)
             first = position if first is None else first
             apart = np.linalg.norm(position - first, axis=1).max()
-            said = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
+            message = f"{apart:.1g}" if found["converged"] else "NOT CONVERGED"
             yield (f"| {size} | {layers} | {found['unknowns']} | {method} | {found['steps']} | "
                    f"{found['iterations']} | {found['evaluations']} | {found['hessians']} | "
                    f"{found['made']} | {found['applied']} | "
-                   f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {said} |")
+                   f"{1e6 * found['seconds'] / found['unknowns']:.0f} | {found['memory']:.0f} | {message} |")
 
 
 def main():

@@ -183,8 +183,8 @@ void copy(benchmark::State& state, double bytes) {
 void spring_blocks(benchmark::State& state, int64_t columns) {
   Workload& work = workload(columns);
   for (auto _ : state)
-    mechanics::for_each_spring_block(work.spring_loop(), work.position, 1.0, Curvature::convex,
-                                     [](int64_t, const Mat3& block) {
+    mechanics::for_each_spring_block(work.spring_loop(), work.position, 1.0,
+                                     Curvature::semidefinite, [](int64_t, const Mat3& block) {
                                        benchmark::DoNotOptimize(block.data());
                                        benchmark::ClobberMemory();
                                      });

@@ -41,7 +41,7 @@ def measure(folder, name, chosen):
     counted = events(folder / "log")
     (made, making), (applied, applying) = counted["PCRenew"], counted["PCApply"]
     end = "" if solved.status == 0 else " (not done)"
-    return (f"| {name} | {solved.said['load steps'].split()[0]}{end} | {solved.evaluations[1]} | "
+    return (f"| {name} | {solved.message['load steps'].split()[0]}{end} | {solved.evaluations[1]} | "
             f"{made} | {applied} | {1e3 * making / made:.0f} | {1e3 * applying / applied:.1f} | "
             f"{solved.seconds:.1f} | {solved.memory:.0f} |")
 

@@ -17,14 +17,14 @@ class Run:
     error: str
 
     @property
-    def said(self):
+    def message(self):
         """Rows of repose-solve by their names; of those of one name, the last."""
         return {line[:24].strip(): line[25:] for line in self.text.splitlines()}
 
     @property
     def evaluations(self):
         """Of value and gradient, and of the Hessian, on the scene's own mesh."""
-        words = self.said["evaluations"].split()
+        words = self.message["evaluations"].split()
         return int(words[0]), int(words[5])
 
     @property

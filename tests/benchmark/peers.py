@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Repose's solid against other programs and minimisers on the same points; prints a table a file.
+"""Repose's solid against other programs and minimizers on the same points; prints a table a file.
 
     tests/benchmark/peers.py FILE.h5 … [-bin build/bin] [-methods repose,ccx_spooles,…]
                              [-accuracy 0.01] [-part 1] [-moving 0.1] [-rounds 3] [-seconds 600]
@@ -293,11 +293,11 @@ class Comparison:
         step = last(self.folder / "result.h5")
         position = step["point/position"]
         away = np.linalg.norm(position - self.rest, axis=1).max()
-        said = "" if step["converged"] else "NOT CONVERGED, "
+        message = "" if step["converged"] else "NOT CONVERGED, "
         self.evaluation = self.contest("costs")["evaluation"]
         counts = f"{search['evaluations']} evaluations, {search['assemblies']} Hessians"
         return [Row("**Repose**, its search", search["seconds"], None, counts, position,
-                    f"{said}says {step['displacement_error']:.2g} mm, is {away:.2g} mm away"),
+                    f"{message}says {step['displacement_error']:.2g} mm, is {away:.2g} mm away"),
                 Row("Repose, the whole program", program.seconds, None, "", position)]
 
     def liblbfgs(self):

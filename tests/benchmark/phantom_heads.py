@@ -106,11 +106,11 @@ def rows(options, base):
             folder = pathlib.Path(name)
             make(folder, shape, base, random)
             done = run([options.bin / "repose-solve", "scene.yaml"], folder, ends=None)
-            said = done.text.split()
-            number = (lambda word: said[said.index(word) - 1] if word in said else "0")
-            inverted = done.said.get("inverted prisms", "–").split(":")[0]
+            message = done.text.split()
+            number = (lambda word: message[message.index(word) - 1] if word in message else "0")
+            inverted = done.message.get("inverted prisms", "–").split(":")[0]
             ratio = f"{follows(folder):.2f}" if done.status in (0, 2) else done.error.strip()
-            angle = done.text.split("no angle below ")[-1].split("°")[0] if said else "–"
+            angle = done.text.split("no angle below ")[-1].split("°")[0] if message else "–"
             yield (f"| {seed} | {', '.join(f'{s:.2f}' for s in shape.scale)} | {shape.chin:+.1f} "
                    f"| {'open' if shape.mouth_open else 'closed'} | {shape.beard:g} "
                    f"| {number('vertices,')} | {angle}° | {number('shortened')} | {done.status} "

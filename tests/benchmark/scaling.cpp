@@ -35,15 +35,15 @@ struct Cost {
 
 /// Seconds of `work`, the least of several goes that together take about half a second.
 double seconds_of(const std::function<void()>& work) {
-  double least = 1e300, total = 0;
+  double minimum = 1e300, total = 0;
   for (int go = 0; go < 3 || total < 0.5; ++go) {
     const double begin = cpu_seconds();
     work();
     const double took = cpu_seconds() - begin;
-    least = std::min(least, took);
+    minimum = std::min(minimum, took);
     total += took;
   }
-  return least;
+  return minimum;
 }
 
 /// The jaw opens by 8°, as in the shipped scenes.

@@ -52,12 +52,12 @@ def rows_of(size, poisson, chosen):
                     unknowns = 3 * int((h5["model/point/set"][()] == 0).sum())
                 first = position if first is None else first
                 apart = np.linalg.norm(position - first, axis=1).max()
-                said = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
+                message = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
                 seconds = solved.stages["solve"][0]
                 name = method + ", contact" * (contact == "on")
                 yield (f"| {unknowns} | {poisson} | {name} | {solved.evaluations[0]} | "
                        f"{solved.evaluations[1]} | {seconds:.2f} | {1e6 * seconds / unknowns:.0f} | "
-                       f"{solved.memory:.0f} | {inverted} | {said} |")
+                       f"{solved.memory:.0f} | {inverted} | {message} |")
 
 
 def main():

@@ -39,7 +39,7 @@ def read(file):
     return found
 
 
-def draw(axes, face, values, title, unit, limits, colours="viridis"):
+def draw(axes, face, values, title, unit, limits, colors="viridis"):
     x, triangles = face["final"], face["triangles"]
     corners = x[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -48,16 +48,16 @@ def draw(axes, face, values, title, unit, limits, colours="viridis"):
     seen = np.flatnonzero(facing > 0)
     order = seen[np.argsort((corners.mean(axis=1) @ TOWARDS)[seen])]
     scale = plt.Normalize(*limits)
-    colour = plt.get_cmap(colours)(scale(values[triangles].mean(axis=1)))[:, :3]
-    colour *= (SHADE + (1 - SHADE) * np.clip(facing, 0, 1))[:, None]
+    color = plt.get_cmap(colors)(scale(values[triangles].mean(axis=1)))[:, :3]
+    color *= (SHADE + (1 - SHADE) * np.clip(facing, 0, 1))[:, None]
     flat = np.stack([corners @ RIGHT, corners @ UP], axis=-1)
-    axes.add_collection(PolyCollection(flat[order], facecolors=colour[order],
-                                       edgecolors=colour[order], linewidths=0.3))
+    axes.add_collection(PolyCollection(flat[order], facecolors=color[order],
+                                       edgecolors=color[order], linewidths=0.3))
     axes.autoscale()
     axes.set_aspect("equal")
     axes.axis("off")
     axes.set_title(title, fontsize=15)
-    bar = plt.colorbar(plt.cm.ScalarMappable(scale, colours), ax=axes, shrink=0.6, pad=0.02)
+    bar = plt.colorbar(plt.cm.ScalarMappable(scale, colors), ax=axes, shrink=0.6, pad=0.02)
     bar.set_label(unit, fontsize=13)
     bar.ax.tick_params(labelsize=12)
 

@@ -6,7 +6,7 @@
                                   [-output docs/measurements/solid.md]
 
 Every way solves the model of a scene with `preset: face` to 0.01 mm, as the program measures it,
-without contact, so that all minimise the same smooth energy. A quasi-Newton method without memory
+without contact, so that all minimize the same smooth energy. A quasi-Newton method without memory
 that begins with the stiffness is Newton's method with a frozen Hessian; with a memory of one pair it
 is preconditioned nonlinear conjugate gradients (Shanno 1978). Its stiffness is one cycle of the
 columns' multigrid, or MUMPS' factors. Preconditioners made and applied, and products with the
@@ -57,19 +57,19 @@ def rows_of(scene, poisson, chosen):
         solve = [chosen.bin / "repose-solve"]
         common = ["-accuracy", 0.01, "-time_limit", chosen.seconds]
         made = run([*solve, "scene.yaml", *common, "-output", "model"], folder, ends=[0])
-        unknowns = int(made.said["unknowns"].split()[0])
+        unknowns = int(made.message["unknowns"].split()[0])
         first = None
         for way in chosen.ways.split(";"):
             solved = run([*solve, "model.h5", *common, "-output", "out", "-log_view", ":log",
                           *WAYS[way]], folder)
             here, counted = last(folder / "out.h5"), events(folder / "log")
             first = (solved.seconds, here) if first is None else first
-            said = f"{apart(first[1], here):.1g}" if solved.status == 0 else "time was up"
+            message = f"{apart(first[1], here):.1g}" if solved.status == 0 else "time was up"
             products, made, applied = (counted.get(event, (0,))[0]
                                        for event in ("RpHessianAction", "PCRenew", "PCApply"))
             yield (f"| {unknowns} | {poisson} | {way} | {solved.evaluations[0]} | "
                    f"{solved.evaluations[1]} | {products} | {made} | {applied} | "
-                   f"{solved.seconds:.2f} | {solved.seconds / first[0]:.1f}× | {said} |")
+                   f"{solved.seconds:.2f} | {solved.seconds / first[0]:.1f}× | {message} |")
 
 
 def main():

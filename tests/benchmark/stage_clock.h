@@ -41,7 +41,7 @@ class Clock {
 
  private:
   void restart() {
-    std::ofstream("/proc/self/clear_refs") << 5;  // the peak starts anew
+    std::ofstream("/proc/self/clear_refs") << 5;  // the peak starts again
     begin_ = base::cpu_seconds();
   }
   double begin_ = 0;

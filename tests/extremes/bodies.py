@@ -99,7 +99,7 @@ def chain(count, stiffness, force, **more):
 
 
 def fan(rays, radius=10.0, thickness=2.0, move=(0.4, 0.2, 0.6), sweep=2 * np.pi):
-    """One vertex with many neighbours, two layers; deepest points held, the middle one of them
+    """One vertex with many neighbors, two layers; deepest points held, the middle one of them
     moved.
 
     A sweep below 2π gives slivers: an open fan.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Extremes of springs and solids: each row is one run of repose-solve, judged by closed forms or
 by an
-independent minimiser, or refused in words. Exit status 1 where a row is not as expected.
+independent minimizer, or refused in words. Exit status 1 where a row is not as expected.
 
     tests/extremes/extremes.py -bin build-ci/bin                       # the whole table
     tests/extremes/extremes.py -bin build-ci/bin -fast 1               # without the slow rows
@@ -54,7 +54,7 @@ def line_of(group, verdict):
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def wanted(arguments):
+def expected(arguments):
     for group, rows in GROUPS.items():
         for row in rows:
             if not (arguments.fast and row.slow) and re.search(
@@ -79,7 +79,7 @@ def main():
     environment, unexpected = mpi_environment(), []
 
     def lines(top):
-        for group, row in wanted(arguments):
+        for group, row in expected(arguments):
             verdict = run_one(group, row, top, environment)
             unexpected.extend([row.name] if verdict.faults else [])
             yield line_of(group, verdict)

@@ -1,4 +1,4 @@
-"""A row of the table: one run of repose-solve at an extreme, and what an independent minimiser
+"""A row of the table: one run of repose-solve at an extreme, and what an independent minimizer
 says of
 its result."""
 
@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, eigsh
 
 from conftest import finish, programs
-from continuum import Solid, factorised, newton_step, rest_position
-from networks import Network, factorised_dense
+from continuum import Solid, factorized, newton_step, rest_position
+from networks import Network, factorized_dense
 from tissue import model_of, steps, write_model
 
 TIME_LIMIT = 600  # seconds
@@ -33,7 +33,7 @@ class Row:
     may_end: str = ""  # a pattern: the run may end without success, with these words
     refused: str = ""  # a pattern: the input is refused with these words
     slow: bool = False
-    judged: bool = True  # by an independent minimiser
+    judged: bool = True  # by an independent minimizer
 
 
 @dataclasses.dataclass
@@ -57,7 +57,7 @@ def volume_weight(step):
 
 
 def tissue_of(model, step, exact=False):
-    """The independent energy of a model as a step minimised it."""
+    """The independent energy of a model as a step minimized it."""
     if "edge/points" in model:
         return Solid(model)
     return Network(model, volume_weight(step), np.longdouble if exact else float)
@@ -75,10 +75,10 @@ def nearest_rest(tissue, found):
     """The rest position that Newton's method comes to from there."""
     x = found.astype(getattr(tissue, "dtype", float))
     unknown = (3 * tissue.soft[:, None] + np.arange(3)).ravel()
-    factorise = factorised if x.dtype == float else factorised_dense
+    factorize = factorized if x.dtype == float else factorized_dense
     push, last = load_of(tissue), np.inf
     for _ in range(60):
-        x, length = newton_step(tissue, x, unknown, push, factorise)
+        x, length = newton_step(tissue, x, unknown, push, factorize)
         if length < 1e-13 * np.abs(x).max() or (length < 1e-9 and length > last / 2):
             break
         last = length
@@ -95,7 +95,7 @@ def follow(loads=8, exact=False):
             loads=loads,
             tolerance=1e-6 * np.ptp(tissue.rest),
             force=load_of(tissue),
-            factorise=factorised_dense if exact else factorised,
+            factorize=factorized_dense if exact else factorized,
         )
         return nearest_rest(tissue, near)
 
@@ -157,7 +157,7 @@ def shortened(text, folder):
 
 
 def with_contact(model, step):
-    """The minimisers know no contact: its forces, which repose-check recomputes, are dead loads."""
+    """The minimizers know no contact: its forces, which repose-check recomputes, are dead loads."""
     if "point/contact_force" not in step:
         return model
     name = "point/external_force"

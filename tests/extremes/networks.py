@@ -6,7 +6,7 @@ the rows of springs. Like continuum.Solid in its interface, and sharing nothing 
 import numpy as np
 from scipy import sparse
 
-from continuum import PAIRS, VOLUME, centred, volumes
+from continuum import PAIRS, VOLUME, centered, volumes
 
 
 def law(elongation, stiffness, reference, power):
@@ -120,7 +120,7 @@ class Network:
         k = self.weight[:, None, None, None, None] * np.einsum("mid,mje->mijde", slopes, slopes)
         if curved:
             along = 6 * np.einsum(
-                "m,ijk,mkd->mijd", self.weight * (v - self.volume), VOLUME, centred(x, self.prisms)
+                "m,ijk,mkd->mijd", self.weight * (v - self.volume), VOLUME, centered(x, self.prisms)
             )
             for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                 k[..., a, b] += along[..., c]
@@ -128,7 +128,7 @@ class Network:
         return k
 
 
-def factorised_dense(matrix):
+def factorized_dense(matrix):
     """A solver of a symmetric matrix of any floating type, by elimination without pivots after the
     scaling that makes its diagonal one."""
     matrix = np.array(matrix)

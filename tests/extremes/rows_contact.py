@@ -1,4 +1,4 @@
-"""Extremes of contact, on the head of the paper's size. The independent minimisers know none: what
+"""Extremes of contact, on the head of the paper's size. The independent minimizers know none: what
 a row says is held to the result's own words, and repose-check recomputes gaps, forces and how deep
 anything is."""
 

@@ -74,11 +74,11 @@ LIMITED = ("-time_limit", "200")
 
 def rows_of_turgor(kind, volume):
     """A solid of fat has no skin to stretch; springs that are stretched to twice their length ask
-    others to be shorter than nothing."""
+    others to have negative rest lengths."""
     tissue = SKIN_ON_FAT if kind == "solid" else TISSUES[kind]
     for turgor in (0, 0.1, 1):
         scene = head(tissue, forward(6), in_tissue=f"  turgor: {turgor}\n", solve=volume)
-        refused = "shorter than nothing" if kind == "springs" and turgor == 1 else ""
+        refused = "negative rest lengths" if kind == "springs" and turgor == 1 else ""
         yield Row(
             f"head: turgor {turgor}, jaw 6 mm forward",
             lambda _, scene=scene: scene,
@@ -105,11 +105,11 @@ def rows_of(kind):
     yield row("head: jaw 40 mm forward", forward(40))
     yield from rows_of_turgor(kind, volume)
     yield row("head: 64 layers, jaw 2 mm forward", forward(2), layers=64)
-    for factor, unit in ((1e-3, "metres"), (1e3, "micrometres")):
+    for factor, unit in ((1e-3, "meters"), (1e3, "micrometers")):
         yield Row(
             f"head: surfaces in {unit}",
             in_unit(tissue, factor),
-            refused="in (metres|micrometres)|20 mm|2000 mm|across",
+            refused="in (meters|micrometers)|20 mm|2000 mm|across",
         )
     yield Row(
         "head: cut, weight, turgor, forces, sliding, contact at once",

@@ -136,8 +136,8 @@ ROWS = [
         Row(f"Poisson {nu}", plain(poisson=nu), FINE, truth=follow(8))
         for nu in (-0.9, -0.5, 0.0, 0.49, 0.4999)
     ),
-    Row("metres", scaled(1e-3), ("-accuracy", "1e-9"), truth=follow(8)),
-    Row("micrometres", scaled(1e3), ("-accuracy", "1e-3"), truth=follow(8)),
+    Row("meters", scaled(1e-3), ("-accuracy", "1e-9"), truth=follow(8)),
+    Row("micrometers", scaled(1e3), ("-accuracy", "1e-3"), truth=follow(8)),
     Row(
         "1e6 mm from the origin",
         moved(lambda x: x + 1e6),
@@ -151,7 +151,7 @@ ROWS = [
     ),
     Row("slabs a hundred times deeper than wide", thick(400.0), FINE, truth=follow(8)),
     Row("64 layers", thick(16.0, layers=64, cells=2, size=8.0), FINE, truth=follow(4)),
-    Row("a vertex with 500 neighbours", fan_of(500), FINE, truth=follow(8)),
+    Row("a vertex with 500 neighbors", fan_of(500), FINE, truth=follow(8)),
     Row("slivers of 0.01°", fan_of(12, sweep=np.deg2rad(0.11)), FINE, may_end=BUCKLES),
     Row("a flat prism", wrong("prism/rest_volume", 0.0), FINE, refused="rest_volume.*flat prisms"),
     Row(

@@ -14,7 +14,7 @@ namespace {
 class Reader {
  public:
   explicit Reader(const std::string& name) {
-    add_neighbours(folder_.path("."));
+    add_neighbors(folder_.path("."));
     for (const Target& target : targets(folder_.path(".")))
       if (target.name == name)
         target_ = target;

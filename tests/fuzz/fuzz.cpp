@@ -45,11 +45,11 @@ void read_on(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
 /// Returns the number of inputs that went wrong.
 uint64_t run(const Target& target, uint64_t number, uint64_t seed, uint64_t inputs,
              const std::filesystem::path& folder) {
-  constexpr uint64_t most_findings = 20;
+  constexpr uint64_t max_findings = 20;
   auto* progress = static_cast<Progress*>(
       mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
   uint64_t findings = 0;
-  while (progress->next < inputs && findings < most_findings) {
+  while (progress->next < inputs && findings < max_findings) {
     std::fflush(stdout);
     const pid_t child = fork();
     if (child == 0) {
@@ -80,7 +80,7 @@ uint64_t run(const Target& target, uint64_t number, uint64_t seed, uint64_t inpu
 
 int run_all(uint64_t inputs, uint64_t seed, const std::string& only) {
   const results::Folder folder;
-  add_neighbours(folder.path("."));
+  add_neighbors(folder.path("."));
   uint64_t findings = 0, number = 0;
   for (const Target& target : targets(folder.path("."))) {
     if (only.empty() || only == target.name)

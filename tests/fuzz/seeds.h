@@ -40,7 +40,7 @@ inline surface::Surface tetrahedron() {
           {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
 }
 
-/// A PLY file with a colour and a number at its vertices.
+/// A PLY file with a color and a number at its vertices.
 inline std::string painted() {
   return "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
          "property double z\nproperty uchar red\nproperty float depth\nelement face 1\n"

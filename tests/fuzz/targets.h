@@ -78,7 +78,7 @@ inline std::vector<Target> targets(const std::filesystem::path& folder) {
 }
 
 /// What files name is there, and a slice beside the one that is damaged.
-inline void add_neighbours(const std::filesystem::path& folder) {
+inline void add_neighbors(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(REPOSE_MESHES))
     std::filesystem::create_symlink(entry.path(), folder / entry.path().filename());
   std::filesystem::create_directory(folder / "slices");

@@ -184,10 +184,10 @@ def main():
         if verdict.elsewhere:
             counts["from the start: " + verdict.elsewhere.split(":")[0]] += 1
         if verdict.faults or verdict.elsewhere or kind != "a rest position" or options.only is not None:
-            told = "; ".join(["DISAGREES"] * bool(verdict.faults) + [verdict.ended] + verdict.faults)
-            told += f"; from the start {verdict.elsewhere}" * bool(verdict.elsewhere)
+            report = "; ".join(["DISAGREES"] * bool(verdict.faults) + [verdict.ended] + verdict.faults)
+            report += f"; from the start {verdict.elsewhere}" * bool(verdict.elsewhere)
             levels = " ".join(f"{k}={v}" for k, v in scenes[number].items() if v != "-")
-            print(f"{number}: {told}\n    {levels}", flush=True)
+            print(f"{number}: {report}\n    {levels}", flush=True)
     for kind, count in counts.most_common():
         print(f"{count:5d}  {kind}")
     print(f"{end - begin} scenes in {time.time() - clock:.0f} s")

@@ -118,7 +118,7 @@ BREAKS = [
     ),
     (
         "a trial step that says nothing is believed",
-        "contraction_ = found <= trusted_contraction ? found : most_contraction;",
+        "contraction_ = found <= trusted_contraction ? found : max_contraction;",
         "contraction_ = 0;",
         f"{SOLVE}|extremes",
     ),
@@ -195,14 +195,14 @@ BREAKS = [
     ),
     (
         "touching costs no energy",
-        "value += touches_.area[c] * (now.value + before);",
-        "value += touches_.area[c] * before;",
+        "value += pairs_.area[c] * (now.value + before);",
+        "value += pairs_.area[c] * before;",
         r"^mechanics\.contact",
     ),
     (
         "the energy jumps where a point touches",
-        "value += touches_.area[c] * (now.value + before);",
-        "value += touches_.area[c] * now.value;",
+        "value += pairs_.area[c] * (now.value + before);",
+        "value += pairs_.area[c] * now.value;",
         r"^mechanics\.contact",
     ),
     (

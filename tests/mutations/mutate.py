@@ -105,7 +105,7 @@ def caught_by(build, tests, jobs):
     options = ["--stop-on-failure", "--timeout", TIME_LIMIT]
     tested = run("ctest", "-R", exactly, *options, cwd=build)
     failed = re.findall(r"^\s*\d+ - (\S+) \((\w+)\)", tested.stdout, re.M)
-    words = [name + (" comes to no end" if how == "Timeout" else "") for name, how in failed]
+    words = [name + (" does not converge" if how == "Timeout" else "") for name, how in failed]
     return ", ".join(words), f"passes {', '.join(tests)}"
 
 

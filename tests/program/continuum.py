@@ -48,7 +48,7 @@ def moduli(young, poisson):
     return mu, young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
 
 
-def centred(x, prisms):
+def centered(x, prisms):
     """The prisms' points from their middles, [M, 6, 3]."""
     corners = x[prisms]
     return corners - corners.mean(1, keepdims=True)
@@ -56,7 +56,7 @@ def centred(x, prisms):
 
 def volumes(x, prisms):
     """Volumes [M] and their gradients [M, 6, 3]."""
-    corners = np.ascontiguousarray(centred(x, prisms).transpose(1, 2, 0))  # [6, 3, M]
+    corners = np.ascontiguousarray(centered(x, prisms).transpose(1, 2, 0))  # [6, 3, M]
     one, other = corners[PAIRS[:, 0]], corners[PAIRS[:, 1]]
     crosses = np.stack([one[:, d] * other[:, e] - one[:, e] * other[:, d]
                         for d, e in ((1, 2), (2, 0), (0, 1))], axis=1)
@@ -66,7 +66,7 @@ def volumes(x, prisms):
 
 def jacobians(x, prisms):
     """∂x_d/∂ξ_e at the Gauss points, [M, 6, 3, 3]."""
-    return np.einsum("qie,mid->mqde", SLOPES, centred(x, prisms))
+    return np.einsum("qie,mid->mqde", SLOPES, centered(x, prisms))
 
 
 def wedge_laplacians(x, prisms):
@@ -183,7 +183,7 @@ class Solid:
 
     def curvature(self, x, push):
         """push ∂²v/∂x², [M, 18, 18]: ∂²v/∂x_i∂x_j = -6 Σ A_ijk [x_k]×."""
-        along = 6 * np.einsum("m,ijk,mkd->mijd", push, VOLUME, centred(x, self.prisms))
+        along = 6 * np.einsum("m,ijk,mkd->mijd", push, VOLUME, centered(x, self.prisms))
         crossed = np.zeros(along.shape + (3,))  # -[along]×
         for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             crossed[..., a, b] = along[..., c]
@@ -191,19 +191,19 @@ class Solid:
         return crossed.transpose(0, 1, 3, 2, 4).reshape(-1, 18, 18)
 
 
-def factorised(matrix):
+def factorized(matrix):
     """A solver of a symmetric sparse matrix."""
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3,
                 options={"SymmetricMode": True}).solve
 
 
-def rest_position(solid, fixed_at=None, tolerance=1e-9, loads=4, force=None, factorise=factorised,
-                  said=None):
+def rest_position(solid, fixed_at=None, tolerance=1e-9, loads=4, force=None, factorize=factorized,
+                  message=None):
     """Positions [N, 3] where the energy is least with the fixed points at `fixed_at` [N, 3] (their
     targets if None) and dead forces [N, 3] on the soft ones. The fixed points go there on straight
     lines in `loads` equal parts; each begins with the linear prediction and is followed by Newton's
     method, the last until a whole step moves no point by more than `tolerance` mm. A step that does
-    not lead down is made with the positive part of the Hessian, and halved until it does. `said`
+    not lead down is made with the positive part of the Hessian, and halved until it does. `message`
     gets one line an iteration."""
     x, soft = solid.rest.copy(), solid.soft
     unknown = (3 * soft[:, None] + np.arange(3)).ravel()
@@ -215,12 +215,12 @@ def rest_position(solid, fixed_at=None, tolerance=1e-9, loads=4, force=None, fac
         hessian = solid.hessian(x)
         slope = (solid.value_and_gradient(x)[1] - push).ravel() + hessian @ motion.ravel()
         x += motion
-        x[soft] -= factorise(hessian[unknown][:, unknown])(slope[unknown]).reshape(-1, 3)
+        x[soft] -= factorize(hessian[unknown][:, unknown])(slope[unknown]).reshape(-1, 3)
         enough = tolerance if part == loads - 1 else 0.1
         for iteration in range(100):
-            x, length = newton_step(solid, x, unknown, push, factorise)
-            if said:
-                said(f"{part}.{iteration}: step {length:.3g} mm, {solid.value(x):.12g} N mm")
+            x, length = newton_step(solid, x, unknown, push, factorize)
+            if message:
+                message(f"{part}.{iteration}: step {length:.3g} mm, {solid.value(x):.12g} N mm")
             if length <= enough:
                 break
         else:
@@ -228,14 +228,14 @@ def rest_position(solid, fixed_at=None, tolerance=1e-9, loads=4, force=None, fac
     return x
 
 
-def newton_step(solid, x, unknown, push, factorise):
+def newton_step(solid, x, unknown, push, factorize):
     """The next positions and the whole step's largest length, mm."""
     value, gradient = solid.value_and_gradient(x)
     value -= (push * x).sum()
     slope = (gradient - push).ravel()[unknown]
     for curved in (True, False):
         hessian = solid.hessian(x, curved)[unknown][:, unknown]
-        step = -factorise(hessian)(slope)
+        step = -factorize(hessian)(slope)
         if step @ slope < 0 and step @ (hessian @ step) > 0:
             break
     length = np.linalg.norm(step.reshape(-1, 3), axis=1).max()

@@ -17,9 +17,9 @@ def options_page(folder, environment=None):
     """The page on the programs in a folder."""
     text = HEAD
     for program in sorted(folder.glob("repose-*")):
-        said = subprocess.run([program, "-help"], text=True, check=True, env=environment,
+        message = subprocess.run([program, "-help"], text=True, check=True, env=environment,
                               stdout=subprocess.PIPE, timeout=60).stdout
-        text += f"\n## {program.name}\n\n```\n{said.strip()}\n```\n"
+        text += f"\n## {program.name}\n\n```\n{message.strip()}\n```\n"
     return text
 
 

@@ -99,9 +99,9 @@ def test_an_insisted_edge_lists_and_writes_all_places(folder, environment):
     assert 300 < len(places.points) < 1000
 
 
-def test_metres_are_refused(folder, environment):
+def test_meters_are_refused(folder, environment):
     mesh = meshio.read(folder / "decimated.ply")
-    write(folder / "metres.ply", mesh.points / 1000, mesh.cells_dict["triangle"])
-    (folder / "metres.yaml").write_text(scene_of("metres.ply"))
-    result = runner(folder, environment)("repose-solve", "metres.yaml")
-    assert result.returncode == 1 and "metres" in result.stderr
+    write(folder / "meters.ply", mesh.points / 1000, mesh.cells_dict["triangle"])
+    (folder / "meters.yaml").write_text(scene_of("meters.ply"))
+    result = runner(folder, environment)("repose-solve", "meters.yaml")
+    assert result.returncode == 1 and "meters" in result.stderr

@@ -60,7 +60,7 @@ class Input:
         meshio.Mesh(points, mesh.cells).write(self.folder / name, binary=False)
         return ["scene.yaml"]
 
-    def metres(self):
+    def meters(self):
         for part in ("skin", "skull", "mandible"):
             self.moved(f"paper_{part}.ply", lambda points: points.__imul__(1e-3))
         return ["scene.yaml"]
@@ -207,8 +207,8 @@ CASES = {
     "NaN in a mesh": (
         lambda i: i.moved("paper_skin.ply", lambda p: p.__setitem__((7, 1), np.nan)),
         ["paper_skin.ply", "7"]),
-    "meshes in metres": (
-        lambda i: i.metres(), ["paper_skin.ply", "mm"]),
+    "meshes in meters": (
+        lambda i: i.meters(), ["paper_skin.ply", "mm"]),
     "bone that misses the skin": (
         lambda i: i.moved("paper_mandible.ply", lambda p: p.__iadd__(1e3)), ["mandible"]),
     "unknown option": (

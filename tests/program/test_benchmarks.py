@@ -87,9 +87,9 @@ def test_estimates_of_a_few_runs(estimate):
         rows = list(csv.DictReader(file))
     assert {row["solver"] for row in rows} == {"ntr", "lmvm"} and len(rows) == 6
     for row in rows:
-        error, told = float(row["error"]), float(row["estimate"])
-        assert error <= told + 1e-9 and float(row["elsewhere"]) == 0, row
-        assert row["interrupted"] or 1e-7 < told <= float(row["accuracy"]), row
+        error, report = float(row["error"]), float(row["estimate"])
+        assert error <= report + 1e-9 and float(row["elsewhere"]) == 0, row
+        assert row["interrupted"] or 1e-7 < report <= float(row["accuracy"]), row
         assert row["converged"] == "True" or row["interrupted"], row
 
 

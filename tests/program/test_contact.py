@@ -138,7 +138,7 @@ BAD = {
     "no such word": ("  layers: 4", "  attach: glued\n  layers: 4", "attach"),
     "grid of 0 mm": ("moves:", "contact: {grid: 0}\nmoves:", "grid"),
     "negative stiffness": ("moves:", "contact: {stiffness: -1}\nmoves:", "stiffness"),
-    "a switch misspelt": ("moves:", "contact: {bones: perhaps}\nmoves:", "bones"),
+    "a switch misspelled": ("moves:", "contact: {bones: perhaps}\nmoves:", "bones"),
 }
 
 

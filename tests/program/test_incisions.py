@@ -112,7 +112,7 @@ def test_bad_paths_are_refused_in_one_line(run, folder, path, message, ranks):
 
 def test_rim_depth_and_instruments_are_refused(run, folder):
     for scene, message in ((SCENE.replace("layers: 2", "layers: 5"), "1 … 4"),
-                           (SCENE.replace(PATH, rim_path(folder)), "comes to the rim"),
+                           (SCENE.replace(PATH, rim_path(folder)), "reaches the rim"),
                            (SCENE.replace("solve:", BALL + "solve:"), "an instrument holds")):
         (folder / "cut.yaml").write_text(scene)
         result = run("repose-solve", "cut.yaml", cwd=folder)

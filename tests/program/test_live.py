@@ -111,8 +111,8 @@ def talk(environment, lines, ranks=1):
 
 
 def test_malformed_lines_and_the_end_of_the_input(environment):
-    status, said = talk(environment, b'{"do": \n\n[1]\n\xff\xfe\n{"id": "x", "do": "quit"}\n')
-    answers = [json.loads(line) for line in said.splitlines()]
+    status, message = talk(environment, b'{"do": \n\n[1]\n\xff\xfe\n{"id": "x", "do": "quit"}\n')
+    answers = [json.loads(line) for line in message.splitlines()]
     assert status == 0 and [answer["ok"] for answer in answers] == [False, False, False, True]
     assert answers[-1]["id"] == "x"
     assert talk(environment, b"") == (0, b"")
@@ -174,8 +174,8 @@ def test_a_scene_without_a_plan_is_refused(environment):
 def test_the_client_of_the_guide_works(environment, tmp_path):
     page = (PROJECT / "docs/guide/live.md").read_text()
     client = re.findall(r"```python\n(import json.*?)```", page, re.S)[0]
-    said = subprocess.run([sys.executable, "-c", client, SCENE], text=True, check=True, timeout=60,
+    message = subprocess.run([sys.executable, "-c", client, SCENE], text=True, check=True, timeout=60,
                           stdout=subprocess.PIPE,
                           env={**os.environ, **environment,
                                "PATH": f"{programs()}:{os.environ['PATH']}"}).stdout
-    assert re.search(r"mandible 2 mm forward: the skin moves by up to [12]\.\d+ mm", said)
+    assert re.search(r"mandible 2 mm forward: the skin moves by up to [12]\.\d+ mm", message)

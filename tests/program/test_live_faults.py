@@ -59,14 +59,14 @@ def children():
 
 
 def test_every_nth_answer_is_solved_again_from_a_cold_start(small):
-    told = []
-    with opened(small, verify_every=2, on_verified=told.append) as session:
+    report = []
+    with opened(small, verify_every=2, on_verified=report.append) as session:
         session.solve({})
-        assert not told
+        assert not report
         session.solve(PLAN, accuracy=0.01)
         session.wait_for_verification()
         (one,) = session.verifications
-    assert told == [one] and one.plan == PLAN
+    assert report == [one] and one.plan == PLAN
     assert one.agrees and one.distance < 0.03
     assert re.match(r"verified from a cold start: the same face within 0\.0\d\d mm$", one.message)
     assert not children()

@@ -118,14 +118,14 @@ def test_requests_are_answered_or_refused_in_words(served):
     server, address = served
     token = {"X-Token": server.token}
     for content in (b"", b"[]", b"{", b"\xff", b"[" * 100000 + b"]" * 100000):
-        code, said = status(address, "/solve", token, content)
-        assert code == 400 and said.count(b"\n") == 1
+        code, message = status(address, "/solve", token, content)
+        assert code == 400 and message.count(b"\n") == 1
     for length in ("-5", "many", str(1 << 30)):
-        code, said = status(address, "/solve", {**token, "Content-Length": length}, b"{}")
-        assert code == 400 and said.count(b"\n") == 1
+        code, message = status(address, "/solve", {**token, "Content-Length": length}, b"{}")
+        assert code == 400 and message.count(b"\n") == 1
     far = json.dumps({"plan": {"chin": {"translate": [0, 99, 0]}}}).encode()
-    code, said = status(address, "/solve", token, far)
-    assert code == 409 and b"'chin': translation 99 mm" in said
+    code, message = status(address, "/solve", token, far)
+    assert code == 409 and b"'chin': translation 99 mm" in message
 
 
 def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
@@ -144,11 +144,11 @@ def test_a_bone_is_dragged_and_the_face_follows(live, served):
     server, address = served
     server.page = live.page(SCENE).replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode())
     with tempfile.TemporaryDirectory() as profile:
-        said = subprocess.run(
+        message = subprocess.run(
             [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],
              f"--user-data-dir={profile}", "--window-size=390,844", "--virtual-time-budget=60000",
              "--dump-dom", address], capture_output=True, text=True, timeout=110).stdout
-    found = json.loads(FOUND.search(said)[1].replace("&amp;", "&"))
+    found = json.loads(FOUND.search(message)[1].replace("&amp;", "&"))
     assert "error" not in found, found
     assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
     assert found["during"] == "preview" and found["undone"]

@@ -39,10 +39,10 @@ def test_loads_rise_to_one(solved):
 
 def verified(run, scene, *options, ranks=1):
     """What -verify_path says of a scene, and the exit status."""
-    said = run("repose-solve", PROJECT / "meshes" / scene, "-verify_path", *options, ranks=ranks)
-    assert said.stderr == ""
-    row = next(line for line in said.stdout.splitlines() if line.startswith("  path "))
-    return said.returncode, row, said.stdout
+    message = run("repose-solve", PROJECT / "meshes" / scene, "-verify_path", *options, ranks=ranks)
+    assert message.stderr == ""
+    row = next(line for line in message.stdout.splitlines() if line.startswith("  path "))
+    return message.returncode, row, message.stdout
 
 
 def largest_difference(row):
@@ -52,7 +52,7 @@ def largest_difference(row):
 def test_a_path_that_leads_elsewhere_is_told(run, solved):
     """An opening of 8° in one step: springs are pressed together, and jump to another place."""
     scene, first = "paper_jaw_opening.yaml", ["-accuracy", 1e-3, "-load_steps"]
-    status, row, said = verified(run, scene, *first, 1)
+    status, row, message = verified(run, scene, *first, 1)
     assert status == 2 and "THE REST POSITION DEPENDS ON IT: in 2 load steps in place of 1" in row
     one, two = (last(solved(scene, *first, count)) for count in (1, 2))
     assert apart(one, two) > 1
@@ -61,12 +61,12 @@ def test_a_path_that_leads_elsewhere_is_told(run, solved):
     at = one["point/position"][farthest] - one["point/displacement"][farthest]
     place = re.search(r"farthest about \((\S+), (\S+), (\S+)\) mm", row).groups()
     assert [float(x) for x in place] == pytest.approx(at, abs=0.06)
-    assert "NOT CONVERGED" not in said
+    assert "NOT CONVERGED" not in message
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_path_that_is_one(run, ranks):
-    status, row, said = verified(run, "head_solid.yaml", ranks=ranks)
+    status, row, message = verified(run, "head_solid.yaml", ranks=ranks)
     assert status == 0 and "verified: in 2 load steps in place of 1" in row
     assert 0 < largest_difference(row) <= 0.2  # twice the accuracy
 
@@ -82,7 +82,7 @@ def test_contact_ends_in_automatic_steps_whatever_steps_lead_there(solved):
 
 @pytest.mark.parametrize("options, why", [
     (["-adapt"], "-adapt: the path is to be verified"),
-    (["-restart", "a.h5"], "-verify_path: the run goes on from another result")])
+    (["-restart", "a.h5"], "-verify_path: the run resumes from another result")])
 def test_a_path_that_cannot_be_verified(run, options, why):
-    said = run("repose-solve", PROJECT / "meshes/head_solid.yaml", "-verify_path", *options)
-    assert (said.returncode, said.stdout) == (1, "") and why in said.stderr
+    message = run("repose-solve", PROJECT / "meshes/head_solid.yaml", "-verify_path", *options)
+    assert (message.returncode, message.stdout) == (1, "") and why in message.stderr

@@ -59,12 +59,12 @@ def stored_map(scene):
 
 
 def test_a_page_is_made_and_says_what_it_rests_on(made):
-    scene, said = made
-    assert said.returncode == 0, said
+    scene, message = made
+    assert message.returncode == 0, message
     page = scene.with_name("one_map.html")
     assert 500_000 < page.stat().st_size < 5_000_000
-    assert re.search(r"one_map.html: \d\.\d\d MB, 9 plans, \d+ modes", said.stdout)
-    assert said.stderr.count("plans solved") == 1 and "9 of 9 plans solved" in said.stderr, "a quiet log"
+    assert re.search(r"one_map.html: \d\.\d\d MB, 9 plans, \d+ modes", message.stdout)
+    assert message.stderr.count("plans solved") == 1 and "9 of 9 plans solved" in message.stderr, "a quiet log"
     assert not re.search(r"(?:src|href)=[\"']?https?:|\bimport\(|\bfetch\(", page.read_text().split(
         "// three.js")[0]), "nothing is loaded"
 
@@ -82,9 +82,9 @@ def test_solved_plans_are_kept_and_damaged_ones_solved_again(made, script):
 
 def test_ranks_of_mpirun_share_the_plans(script, tmp_path):
     scene = one_piece(tmp_path)
-    said = script(scene, "-samples", 4, "-accuracy", 0.2, ranks=2)
-    assert said.returncode == 0, said
-    assert said.stderr.count("2 of 2 plans solved") == 2 and scene.with_name("one_map.html").is_file()
+    message = script(scene, "-samples", 4, "-accuracy", 0.2, ranks=2)
+    assert message.returncode == 0, message
+    assert message.stderr.count("2 of 2 plans solved") == 2 and scene.with_name("one_map.html").is_file()
 
 
 def test_the_plan_shown_is_solved_by_its_command(made, script):
@@ -106,9 +106,9 @@ def test_the_plan_shown_is_solved_by_its_command(made, script):
     (["-samples", 1], "-samples 1: must be 3 … 10000"), (["-accuracy", "x"], "-accuracy"),
     (["-output", "/nowhere/page.html"], "make its folder first")])
 def test_refusals_are_one_line(made, script, arguments, words):
-    said = script(made[0], *arguments)
-    assert said.returncode == 1 and words in said.stderr, said
-    assert len(said.stderr.splitlines()) == 1 and said.stderr.startswith("map.py: ")
+    message = script(made[0], *arguments)
+    assert message.returncode == 1 and words in message.stderr, message
+    assert len(message.stderr.splitlines()) == 1 and message.stderr.startswith("map.py: ")
 
 
 def test_sliders_move_the_face_as_python_does(made):

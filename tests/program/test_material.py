@@ -89,12 +89,12 @@ def write_painted(file, points, triangles, painted):
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_no_material_is_refused_in_one_line(run, tmp_path, case):
-    tissue, more, told = REFUSED[case]
+    tissue, more, report = REFUSED[case]
     write_painted(tmp_path / "painted.ply", np.eye(4, 3), [[0, 1, 2]], [True, False, False, False])
     (tmp_path / "scene.yaml").write_text(scene(tissue, more=more))
     result = run("repose-solve", "scene.yaml", "-output", "out")
     assert result.returncode == 1, result
-    assert told in result.stderr and result.stderr.count("\n") == 1, result.stderr
+    assert report in result.stderr and result.stderr.count("\n") == 1, result.stderr
     assert not (tmp_path / "out.h5").exists()
 
 
@@ -181,7 +181,7 @@ def test_strata_regions_and_depths(run, tmp_path):
 
 
 def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path):
-    file, told = solve(run, tmp_path, "springs",
+    file, report = solve(run, tmp_path, "springs",
                        scene("  springs: {isotropic: {young: 0.015, poisson: 0.45}}"))
     shear = 0.015 / 2.9
     assert np.isclose(last(file)["bulk_modulus"], 0.015 / 0.3 - 5 * shear / 3)
@@ -189,8 +189,8 @@ def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path
 
 
 def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
-    file, told = solve(run, tmp_path, "coarse", scene(), "-discretisation")
-    assert "mesh and layers" in told and "order" in told
+    file, report = solve(run, tmp_path, "coarse", scene(), "-discretisation")
+    assert "mesh and layers" in report and "order" in report
     step, model = last(file), model_of(file)
     error, layer = step["point/discretisation_error"], model["point/layer"]
     assert error.max() > 0.01 and (error[layer > 0] == 0).all()
@@ -205,17 +205,17 @@ def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
     assert apart_at_skin.mean() <= 2 * error[layer == 0].mean()
 
 
-@pytest.mark.parametrize("edge, accuracy, told, more", [
-    ("", 0.01, "MORE THAN THE 0.01 mm ASKED FOR: the skin as given is the finest", False),
+@pytest.mark.parametrize("edge, accuracy, report, more", [
+    ("", 0.01, "MORE THAN THE 0.01 mm REQUESTED: the skin as given is the finest", False),
     ("", 20, "mm from the continuum at most", False),
     ("  edge: 9\n  depths: [0, 0.3, 0.6, 1]", 0.01, "the scene fixes its layers", False),
     ("  edge: 9", 1.5, "mm from the continuum at most", True)])
-def test_adapt_goes_towards_the_continuum_or_says_why_not(run, tmp_path, edge, accuracy, told, more):
+def test_adapt_goes_towards_the_continuum_or_says_why_not(run, tmp_path, edge, accuracy, report, more):
     text = scene(edge, JAW_OPENS, head="paper")
     own = solve(run, tmp_path, "own", text, "-accuracy", 1)[0]
-    file, said = solve(run, tmp_path, "found", text, "-accuracy", accuracy, "-adapt")
-    assert told in said, said
+    file, message = solve(run, tmp_path, "found", text, "-accuracy", accuracy, "-adapt")
+    assert report in message, message
     step = last(file)
     reached = step["discretisation_error"] <= accuracy
-    assert reached == ("MORE THAN" not in said)
+    assert reached == ("MORE THAN" not in message)
     assert (len(step["point/position"]) > len(last(own)["point/position"])) == more

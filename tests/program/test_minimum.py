@@ -1,5 +1,5 @@
 """The rest position is a minimum of the model as docs/theory/model.md writes it: numpy computes the same
-objective and gradient, and scipy's minimiser, started elsewhere, comes back to it."""
+objective and gradient, and scipy's minimizer, started elsewhere, comes back to it."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_numbers_of_the_result(found):
     assert largest <= 1e-6 * np.abs(tension).max()
 
 
-def test_an_independent_minimiser_comes_back(found):
+def test_an_independent_minimizer_comes_back(found):
     tissue, step = found
     rest = step["point/position"]
     soft = tissue.soft

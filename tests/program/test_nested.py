@@ -70,9 +70,9 @@ def skin_distance(coarse, fine):
 
 
 def test_adapt_solves_a_coarser_model_within_the_accuracy(head):
-    coarse, said = head("-adapt", "-accuracy", 10)
+    coarse, message = head("-adapt", "-accuracy", 10)
     error = last(coarse)["discretisation_error"]
-    assert error + last(coarse)["displacement_error"] <= 10 and "solved model" in said
+    assert error + last(coarse)["displacement_error"] <= 10 and "solved model" in message
     assert "discretisation_error" not in steps(coarse)[0]
     assert len(at_skin(coarse)[0]) < 1500
     assert skin_distance(coarse, head()[0]) < error
@@ -81,15 +81,15 @@ def test_adapt_solves_a_coarser_model_within_the_accuracy(head):
 
 
 def test_adapt_keeps_the_scene_s_own_model_where_nothing_else_is_near_enough(head):
-    own, said = head("-adapt", "-accuracy", 1e-3)
-    assert "discretisation_error" not in last(own) and "solved model" not in said
+    own, message = head("-adapt", "-accuracy", 1e-3)
+    assert "discretisation_error" not in last(own) and "solved model" not in message
     assert apart(last(own), last(head()[0])) < 1e-3
 
 
 def test_a_preview_is_a_coarse_model_and_says_what_it_is_worth(head):
-    preview, said = head("-profile", "preview")
+    preview, message = head("-profile", "preview")
     error = last(preview)["discretisation_error"]
-    assert ("MORE THAN THE 1 mm ASKED FOR" in said) == (error > 1)
+    assert ("MORE THAN THE 1 mm REQUESTED" in message) == (error > 1)
     assert skin_distance(preview, head()[0]) < error
     assert last(preview)["evaluations"] < 50
 
@@ -103,7 +103,7 @@ def test_adapt_on_two_ranks(head):
 
 @pytest.mark.parametrize("options, words", [
     (["-adapt", "-profile", "exact"], "-adapt solves coarser models"),
-    (["-adapt", "-load_steps", 3], "load_steps are asked for"),
+    (["-adapt", "-load_steps", 3], "load_steps are requested"),
     (["-adapt", "-functional", "force", "-volume", "none"], "the functional is force"),
     (["-profile", "quick"], "preview, balanced, exact"),
 ])
@@ -115,17 +115,17 @@ def test_what_cannot_be_is_refused_in_a_line(head, options, words):
 
 def test_a_model_file_has_no_coarser_models(head):
     refused = head.run("repose-solve", head()[0], "-adapt", "-output", "refused")
-    assert refused.returncode == 1 and "what it was made from" in refused.stderr
+    assert refused.returncode == 1 and "does not state its scene" in refused.stderr
 
 
 def test_a_dry_run_says_what_would_be_done_and_why(head):
     def strategy(*options):
-        said = head.run("repose-solve", "forward.yaml", "-dry_run", *options)
-        assert (said.returncode, said.stderr) == (0, ""), said
-        return dict(re.findall(r"^  (\S[\w ]{0,20}\S) {2,}(.*)$", said.stdout, re.M))
+        message = head.run("repose-solve", "forward.yaml", "-dry_run", *options)
+        assert (message.returncode, message.stderr) == (0, ""), message
+        return dict(re.findall(r"^  (\S[\w ]{0,20}\S) {2,}(.*)$", message.stdout, re.M))
 
     usual, steps_given = strategy(), strategy("-load_steps", 3, "-profile", "preview")
-    assert usual["minimises"] == "the energy of springs, volume term penalty, to 1e-06 mm"
-    assert usual["coarser models"] == "none: no option asks for any"
-    assert steps_given["coarser models"] == "none: load_steps are asked for"
+    assert usual["minimizes"] == "the energy of springs, volume term penalty, to 1e-06 mm"
+    assert usual["coarser models"] == "none: no option requests any"
+    assert steps_given["coarser models"] == "none: load_steps are requested"
     assert "because of -profile preview" in strategy("-profile", "preview")["coarser models"]

@@ -48,7 +48,7 @@ def test_table_1_is_the_papers(page):
     assert all(0 < float(cell) < 100 * PATIENCE for cell in row[4:])
 
 
-def test_energy_is_minimised(page):
+def test_energy_is_minimized(page):
     springs, volumes = tables(page)[1]
     assert (springs[:2], volumes[:2]) == (["f_e", "2"], ["f_e + f_v", "2"])
     *_, newton, default = springs

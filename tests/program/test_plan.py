@@ -40,7 +40,7 @@ def test_a_sweep_through_equal_moves_is_continuous(run, scene, tmp_path):
         assert result.returncode == 0, result
         faces.append(skin(f"{name}.h5"))
     steps = [np.linalg.norm(b - a, axis=1).max() for a, b in zip(faces, faces[1:])]
-    assert steps[1] < 0.02, "a thousandth of a millimetre more, where pieces move alike"
+    assert steps[1] < 0.02, "a thousandth of a millimeter more, where pieces move alike"
     assert max(steps) < 0.1
 
 
@@ -52,8 +52,8 @@ def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
                      *options, ranks=ranks)
         assert result.returncode == 0, result
         return result.stdout, f"{name}.h5"
-    said, file = solve(-4, "-tangents")
-    assert "12 of 12 derivatives" in said
+    message, file = solve(-4, "-tangents")
+    assert "12 of 12 derivatives" in message
     assert run("repose-check", file).returncode == 0
     with h5py.File(file) as result:
         last = result["step"][sorted(result["step"])[-1]]["point"]

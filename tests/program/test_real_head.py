@@ -67,7 +67,7 @@ def displacement_gradients(points, displacement, triangles):
     return changes @ np.linalg.pinv(edges)
 
 
-def neighbours(triangles):
+def neighbors(triangles):
     """Pairs of triangles that share an edge."""
     owners = defaultdict(list)
     for row, (a, b, c) in enumerate(triangles):
@@ -77,11 +77,11 @@ def neighbours(triangles):
 
 
 def test_the_skin_is_smooth(face):
-    """Neighbouring triangles are strained and turned alike."""
+    """Neighboring triangles are strained and turned alike."""
     model, step = model_of(face), last(face)
     triangles = model["skin/points"]
     gradient = displacement_gradients(model["point/position"], step["point/displacement"], triangles)
-    one, other = neighbours(triangles).T
+    one, other = neighbors(triangles).T
     jump = np.linalg.norm(gradient[one] - gradient[other], axis=(1, 2))
     assert jump.max() < 0.6
     assert np.quantile(jump, 0.99) < 0.25

@@ -148,7 +148,7 @@ def test_the_page_stands_alone(report, opened, tmp_path):
     text = (tmp_path / "page.html").read_text()
     for name in ("three.js", "viewer.js", "sheet.js", "viewer.css", "sheet.css"):
         assert (PROJECT / "drivers/web" / name).read_text() in text
-    assert "Permission is hereby granted" in text, "the licence of three.js"
+    assert "Permission is hereby granted" in text, "the license of three.js"
 
 
 class View:
@@ -336,8 +336,8 @@ def test_landmarks_and_angles_are_right(report, opened, tmp_path):
     sides = [here, {name: BENT @ place for name, place in here.items()}]
     for name in marks:
         x, y, z = sides[1][name] - here[name]
-        wanted = ["skin", *(f"{v:.2f}" for v in (-y, x, z, math.hypot(x, y, z)))]
-        assert page.rows[name.replace("_", " ")] == wanted
+        expected = ["skin", *(f"{v:.2f}" for v in (-y, x, z, math.hypot(x, y, z)))]
+        assert page.rows[name.replace("_", " ")] == expected
     convexity = [180 - corner(p["glabella_soft"], p["subnasale"], p["pogonion_soft"]) for p in sides]
     assert page.rows["facial convexity"] == [
         "180° − angle glabella–subnasale–pogonion", "°",

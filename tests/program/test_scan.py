@@ -38,7 +38,7 @@ def test_a_real_scan_becomes_a_mesh(run, tmp_path, name, cells):
     result = run("repose-scan", DATA / f"{name}.ply")
     assert (result.returncode, result.stderr) == (0, ""), result
     assert f"512 × 400 cells, {cells} of them with a point" in result.stdout
-    assert "taken as metres" in result.stdout
+    assert "taken as meters" in result.stdout
     assert "non-manifold" not in result.stdout
     mesh = meshio.read(tmp_path / "scan.ply")
     corners = mesh.points[mesh.cells_dict["triangle"]]
@@ -66,11 +66,11 @@ def test_the_largest_component_alone(run):
     assert "1 component" in result.stdout and "smaller components left out" in result.stdout
 
 
-def test_colours_are_kept(run, tmp_path):
+def test_colors_are_kept(run, tmp_path):
     (tmp_path / "range.ply").write_text(GRID + BODY + CELLS)
     result = run("repose-scan", "range.ply", "-unit", "mm")
     assert (result.returncode, result.stderr) == (0, ""), result
-    assert "with colours" in result.stdout
+    assert "with colors" in result.stdout
     mesh = meshio.read(tmp_path / "scan.ply")
     red = np.asarray(mesh.point_data["red"]).astype(np.uint8)  # read as signed
     assert sorted(red) == [0, 0, 100, 100, 200, 200]

@@ -320,17 +320,17 @@ def test_the_lips_are_the_scenes_mouth_and_a_cut_is_an_incision(panel, head, tmp
 def test_progress_only_grows_and_ends(panel, head, tmp_path):
     result = panel(*head(), "--tissue", "springs", "--accuracy", 1e-6, "--predictedSkin",
                    tmp_path / "skin.vtp")
-    told = [float(t) for t in re.findall("<filter-progress>(.*?)</filter-progress>", result.stdout)]
-    assert told == sorted(told) and told[-1] == 1 and len(set(told)) > 3
-    assert all(0 <= share <= 1 for share in told)
+    report = [float(t) for t in re.findall("<filter-progress>(.*?)</filter-progress>", result.stdout)]
+    assert report == sorted(report) and report[-1] == 1 and len(set(report)) > 3
+    assert all(0 <= share <= 1 for share in report)
 
 
 def test_a_missed_accuracy_is_handed_over_and_says_so(panel, head, tmp_path):
     result = panel(*head(), "--accuracy", 1e-6, "--timeLimit", 1e-6, "--predictedSkin",
                    tmp_path / "skin.vtp", "--returnparameterfile", tmp_path / "numbers.params")
     assert (result.returncode, result.stderr) == (0, "")
-    said = returned(tmp_path / "numbers.params")["verdict"]
-    assert said.startswith("ACCURACY NOT REACHED") and said in result.stdout
+    message = returned(tmp_path / "numbers.params")["verdict"]
+    assert message.startswith("ACCURACY NOT REACHED") and message in result.stdout
     assert len(read_vtp(tmp_path / "skin.vtp")["Points"]) == 477
 
 
@@ -383,10 +383,10 @@ def program():
 @pytest.mark.parametrize("error", [0.05, 0.1, 0.2, np.inf])
 @pytest.mark.parametrize("preview", [False, True])
 def test_an_accuracy_is_claimed_only_where_it_is_reached(program, status, error, preview):
-    told = {"load": 1.0, "displacement_error": error, "reason": b"why"}
-    said = program["verdict"](status, told, 0.1, preview)
+    report = {"load": 1.0, "displacement_error": error, "reason": b"why"}
+    message = program["verdict"](status, report, 0.1, preview)
     reached = status == 0 and error <= 0.1
-    assert said.startswith("ACCURACY NOT REACHED" if not reached else
+    assert message.startswith("ACCURACY NOT REACHED" if not reached else
                            "PREVIEW, to 0.1 mm" if preview else "accuracy reached: ")
 
 
@@ -465,8 +465,8 @@ def test_uncertainty_is_told_point_by_point(panel, head, tmp_path):
     step = last(tmp_path / "face.h5")
     used = np.unique(model_of(tmp_path / "face.h5")["skin/points"])
     wanted = step["displacement_error"] + step["point/discretisation_error"][used]
-    told = read_vtp(tmp_path / "skin.vtp")["uncertainty"][:, 0]
-    assert np.abs(told - wanted).max() < 1e-12 and told.max() > 10 * told.min()
+    report = read_vtp(tmp_path / "skin.vtp")["uncertainty"][:, 0]
+    assert np.abs(report - wanted).max() < 1e-12 and report.max() > 10 * report.min()
     numbers = returned(tmp_path / "numbers")
     assert float(numbers["meshError"]) == pytest.approx(step["discretisation_error"], rel=1e-5)
     assert float(numbers["accuracyReached"]) == pytest.approx(step["displacement_error"], rel=1e-5)

@@ -73,7 +73,7 @@ def test_a_method_that_overwrites_memory_is_refused(run, method, prefix):
     assert result.returncode == 1 and f"-{prefix}ksp_type gltr" in result.stderr, result
 
 
-def test_lmvm_from_the_stiffness_minimises_forces(solved):
+def test_lmvm_from_the_stiffness_minimizes_forces(solved):
     forces = "-functional", "force", "-volume", "none", "-accuracy", ACCURACY
     default, other = (last(solved(ADVANCE, *forces, *more)) for more in ((), STIFFNESS))
     assert apart(default, other) <= 2 * ACCURACY

@@ -103,7 +103,7 @@ def test_an_end_before_its_time_is_said_loudly(run, folder):
     (SCENE + "tearing: {limit: 1}\ninstruments:\n"
      "  - {sphere: {center: [63, -98, -10], radius: 20}, push: [-9, 12, 0], skin: slide}\n",
      "exclude each other"),
-], ids=["zero", "empty", "misspelt", "no forces", "sliding"])
+], ids=["zero", "empty", "misspelled", "no forces", "sliding"])
 def test_bad_lines_are_refused(run, folder, scene, message):
     (folder / "bad.yaml").write_text(scene)
     result = run("repose-solve", "bad.yaml", cwd=folder)

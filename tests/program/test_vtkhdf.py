@@ -131,8 +131,8 @@ def test_advance_is_the_way_along_the_normal_of_the_skin_above(opening):
     for k in range(3):
         np.add.at(normal, column[model["skin/points"][:, k]], np.cross(b - a, c - a))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    wanted = (step["point/displacement"] * normal[column]).sum(1)
-    assert np.abs(step["point/advance"] - wanted).max() < 1e-12 and abs(wanted).max() > 1
+    expected = (step["point/displacement"] * normal[column]).sum(1)
+    assert np.abs(step["point/advance"] - expected).max() < 1e-12 and abs(expected).max() > 1
     mouth = np.argmin(((x - (0, -90, -70))**2).sum(1))  # the chin: outwards is forward, −y
     assert normal[column[mouth]][1] < 0
 
@@ -171,10 +171,10 @@ def read_back(file, environment):
     """Compares all that this Python's readers show, and those that REPOSE_READERS names."""
     others = [name for name in os.environ.get("REPOSE_READERS", "").split(":") if name]
     for python in [sys.executable, *others]:
-        said = finish([python, str(PROJECT / "tests/program/read_back.py"), str(file)], file.parent,
+        message = finish([python, str(PROJECT / "tests/program/read_back.py"), str(file)], file.parent,
                       environment, 120)
-        assert (said.returncode, said.stderr) == (0, ""), said
-        assert said.stdout.count(f"{len(steps(file))} load steps") == said.stdout.count("agree") > 0
+        assert (message.returncode, message.stderr) == (0, ""), message
+        assert message.stdout.count(f"{len(steps(file))} load steps") == message.stdout.count("agree") > 0
 
 
 def test_other_programs_read_every_array_of_every_step(opening, environment):

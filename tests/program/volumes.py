@@ -24,7 +24,7 @@ def level_of(points):
 
 
 def samples(origin=ORIGIN, turn=TURN, spacing=SPACING, size=SIZE):
-    """Values at the voxel centres times 1000, [k, j, i], as 16-bit numbers."""
+    """Values at the voxel centers times 1000, [k, j, i], as 16-bit numbers."""
     k, j, i = np.meshgrid(*(np.arange(n) for n in size[::-1]), indexing="ij")
     points = origin + np.stack([i, j, k], axis=-1) * spacing @ turn.T
     return np.rint(1000 * level_of(points)).astype("<i2")
@@ -94,7 +94,7 @@ def element(group, number, kind, value):
 
 
 def write_slice(file, values, position, series="1.2.3", title="bone", number=1, spacing=SPACING):
-    """One CT slice [rows, columns] with its centre of pixel (0, 0) at `position`, LPS."""
+    """One CT slice [rows, columns] with its center of pixel (0, 0) at `position`, LPS."""
     def numbers(entries):
         return "\\".join(f"{entry:.10g}" for entry in entries)
 

@@ -302,8 +302,8 @@ class Session:
             status = self._process.wait(timeout=10)
         except subprocess.TimeoutExpired:
             status = "unknown"
-        said = next((line for line in self._errors if line.startswith("error:")), "")
-        return said[7:] or f"repose-live has ended (status {status}): {' '.join(self._errors[-3:])}"
+        message = next((line for line in self._errors if line.startswith("error:")), "")
+        return message[7:] or f"repose-live has ended (status {status}): {' '.join(self._errors[-3:])}"
 
 
 # What mpirun gives the processes that it starts; its settings (OMPI_MCA_…) of users are others.

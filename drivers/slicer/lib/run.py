@@ -22,7 +22,7 @@ TISSUE = {**{preset: {"material": {"preset": preset}}
           "springs": {"springs": {"default": {"modulus": 0.05, "law": "quartic", "reference": 1.0}},
                       "turgor": 0.1}}
 MOVING = 0.1  # mm: skin that moves less does not count for the mean
-PATIENCE = 10  # s that a cancelled solver has to end by itself
+PATIENCE = 10  # s that a canceled solver has to end by itself
 PREVIEW = 1  # mm, the accuracy of a preview
 TEMPORARY = "repose_panel_"  # what the names of temporary folders begin with
 ITERATION = re.compile(r"load (\S+)  iteration .* evaluations  (?:(\S+) mm to go)?")
@@ -32,7 +32,7 @@ class Refusal(Exception):
     """What a person has to change, in one line."""
 
 
-class Cancelled(Exception):
+class Canceled(Exception):
     """Slicer's Cancel button."""
 
 
@@ -219,7 +219,7 @@ class Progress:
     next the orders of magnitude its search has taken off the distance. Told as Slicer reads it."""
 
     def __init__(self, accuracy):
-        self.accuracy, self.load, self.reached, self.farthest, self.told = accuracy, 0, 0, 0, 0
+        self.accuracy, self.load, self.reached, self.farthest, self.reported = accuracy, 0, 0, 0, 0
 
     def __call__(self, line):
         if not (match := ITERATION.search(line)):
@@ -234,8 +234,8 @@ class Progress:
         if self.farthest > self.accuracy and 0 < to_go < self.farthest:
             share = math.log(self.farthest / to_go) / math.log(self.farthest / self.accuracy)
         done = self.reached + max(self.load - self.reached, 0) * min(share, 0.99)
-        self.told = max(self.told, round(0.95 * done, 3))
-        print(f"<filter-progress>{self.told}</filter-progress>", flush=True)
+        self.reported = max(self.reported, round(0.95 * done, 3))
+        print(f"<filter-progress>{self.reported}</filter-progress>", flush=True)
 
 
 def solve(chosen, scene):
@@ -253,7 +253,7 @@ def solve(chosen, scene):
             if not ITERATION.search(text):
                 printed.append(text)
         status = process.wait()
-    except Cancelled:
+    except Canceled:
         process.send_signal(signal.SIGTERM)
         try:
             process.wait(PATIENCE)
@@ -261,9 +261,9 @@ def solve(chosen, scene):
             process.kill()
         raise
     if status not in (0, 2):
-        said = scene.with_name("stderr").read_text(errors="replace")
-        own = [text for text in said.splitlines() if text.startswith(("error: ", "internal error"))]
-        raise Refusal((own or said.splitlines() or [f"repose-solve ended with status {status}"])[0]
+        message = scene.with_name("stderr").read_text(errors="replace")
+        own = [text for text in message.splitlines() if text.startswith(("error: ", "internal error"))]
+        raise Refusal((own or message.splitlines() or [f"repose-solve ended with status {status}"])[0]
                       .removeprefix("error: ").replace(f"{scene.parent}/", ""))
     return status, "".join(printed)
 
@@ -333,15 +333,15 @@ def skin_to_hand_back(h5, result):
 
 
 def hand_back(chosen, result, numbers):
-    """Writes the models that are asked for; the numbers for the panel."""
+    """Writes the models that are requested; the numbers for the panel."""
     import h5py
     import numpy as np
     with h5py.File(result) as h5:
         step = h5["step"][sorted(h5["step"])[-1]]
-        told = dict(step.attrs)
+        report = dict(step.attrs)
         points, triangles, arrays = skin_to_hand_back(h5, result)
         movement, ratio = arrays["displacement_magnitude"], step["prism/volume_ratio"][:]
-        error, mesh_error = told["displacement_error"], told.get("discretisation_error")
+        error, mesh_error = report["displacement_error"], report.get("discretisation_error")
         if chosen["predictedSkin"]:
             write_vtp(chosen["predictedSkin"], points, triangles, arrays)
         moved, first = step["bone_surface/points"][:] if "bone_surface/points" in step else None, 0
@@ -358,18 +358,18 @@ def hand_back(chosen, result, numbers):
             "largestMovement": float(movement.max(initial=0)),
             "meanMovement": float(moving.mean()) if len(moving) else 0.0,
             "volumeChange": 100 * float(abs(ratio - 1).max(initial=0)),
-            "invertedPrisms": int(told["inverted_prisms"])}, told
+            "invertedPrisms": int(report["inverted_prisms"])}, report
 
 
-def verdict(status, told, accuracy, preview):
+def verdict(status, report, accuracy, preview):
     """One line for the panel."""
-    load, error = told["load"], told["displacement_error"]
+    load, error = report["load"], report["displacement_error"]
     if status == 0 and error <= accuracy:
         if preview:
             return (f"PREVIEW, to {accuracy:g} mm: the face is within {error:.3g} mm of rest; "
                     "apply without First look for the result")
         return f"accuracy reached: {error:.3g} mm of {accuracy:g} mm"
-    reason = told["reason"].decode() if isinstance(told["reason"], bytes) else str(told["reason"])
+    reason = report["reason"].decode() if isinstance(report["reason"], bytes) else str(report["reason"])
     near = f"about {error:.3g} mm" if math.isfinite(error) else "at no known distance"
     where = "" if load == 1 else f"; the bones have made {100 * load:.0f} % of their way only"
     return f"ACCURACY NOT REACHED: the face is {near} from rest{where} ({reason})"
@@ -379,8 +379,8 @@ def work(chosen, folder):
     scene, numbers = write_scene(chosen, folder)
     print("<filter-start><filter-name>Repose</filter-name></filter-start>", flush=True)
     status, printed = solve(chosen, scene)
-    returned, told = hand_back(chosen, scene.with_name("result.h5"), numbers)
-    returned = {"verdict": verdict(status, told, accuracy_of(chosen), chosen["preview"]), **returned}
+    returned, report = hand_back(chosen, scene.with_name("result.h5"), numbers)
+    returned = {"verdict": verdict(status, report, accuracy_of(chosen), chosen["preview"]), **returned}
     if chosen["resultFile"]:
         shutil.copyfile(scene.with_name("result.h5"), chosen["resultFile"])
     if chosen["returnparameterfile"]:
@@ -401,7 +401,7 @@ def cancel(*_):
     """Ends the run. Further signals must not interrupt the cleaning."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    raise Cancelled
+    raise Canceled
 
 
 def lock(folder):
@@ -448,8 +448,8 @@ def main():
     except (Refusal, OSError) as reason:
         print(f"Repose: {reason}", file=sys.stderr)
         return 1
-    except Cancelled:
-        print("Repose: cancelled", file=sys.stderr)
+    except Canceled:
+        print("Repose: canceled", file=sys.stderr)
         return 128 + signal.SIGTERM
     return 0
 

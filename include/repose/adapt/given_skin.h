@@ -8,7 +8,7 @@
 
 namespace repose::adapt {
 
-/// How the vertices of a given skin follow the points of the solved one.
+/// Maps the points of the solved skin to the vertices of the given one.
 struct GivenSkinMap {
   using Sum = std::vector<std::pair<int64_t, double>>;
   std::vector<Sum> sum;        ///< [vertices] their displacement: rows of solved points, weights

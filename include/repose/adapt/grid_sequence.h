@@ -22,7 +22,7 @@ struct Level {
   double skin_change = 0;
   /// mm, estimate of the largest distance of the skin's rest position from that of the scene's own
   /// model; ∞ for the first.
-  double discretisation_error = 0;
+  double discretization_error = 0;
 };
 
 /// Results of a sequence of coarser models.
@@ -39,10 +39,10 @@ struct GridSequence {
 
 /// Levels and accuracy of a sequence of models.
 struct SequencePlan {
-  std::vector<Resolution> levels;             ///< coarsest first
-  std::optional<solve::Recording> recording;  ///< initial equilibrium of every model
-  solve::Settings settings;                   ///< of the scene's own model
-  /// mm: a level whose discretisation error and search error are together no more is the last one;
+  std::vector<Resolution> levels;                        ///< coarsest first
+  std::optional<solve::ReferenceState> reference_state;  ///< initial equilibrium of every model
+  solve::Settings settings;                              ///< of the scene's own model
+  /// mm: a level whose discretization error and search error are together no more is the last one;
   /// 0: all are solved.
   double enough = 0;
 };
@@ -50,12 +50,12 @@ struct SequencePlan {
 /// Resolutions that are compared to see how fine is fine enough: edges twice as long from level to
 /// level, from about `most_columns` down to the fewest worth solving, and one layer fewer where the
 /// scene lets layers be any number (layers_are_free).
-std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t most_columns);
+std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t max_columns);
 
 /// Solves the coarse models from the coarsest up, the first along the load path, each other from
 /// the answer before it. `anatomy` and `fine`, its model without incisions, on rank 0 only. A level
 /// that cannot be built or does not converge ends the sequence. Collective.
 GridSequence solve_sequence(MPI_Comm comm, const model::Anatomy& anatomy, const model::Model& fine,
-                            const SequencePlan& wanted);
+                            const SequencePlan& requested);
 
 }  // namespace repose::adapt

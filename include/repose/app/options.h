@@ -11,6 +11,6 @@ namespace repose::app {
 std::vector<base::Option> solve_options();
 
 /// The command line beats the scene, and an option of its own the profile.
-void override_by(const base::Options& options, scene::Solve& wanted);
+void override_by(const base::Options& options, scene::Solve& requested);
 
 }  // namespace repose::app

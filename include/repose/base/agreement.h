@@ -14,11 +14,11 @@ int size(MPI_Comm comm);
 /// Runs `work` on every rank (or on rank 0 only) and agrees on the outcome: if it threw anywhere,
 /// every rank throws the same error (that of the lowest rank, InputError or InternalError kept).
 /// No rank is left waiting in a collective that another never reaches. Collective.
-void together(MPI_Comm comm, const std::function<void()>& work);
-void on_first_rank(MPI_Comm comm, const std::function<void()>& work);
+void collective_try(MPI_Comm comm, const std::function<void()>& work);
+void on_root(MPI_Comm comm, const std::function<void()>& work);
 
 /// Gives rank 0's text to all ranks. Collective.
-void share(MPI_Comm comm, std::string& text);
+void broadcast(MPI_Comm comm, std::string& text);
 
 /// The part [begin, end) of n rows that a rank holds in natural order; sizes differ by at most one.
 struct Slab {

@@ -18,7 +18,7 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
-  bool wanted();  ///< the same on all ranks; stays true. Collective.
+  bool requested();  ///< the same on all ranks; stays true. Collective.
 
   /// Calls `work` on a thread of its own as soon as a signal arrives, and at once if one has;
   /// mpirun kills its ranks a second after the signal, wherever their search is. `work` must not
@@ -32,7 +32,7 @@ class Interrupt {
   double limit_;
   bool signals_;
   Clock::time_point begin_ = Clock::now();
-  bool wanted_ = false;
+  bool requested_ = false;
   std::unique_ptr<Listener> listener_;
 };
 

@@ -57,9 +57,9 @@ class Options {
 
   /// -help was given. With `-help petsc` or `-help intro` it goes to PETSc instead, and this is
   /// false.
-  bool help_wanted() const { return help_wanted_; }
+  bool help_requested() const { return help_requested_; }
   /// Returns true where -version was given.
-  bool version_wanted() const { return version_wanted_; }
+  bool version_requested() const { return version_requested_; }
   /// Returns the help page: description, arguments and options, from the table.
   std::string help() const;
 
@@ -68,7 +68,7 @@ class Options {
   int petsc_argc() const { return static_cast<int>(petsc_tokens_.size()); }
   char** petsc_argv() const { return petsc_pointers_.data(); }
 
-  /// Reads PETSc's database (where PETSc is initialised; what is ours is marked as used) and checks
+  /// Reads PETSc's database (where PETSc is initialized; what is ours is marked as used) and checks
   /// everything. InputError, one line, for a name that is neither ours nor begins as PETSc's do
   /// (with the nearest of ours) and does not come from PETSC_OPTIONS, a missing value, a value of
   /// the wrong kind or out of range, a missing or unexpected argument. Call once, before any of the
@@ -88,7 +88,7 @@ class Options {
   std::vector<std::string> texts(std::string_view name) const;  ///< all values; empty if none
 
   /// The PETSc options of the command line, and the unknown ones of PETSC_OPTIONS, that nobody
-  /// requested. PETSc must be initialised.
+  /// requested. PETSc must be initialized.
   std::vector<std::string> unused() const;
   /// The options by which the user changes what PETSc computes, as typed, or empty. After check().
   const std::string& petsc_settings() const { return petsc_settings_; }
@@ -110,11 +110,11 @@ class Options {
   std::vector<std::string> positional_, unknown_, petsc_tokens_;
   std::vector<std::string> ignored_;  // names in PETSC_OPTIONS that are neither ours nor PETSc's
   mutable std::vector<char*> petsc_pointers_;
-  bool help_wanted_ = false, version_wanted_ = false;
+  bool help_requested_ = false, version_requested_ = false;
 };
 
 /// All options in PETSc's database, as (name without its dash, value); the value is empty where
-/// there is none. PETSc must be initialised. Not collective.
+/// there is none. PETSc must be initialized. Not collective.
 std::vector<std::pair<std::string, std::string>> petsc_options();
 
 /// Sets a PETSc option for its life; what the person gave stands again after.

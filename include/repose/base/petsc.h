@@ -55,8 +55,8 @@ using MatHandle = Handle<Mat, MatDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
 using IndexSetHandle = Handle<IS, ISDestroy>;
 
-/// PETSc and MPI for the life of a program: initialises both (root may run Open MPI), makes PETSc
-/// return its errors instead of aborting, finalises. Collective.
+/// PETSc and MPI for the life of a program: initializes both (root may run Open MPI), makes PETSc
+/// return its errors instead of aborting, finalizes. Collective.
 class Session {
  public:
   Session(int argc, char** argv, const char* help);

@@ -26,7 +26,7 @@ double cpu_seconds();
 
 /// Returns the provenance of a result as (name, text): "program" with its version, "command" as
 /// it was typed (where the system tells), "ranks", "libraries" with their versions. Not collective;
-/// PETSc must be initialised.
+/// PETSc must be initialized.
 std::vector<std::pair<std::string, std::string>> this_run(MPI_Comm comm);
 
 /// A folder that comes with the programs, such as "meshes", wherever they are called from: the one

@@ -19,7 +19,7 @@ std::optional<int64_t> parse_integer(std::string_view text);
 
 /// `text` in single quotes, fit for a one-line message: control characters become '?', and what
 /// goes past 60 bytes becomes "...".
-std::string shown(std::string_view text);
+std::string quote(std::string_view text);
 
 /// ASCII letters in lower case, whatever the locale.
 std::string lower(std::string_view text);
@@ -47,10 +47,10 @@ struct Range {
 
 /// Describes a valid number for a message: "a number of mm, > 0, or auto". `words` may stand in its
 /// place; `unit` may be empty.
-std::string wanted_number(bool whole, std::string_view unit, const Range& range,
-                          const std::vector<std::string>& words);
+std::string expected_number(bool whole, std::string_view unit, const Range& range,
+                            const std::vector<std::string>& words);
 
-/// Least number of insertions, deletions, substitutions and swaps of neighbours that turn `a` into
+/// Least number of insertions, deletions, substitutions and swaps of neighbors that turn `a` into
 /// `b` (optimal string alignment), upper and lower case taken as one. Works on bytes.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 

@@ -44,8 +44,8 @@ class ForceHessian : public Hessian {
 
   void assemble(Vec displacement) override;  ///< collective
   Mat exact() override { return exact_; }
-  Mat convex() override { return convex_; }
-  Mat model() override { return convex_; }
+  Mat spd_approximation() override { return spd_; }
+  Mat model() override { return spd_; }
   bool elliptic() const override { return false; }  // its square
 
  private:
@@ -58,7 +58,7 @@ class ForceHessian : public Hessian {
   std::unique_ptr<Tangent> volume_;
   base::MatHandle metric_;  // λ D, block diagonal
   base::MatHandle third_;
-  base::MatHandle convex_, exact_;
+  base::MatHandle spd_, exact_;
   int64_t elastic_assemblies_ = -1;  // of H and …
   double epsilon_ = 0;               // … ε, at the last assembly
 };

@@ -10,7 +10,7 @@ constexpr double overflown = 1e100;  ///< stands for a value that is more, or no
 /// Refuses a state at a load, `what` of which overflow, saying what to check.
 [[noreturn]] void refuse_overflow(const char* what, double load);
 
-/// A function of the displacements of the unknowns that a solver minimises.
+/// A function of the displacements of the unknowns that a solver minimizes.
 class Function {
  public:
   explicit Function(Positions& positions) : positions_(positions) {}
@@ -54,20 +54,20 @@ class Hessian {
   virtual Mat exact() = 0;  ///< its entries, at the state of the last assemble(); collective
   /// The entries of the relative, which may stay behind: renew() brings them to the state of the
   /// last assemble(). Collective.
-  virtual Mat convex() = 0;
+  virtual Mat spd_approximation() = 0;
   virtual void renew() {}
   /// Returns an operator that acts as exact(), with or without entries.
   virtual Mat action() { return exact(); }
   /// The one whose quadratic model a Newton method steps by.
   virtual Mat model() { return action(); }
-  /// Returns whether multigrid can precondition it: it couples neighbours as elasticity does, and
+  /// Returns whether multigrid can precondition it: it couples neighbors as elasticity does, and
   /// its relative can be visited.
   virtual bool elliptic() const { return true; }
   /// Shows all blocks of the relative that touch this rank's points, at the state of the last
   /// assemble(), but for those of contact, which change more often. Not collective.
-  virtual void visit_convex(const BlockVisitor&) const {}
-  /// Shows those of contact, where visit_convex couples points. Not collective.
-  virtual void visit_contact(const BlockVisitor&) const {}
+  virtual void visit_spd_blocks(const BlockVisitor&) const {}
+  /// Shows those of contact, where visit_spd_blocks couples points. Not collective.
+  virtual void visit_contact_blocks(const BlockVisitor&) const {}
   int64_t assemblies() const { return assemblies_; }
   /// Returns the assemblies at a new displacement or load; at others contact alone changed.
   int64_t states() const { return states_; }

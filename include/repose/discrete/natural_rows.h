@@ -5,7 +5,7 @@
 
 namespace repose::discrete {
 
-/// Brings what each rank knows of its points, springs and prisms into the rows of the result file:
+/// Brings each rank's values of its points, springs and prisms into the rows of the result file:
 /// slabs (base::slab) in natural order, whatever the distribution; and back. All members
 /// collective.
 class NaturalRows {
@@ -16,8 +16,8 @@ class NaturalRows {
   /// The arrays of a step at the objective's last update.
   model::StepRows rows(Objective& objective) const;
 
-  /// The arrays of a raised part's model, as it is now.
-  static model::ModelRows of_model(MPI_Comm comm, const RaisedPart& raised);
+  /// The arrays of a local model in its present state.
+  static model::ModelRows of_model(MPI_Comm comm, const LocalModel& local_model);
 
   /// This rank's slab of values [at least owned points] at the points, in natural order.
   std::vector<Vec3> natural(std::span<const Vec3> values) const;
@@ -36,13 +36,14 @@ class NaturalRows {
     int block;  // numbers a row
   };
   /// Copies from the owned values to this rank's slab, or the other way.
-  void carry(const Rows& rows, const double* owned, const double* natural, ScatterMode mode) const;
-  void carry_at_once(const Rows& rows, const double* owned, const double* natural,
+  void scatter_rows(const Rows& rows, const double* owned, const double* natural,
+                    ScatterMode mode) const;
+  void scatter_chunk(const Rows& rows, const double* owned, const double* natural,
                      ScatterMode mode) const;
-  std::vector<double> bring(const Rows& rows, const std::vector<double>& owned) const;
+  std::vector<double> to_slab(const Rows& rows, const std::vector<double>& owned) const;
   /// Brings the first of `values`, as many as there are rows, whatever they are.
   template <class Value>
-  std::vector<Value> bring_each(const Rows& rows, const std::vector<Value>& values) const;
+  std::vector<Value> to_slab_each(const Rows& rows, const std::vector<Value>& values) const;
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_contact(Objective& objective, model::StepRows& rows) const;

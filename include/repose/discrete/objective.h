@@ -1,11 +1,11 @@
 #pragma once
 #include "repose/discrete/function.h"
+#include "repose/mechanics/cut_face_contact.h"
 #include "repose/mechanics/energy.h"
-#include "repose/mechanics/wall_contact.h"
 
 namespace repose::discrete {
 
-/// The function that is minimised (docs/theory/model.md Eqs. 11, 12) over the displacements of the
+/// The function that is minimized (docs/theory/model.md Eqs. 11, 12) over the displacements of the
 /// unknowns: value, gradient and Hessian action, with gravity and external forces as a potential W
 /// = −Σ_{soft} (m g + f^ext) · (x − X). All members are collective unless said otherwise.
 class Objective : public Function {
@@ -30,12 +30,12 @@ class Objective : public Function {
   std::vector<std::array<int32_t, 2>> links() const;
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
-  mechanics::TouchLoop& touches() { return touches_; }
+  mechanics::BodyContact& body_contact() { return body_contact_; }
   /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
   /// are kept. Not collective.
   void round_bodies(bool rounded);
-  mechanics::WallLoop& walls() { return walls_; }
-  const mechanics::WallLoop& walls() const { return walls_; }
+  mechanics::CutFaceContact& cut_face_contact() { return cut_face_contact_; }
+  const mechanics::CutFaceContact& cut_face_contact() const { return cut_face_contact_; }
   /// Takes the bodies to where they are at the positions' load. Not collective.
   void place_bodies();
   /// Contact's value, at the last update, summed over ranks, N·mm.
@@ -65,9 +65,9 @@ class Objective : public Function {
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool averages_volumes_;
-  mechanics::TouchLoop touches_, other_touches_;  // those in use, and the others
-  bool rounded_ = false;                          // bodies in use are
-  mechanics::WallLoop walls_;
+  mechanics::BodyContact body_contact_, other_body_contact_;  // those in use, and the others
+  bool rounded_ = false;                                      // bodies in use are
+  mechanics::CutFaceContact cut_face_contact_;
   int64_t placed_at_ = -1;        // positions' revision at which the bodies are
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero

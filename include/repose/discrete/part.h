@@ -42,20 +42,21 @@ struct Part {
 Part distribute(MPI_Comm comm, const model::Model& model);
 
 /// Part built by its own rank, and global numbers of the model.
-struct RaisedPart {
+struct LocalModel {
   Part part;
-  model::Model frame;              ///< Ground::frame() and its contact's bodies, on rank 0
-  model::Counts counts;            ///< of the whole model, on all ranks
-  int64_t touches = 0;             ///< likewise, rows of contact
-  std::vector<int64_t> touch_row;  ///< [touches of the part] in the whole model
-  std::vector<Vec3> outward;       ///< [owned points] outward_normals()
-  double effective_modulus = 0;    ///< N/mm², on rank 0
+  model::Model
+      global_metadata;   ///< ColumnGeometry::global_metadata() and its contact's bodies, on rank 0
+  model::Counts counts;  ///< of the whole model, on all ranks
+  int64_t contact_pairs = 0;      ///< rows of contact of the whole model
+  std::vector<int64_t> pair_row;  ///< [touches of the part] in the whole model
+  std::vector<Vec3> outward;      ///< [owned points] outward_normals()
+  double effective_modulus = 0;   ///< N/mm², on rank 0
 };
 
 /// Builds the parts of a fully distributed model, equal to distribute() of the scene's model: rank
-/// 0, which alone has the `ground`, gives every rank the columns that it owns and those around
+/// 0, which alone has the `geometry`, gives every rank the columns that it owns and those around
 /// them, and the rank makes the model of these. `scene` is read on all ranks; its moves are rank
 /// 0's. Throws InputError. Collective.
-RaisedPart raise(MPI_Comm comm, const model::Ground* ground, scene::Scene scene);
+LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene);
 
 }  // namespace repose::discrete

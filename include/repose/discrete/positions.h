@@ -39,10 +39,10 @@ class Positions {
   /// A zero vector of unknowns: blocks of 3, this rank's soft-tissue points in local order.
   base::VecHandle make_vector() const;
   /// The rows of `values` [local points] that are unknowns of this rank, into `out`.
-  void keep_owned(std::span<const Vec3> values, Vec out) const;
+  void restrict_to_owned(std::span<const Vec3> values, Vec out) const;
   /// Ghosted copy: `out` [local points] = `in` at soft-tissue points, untouched elsewhere.
   /// Collective.
-  void spread(Vec in, std::span<Vec3> out) const;
+  void scatter_to_local(Vec in, std::span<Vec3> out) const;
 
   const Part& part() const { return part_; }
   MPI_Comm comm() const { return comm_; }

@@ -16,7 +16,7 @@ class Tangent : public Hessian {
   /// Nothing is done if `displacement` is the state it is at, and nothing has changed since.
   void assemble(Vec displacement) override;
   /// The next assembly is done in any case: the elements have changed.
-  void forget() { at_.clear(); }
+  void invalidate() { at_.clear(); }
   /// The next assembly takes the objective's contact as it is then.
   void forget_contact() { contact_changed_ = true; }
 
@@ -30,11 +30,11 @@ class Tangent : public Hessian {
   void third(std::span<const Vec3> direction, Mat matrix);
 
   Mat exact() override;
-  Mat convex() override;
+  Mat spd_approximation() override;
   void renew() override;
   Mat action() override { return action_; }
-  void visit_convex(const BlockVisitor& visit) const override;
-  void visit_contact(const BlockVisitor& visit) const override;
+  void visit_spd_blocks(const BlockVisitor& visit) const override;
+  void visit_contact_blocks(const BlockVisitor& visit) const override;
 
  private:
   static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
@@ -47,7 +47,7 @@ class Tangent : public Hessian {
 
   Objective& objective_;
   std::unique_ptr<TangentEntries> entries_;
-  base::MatHandle exact_, convex_, action_;
+  base::MatHandle exact_, spd_, action_;
   base::MatHandle coupled_;               // exact_ and what averaged volumes couple
   std::vector<Objective::Block> blocks_;  // of terms and contact, at the last assembly
   std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative

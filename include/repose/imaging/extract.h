@@ -40,7 +40,7 @@ struct Extracted {
 using StepWatch = std::function<void(const std::string& step, double done)>;
 
 /// Throws InputError as the functions it calls do, and where not exactly one of level, otsu and
-/// label is wanted.
-Extracted extract(const Volume& volume, const Extraction& wanted, const StepWatch& watch = {});
+/// label is requested.
+Extracted extract(const Volume& volume, const Extraction& requested, const StepWatch& watch = {});
 
 }  // namespace repose::imaging

@@ -8,7 +8,7 @@ using surface::Surface;
 
 /// Treatment of a surface at the border of the volume.
 enum class VolumeBorder {
-  closed,  ///< capped in the outermost voxel centres: the result is closed
+  closed,  ///< capped in the outermost voxel centers: the result is closed
   open     ///< cut off: the result has a rim there
 };
 

@@ -24,7 +24,7 @@ struct OuterSkin {
 
 /// Distances d to the given triangles on a grid; the outside is what a ball reaches from beyond the
 /// surface, {d ≥ outside} where it is connected, and the solid what stays farther than that from
-/// its centres; the solid is then opened by the inside ball (erosion, then dilation). Each border
+/// its centers; the solid is then opened by the inside ball (erosion, then dilation). Each border
 /// is an isosurface of an unrounded distance, so balls rest on triangles and not on voxels. A
 /// border loop so long that the head is open there is closed by a cone first, which counts as a
 /// cap, as do flat parts larger than `cap_area`. Throws InputError where nothing as thick as the

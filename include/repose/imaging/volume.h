@@ -15,12 +15,12 @@ namespace repose::imaging {
 using Watch = std::function<void(double)>;
 
 /// Numbers at the points of a regular, perhaps oblique or sheared grid: voxel (i, j, k) has its
-/// centre at origin + axes · (i, j, k).
+/// center at origin + axes · (i, j, k).
 struct Volume {
   std::string name;                  ///< for messages: a file's or folder's path
   std::array<int64_t, 3> size{};     ///< voxels along i, j, k; each at least 2
   Mat3 axes = Mat3::Identity();      ///< mm, LPS; column a is one step along axis a
-  Vec3 origin = Vec3::Zero();        ///< mm, LPS; centre of voxel (0, 0, 0)
+  Vec3 origin = Vec3::Zero();        ///< mm, LPS; center of voxel (0, 0, 0)
   std::vector<float> values;         ///< [k][j][i], HU or labels; all finite
   std::vector<std::string> remarks;  ///< what was done to the data on reading, a line each
 
@@ -36,7 +36,7 @@ Mat3 inverse_axes(const Volume& volume);
 /// .mhd). Positions come in LPS: NIfTI, which is RAS, and NRRD of another space are converted;
 /// DICOM's rescale slope is applied; oblique axes and tilted gantries are kept as they are. Numbers
 /// that are not finite become the least finite one, with a remark. Throws InputError, one line
-/// naming the file, for what is missing, truncated, not three-dimensional, coloured or without
+/// naming the file, for what is missing, truncated, not three-dimensional, colored or without
 /// spacing, and for a folder with several series, missing or doubled slices. `watch` follows DICOM
 /// slices.
 Volume read_volume(const std::filesystem::path& path, const Watch& watch = {});

@@ -6,7 +6,7 @@
 
 namespace repose::linear {
 
-/// A coarser tissue with as many layers: aggregates of neighbouring columns become its columns
+/// A coarser tissue with as many layers: aggregates of neighboring columns become its columns
 /// (semicoarsening along the skin). Each point moves with a few coarse points of its own layer, by
 /// weights that are the aggregates' smoothed once over the layer (smoothed aggregation: Vaněk,
 /// Mandel & Brezina 1996), the same for x, y and z. Aggregates and weights stay on one rank.
@@ -16,7 +16,7 @@ class Coarsening {
   Coarsening(MPI_Comm comm, const ColumnLevel& fine, const std::vector<Vec3>& at);
 
   /// Means of the points that the coarse ones stand for, mm.
-  const std::vector<Vec3>& centre() const { return centre_; }
+  const std::vector<Vec3>& center() const { return center_; }
   /// The coarse matrix Pᵀ A P takes its numbers from `fine`. Not collective.
   void refill(const ColumnLevel& fine);
   ColumnLevel& coarse() { return *coarse_; }
@@ -45,15 +45,15 @@ class Coarsening {
   void add_to(std::span<const Lanes> coarse, std::span<Lanes> fine) const;
 
  private:
-  /// What a point moves with: coarse points and their weights, which add up to 1.
-  static constexpr int most = 4;
+  /// Coarse points that a point moves with and their weights, which add up to 1.
+  static constexpr int maximum = 4;
   struct Weights {
-    std::array<int32_t, most> point;  // numbers of the coarse level; unused ones have weight 0
-    std::array<float, most> weight;
+    std::array<int32_t, maximum> point;  // numbers of the coarse level; unused ones have weight 0
+    std::array<float, maximum> weight;
     /// Calls visit(point, weight) for those that are used.
     template <class Visit>
     void visit(Visit&& visit) const {
-      for (int m = 0; m < most; ++m)
+      for (int m = 0; m < maximum; ++m)
         if (weight[m] != 0) visit(point[m], weight[m]);
     }
   };
@@ -65,7 +65,7 @@ class Coarsening {
     double weight;
     int32_t point;
   };
-  void find_centres(const std::vector<Vec3>& at, const std::vector<int32_t>& point, int32_t own);
+  void find_centers(const std::vector<Vec3>& at, const std::vector<int32_t>& point, int32_t own);
   void make_linear(const Vec3& at, std::vector<Candidate>& found) const;
   void smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
               const std::vector<int32_t>& point);
@@ -74,7 +74,7 @@ class Coarsening {
   BlockPattern find_pattern(const ColumnLevel& fine, int32_t own, int32_t ghosts) const;
 
   int32_t fine_own_;
-  std::vector<Vec3> centre_;          // [coarse own] mm
+  std::vector<Vec3> center_;          // [coarse own] mm
   std::vector<Weights> weights_;      // [fine own + ghosts]
   std::vector<int64_t> share_begin_;  // [coarse own + 1]
   std::vector<Share> share_;          // the transpose of the weights

@@ -49,7 +49,7 @@ struct BlockPattern {
 class ColumnLevel {
  public:
   /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
-  /// pattern couples points of a column to their neighbours in it only. Collective.
+  /// pattern couples points of a column to their neighbors in it only. Collective.
   ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
               BlockPattern pattern);
 
@@ -69,7 +69,7 @@ class ColumnLevel {
   const Eigen::Matrix3f& block(int64_t place) const { return block_[place]; }
   /// The place of the diagonal block of an own row, which those right of it follow.
   int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
-  /// Takes all blocks anew; those left of the diagonal are mirror images. Not collective.
+  /// Sets all blocks again; those left of the diagonal are mirror images. Not collective.
   void fill(const UpperSums& sums);
   /// Adds to the block of two own points, and to its mirror image; it is in the pattern.
   void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
@@ -121,7 +121,7 @@ class UpperSums {
   explicit UpperSums(const ColumnLevel& level);
   /// To the block of an own row and a column not left of it, which is in the pattern.
   void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
-  /// Of a row's blocks, from the diagonal on.
+  /// Returns the blocks of a row from the diagonal on.
   std::span<const Eigen::Matrix3f> row(int32_t i) const {
     return std::span(sum_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
   }

@@ -24,7 +24,7 @@ class ColumnMultigrid {
   ColumnMultigrid(MPI_Comm comm, const discrete::Part& part, const BlockSource& blocks);
   ~ColumnMultigrid();
 
-  /// Takes the numbers of the matrix anew; no block may be where there was none. Collective.
+  /// Takes the numbers of the matrix again; no block may be where there was none. Collective.
   void refill(const BlockSource& blocks);
   /// Adds blocks of own points, in place of those that the last call since refill() added: on each
   /// level only what they change. Collective.

@@ -5,7 +5,7 @@
 
 namespace repose::linear {
 
-/// How much a preconditioner made at an earlier state has come to cost: the iterations that its
+/// Measures the cost of a preconditioner made at an earlier state: the iterations that its
 /// solves took beyond what the same reductions of the residual took when it was new. Renewed when
 /// that exceeds the price of a new one, total work is at most about twice that of the best times
 /// of renewal, whichever these are (the ski-rental rule: Karlin, Manasse, Rudolph & Sleator 1988).
@@ -14,11 +14,11 @@ class LagPolicy {
  public:
   explicit LagPolicy(double price) : price_(price) {}  ///< of a renewal, in iterations
 
-  /// Whether a new one is worth its price.
-  bool out() const { return spent_ > price_; }
-  /// Whether a new one was too slow, as long as there is proof enough: a solve near a state where
+  /// Returns whether a new one is worth its price.
+  bool should_rebuild() const { return spent_ > price_; }
+  /// Returns whether a new one was too slow, given enough iterations: a solve near a state where
   /// the stiffness is singular is slow with any preconditioner.
-  bool hopeless() const {
+  bool stagnates() const {
     constexpr double slowest = 15;  // iterations per e-fold
     constexpr double proof = 300;   // iterations
     return new_iterations_ > proof && new_rate() > slowest;

@@ -14,7 +14,7 @@ using PcHandle = base::Handle<PC, PCDestroy>;
 
 /// Linear solves with a Hessian: conjugate gradients on the exact action, preconditioned from the
 /// convex relative, by default by multigrid on columns (`-pc_type columns`, column_multigrid.h);
-/// that which is hopelessly slow gives way to MUMPS' Cholesky factors, which also serve where
+/// falls back to MUMPS' Cholesky factors when it stagnates; these also serve where
 /// multigrid does not work, up to `factors_limit` unknowns. A preconditioner made at one state
 /// serves the next ones until it is worn out (lag_policy.h). `-ksp_…` and `-pc_…` options apply,
 /// and `-pc_renewal_price`: the iterations that a preconditioner may cost before it is renewed. All
@@ -36,13 +36,13 @@ class TangentSolver {
   void refresh(Vec displacement);
 
   /// Makes `other` use the preconditioner, whose lag its solves add to.
-  void lend_preconditioner(KSP other);
+  void share_preconditioner(KSP other);
 
   /// Solves H δ = rhs at `displacement` (prepared there), to a relative natural residual. Returns
   /// whether the Hessian showed no negative curvature on the way; where it did, or iterations ran
   /// out, δ is the iterate reached.
   bool solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance);
-  bool finished() const { return finished_; }  ///< the latest solve, to what was asked of it
+  bool finished() const { return finished_; }  ///< the latest solve, to the tolerance requested
 
   /// The Newton step −H⁻¹ ∇Φ at `displacement`, its largest block in mm: how far the rest position
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.
@@ -53,53 +53,55 @@ class TangentSolver {
   /// more than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it,
   /// or below `slack`, mm. Infinite where that is out of reach, or a random load meets negative
   /// curvature.
-  double sure_distance(Vec displacement, Vec gradient, double slack);
-  /// Whether a random load meets no negative curvature: what no force disturbs may be a saddle.
+  double error_bound(Vec displacement, Vec gradient, double slack);
+  /// Returns whether a random load meets no negative curvature: a balanced state may be a saddle.
   bool is_minimum(Vec displacement);
-  /// Whether the latest distance, or the random load that it was to be sure by, met any.
-  bool negative_curvature() const { return bends_ || !convex_; }
-  double unsure() const { return unsure_; }  ///< mm, of the latest, where it is not little of it
+  /// Returns whether the latest distance, or the random load that bounded it, met any.
+  bool negative_curvature() const { return negative_curvature_ || !convex_; }
+  double error_slack() const {
+    return error_slack_;
+  }  ///< mm, of the latest, where it is not little of it
 
-  /// What newton_distance would be, roughly, by the preconditioner alone; 0 where there is none
+  /// Estimates newton_distance by the preconditioner alone; 0 where there is none
   /// yet.
   double preconditioned_step(Vec gradient);
 
-  /// How much shorter than the latest newton_distance, at `displacement`, the Newton step from its
-  /// end `trial` is, where the gradient is given: by the largest block or by the energy norm
+  /// Ratio to the latest newton_distance, at `displacement`, of the Newton step from its
+  /// end `trial`, where the gradient is given: by the largest block or by the energy norm
   /// √(∇Φᵀ H⁻¹ ∇Φ), whichever falls less. Infinite where the model that the step is of misleads: H
   /// is not positive definite at its end, or the slope along it is not even halved there.
   double contraction(Vec displacement, Vec trial, Vec gradient);
 
   /// H⁻¹ ∇Φ of the last newton_distance.
-  Vec latest() const { return work_; }
+  Vec newton_step() const { return work_; }
 
   discrete::Hessian& hessian() { return hessian_; }
   PC preconditioner();
-  /// What is to be given as the matrix that the preconditioner is made from.
+  /// Returns the matrix that the preconditioner is made from.
   Mat preconditioner_matrix();
-  /// Makes the preconditioner anew, at the state of the Hessian's last assembly.
+  /// Rebuilds the preconditioner, at the state of the Hessian's last assembly.
   void renew_preconditioner();
   /// Takes the Hessian's present contact into the preconditioner, where that is multigrid.
   void update_contact();
-  bool by_factors() const { return factors_ != nullptr; }  ///< multigrid has given way
+  bool by_factors() const { return factors_ != nullptr; }  ///< the direct fallback is in use
   int64_t renewals() const { return renewals_; }           ///< of the preconditioner
 
  private:
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
   void choose_preconditioner();
-  bool hopeless() const;
+  bool use_direct_fallback() const;
   /// Says why no linear system can be solved. Collective.
-  [[noreturn]] void give_up();
+  [[noreturn]] void throw_unsolvable();
   double largest_compliance(Vec displacement);
-  /// Whether δ leaves less of rhs than nothing would: the norm that a solve ends by is that of the
+  /// Returns whether δ reduces the residual: the norm that a solve ends by is that of the
   /// preconditioner, which says little where stiffnesses lie far apart.
-  bool truly_smaller(Vec rhs, Vec delta);
-  /// Takes the residual of the latest Newton step down by a factor; whether it could be.
-  bool improve(Vec displacement, Vec gradient, double factor);
+  bool residual_decreased(Vec rhs, Vec delta);
+  /// Reduces the residual of the latest Newton step by a factor; returns whether it succeeded.
+  bool refine(Vec displacement, Vec gradient, double factor);
   void renew_columns();
 
-  double unsure_ = 0;
+  double error_slack_ = 0;
   static constexpr double usual_ = 0.05;  // to which Newton steps are solved for
 
   discrete::Positions& positions_;
@@ -112,12 +114,12 @@ class TangentSolver {
   base::VecHandle work_, measured_;  // the latest Newton step and the gradient it is of
   double distance_ = 0;              // its length, …
   int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
-  int64_t sure_at_ = -1;             // and at this many it is sure
+  int64_t bounded_at_ = -1;          // and at this many it is sure
   double compliance_ = 0;            // mm/N, of the softest point, …
   int64_t compliance_at_ = -1;       // … at this many renewals of the preconditioner
   double compliance_load_ = 0;       // … and at this load
   bool convex_ = true;               // the random load met no negative curvature, …
-  bool bends_ = false;               // … the latest Newton step did
+  bool negative_curvature_ = false;  // … the latest Newton step did
   bool finished_ = false;
   LagPolicy lag_;
   int64_t renewals_ = 0;

@@ -12,8 +12,8 @@ namespace repose::live {
 struct Channel {
   int input;  ///< file descriptors, used by rank 0 alone
   int output;
-  /// Of 127.0.0.1, 0 for a free one: clients connect there, one after the other, and `output` gets
-  /// one line with port and token.
+  /// Port of 127.0.0.1, 0 for a free one: clients connect there, one after the other, and `output`
+  /// gets one line with port and token.
   std::optional<int> port;
 };
 

@@ -12,7 +12,8 @@
 /// without the max where a point slides.
 namespace repose::mechanics {
 
-/// Of a constraint, per area: value (N/mm), pressure p − k g where it acts, and −d(pressure)/dg.
+/// State of a constraint, per area: value (N/mm), pressure p − k g where it acts, and
+/// −d(pressure)/dg.
 struct Pressing {
   double value, pressure, stiffness;
 };
@@ -45,14 +46,14 @@ void visit_products(const LinearGap::Gradient& g, double weight, Visit&& visit) 
 
 /// Points against rigid bodies. A distance changes by no more than its point moves, so that a
 /// constraint is evaluated only where a lower bound of its gap lets it act.
-class TouchLoop {
+class BodyContact {
  public:
-  TouchLoop() = default;
+  BodyContact() = default;
   /// `touches` with local point numbers.
-  TouchLoop(const model::Touches& touches, double stiffness, std::vector<RigidBody> bodies);
+  BodyContact(const model::ContactPairs& pairs, double stiffness, std::vector<RigidBody> bodies);
 
-  bool empty() const { return touches_.point.empty(); }
-  const model::Touches& touches() const { return touches_; }
+  bool empty() const { return pairs_.point.empty(); }
+  const model::ContactPairs& pairs() const { return pairs_; }
   std::span<const double> multipliers() const { return multiplier_; }
   void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }
   std::vector<RigidBody>& bodies() { return bodies_; }
@@ -62,14 +63,14 @@ class TouchLoop {
   /// Adds scale · gradient; returns the value, N·mm, unscaled.
   double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
   /// Evaluates the gaps that may act, for all functions below.
-  void look(std::span<const Vec3> position);
+  void update_gaps(std::span<const Vec3> position);
   /// Evaluates all gaps: by the exact distance (RigidBody::outside) where RigidBody::lower_bound
   /// shows them to be above 1 mm.
-  void look_at_all(std::span<const Vec3> position);
-  /// Calls visit(point, block): the Hessian at the latest look, or a semidefinite relative.
+  void update_all_gaps(std::span<const Vec3> position);
+  /// Calls visit(point, block): the Hessian at the latest update, or a semidefinite relative.
   template <class Visit>
   void for_each_block(bool exact, Visit&& visit) const {
-    for (const size_t c : acting_) visit(touches_.point[c], block(c, exact, now(c)));
+    for (const size_t c : acting_) visit(pairs_.point[c], block(c, exact, now(c)));
   }
   /// The gaps below `reach` mm, to first order about the positions; those above `smoothed_to` mm,
   /// without multipliers, may be those of the exact distance (RigidBody::outside).
@@ -89,17 +90,17 @@ class TouchLoop {
   void for_each_curvature(std::span<const LinearGap> gaps, bool exact, Visit&& visit) const {
     for (const LinearGap& g : gaps)
       if (const double p = multiplier_[g.constraint]; p != 0)
-        visit(touches_.point[g.constraint], block(g.constraint, exact, {0, p, 0}));
+        visit(pairs_.point[g.constraint], block(g.constraint, exact, {0, p, 0}));
   }
   /// Gaps (mm; where they cannot act a lower bound) and pressures p − k g (N/mm²) at the latest
-  /// look, [C].
+  /// update, [C].
   std::span<const double> gaps() const { return gap_; }
   double pressure(size_t c) const { return now(c).pressure; }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
  private:
-  bool slides(size_t c) const { return touches_.binding[c] == model::Binding::slides; }
-  double least_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
+  bool slides(size_t c) const { return pairs_.binding[c] == model::Binding::slides; }
+  double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
   bool stays_above(double gap, size_t c, const Vec3& beside);
   Pressing now(size_t c) const { return press(gap_[c], multiplier_[c], stiffness_, slides(c)); }
   void measure(size_t c, const Vec3& beside);
@@ -107,16 +108,16 @@ class TouchLoop {
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);
   Mat3 block(size_t c, bool exact, const Pressing& pressing) const;
 
-  model::Touches touches_;
+  model::ContactPairs pairs_;
   double stiffness_ = 1;
   std::vector<RigidBody> bodies_;
   std::vector<double> multiplier_;  // [C] N/mm²
   std::vector<Vec3> seen_;          // [C] where the point was beside its body when last evaluated
   std::vector<double> distance_;    // [C] mm, then, or a lower bound
-  std::vector<double> gap_;         // [C] at the latest look
+  std::vector<double> gap_;         // [C] at the latest update
   std::vector<Vec3> normal_;        // [C] when last measured
   std::vector<Mat3> curvature_;     // [C] when last measured
-  std::vector<size_t> acting_;      // at the latest look
+  std::vector<size_t> acting_;      // at the latest update
 };
 
 }  // namespace repose::mechanics

@@ -5,7 +5,7 @@
 
 /// Energies and their gradients as kernels on plain arrays, the same code for one rank, many, the
 /// tests and the benchmark. `position` is [P] mm over the local points; gradients are added to
-/// `gradient` [P] (N), for every local point, fixed or not: the caller keeps the rows it wants.
+/// `gradient` [P] (N), for every local point, fixed or not: the caller keeps the rows it needs.
 namespace repose::mechanics {
 
 /// Adds scale · ∂f_e/∂x to `gradient` and returns Σ E(s) over the counted springs (N·mm, unscaled).

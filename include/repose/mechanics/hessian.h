@@ -12,7 +12,7 @@ namespace repose::mechanics {
 /// Which Hessian: the exact one, or a positive semidefinite one that leaves out what can be
 /// negative (the transverse stiffness T/r of a compressed spring, the curvature of v itself; of a
 /// solid as much of that as its edges do not outweigh).
-enum class Curvature { exact, convex };
+enum class Curvature { exact, semidefinite };
 
 /// ∂²E/∂q∂q of a spring with d = q − p: T′ u uᵀ + (T/r)(1 − u uᵀ), N/mm. The blocks of its two
 /// points are +K, +K and −K, −K. Where r = 0 and the direction is undefined, T/r is taken as T′ so
@@ -38,7 +38,7 @@ SpringStiffness spring_stiffness(const Vec3& d, double k0, double rest_length,
   const double along = spring_tangent<p>(s, k0, inverse_reference);
   if (r == 0) return {along, along, Vec3::Zero()};
   const double across = spring_tension<p>(s, k0, inverse_reference) / r;
-  const bool left_out = curvature == Curvature::convex && across < 0;
+  const bool left_out = curvature == Curvature::semidefinite && across < 0;
   return {along, left_out ? 0.0 : across, d / r};
 }
 
@@ -103,7 +103,7 @@ struct PrismTerm {
 /// Its 6×6 blocks: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `most_slope`.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
-                         const Weights& weights, double most_slope);
+                         const Weights& weights, double max_slope);
 
 /// [M] What |φ′| of each prism may be for the blocks to be semidefinite with the rest of the
 /// Hessian: nothing where there are springs. A solid's ½ μ |F|² + φ′ J has the curvatures μ ± φ′ σ,
@@ -117,7 +117,7 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
 /// prism is in their place, which is never less (Cauchy & Schwarz).
 template <class Visit>
 void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
-                          const Weights& weights, std::span<const double> most_slope,
+                          const Weights& weights, std::span<const double> max_slope,
                           Visit&& visit) {
   if (weights.volume == VolumeTerm::none) return;
   const PrismLoop& prisms = loops.prisms;
@@ -127,10 +127,10 @@ void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     PrismTerm term{prisms.compliance[e], prisms.target_volume[e]};
     if (!nodal.empty()) term.nodal_slope = nodal[loops.nodal.place[prisms.row[e]]];
-    if (!nodal.empty() && !most_slope.empty())
+    if (!nodal.empty() && !max_slope.empty())
       term.nodal_curvature = prisms.nodal_modulus[e] / prisms.rest_volume[e];
-    const double most = most_slope.empty() ? std::numeric_limits<double>::max() : most_slope[e];
-    visit(e, prism_blocks(corners, term, weights, most));
+    const double maximum = max_slope.empty() ? std::numeric_limits<double>::max() : max_slope[e];
+    visit(e, prism_blocks(corners, term, weights, maximum));
   }
 }
 

@@ -79,6 +79,7 @@ void place_bodies(double load, BoneMatrix&& bone_matrix, std::vector<RigidBody>&
 }
 
 /// [C] mm, Touches::offset of the contact of a model, whose bodies are at load 0.
-std::vector<double> touch_offsets(const model::Model& model, const std::vector<RigidBody>& bodies);
+std::vector<double> contact_offsets(const model::Model& model,
+                                    const std::vector<RigidBody>& bodies);
 
 }  // namespace repose::mechanics

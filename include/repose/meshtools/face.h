@@ -21,11 +21,11 @@ struct FaceRequest {
 };
 
 struct Face {
-  Surface skin;                     ///< manifold, one component, its triangles nearly equilateral
-  double off_95 = 0, off_most = 0;  ///< mm from its vertices to the given skin
-  double least_angle = 0;           ///< degrees, of its triangles
-  int64_t openings = 0;             ///< of the given skin beside it, as large as an open mouth
-  int64_t borders = 0;              ///< loops of its own border
+  Surface skin;                    ///< manifold, one component, its triangles nearly equilateral
+  double off_95 = 0, off_max = 0;  ///< mm from its vertices to the given skin
+  double min_angle = 0;            ///< degrees, of its triangles
+  int64_t openings = 0;            ///< of the given skin beside it, as large as an open mouth
+  int64_t borders = 0;             ///< loops of its own border
 };
 
 /// A skin fit to be solved, from any triangles: the outer skin (outer_skin.h) in the regions, or

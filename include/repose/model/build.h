@@ -19,11 +19,11 @@ struct BuildReport {
   int64_t attached = 0;   ///< columns that end in bone
   int64_t free_deep = 0;  ///< columns that end free: no bone near, unattached, or released
   int64_t released = 0;   ///< of those, released near a piece that moves differently
-  int64_t shortened = 0;  ///< columns made shorter so that neighbours do not cross
+  int64_t shortened = 0;  ///< columns made shorter so that neighbors do not cross
   double thickness_min = 0, thickness_median = 0, thickness_max = 0;  ///< mm
   double effective_modulus = 0;       ///< N/mm², as the function below
   std::vector<std::string> remarks;   ///< lines for a person, each complete
-  std::vector<std::string> warnings;  ///< likewise: what is implausible and should be changed
+  std::vector<std::string> warnings;  ///< implausible properties that should be changed
 };
 
 struct BuiltModel {
@@ -46,7 +46,7 @@ struct Anatomy {
   std::optional<surface::Surface> given_skin;
   std::vector<surface::Surface> bones;  ///< [scene.bones]
   std::vector<std::string> remarks;     ///< lines for a person, each complete
-  std::vector<std::string> warnings;    ///< likewise, of what is implausible
+  std::vector<std::string> warnings;    ///< implausible properties, a line each
 };
 
 /// Reads the scene's surfaces, cuts its bones and resolves collisions. Serial.
@@ -98,12 +98,12 @@ struct Piece {
 
 /// Geometry of the columns of tissue: all of a model but its layers.
 /// Takes memory by the skin, where the model takes it by the skin times the layers.
-class Ground {
+class ColumnGeometry {
  public:
   /// Serial; as build_model(). For scenes of which nothing is beyond_columns().
-  explicit Ground(const Anatomy& anatomy);
-  ~Ground();
-  Ground(Ground&&) noexcept;
+  explicit ColumnGeometry(const Anatomy& anatomy);
+  ~ColumnGeometry();
+  ColumnGeometry(ColumnGeometry&&) noexcept;
 
   const SkinMesh& skin() const;
   int64_t layers() const;
@@ -113,7 +113,7 @@ class Ground {
   /// with these: all that values at elements of the given columns depend on.
   Piece piece(const std::vector<int64_t>& columns) const;
   /// The model without its points, prisms and edges: skin, bones, bodies, the grid of contact.
-  Model frame() const;
+  Model global_metadata() const;
   BuildReport report() const;
 
  private:
@@ -122,14 +122,14 @@ class Ground {
 };
 
 /// Returns the reason why a scene's model cannot be built column by column, or an empty text.
-std::string beyond_columns(const scene::Scene& scene);
+std::string explain_central_build(const scene::Scene& scene);
 
 /// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
 /// columns that the piece was made around, all there is; of others, what the piece has. Indices are
 /// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0. `found` [regions of
 /// the material] gets the prisms in each. Serial.
-Model raise(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
-            const Piece& piece, std::vector<int64_t>& found);
+Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
+                  const Piece& piece, std::vector<int64_t>& found);
 
 /// Sums over one column, for the means over the whole tissue.
 struct ColumnSums {
@@ -160,7 +160,7 @@ double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& sol
 struct Bones {
   std::vector<surface::Surface> surfaces;  ///< [scene.bones], pieces cut off, kerfs taken out
   std::vector<std::string> remarks;        ///< lines for a person: what was cut
-  std::vector<std::string> warnings;       ///< likewise: what is implausible
+  std::vector<std::string> warnings;       ///< implausible properties
 };
 
 /// Reads the files of the scene's bones and makes its osteotomies in their order. Throws

@@ -37,13 +37,13 @@ bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b);
 /// `moves` in the order of the scene.
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
-                             const scene::Collision& wanted);
+                             const scene::Collision& requested);
 
-/// Does what the scene wants about contacts: moves are shortened, remarks added; where it wants
+/// Resolves contacts as the scene requests: moves are shortened, remarks added; where it requests
 /// nothing, a remark on bones that end more than 1 mm inside one another. Throws InputError naming
 /// the scene and the first contact in mode stop.
-void heed_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                     std::vector<std::string>& remarks);
+void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
+                        std::vector<std::string>& remarks);
 
 /// Adds a warning for every two bones that lie more than 2 mm inside one another before all moves.
 void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
@@ -51,6 +51,6 @@ void report_initial_overlaps(const std::vector<surface::Surface>& bones, const s
 
 /// One line a pair, for a person.
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
-                                  const scene::Collision& wanted);
+                                  const scene::Collision& requested);
 
 }  // namespace repose::model

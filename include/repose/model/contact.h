@@ -28,7 +28,7 @@ inline constexpr int shape_numbers = 7;
 enum class Binding : int8_t { touches = 0, slides = 1 };
 
 /// Points that touch bodies, frictionless (docs/theory/contact.md).
-struct Touches {
+struct ContactPairs {
   std::vector<int64_t> point;    ///< [C]
   std::vector<int32_t> body;     ///< [C] row of Contact::bodies
   std::vector<Binding> binding;  ///< [C]
@@ -42,7 +42,7 @@ struct Touches {
 /// surfaces (docs/theory/contact.md), one of the first side, whose places stay off the second's
 /// surface. A net has columns along the cut and rows from the skin inwards; a control is a weighted
 /// sum of points.
-struct Walls {
+struct CutFaces {
   std::vector<std::array<int64_t, 2>> size;  ///< [K] columns and rows of a cut's nets
   /// [controls + 1] where a control's points begin: of each cut those of the first side, column by
   /// column, then those of the second.
@@ -57,9 +57,9 @@ struct Contact {
   double stiffness = 0;  ///< N/mm³, of the penalty that multipliers make exact
   double spacing = 1;    ///< mm, of the grids of distances to meshes
   std::vector<Body> bodies;
-  Touches touches;
-  Walls walls;
-  bool empty() const { return touches.point.empty() && walls.empty(); }
+  ContactPairs pairs;
+  CutFaces cut_faces;
+  bool empty() const { return pairs.point.empty() && cut_faces.empty(); }
 };
 
 }  // namespace repose::model

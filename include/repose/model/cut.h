@@ -10,7 +10,7 @@ namespace repose::model {
 
 /// An incision in a model's own terms.
 struct Cut {
-  std::vector<int64_t> columns;  ///< skin vertices along it, neighbours joined by edges; tips first
+  std::vector<int64_t> columns;  ///< skin vertices along it, neighbors joined by edges; tips first
                                  ///< and last
   int layers;                    ///< point layers that it parts, from the skin down
   bool meets = false;            ///< its sides touch and do not pass each other

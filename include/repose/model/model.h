@@ -138,12 +138,12 @@ void for_each_array(Group& of, Visit&& visit) {
 
 /// Slabs (base::slab) of the arrays of a fully distributed model on this rank, in natural order.
 struct ModelRows {
-  Counts counts;        ///< of the whole
-  int64_t touches = 0;  ///< likewise, rows of contact
+  Counts counts;              ///< of the whole
+  int64_t contact_pairs = 0;  ///< rows of contact of the whole model
   Points points;
   Prisms prisms;
   Edges edges;
-  Touches touch;              ///< without offsets
+  ContactPairs pairs;         ///< without offsets
   std::vector<Vec3> outward;  ///< outward_normals()
 };
 

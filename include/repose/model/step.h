@@ -36,7 +36,7 @@ struct StepNumbers {
   double smallest_eigenvalue = std::numeric_limits<double>::quiet_NaN();
   double largest_eigenvalue = std::numeric_limits<double>::quiet_NaN();  ///< likewise
   /// mm, estimate for the skin of a model coarser than the scene requests; NaN for the scene's own.
-  double discretisation_error = std::numeric_limits<double>::quiet_NaN();
+  double discretization_error = std::numeric_limits<double>::quiet_NaN();
   /// mm, largest depth past what is touched, by the smoothed distances that the search uses; NaN
   /// without contact.
   double penetration = std::numeric_limits<double>::quiet_NaN();
@@ -80,7 +80,7 @@ void for_each_number(Numbers& numbers, Visit&& visit) {
   visit("converged", numbers.converged);
   visit("smallest_eigenvalue", numbers.smallest_eigenvalue);
   visit("largest_eigenvalue", numbers.largest_eigenvalue);
-  visit("discretisation_error", numbers.discretisation_error);
+  visit("discretisation_error", numbers.discretization_error);
   visit("penetration", numbers.penetration);
   visit("penetration_exact", numbers.penetration_exact);
   visit("contact_energy", numbers.contact_energy);
@@ -106,7 +106,7 @@ struct StepRows {
   std::vector<Vec3> stretch;      ///< principal stretches of a solid, largest first; else empty
   std::vector<double> von_mises;  ///< N/mm², of a solid; else empty
   /// mm, how far mesh and layers leave the skin from the continuum; empty where not estimated.
-  std::vector<double> discretisation_error = {};
+  std::vector<double> discretization_error = {};
   std::vector<double> elongation;  ///< mm
   std::vector<double> tension;     ///< N
   /// Further fields of the points at this step; the same names on all ranks.

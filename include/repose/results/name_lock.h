@@ -6,12 +6,12 @@ namespace repose::results {
 
 /// Returns whether the process that a lock file names may still live: not if it is one of this
 /// host's that has ended, even if its number has been given to another since.
-bool may_live(const std::string& holder);
+bool may_be_running(const std::string& holder);
 
 /// The right to write results of one name, NAME.h5 and what goes with it: one run's at a time. It
 /// is an advisory lock (flock) on NAME.lock, so that it ends with its process however that ends:
 /// what a killed run left behind is no obstacle, and its unfinished files (NAME….part) are removed.
-/// Where the file system knows no locks, NAME.lock itself is the lock as long as the process that
+/// Where the file system has no locks, NAME.lock itself is the lock as long as the process that
 /// it names may live. For one process; not copied or moved.
 class NameLock {
  public:

@@ -30,7 +30,7 @@ class ResultFile {
              Kind kind = Kind::result);
   /// Creates the file of a fully distributed model: `frame`, on rank 0, has what is neither point
   /// nor element; no rank's slabs are empty.
-  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& frame,
+  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& global_metadata,
              const model::ModelRows& slabs, Kind kind = Kind::result);
   ~ResultFile();
   ResultFile(const ResultFile&) = delete;
@@ -45,7 +45,7 @@ class ResultFile {
   void keep(const std::filesystem::path& earlier, int64_t count);
 
   /// Writes a step that has not converged and that the next append replaces.
-  void append_under_way(const model::StepNumbers& numbers, const model::StepRows& rows);
+  void append_provisional(const model::StepNumbers& numbers, const model::StepRows& rows);
 
   /// Makes the part, as it was between the latest two calls, NAME.h5, with its XDMF files: at once,
   /// on rank 0 only and from any thread. Its last step says that it has not converged, and of a

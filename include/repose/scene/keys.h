@@ -31,7 +31,7 @@ struct Key {
   std::string
       path;  ///< "tissue.layers"; [] stands for an item of a list, * for a name of one's own
   KeyKind kind;
-  std::string standard;  ///< default as written in a file, "required", or empty: not modelled
+  std::string standard;  ///< default as written in a file, "required", or empty: not modeled
   std::string sentence;  ///< what it is
   std::string unit{};
   base::Range range{};                 ///< of a number, or of each of several
@@ -54,7 +54,7 @@ std::vector<const Key*> keys_below(std::string_view path);
 std::string last_word(std::string_view path);
 
 /// Describes a valid value, for messages and the documentation: "a number of mm, > 0".
-std::string wanted(const Key& key);
+std::string expected(const Key& key);
 
 /// The table in Markdown, one row a key: key, value, default, meaning.
 std::string describe_keys();

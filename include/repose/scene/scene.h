@@ -128,7 +128,7 @@ using Region = std::variant<SphereRegion, Box, MeshRegion, LabelRegion, CurveReg
 using SkinRegion = std::variant<Region, PaintedRegion>;
 
 /// Attachment of tissue that ends at bone: it moves with it; it keeps its distance and slides
-/// along; it may lift off but never passes; it does not know of it.
+/// along; it may lift off but never passes; it ignores it.
 enum class Attach { fixed, slide, contact, free };
 
 struct AttachRegion {
@@ -270,7 +270,7 @@ struct Collision {
   double tolerance = 0.05;  ///< mm: how much sooner than at contact a clamped motion may end
 };
 
-/// What a scene takes from the landmarks of its head.
+/// Parts of a scene that its head's landmarks define.
 struct AnatomyPlan {
   std::filesystem::path file;  ///< absolute, of the landmarks
   Landmarks landmarks;

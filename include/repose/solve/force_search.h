@@ -1,6 +1,6 @@
 #pragma once
 #include "repose/discrete/force_functional.h"
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 namespace repose::solve {
 
@@ -8,12 +8,12 @@ namespace repose::solve {
 /// towards zero. Without volume term every ε has the same minimum, F = 0.
 class ForceSearch : public RestSearch {
  public:
-  ForceSearch(discrete::ForceFunctional& functional, Minimiser& minimiser);
+  ForceSearch(discrete::ForceFunctional& functional, Minimizer& minimizer);
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
   discrete::ForceFunctional& functional_;
-  Minimiser& minimiser_;
+  Minimizer& minimizer_;
   base::VecHandle before_;
 };
 

@@ -36,10 +36,10 @@ struct PathSettings {
 
 /// Load steps that were made again in two parts, by the reason.
 struct Halvings {
-  int64_t failed = 0;   ///< the search came to no end
-  int64_t folded = 0;   ///< more tissue was inside out
-  int64_t strayed = 0;  ///< it ended far from the prediction
-  int64_t count() const { return failed + folded + strayed; }
+  int64_t failed = 0;          ///< the search did not converge
+  int64_t folded = 0;          ///< more tissue was inside out
+  int64_t off_prediction = 0;  ///< it ended far from the prediction
+  int64_t count() const { return failed + folded + off_prediction; }
   Halvings& operator+=(const Halvings& more);
 };
 
@@ -90,9 +90,9 @@ class LoadPath {
   void follow(Vec displacement, double longest, double end, const OnStep& on_step);
   void follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
                     const OnStep& on_step);
-  void leap(Vec displacement, Vec guess, const OnStep& on_step);
+  void try_guess(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
-  void take_back(const Attempt& tried, Vec displacement);
+  void reject_step(const Attempt& tried, Vec displacement);
   bool in_vain(const Attempt& tried) const;
   void explain_failure();
 

@@ -7,15 +7,15 @@ namespace repose::solve {
 
 /// Outcome of the initial equilibrium.
 struct Prestress {
-  double residual = 0;          ///< largest |F_i| left on a soft-tissue point, N
-  double largest_force = 0;     ///< largest |F_i| before: skin tension and weight, N
-  double least_rest_ratio = 1;  ///< of springs: smallest rest length over initial length
+  double residual = 0;        ///< largest |F_i| left on a soft-tissue point, N
+  double largest_force = 0;   ///< largest |F_i| before: skin tension and weight, N
+  double min_rest_ratio = 1;  ///< of springs: smallest rest length over initial length
   bool solid = false;
   double largest_pressure = 0;  ///< of a solid, N/mm²
 };
 
 /// State of the tissue when its surfaces were recorded.
-struct Recording {
+struct ReferenceState {
   double turgor = 0;            ///< initial strain of the skin springs; a solid's model has its own
   Vec3 gravity = Vec3::Zero();  ///< N/kg
 };
@@ -30,12 +30,12 @@ struct Recording {
 /// naming the springs where a rest length would not be positive, or the point that no spring can
 /// hold. Collective.
 ///
-/// Of a solid it is force densities q of its edges (tension over length) and pressures p of its
-/// prisms that balance skin tension and weight, those of least energy Σ q² r⁴/(Y v) + Σ p² V/K with
-/// the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift the
-/// edges' weights and the prisms' target volumes (docs/theory/continuum.md).
-Prestress prestress(MPI_Comm comm, model::Model& model, Recording as);
+/// For a solid it consists of force densities q of its edges (tension over length) and pressures p
+/// of its prisms that balance skin tension and weight, those of least energy Σ q² r⁴/(Y v) + Σ p²
+/// V/K with the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift
+/// the edges' weights and the prisms' target volumes (docs/theory/continuum.md).
+Prestress prestress(MPI_Comm comm, model::Model& model, ReferenceState as);
 /// Balances a solid that is already distributed.
-Prestress prestress(MPI_Comm comm, discrete::Part& part, Recording as);
+Prestress prestress(MPI_Comm comm, discrete::Part& part, ReferenceState as);
 
 }  // namespace repose::solve

@@ -3,11 +3,11 @@
 
 #include "repose/discrete/force_functional.h"
 #include "repose/discrete/tangent.h"
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 namespace repose::solve {
 
-/// The function that is minimised with its derivatives and linear solvers, one object so that they
+/// The function that is minimized with its derivatives and linear solvers, one object so that they
 /// live and end together: f_e + W with a volume term, or the force functional.
 class Problem {
  public:
@@ -16,11 +16,11 @@ class Problem {
 
   discrete::Function& function();
   linear::TangentSolver& solver();  ///< of function()
-  ErrorEstimate error_estimate();   ///< whose Newton step tells the distance from rest best
+  ErrorEstimate error_estimate();   ///< whose Newton step estimates the distance from rest best
 
   discrete::Objective& objective() {
     return objective_;
-  }                                                  ///< f_e + W alone where forces are minimised
+  }                                                  ///< f_e + W alone where forces are minimized
   discrete::Tangent& tangent() { return tangent_; }  ///< of objective()
   linear::TangentSolver& elastic_solver() { return elastic_solver_; }  ///< of objective()
   discrete::ForceFunctional* force() {

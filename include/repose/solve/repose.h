@@ -17,7 +17,7 @@ namespace repose::solve {
 using Receiver = std::function<void(const model::StepNumbers&, const model::StepRows&)>;
 
 /// Hands the state that a search is at to a receiver, as a step that has not converged. Collective.
-using Look = std::function<void(const Receiver&)>;
+using StateSnapshot = std::function<void(const Receiver&)>;
 
 /// A piece of bone whose motion is a parameter of the rest position.
 struct PlanPiece {
@@ -29,8 +29,8 @@ struct PlanPiece {
 /// Settings of a solve.
 struct Settings {
   mechanics::Weights weights;                                ///< the objective
-  model::Functional functional = model::Functional::energy;  ///< what is minimised
-  base::Stages* stages = nullptr;        ///< of which "distribute" and "solve" are ended
+  model::Functional functional = model::Functional::energy;  ///< what is minimized
+  base::Stages* stages = nullptr;        ///< whose stages "distribute" and "solve" are ended
   base::Interrupt* interrupt = nullptr;  ///< ends the search, and all others that share it
   bool monitor = false;                  ///< print a line for every iteration
   std::string activity = {};             ///< begins the line that a terminal shows
@@ -43,7 +43,7 @@ struct Settings {
   /// Returns whether to end the search as if interrupted; called at each iteration, collective.
   std::function<bool()> abandoned = {};
   /// Called at each iteration, on all ranks.
-  std::function<void(double load, const Look&)> under_way;
+  std::function<void(double load, const StateSnapshot&)> on_iterate;
   PathSettings path;
 };
 
@@ -56,7 +56,7 @@ struct PenetrationDepth {
 };
 
 /// Contact of the tissue with one body.
-struct BodyContact {
+struct ContactSummary {
   int64_t points = 0;         ///< that press
   Vec3 force = Vec3::Zero();  ///< N, of the tissue on the body; of cuts' sides, of one on the other
   int64_t inside = 0;         ///< points that were inside the body at the start, and stay so
@@ -83,7 +83,7 @@ struct Summary {
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where requested
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where requested
-  std::vector<BodyContact>
+  std::vector<ContactSummary>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
   PiercedColumns pierced;
 };

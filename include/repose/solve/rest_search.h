@@ -14,7 +14,7 @@ struct Iteration {
   double load = 0;
   double objective = 0;
   double largest_force = 0;      ///< largest block of ∇Φ
-  double millimetres_to_go = 0;  ///< estimated distance to the rest position
+  double millimeters_to_go = 0;  ///< estimated distance to the rest position
   int64_t evaluations = 0;       ///< of value and gradient so far
   Vec displacement = nullptr;    ///< the state
 };
@@ -36,7 +36,7 @@ struct ContactPressures {
 /// Outcome of a search for the rest position at one load.
 struct Outcome {
   bool converged = false;         ///< the estimated distance is below the accuracy requested
-  bool stopped = false;           ///< it was asked to end early
+  bool stopped = false;           ///< it was stopped early
   bool stable = false;            ///< no negative curvature was met at the end
   double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
   double objective = 0;
@@ -58,11 +58,11 @@ class RestSearch {
   }
   /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
-  /// The same from a `displacement` that is near to rest. Collective.
+  /// Searches from a `displacement` that is near to rest. Collective.
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
   }
-  /// The last run's outcome is not taken: what it learnt is forgotten, at the positions' load and
+  /// The last run's outcome is not taken: what it learned is forgotten, at the positions' load and
   /// `displacement`, from which the path continues. Collective.
   virtual void go_back(Vec /*displacement*/) {}
   /// What the next search begins with, besides a displacement.

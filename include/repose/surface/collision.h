@@ -8,7 +8,7 @@
 
 #include "repose/surface/surface.h"
 
-/// Contacts between two surfaces that move rigidly: trees built once, asked in any pose.
+/// Contacts between two surfaces that move rigidly: trees built once, queried in any pose.
 namespace repose::surface {
 
 /// Surfaces nearer than this touch, mm: far more than what rounding does to coordinates of bones,
@@ -45,7 +45,7 @@ class CollisionTree {
 };
 
 /// Two triangles and how far they are from each other.
-struct Approach {
+struct ClosestApproach {
   double distance = std::numeric_limits<double>::infinity();  ///< mm, 0 where they intersect
   std::array<int64_t, 2> triangles{-1, -1};                   ///< of a and b
   Vec3 at = Vec3::Zero();  ///< mm, the middle of the shortest way between them, in a's frame
@@ -56,8 +56,9 @@ struct Approach {
 bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose);
 
 /// The nearest triangles, no farther than `limit` mm apart.
-std::optional<Approach> nearest(const CollisionTree& a, const CollisionTree& b, const Mat4& pose,
-                                double limit = std::numeric_limits<double>::infinity());
+std::optional<ClosestApproach> nearest(const CollisionTree& a, const CollisionTree& b,
+                                       const Mat4& pose,
+                                       double limit = std::numeric_limits<double>::infinity());
 
 /// All pairs of triangles within `limit` mm, sorted.
 std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
@@ -65,7 +66,7 @@ std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
                                                       double limit);
 
 /// The triangles of a surface that lie within `near` mm of another, split until they are no longer
-/// than `longest` mm or farther away; the others as they are. Points of neighbours are not shared.
+/// than `longest` mm or farther away; the others as they are. Points of neighbors are not shared.
 Surface refine_near(const Surface& surface, const CollisionTree& own, const CollisionTree& other,
                     double near, double longest);
 
@@ -82,8 +83,8 @@ class Encounter {
   int64_t ignored_triangles() const { return ignored_; }  ///< of both surfaces
 
   struct Next {
-    double load;        ///< that may pass until some pair could be within `clearance`; infinite
-    Approach approach;  ///< the pair that bounds it
+    double load;  ///< that may pass until some pair could be within `clearance`; infinite
+    ClosestApproach approach;  ///< the pair that bounds it
   };
   /// From the relative pose of b in a's frame on.
   Next next(const Mat4& pose, double clearance);
@@ -96,7 +97,7 @@ class Encounter {
     std::vector<char> only_such;  // [nodes] all triangles below are ignored
   };
   static Side make_side(const CollisionTree& tree, const Twist& twist);
-  static void summarise(Side& side);
+  static void summarize(Side& side);
   class Sweep;
 
   Side a_, b_;

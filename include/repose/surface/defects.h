@@ -30,7 +30,7 @@ struct Defects {
 /// Inspects a surface as it stands. Triangles that name a vertex twice take no part in the counts
 /// of edges, loops and components; triangles without area none in self-intersections, for which
 /// vertices that coincide are one. Throws InputError naming the surface for a coordinate that is
-/// not finite or an index without a point. Self-intersections are looked for when
+/// not finite or an index without a point. Self-intersections are searched for when
 /// `self_intersections` is true (the slow part, O(T log T)).
 Defects inspect(const Surface& surface, bool self_intersections = true);
 

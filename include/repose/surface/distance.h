@@ -38,8 +38,9 @@ class DistanceTree {
   /// nullopt. An origin on the surface is a hit at distance 0. Exact in whether there is a hit.
   std::optional<Hit> first_hit(const Vec3& origin, const Vec3& direction, double reach) const;
 
-  /// Whether `query` lies inside the (closed) surface or on it: the parity of the triangles that a
-  /// ray crosses, whatever their orientation; rays that touch an edge are not counted (exact).
+  /// Returns whether `query` is inside the (closed) surface or on it, by the parity of the
+  /// triangles that a ray crosses, whatever their orientation; rays that touch an edge are not
+  /// counted (exact).
   bool contains(const Vec3& query) const;
 
  private:

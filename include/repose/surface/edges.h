@@ -65,9 +65,9 @@ class EdgeTable {
 };
 
 /// The vertices that each vertex shares an edge with, in the order of the edges.
-class VertexNeighbours {
+class VertexNeighbors {
  public:
-  VertexNeighbours(const EdgeTable& edges, size_t vertices);
+  VertexNeighbors(const EdgeTable& edges, size_t vertices);
   std::span<const int64_t> operator[](int64_t vertex) const {
     return std::span(vertex_).subspan(begin_[vertex], begin_[vertex + 1] - begin_[vertex]);
   }

@@ -4,7 +4,7 @@
 
 #include "repose/base/geometry.h"
 
-/// Triangle surfaces as every other room sees them: plain arrays, nothing of CGAL.
+/// Triangle surfaces as the other rooms use them: plain arrays, nothing of CGAL.
 namespace repose::surface {
 
 /// An indexed triangle surface. Points in mm; triangles counter-clockwise seen from outside.

@@ -66,7 +66,7 @@ class TriangleTree {
 
   /// Returns the least of all triangles of the max over `points` of the squared distance to it, if
   /// below `limit` (`limit` otherwise); stops at the first one that is at most `enough`.
-  double least_greatest(std::span<const Vec3> points, double limit, double enough) const;
+  double min_max(std::span<const Vec3> points, double limit, double enough) const;
 
   /// Returns whether all points lie within √limit of one and the same triangle. `hint` is tried
   /// first and receives that triangle.
@@ -108,7 +108,7 @@ class TriangleTree {
     int64_t parent = -1;
   };
 
-  int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centres);
+  int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centers);
   Box box_around(const Node& node) const;
   void refit(int64_t node);
 

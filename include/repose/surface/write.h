@@ -19,7 +19,7 @@ struct PointData {
     std::string name;
     std::vector<Vec3> values;  ///< [P]
   };
-  std::vector<std::array<uint8_t, 3>> colours;  ///< red, green, blue
+  std::vector<std::array<uint8_t, 3>> colors;  ///< red, green, blue
   std::vector<Field> fields;
   std::vector<VectorField> vectors;
 };
@@ -29,7 +29,7 @@ void check_surface_ending(const std::filesystem::path& file);
 
 /// Writes a surface in the format its ending names, complete or not at all: .ply (binary little
 /// endian, double coordinates), .stl (binary, float), .obj (text, exact) or .vtp (VTK's XML,
-/// binary). PLY and VTP keep colours and fields, VTP vectors too, OBJ colours, STL nothing. Throws
+/// binary). PLY and VTP keep colors and fields, VTP vectors too, OBJ colors, STL nothing. Throws
 /// InputError for another ending, more points than the format can number, or a file that cannot be
 /// written.
 void write_surface(const std::filesystem::path& file, const Surface& surface,

@@ -27,9 +27,9 @@ namespace {
 
 /// Drops what ITK's libraries write to the terminal. Where one aborts, as Debian's GDCM
 /// does at many a damaged file, for it is built with its assertions, control comes back.
-class Shield {
+class AbortGuard {
  public:
-  Shield() {
+  AbortGuard() {
     itk::Object::GlobalWarningDisplayOff();
     std::fflush(stderr);
     terminal_ = dup(STDERR_FILENO);
@@ -40,7 +40,7 @@ class Shield {
     action.sa_handler = [](int) { siglongjmp(place_, 1); };
     sigaction(SIGABRT, &action, &usual_);
   }
-  ~Shield() {
+  ~AbortGuard() {
     sigaction(SIGABRT, &usual_, nullptr);
     dup2(terminal_, STDERR_FILENO);
     close(terminal_);
@@ -60,7 +60,7 @@ class Shield {
 };
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& reason) {
-  base::refuse("{}: cannot be read as a volume, truncated or damaged: {}; export it anew",
+  base::refuse("{}: cannot be read as a volume, truncated or damaged: {}; export it again",
                file.string(), reason);
 }
 
@@ -98,9 +98,9 @@ std::string one_line(std::string text) {
 /// Does `work` with an image reader whose header has been read.
 Image with_reader(const std::filesystem::path& file, ImageFormat format,
                   const std::function<Image(itk::ImageIOBase&)>& work) {
-  Shield shield;
+  AbortGuard guard;
   Image image;
-  const bool survived = shield.survives([&] {
+  const bool survived = guard.survives([&] {
     try {
       const auto io = reader_of(format);
       io->SetFileName(file.string());
@@ -207,12 +207,12 @@ bool is_dicom(const std::filesystem::path& file) {
   std::array<char, 132> begin{};
   std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
   const bool marked = std::string_view(begin.data() + 128, 4) == "DICM";
-  Shield shield;
+  AbortGuard guard;
   bool answer = false;
-  const bool survived = shield.survives(
-      [&] { answer = itk::GDCMImageIO::New()->CanReadFile(file.string().c_str()); });
+  const bool survived =
+      guard.survives([&] { answer = itk::GDCMImageIO::New()->CanReadFile(file.string().c_str()); });
   if (!survived) refuse(file, "its library gives up");
-  if (marked && !answer) refuse(file, "it begins as DICOM and does not go on so");
+  if (marked && !answer) refuse(file, "it begins as DICOM, but what follows is not DICOM");
   return answer;
 }
 

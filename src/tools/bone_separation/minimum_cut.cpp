@@ -26,7 +26,7 @@ class Flow {
       const int32_t node = queue_[next];
       if (terminals_[node] == sink) return true;
       for (int d = 0; d < 6; ++d) {
-        const int32_t other = graph_.neighbour[node][d];
+        const int32_t other = graph_.neighbor[node][d];
         if (other < 0 || distance_[other] >= 0 || graph_.capacity[node][d] == 0) continue;
         distance_[other] = distance_[node] + 1;
         queue_.push_back(other);
@@ -48,21 +48,21 @@ class Flow {
   };
 
   void fill_from(int32_t start) {
-    std::vector<Step> way;
+    std::vector<Step> path;
     for (int32_t node = start;;) {
       if (terminals_[node] == sink) {
-        send(way);
-        while (graph_.capacity[way.back().node][way.back().direction] > 0) way.pop_back();
-        node = way.back().node;
-        way.pop_back();
+        send(path);
+        while (graph_.capacity[path.back().node][path.back().direction] > 0) path.pop_back();
+        node = path.back().node;
+        path.pop_back();
       } else if (const int d = onward(node); d < 6) {
-        way.push_back({node, d});
-        node = graph_.neighbour[node][d];
+        path.push_back({node, d});
+        node = graph_.neighbor[node][d];
       } else {
-        if (way.empty()) return;
-        node = way.back().node;
+        if (path.empty()) return;
+        node = path.back().node;
         ++arc_[node];
-        way.pop_back();
+        path.pop_back();
       }
     }
   }
@@ -71,19 +71,19 @@ class Flow {
   int onward(int32_t node) {
     uint8_t& d = arc_[node];
     for (; d < 6; ++d) {
-      const int32_t other = graph_.neighbour[node][d];
+      const int32_t other = graph_.neighbor[node][d];
       if (other >= 0 && graph_.capacity[node][d] > 0 && distance_[other] == distance_[node] + 1)
         break;
     }
     return d;
   }
 
-  void send(const std::vector<Step>& way) {
-    int32_t most = graph_.capacity[way[0].node][way[0].direction];
-    for (const auto& [node, d] : way) most = std::min(most, graph_.capacity[node][d]);
-    for (const auto& [node, d] : way) {
-      graph_.capacity[node][d] -= most;
-      graph_.capacity[graph_.neighbour[node][d]][d ^ 1] += most;
+  void send(const std::vector<Step>& path) {
+    int32_t maximum = graph_.capacity[path[0].node][path[0].direction];
+    for (const auto& [node, d] : path) maximum = std::min(maximum, graph_.capacity[node][d]);
+    for (const auto& [node, d] : path) {
+      graph_.capacity[node][d] -= maximum;
+      graph_.capacity[graph_.neighbor[node][d]][d ^ 1] += maximum;
     }
   }
 
@@ -105,7 +105,7 @@ std::vector<bool> minimum_cut(GridGraph& graph, const Terminals& terminals) {
   for (const int32_t node : reached) side[node] = true;
   for (size_t next = 0; next < reached.size(); ++next)
     for (int d = 0; d < 6; ++d) {
-      const int32_t other = graph.neighbour[reached[next]][d];
+      const int32_t other = graph.neighbor[reached[next]][d];
       if (other < 0 || side[other] || graph.capacity[other][d ^ 1] == 0) continue;
       side[other] = true;
       reached.push_back(other);

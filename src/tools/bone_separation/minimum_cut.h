@@ -6,11 +6,10 @@
 /// The least cut between two sets of the nodes of a grid.
 namespace repose::tools::bone_separation {
 
-/// A graph whose nodes have up to six neighbours: across 2a and 2a + 1 along axis a. Every edge
+/// A graph whose nodes have up to six neighbors: across 2a and 2a + 1 along axis a. Every edge
 /// goes both ways and has a capacity of its own each way.
 struct GridGraph {
-  std::vector<std::array<int32_t, 6>>
-      neighbour;  ///< −1: none; that of d sees this one across d ^ 1
+  std::vector<std::array<int32_t, 6>> neighbor;  ///< −1: none; that of d sees this one across d ^ 1
   std::vector<std::array<int32_t, 6>> capacity;  ///< what is left of it, once flow has gone
 };
 

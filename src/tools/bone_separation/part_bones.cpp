@@ -42,8 +42,8 @@ class Bone {
         const int32_t other = next(voxels_[node], axis);
         if (other < 0) continue;
         const size_t up = 2 * static_cast<size_t>(axis), down = up + 1;
-        graph.neighbour[node][up] = other;
-        graph.neighbour[other][down] = static_cast<int32_t>(node);
+        graph.neighbor[node][up] = other;
+        graph.neighbor[other][down] = static_cast<int32_t>(node);
         graph.capacity[node][up] = graph.capacity[other][down] =
             cost(voxels_[node], voxels_[other], axis);
       }

@@ -20,7 +20,7 @@ constexpr double slab_half = 6, slab_depth = 55, slab_width = 36;
 constexpr double jaw_height = 110;                    // above the lowest point of the chin
 constexpr double jaw_volume = 150000;                 // mm³
 constexpr double joint_height = 8, joint_width = 25;  // the least of a jaw beyond the teeth
-constexpr double level_step = 40, most_steps = 40;    // HU
+constexpr double level_step = 40, max_steps = 40;     // HU
 constexpr double spacing[] = {25, 10};                // of points in skull and jaw
 constexpr double apart = 14;                          // skull's points from the jaw
 
@@ -49,7 +49,7 @@ class Head {
   /// The chin's component without the slab at the teeth, at the lowest level at which it is no part
   /// of the skull; empty: there is none. Sets the level.
   std::vector<int64_t> part_jaw() {
-    for (int step = 0; step < most_steps; ++step, level_ += level_step)
+    for (int step = 0; step < max_steps; ++step, level_ += level_step)
       if (std::vector<int64_t> jaw = flood(); !jaw.empty()) return jaw;
     return {};
   }
@@ -141,8 +141,8 @@ class Head {
     for (const int64_t voxel : bone_) {
       const Vec3 at = center(voxel);
       if (std::abs(at.x() - middle_) > profile_width) continue;
-      double& least = profile.try_emplace(std::llround(at.z() / 2), at.y()).first->second;
-      least = std::min(least, at.y());
+      double& minimum = profile.try_emplace(std::llround(at.z() / 2), at.y()).first->second;
+      minimum = std::min(minimum, at.y());
       front_ = std::min(front_, at.y());
     }
     for (const auto& [height, y] : profile)

@@ -122,12 +122,12 @@ class Bodies {
 /// `slack` in mm: bodies that are nearer may press.
 void add_bodies(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
                 double slack, Truth& truth) {
-  const model::Touches& touches = model.contact.touches;
+  const model::ContactPairs& pairs = model.contact.pairs;
   const double bound = smoothing_bound(model.contact.spacing);
-  for (size_t c = 0; c < touches.point.size(); ++c) {
-    const int64_t row = touches.point[c];
-    const int32_t body = touches.body[c];
-    const bool slides = touches.binding[c] == model::Binding::slides;
+  for (size_t c = 0; c < pairs.point.size(); ++c) {
+    const int64_t row = pairs.point[c];
+    const int32_t body = pairs.body[c];
+    const bool slides = pairs.binding[c] == model::Binding::slides;
     const bool mesh = bodies.is_mesh(body);
     const double now = bodies.distance(body, bodies.beside(body, position[row]));
     double initial = slides || now < 0 ? bodies.distance(body, model.points.position[row]) : 0;
@@ -136,7 +136,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     AtPoint& point = truth.points[row];
     point.slides = point.slides || slides;
     point.mesh = point.mesh || mesh;
-    point.area = touches.area[c];
+    point.area = pairs.area[c];
     if (slides || gap <= slack + (mesh ? bound : 0)) {
       ++point.near;
       point.pressing = body;
@@ -150,8 +150,8 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
 }
 
 void add_cut_faces(const model::Model& model, const std::vector<Vec3>& position, Truth& truth) {
-  for (const int64_t p : model.contact.walls.point) truth.points[p].wall = true;
-  for (const CutGap& at : cut_gaps(model.contact.walls, position)) {
+  for (const int64_t p : model.contact.cut_faces.point) truth.points[p].wall = true;
+  for (const CutGap& at : cut_gaps(model.contact.cut_faces, position)) {
     AtPoint& point = truth.points[at.point];
     if (at.gap < point.gap) point.body = -1;
     point.gap = std::min(point.gap, at.gap);
@@ -230,13 +230,13 @@ class Claims {
 
 /// mm, the gap of a point to bodies whose distances are averaged as the solver's grids do.
 double Claims::smoothed_gap(int64_t point, bool in_cell) const {
-  const model::Touches& touches = model_.contact.touches;
+  const model::ContactPairs& pairs = model_.contact.pairs;
   const double spacing = model_.contact.spacing;  // more than an average lies off
   double gap = truth_.points[point].wall_gap;
-  for (size_t c = 0; c < touches.point.size(); ++c) {
-    if (touches.point[c] != point) continue;
-    const int32_t body = touches.body[c];
-    const bool slides = touches.binding[c] == model::Binding::slides;
+  for (size_t c = 0; c < pairs.point.size(); ++c) {
+    if (pairs.point[c] != point) continue;
+    const int32_t body = pairs.body[c];
+    const bool slides = pairs.binding[c] == model::Binding::slides;
     const Vec3 beside = bodies_.beside(body, position_[point]);
     const Vec3& before = model_.points.position[point];
     if (!slides && bodies_.distance(body, beside) - spacing > gap) continue;

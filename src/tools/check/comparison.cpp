@@ -56,12 +56,12 @@ void Comparison::array(const std::string& name, std::span<const double> stored,
   add(row);
 }
 
-void Comparison::range(const std::string& name, double stored, double least, double most) {
+void Comparison::range(const std::string& name, double stored, double minimum, double maximum) {
   Row row;
   row.name = name;
   row.stored = stored;
   row.kind = Row::range_only;
-  row.wrong = !(stored >= least && stored <= most);
+  row.wrong = !(stored >= minimum && stored <= maximum);
   row.difference = row.wrong > 0 ? infinite : 0;
   add(row);
 }
@@ -69,7 +69,7 @@ void Comparison::range(const std::string& name, double stored, double least, dou
 void Comparison::statement(const std::string& text, bool holds) {
   Row row;
   row.name = text;
-  row.kind = Row::said;
+  row.kind = Row::stated;
   row.wrong = !holds;
   row.difference = holds ? 0 : infinite;
   add(row);
@@ -80,7 +80,7 @@ std::string Comparison::worst() const {
   for (const Row& row : rows_)
     if (row.wrong > 0 && (!worst || row.difference > worst->difference)) worst = &row;
   if (!worst) return "";
-  if (worst->kind == Row::said) return fmt::format("{}: not so: {}", worst->section, worst->name);
+  if (worst->kind == Row::stated) return fmt::format("{}: not so: {}", worst->section, worst->name);
   if (worst->kind == Row::range_only)
     return fmt::format("{} {}: stored {:.10g} is out of range", worst->section, worst->name,
                        worst->stored);
@@ -93,7 +93,7 @@ std::string Comparison::verdict(const Row& row) {
 }
 
 std::string Comparison::line(const Row& row) {
-  if (row.kind == Row::said)
+  if (row.kind == Row::stated)
     return fmt::format("{:10} {:75} {}\n", row.section, row.name, row.wrong ? "NOT SO" : "holds");
   if (row.kind == Row::range_only)
     return fmt::format("{:10} {:25} {:>17.10g} {:>17} {:>13} {}\n", row.section, row.name,
@@ -149,7 +149,7 @@ std::string Comparison::summary() const {
                         row.entries, row.stored, row.recomputed, row.difference, row.section,
                         verdict(row));
   return text + others(Row::range_only, "ranges that hold") +
-         others(Row::said, "statements that hold");
+         others(Row::stated, "statements that hold");
 }
 
 }  // namespace repose::tools::check

@@ -28,7 +28,7 @@ double bell_slope(double x) {
 /// One side of a cut.
 class Side {
  public:
-  Side(const model::Walls& cuts, size_t first, int columns, int rows,
+  Side(const model::CutFaces& cuts, size_t first, int columns, int rows,
        std::span<const Vec3> position)
       : columns_(columns), rows_(rows) {
     for (size_t c = first; c < first + static_cast<size_t>(columns) * rows; ++c) {
@@ -82,12 +82,12 @@ class Side {
 /// The nearest of a side's points at whole parameters.
 Parameters nearest_whole(const Side& side, const Vec3& place) {
   Parameters nearest(0, 0);
-  double least = (side.point(nearest) - place).squaredNorm();
+  double minimum = (side.point(nearest) - place).squaredNorm();
   for (int i = 0; i < side.end()[0]; ++i)
     for (int j = 0; j < side.end()[1]; ++j) {
       const double squared = (side.point({i, j}) - place).squaredNorm();
-      if (squared >= least) continue;
-      least = squared;
+      if (squared >= minimum) continue;
+      minimum = squared;
       nearest = {i, j};
     }
   return nearest;
@@ -97,15 +97,15 @@ Parameters nearest_whole(const Side& side, const Vec3& place) {
 /// neighbors, halved where none is nearer.
 Parameters descend(const Side& side, const Vec3& place, Parameters at) {
   constexpr double first = 0.25, last = 1e-7;
-  double least = (side.point(at) - place).squaredNorm();
+  double minimum = (side.point(at) - place).squaredNorm();
   for (double step = first; step > last;) {
     Parameters best = at;
     for (const int i : {-1, 0, 1})
       for (const int j : {-1, 0, 1}) {
         const Parameters next = (at + step * Parameters(i, j)).cwiseMax(-1.0).cwiseMin(side.end());
         const double squared = (side.point(next) - place).squaredNorm();
-        if (squared >= least) continue;
-        least = squared;
+        if (squared >= minimum) continue;
+        minimum = squared;
         best = next;
       }
     if (best == at) step /= 2;
@@ -117,17 +117,17 @@ Parameters descend(const Side& side, const Vec3& place, Parameters at) {
 double signed_gap(const Side& side, const Vec3& place) {
   constexpr double at_end = 1e-6;
   const Parameters foot = descend(side, place, nearest_whole(side, place));
-  const Vec3 way = place - side.point(foot);
+  const Vec3 offset = place - side.point(foot);
   const auto [along, inwards] = side.slopes(foot);
   const Vec3 normal = along.cross(inwards);
   const bool opposite =
       foot.minCoeff() > -1 + at_end && (side.end() - foot).minCoeff() > at_end && normal.norm() > 0;
-  return opposite ? normal.normalized().dot(way) : way.norm();
+  return opposite ? normal.normalized().dot(offset) : offset.norm();
 }
 
 }  // namespace
 
-std::vector<CutGap> cut_gaps(const model::Walls& cuts, std::span<const Vec3> position) {
+std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> position) {
   std::vector<CutGap> gaps;
   size_t first = 0, place = 0;
   for (const auto& [columns, rows] : cuts.size) {

@@ -15,6 +15,6 @@ struct CutGap {
 /// Returns the gaps between the sides of all cuts, as docs/reference/formats.md defines them.
 /// Nothing here is shared with the solver's surfaces: splines are sums over their controls one by
 /// one, and the nearest point is found by a search without derivatives.
-std::vector<CutGap> cut_gaps(const model::Walls& cuts, std::span<const Vec3> position);
+std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> position);
 
 }  // namespace repose::tools::check

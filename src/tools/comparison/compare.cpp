@@ -52,7 +52,7 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
     result.mean_signed += sample.area * sample.distance;
     result.mean += sample.area * distance;
     result.rms += sample.area * distance * distance;
-    result.most = std::max(result.most, distance);
+    result.maximum = std::max(result.maximum, distance);
   }
   result.samples = static_cast<int64_t>(samples.size());
   if (!(result.area > 0)) return {};
@@ -64,7 +64,7 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
     double area = 0;
     for (const auto& [distance, part] : sorted)
       if ((area += part) >= share * result.area) return distance;
-    return result.most;
+    return result.maximum;
   };
   const auto within = [&](double limit) {
     double area = 0;
@@ -80,7 +80,7 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
   return result;
 }
 
-std::array<uint8_t, 3> distance_colour(double distance, double reach) {
+std::array<uint8_t, 3> distance_color(double distance, double reach) {
   const double share = std::clamp(distance / reach, -1.0, 1.0);
   const auto fade = [&](double end) {
     return static_cast<uint8_t>(std::lround(255 * (1 - std::abs(share) * (1 - end))));

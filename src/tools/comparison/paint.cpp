@@ -39,15 +39,15 @@ Held held_by(const VertexValues& mesh, const std::filesystem::path& file) {
 }
 
 double apart(const Color& one, const Color& other) {
-  double most = 0;
-  for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(one[c] - other[c]));
-  return most;
+  double maximum = 0;
+  for (int c = 0; c < 3; ++c) maximum = std::max(maximum, std::abs(one[c] - other[c]));
+  return maximum;
 }
 
 /// Returns the paints, the most frequent first.
 std::vector<Color> paints_of(const Held& held) {
   constexpr double blended = 40;
-  constexpr size_t least_part = 200;
+  constexpr size_t min_part = 200;
   std::map<Color, size_t> count;
   for (const Color& value : held.values) ++count[value];
   std::vector<std::pair<Color, size_t>> frequent(count.begin(), count.end());
@@ -56,7 +56,7 @@ std::vector<Color> paints_of(const Held& held) {
   std::vector<Color> paints;
   for (const auto& paint_and_vertices : frequent) {
     const Color& value = paint_and_vertices.first;
-    const bool blend = paint_and_vertices.second * least_part < held.values.size() ||
+    const bool blend = paint_and_vertices.second * min_part < held.values.size() ||
                        std::any_of(paints.begin(), paints.end(), [&](const Color& paint) {
                          return apart(value, paint) <= blended;
                        });

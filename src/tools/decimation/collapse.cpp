@@ -15,11 +15,11 @@ using namespace surface;
 namespace {
 
 /// Least cosine between a triangle's normal before and after a step.
-constexpr double least_turn = 0.2;
+constexpr double min_turn = 0.2;
 /// Least height of a triangle over its longest edge, as a share of that edge.
-constexpr double least_height = 1e-3;
+constexpr double min_height = 1e-3;
 /// Times a point outside the tolerance may pull a placement back in.
-constexpr int most_pulls = 4;
+constexpr int max_pulls = 4;
 /// Passes over the edges end when one removes less than this share of the triangles.
 constexpr double idle_pass = 1e-3;
 
@@ -91,13 +91,13 @@ Collapser::Candidate Collapser::candidate(int64_t a, int64_t b) const {
   if (locks(b)) std::swap(a, b);
   const Quadric sum = quadric_[a] + quadric_[b];
   const Vec3 middle = 0.5 * (surface_.points[a] + surface_.points[b]) - origin_;
-  const Vec3 at = locks(a) ? Vec3(surface_.points[a] - origin_) : sum.minimiser(middle);
+  const Vec3 at = locks(a) ? Vec3(surface_.points[a] - origin_) : sum.minimizer(middle);
   const double length = (surface_.points[a] - surface_.points[b]).squaredNorm();
   const double cost = std::max(sum.at(at), 0.0) + 1e-9 * length * length;
   return {cost, a, b, version_[a], version_[b]};
 }
 
-std::vector<int64_t> Collapser::neighbours(int64_t vertex) const {
+std::vector<int64_t> Collapser::neighbors(int64_t vertex) const {
   std::vector<int64_t> found;
   for (const int64_t t : star_[vertex])
     for (const int64_t other : surface_.triangles[t])
@@ -107,25 +107,25 @@ std::vector<int64_t> Collapser::neighbours(int64_t vertex) const {
   return found;
 }
 
-/// Link condition: the neighbours that both ends share are the corners opposite the edge.
+/// Link condition: the neighbors that both ends share are the corners opposite the edge.
 bool Collapser::gather(int64_t kept, int64_t removed, Star& star) const {
   for (const int64_t t : star_[kept])
     (has(surface_.triangles[t], removed) ? star.dying : star.staying).push_back(t);
   for (const int64_t t : star_[removed])
     if (!has(surface_.triangles[t], kept)) star.staying.push_back(t);
-  const auto a = neighbours(kept), b = neighbours(removed);
+  const auto a = neighbors(kept), b = neighbors(removed);
   std::vector<int64_t> both;
   std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));
   return !star.dying.empty() && both.size() == star.dying.size() && !star.staying.empty();
 }
 
-/// Where the vertex that stays may go, best first: the quadric's minimiser, the middle, the ends.
+/// Where the vertex that stays may go, best first: the quadric's minimizer, the middle, the ends.
 std::vector<Vec3> Collapser::placements(int64_t kept, int64_t removed) const {
   const Vec3 &a = surface_.points[kept], &b = surface_.points[removed];
   if (locks(kept)) return {a};
   const Vec3 middle = 0.5 * (a + b);
   const Quadric sum = quadric_[kept] + quadric_[removed];
-  return {origin_ + sum.minimiser(middle - origin_), middle, a, b};
+  return {origin_ + sum.minimizer(middle - origin_), middle, a, b};
 }
 
 bool Collapser::shapes_stay(const Star& star) const {
@@ -135,8 +135,8 @@ bool Collapser::shapes_stay(const Star& star) const {
     const Vec3 before = scaled_normal(corners(surface_, surface_.triangles[star.staying[i]]));
     const double area = now.norm();
     const int k = longest_edge(t);
-    if (!(area > least_height * (t[(k + 1) % 3] - t[k]).squaredNorm())) return false;
-    if (now.dot(before) < least_turn * area * before.norm()) return false;
+    if (!(area > min_height * (t[(k + 1) % 3] - t[k]).squaredNorm())) return false;
+    if (now.dot(before) < min_turn * area * before.norm()) return false;
   }
   return true;
 }
@@ -194,13 +194,13 @@ bool Collapser::attempt(const Candidate& c) {
   Star star;
   if (!gather(c.kept, c.removed, star)) return false;
   for (Vec3 at : placements(c.kept, c.removed))
-    for (int pull = 0; pull <= most_pulls; ++pull) {
+    for (int pull = 0; pull <= max_pulls; ++pull) {
       Vec3 outside = Vec3::Constant(NAN);
       if (fits(star, c.kept, c.removed, at, &outside)) {
         collapse(star, c.kept, c.removed, at);
         return true;
       }
-      if (locks(c.kept) || !tolerance_ || !outside.allFinite() || pull == most_pulls) break;
+      if (locks(c.kept) || !tolerance_ || !outside.allFinite() || pull == max_pulls) break;
       at = pulled(c.kept, at, outside);
     }
   return false;
@@ -265,7 +265,7 @@ int64_t Collapser::pass(int64_t target, uint64_t since, const std::function<void
     if (version_[best.kept] != best.kept_version || version_[best.removed] != best.removed_version)
       continue;
     if (!attempt(best)) continue;
-    for (const int64_t neighbour : neighbours(best.kept)) offer(best.kept, neighbour);
+    for (const int64_t neighbor : neighbors(best.kept)) offer(best.kept, neighbor);
   }
   return before - alive_;
 }

@@ -44,7 +44,7 @@ class Collapser {
 
   bool locks(int64_t vertex) const { return locked_[vertex]; }
   Candidate candidate(int64_t a, int64_t b) const;
-  std::vector<int64_t> neighbours(int64_t vertex) const;
+  std::vector<int64_t> neighbors(int64_t vertex) const;
   bool gather(int64_t kept, int64_t removed, Star& star) const;
   bool attempt(const Candidate& candidate);
   std::vector<Vec3> placements(int64_t kept, int64_t removed) const;

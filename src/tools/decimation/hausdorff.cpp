@@ -13,7 +13,7 @@ namespace repose::tools::decimation {
 using namespace surface;
 namespace {
 
-constexpr size_t most_pieces = 50'000'000;
+constexpr size_t max_pieces = 50'000'000;
 /// Triangles this many times the distance across are worth a cut along their edges.
 constexpr double large = 4;
 
@@ -27,7 +27,7 @@ class Search {
       for (const int64_t vertex : triangle) see(from_.points[vertex]);
     for (const auto& triangle : from_.triangles) offer(Piece(corners(from_, triangle)));
     size_t refined = 0;
-    while (!pieces_.empty() && pieces_.top().upper > lower_ + accuracy_ && refined++ < most_pieces)
+    while (!pieces_.empty() && pieces_.top().upper > lower_ + accuracy_ && refined++ < max_pieces)
       refine();
     const double upper = pieces_.empty() ? 0 : pieces_.top().upper;
     return {lower_, std::max({upper, lower_, dropped_}), worst_, upper <= lower_ + accuracy_};
@@ -40,12 +40,12 @@ class Search {
     bool operator<(const Bounded& other) const { return upper < other.upper; }
   };
 
-  /// Cuts the piece with the greatest bound: along the edges of the triangle nearest to its centre,
+  /// Cuts the piece with the greatest bound: along the edges of the triangle nearest to its center,
   /// or in halves.
   void refine() {
     Piece piece = pieces_.top().piece;
     pieces_.pop();
-    const auto nearest = tree_.nearest(piece.centre());
+    const auto nearest = tree_.nearest(piece.center());
     parts_.clear();
     const Corners& under = tree_.corners_of(nearest.triangle);
     if (!longer(under, large * (lower_ + accuracy_)) || !piece.cut_to(under, 0, parts_))
@@ -66,8 +66,8 @@ class Search {
   /// Pieces that cannot matter are not kept.
   void offer(const Piece& piece) {
     const double enough = lower_ + 0.5 * accuracy_;
-    const double upper = std::sqrt(tree_.least_greatest(
-        piece.corners(), std::numeric_limits<double>::infinity(), enough * enough));
+    const double upper = std::sqrt(
+        tree_.min_max(piece.corners(), std::numeric_limits<double>::infinity(), enough * enough));
     if (upper <= enough)
       dropped_ = std::max(dropped_, upper);
     else

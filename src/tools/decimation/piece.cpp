@@ -8,7 +8,7 @@ using namespace surface;
 namespace {
 
 /// Least share of a piece's size that a cut takes off on either side: less is rounding.
-constexpr double least_cut = 1e-3;
+constexpr double min_cut = 1e-3;
 
 }  // namespace
 
@@ -21,14 +21,14 @@ Piece::Piece(const Corners& triangle) : count_(3) {
   std::copy(triangle.begin(), triangle.end(), at_.begin());
 }
 
-Vec3 Piece::centre() const {
+Vec3 Piece::center() const {
   Vec3 sum = Vec3::Zero();
   for (const Vec3& corner : corners()) sum += corner;
   return sum / count_;
 }
 
 Piece Piece::cut(const Vec3& normal, double offset) {
-  std::array<double, most> height;
+  std::array<double, maximum> height;
   for (int i = 0; i < count_; ++i) height[i] = normal.dot(at_[i]) - offset;
   const auto end = height.begin() + count_;
   if (std::all_of(height.begin(), end, [](double h) { return h <= 0; })) return {};
@@ -53,13 +53,13 @@ Piece Piece::halve() {
     *this = Piece({t[k], between, t[(k + 2) % 3]});
     return Piece({between, t[(k + 1) % 3], t[(k + 2) % 3]});
   }
-  if (count_ > most / 2) {  // fewer corners for both, so that cuts never outgrow the room
+  if (count_ > maximum / 2) {  // fewer corners for both, so that cuts never outgrow the room
     Piece half;
     for (int i = count_ / 2; i <= count_; ++i) half.add(at_[i % count_]);
     count_ = count_ / 2 + 1;
     return half;
   }
-  const Vec3 middle = centre();
+  const Vec3 middle = center();
   Vec3 longest = Vec3::Zero();
   for (int i = 0; i < count_; ++i)
     for (int j = 0; j < i; ++j)
@@ -68,19 +68,19 @@ Piece Piece::halve() {
 }
 
 bool Piece::cut_to(const Corners& triangle, double margin, std::vector<Piece>& rest) {
-  const Vec3 middle = centre();
+  const Vec3 middle = center();
   double size = 0;
   for (const Vec3& corner : corners()) size = std::max(size, (corner - middle).norm());
   const Vec3 upright = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   std::array<Vec3, 3> outward;
   for (int k = 0; k < 3; ++k) {
     outward[k] = (triangle[(k + 1) % 3] - triangle[k]).cross(upright).normalized();
-    if (!(outward[k].dot(middle - triangle[k]) < -least_cut * size)) return false;
+    if (!(outward[k].dot(middle - triangle[k]) < -min_cut * size)) return false;
   }
   bool was_cut = false;
-  for (int k = 0; k < 3 && count_ < most; ++k) {
+  for (int k = 0; k < 3 && count_ < maximum; ++k) {
     const double side = outward[k].dot(triangle[k]) + margin;
-    const auto beyond = [&](const Vec3& p) { return outward[k].dot(p) > side + least_cut * size; };
+    const auto beyond = [&](const Vec3& p) { return outward[k].dot(p) > side + min_cut * size; };
     if (std::none_of(at_.begin(), at_.begin() + count_, beyond)) continue;
     rest.push_back(cut(outward[k], side));
     was_cut = true;

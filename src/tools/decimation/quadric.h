@@ -29,9 +29,9 @@ struct Quadric {
 
   double at(const Vec3& x) const { return x.dot(a * x) + 2 * b.dot(x) + c; }
 
-  /// The minimiser; where the planes leave it open, it stays near `start` (Tikhonov, as if each
+  /// The minimizer; where the planes leave it open, it stays near `start` (Tikhonov, as if each
   /// plane were uncertain: Trettner and Kobbelt, Fast and robust QEF minimization, 2020).
-  Vec3 minimiser(const Vec3& start) const {
+  Vec3 minimizer(const Vec3& start) const {
     const double scale = a.trace();
     if (!(scale > 0)) return start;
     const Mat3 damped = a + 1e-3 * scale * Mat3::Identity();

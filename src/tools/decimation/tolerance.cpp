@@ -8,8 +8,8 @@ using namespace surface;
 namespace {
 
 constexpr double kept_free = 1e-9;
-constexpr size_t most_open_pieces = 5000;
-/// Share of the distance that a point as high over a triangle as a piece's centre may lie beside
+constexpr size_t max_open_pieces = 5000;
+/// Share of the distance that a point as high over a triangle as a piece's center may lie beside
 /// it.
 constexpr double margin_share = 0.5;
 /// Triangles this many times the distance across are worth a cut along their edges.
@@ -37,9 +37,9 @@ bool Tolerance::contains(const Corners& triangle, Vec3* outside) const {
     if (tree_.one_covers(piece.corners(), squared_, hint_)) continue;
     for (const Vec3& corner : piece.corners())
       if (!contains(corner)) return fail(corner);
-    const Vec3 centre = piece.centre();
-    const auto nearest = tree_.nearest(centre, squared_);
-    if (nearest.triangle < 0 || pieces_.size() > most_open_pieces) return fail(centre);
+    const Vec3 center = piece.center();
+    const auto nearest = tree_.nearest(center, squared_);
+    if (nearest.triangle < 0 || pieces_.size() > max_open_pieces) return fail(center);
     hint_ = nearest.triangle;
     const double margin = margin_share * std::sqrt(squared_ - nearest.squared);
     const Corners& under = tree_.corners_of(nearest.triangle);

@@ -14,7 +14,7 @@ using surface::TriangleTree;
 /// The distance to one triangle T is a convex function of the point, so over a convex piece s it is
 /// greatest at a corner of s:  max_{p∈s} d(p, T) = max_i d(s_i, T).  Where one T of the surface is
 /// within the distance of all corners of s, so is the surface of all of s; where none is, s is cut
-/// along the edges of the T nearest to its centre. This is exact but for rounding, for which 1e-9
+/// along the edges of the T nearest to its center. This is exact but for rounding, for which 1e-9
 /// of the surface's extent is kept free; no layer of prisms or samples stands for the surface, so
 /// none of the distance is lost to them.
 class Tolerance {

@@ -7,8 +7,8 @@
 namespace repose::tools::phantom {
 namespace {
 
-constexpr double joint_gap = 2.5;   // mm of clearance of the skull around the mandible
-constexpr double least_tissue = 5;  // mm of skin over any bone
+constexpr double joint_gap = 2.5;  // mm of clearance of the skull around the mandible
+constexpr double min_tissue = 5;   // mm of skin over any bone
 
 /// Teeth from the back to the midline: position on the arch and radius; `root` and `tip` in z.
 void add_teeth(std::vector<Part>& parts, const std::vector<Bead>& arch, double root, double tip) {
@@ -154,7 +154,7 @@ double skin_distance(const Vec3& point) {
   static const std::vector<Part> parts = skin_parts();
   const double mandible = mandible_distance(point);
   const double bones = soft_min(skull_distance(point, mandible), mandible, 8.0);
-  return soft_min(signed_distance(parts, point), bones - least_tissue, 8.0);
+  return soft_min(signed_distance(parts, point), bones - min_tissue, 8.0);
 }
 
 }  // namespace repose::tools::phantom

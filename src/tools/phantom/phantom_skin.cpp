@@ -70,9 +70,9 @@ std::vector<Vec3> ring(const std::function<Vec3(double)>& curve, int64_t n) {
   }
   std::vector<Vec3> points;
   for (int64_t k = 0; k < n; ++k) {
-    const double wanted = length.back() * k / n;
-    const int64_t i = std::upper_bound(length.begin(), length.end(), wanted) - length.begin();
-    const double t = (i - 1 + (wanted - length[i - 1]) / (length[i] - length[i - 1])) / samples;
+    const double requested = length.back() * k / n;
+    const int64_t i = std::upper_bound(length.begin(), length.end(), requested) - length.begin();
+    const double t = (i - 1 + (requested - length[i - 1]) / (length[i] - length[i - 1])) / samples;
     points.push_back(on_skin(curve(t)));
   }
   return points;

@@ -10,7 +10,7 @@ namespace repose::tools::range_scan {
 using namespace surface;
 namespace {
 
-constexpr int64_t most_cells = int64_t{1} << 32;
+constexpr int64_t max_cells = int64_t{1} << 32;
 
 /// The number behind "obj_info NAME".
 int64_t info(const Content& content, const PlyHeader& header, const char* name) {
@@ -19,9 +19,9 @@ int64_t info(const Content& content, const PlyHeader& header, const char* name) 
     const auto line = base::words(base::next_line(text, position));
     if (line.size() != 3 || line[0] != "obj_info" || line[1] != name) continue;
     const auto number = base::parse_integer(line[2]);
-    if (number && *number > 1 && *number < most_cells) return *number;
+    if (number && *number > 1 && *number < max_cells) return *number;
     base::refuse("{}: obj_info {} is {}; it must be a whole number > 1", content.file.string(),
-                 name, base::shown(line[2]));
+                 name, base::quote(line[2]));
   }
   base::refuse("{}: not a range grid: its header has no obj_info {}; give the scanner's raw PLY",
                content.file.string(), name);
@@ -36,7 +36,7 @@ const PlyElement& element_of(const PlyHeader& header, const char* name, const st
 
 /// Where each property of a vertex goes.
 struct Columns {
-  std::array<int64_t, 3> position{-1, -1, -1}, colour{-1, -1, -1};
+  std::array<int64_t, 3> position{-1, -1, -1}, color{-1, -1, -1};
   std::vector<size_t> other;
 };
 
@@ -51,7 +51,7 @@ Columns columns_of(const PlyElement& vertex, const std::string& file) {
     if (axis < 3)
       columns.position[axis] = static_cast<int64_t>(p);
     else if (part < 3)
-      columns.colour[part] = static_cast<int64_t>(p);
+      columns.color[part] = static_cast<int64_t>(p);
     else if (!vertex.properties[p].list_size)
       columns.other.push_back(p);
   }
@@ -67,14 +67,14 @@ void add_point(RangeGrid& grid, const Columns& columns, const PlyValues::Row& ro
   Vec3 point;
   for (int axis = 0; axis < 3; ++axis) point[axis] = number(columns.position[axis]);
   if (!point.allFinite())
-    base::refuse("{}: vertex {} has a coordinate that is not finite; scan anew or remove it",
+    base::refuse("{}: vertex {} has a coordinate that is not finite; scan again or remove it",
                  grid.name, grid.points.size());
   grid.points.push_back(point);
-  if (columns.colour[0] >= 0 && columns.colour[1] >= 0 && columns.colour[2] >= 0) {
-    std::array<uint8_t, 3> colour;
+  if (columns.color[0] >= 0 && columns.color[1] >= 0 && columns.color[2] >= 0) {
+    std::array<uint8_t, 3> color;
     for (int part = 0; part < 3; ++part)
-      colour[part] = static_cast<uint8_t>(std::clamp(number(columns.colour[part]), 0.0, 255.0));
-    grid.data.colours.push_back(colour);
+      color[part] = static_cast<uint8_t>(std::clamp(number(columns.color[part]), 0.0, 255.0));
+    grid.data.colors.push_back(color);
   }
   for (size_t f = 0; f < columns.other.size(); ++f)
     grid.data.fields[f].values.push_back(number(static_cast<int64_t>(columns.other[f])));
@@ -85,7 +85,7 @@ int64_t cell_of(const PlyValues::Row& row, uint64_t number, const RangeGrid& gri
   const double point = row[0][0];
   if (point >= 0 && point < static_cast<double>(grid.points.size()) && point == std::floor(point))
     return static_cast<int64_t>(point);
-  base::refuse("{}: cell {} of the range grid names point {:g}, but there are {}; export it anew",
+  base::refuse("{}: cell {} of the range grid names point {:g}, but there are {}; export it again",
                grid.name, number, point, grid.points.size());
 }
 

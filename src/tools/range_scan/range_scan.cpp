@@ -32,7 +32,7 @@ void visit_squares(const RangeGrid& grid, bool ring, Visit visit) {
     }
 }
 
-/// The median distance between points of neighbouring cells.
+/// The median distance between points of neighboring cells.
 double median_step(const RangeGrid& grid, const std::vector<Vec3>& points, bool ring) {
   std::vector<double> steps;
   visit_squares(grid, ring, [&](const std::array<int64_t, 4>& corner) {
@@ -41,7 +41,7 @@ double median_step(const RangeGrid& grid, const std::vector<Vec3>& points, bool 
         steps.push_back((points[corner[other]] - points[corner[0]]).norm());
   });
   if (steps.empty())
-    base::refuse("{}: no two neighbouring cells hold points; the scan is empty", grid.name);
+    base::refuse("{}: no two neighboring cells hold points; the scan is empty", grid.name);
   std::nth_element(steps.begin(), steps.begin() + static_cast<int64_t>(steps.size() / 2),
                    steps.end());
   return steps[steps.size() / 2];
@@ -87,12 +87,12 @@ void face_scanner(std::vector<Triangle>& triangles, const std::vector<Vec3>& poi
 }
 
 void cut_steps(ScanMesh& mesh, const ScanOptions& options) {
-  const double least_cosine = std::cos(options.steepest * M_PI / 180);
+  const double min_cosine = std::cos(options.steepest * M_PI / 180);
   const auto& points = mesh.surface.points;
   std::erase_if(mesh.surface.triangles, [&](const Triangle& t) {
     const bool too_long = longest_side(points, t) > mesh.longest_edge;
     const Vec3 normal = normal_of(points, t).normalized();
-    const bool steep = normal.dot(to_scanner(points, t, options.cylinder)) < least_cosine;
+    const bool steep = normal.dot(to_scanner(points, t, options.cylinder)) < min_cosine;
     mesh.cut_long += too_long;
     mesh.cut_steep += steep && !too_long;
     return too_long || steep;
@@ -133,7 +133,7 @@ void renumber(ScanMesh& mesh, const PointData& data) {
     mesh.split += used[from];
     used[from] = true;
     points.push_back(mesh.surface.points[from]);
-    if (!data.colours.empty()) mesh.data.colours.push_back(data.colours[from]);
+    if (!data.colors.empty()) mesh.data.colors.push_back(data.colors[from]);
     for (size_t f = 0; f < data.fields.size(); ++f)
       mesh.data.fields[f].values.push_back(data.fields[f].values[from]);
   }

@@ -15,9 +15,9 @@ namespace {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double least_cosine = 0.5;  ///< between the normals of a pair
-constexpr double on_border = 1e-6;    ///< barycentric share
-constexpr int most_halvings = 6;
+constexpr double min_cosine = 0.5;  ///< between the normals of a pair
+constexpr double on_border = 1e-6;  ///< barycentric share
+constexpr int max_halvings = 6;
 
 Vec3 unit_normal(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
 
@@ -79,7 +79,7 @@ class Icp {
   IcpResult run(const Similarity& start) {
     IcpResult result{.transform = start};
     std::vector<Pair> pairs = match(start);
-    while (result.steps < options_.most_steps && !result.converged) {
+    while (result.steps < options_.max_steps && !result.converged) {
       ++result.steps;
       const Similarity best = solve(pairs);
       double share = 1;
@@ -88,7 +88,7 @@ class Icp {
         std::vector<Pair> next_pairs = match(next);
         const bool better = error_of(next_pairs).plane <= error_of(pairs).plane;
         result.converged = largest_move(result.transform, next) <= options_.tolerance * extent();
-        if (!better && !result.converged && halving < most_halvings) continue;
+        if (!better && !result.converged && halving < max_halvings) continue;
         if (better) {
           result.transform = next;
           pairs = std::move(next_pairs);
@@ -125,7 +125,7 @@ class Icp {
       const Vec3 from = transform.apply(points_[i]);
       const auto nearest = tree_.nearest(from);
       const Vec3 normal = unit_normal(corners(fixed_, fixed_.triangles[nearest.triangle]));
-      if (!((transform.rotation * normals_[i]).dot(normal) > least_cosine)) continue;
+      if (!((transform.rotation * normals_[i]).dot(normal) > min_cosine)) continue;
       if (at_border(nearest.triangle, nearest.point)) continue;
       pairs.push_back({from, nearest.point, normal, nearest.squared});
     }
@@ -143,13 +143,13 @@ class Icp {
 
   /// Least squares of n·(p + ω×(p − c) + u − q) over ω, u, about the pairs' mean c.
   static Similarity solve(const std::vector<Pair>& pairs) {
-    Vec3 centre = Vec3::Zero();
-    for (const Pair& pair : pairs) centre += pair.from / static_cast<double>(pairs.size());
+    Vec3 center = Vec3::Zero();
+    for (const Pair& pair : pairs) center += pair.from / static_cast<double>(pairs.size());
     Mat6 matrix = Mat6::Zero();
     Vec6 right = Vec6::Zero();
     for (const Pair& pair : pairs) {
       Vec6 row;
-      row << (pair.from - centre).cross(pair.normal), pair.normal;
+      row << (pair.from - center).cross(pair.normal), pair.normal;
       matrix += row * row.transpose();
       right += row * pair.normal.dot(pair.to - pair.from);
     }
@@ -163,7 +163,7 @@ class Icp {
     const Mat3 rotation = angle > 0
                               ? Eigen::AngleAxisd(angle, x.head<3>() / angle).toRotationMatrix()
                               : Mat3::Identity();
-    return {1, rotation, centre + x.tail<3>() - rotation * centre};
+    return {1, rotation, center + x.tail<3>() - rotation * center};
   }
 
   double largest_move(const Similarity& a, const Similarity& b) const {

@@ -35,7 +35,7 @@ class Fitter {
 
   bool can_predict(size_t i) const {
     const auto x = without(i).first;
-    return x.size() >= 3 && base::breadth(x) > least_breadth;
+    return x.size() >= 3 && base::breadth(x) > min_breadth;
   }
 
   double error(const Similarity& fit, size_t i) const {
@@ -103,11 +103,11 @@ constexpr size_t none = static_cast<size_t>(-1);
 
 void check_breadth(const std::vector<Vec3>& points, const char* which) {
   const double found = base::breadth(points);
-  if (!(found > least_breadth))
+  if (!(found > min_breadth))
     base::refuse(
         "the {} landmarks lie on a line (breadth {:.2g} of their length, more than {:g} needed), "
         "which leaves the turn about it open; add one beside the line",
-        which, found, least_breadth);
+        which, found, min_breadth);
 }
 
 }  // namespace
@@ -126,8 +126,8 @@ LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec
   result.rms_all = fitter.rms(fitter.fit_without(none));
   result.rms_mirrored =
       fitter.rms(base::fit_similarity(moving, fixed, with_scale, base::Handedness::mirrored));
-  const int64_t least = n == 4 ? 3 : 4;
-  for (size_t out = 0; out < std::max<size_t>(n / 3, 1) && fitter.count() > least; ++out) {
+  const int64_t minimum = n == 4 ? 3 : 4;
+  for (size_t out = 0; out < std::max<size_t>(n / 3, 1) && fitter.count() > minimum; ++out) {
     std::vector<double> suspicion(n, 0);
     for (size_t i = 0; i < n; ++i)
       if (fitter.used()[i]) suspicion[i] = fitter.suspicion(i);

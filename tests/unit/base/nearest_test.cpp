@@ -9,7 +9,7 @@ TEST(Nearest, DistanceCountsEdits) {
   EXPECT_EQ(edit_distance("", ""), 0u);
   EXPECT_EQ(edit_distance("", "skin"), 4u);
   EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
-  EXPECT_EQ(edit_distance("skni", "skin"), 1u) << "a swap of neighbours is one edit";
+  EXPECT_EQ(edit_distance("skni", "skin"), 1u) << "a swap of neighbors is one edit";
   EXPECT_EQ(edit_distance("Layers", "layers"), 0u) << "case does not count";
 }
 

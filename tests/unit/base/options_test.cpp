@@ -34,7 +34,7 @@ std::vector<Option> table() {
           {.name = "functional",
            .kind = OptionKind::choice,
            .default_text = "energy",
-           .help = "What is minimised.",
+           .help = "What is minimized.",
            .choices = {"energy", "force"}},
           {"output", OptionKind::path, "", "Where to write."},
           {.name = "landmarks",
@@ -136,13 +136,13 @@ TEST(Options, PathBehindAViewerOptionIsAnArgument) {
 
 TEST(Options, HelpIsOursUnlessPetscsIsAskedFor) {
   Line ours({"-help"});
-  EXPECT_TRUE(ours->help_wanted());
+  EXPECT_TRUE(ours->help_requested());
   EXPECT_EQ(ours->petsc_argc(), 1);
   Line petscs({"head.yaml", "-help", "petsc"});
-  EXPECT_FALSE(petscs->help_wanted());
+  EXPECT_FALSE(petscs->help_requested());
   EXPECT_STREQ(petscs->petsc_argv()[1], "-help");
   EXPECT_EQ(petscs->petsc_argc(), 2);
-  EXPECT_TRUE(Line({"-version"})->version_wanted());
+  EXPECT_TRUE(Line({"-version"})->version_requested());
   Line intro({"-help", "intro"});
   EXPECT_EQ(intro->petsc_argc(), 3);
 }

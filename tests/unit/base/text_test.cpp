@@ -24,8 +24,8 @@ TEST(Text, WholeNumbers) {
 }
 
 TEST(Text, ShownIsOneShortLine) {
-  EXPECT_EQ(shown("a\nb\tc"), "'a?b?c'");
-  EXPECT_EQ(shown(std::string(1000, 'x')), "'" + std::string(60, 'x') + "...'");
+  EXPECT_EQ(quote("a\nb\tc"), "'a?b?c'");
+  EXPECT_EQ(quote(std::string(1000, 'x')), "'" + std::string(60, 'x') + "...'");
 }
 
 TEST(Range, ContainsItsEndsUnlessExcluded) {

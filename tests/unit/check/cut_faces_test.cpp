@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "repose/mechanics/wall_contact.h"
+#include "repose/mechanics/cut_face_contact.h"
 
 namespace repose::tools::check {
 namespace cut_faces_test {
@@ -15,7 +15,7 @@ constexpr int columns = 6, rows = 5;
 
 /// Two sides of a cut, of which the place of a control is `first` and `second` of (column, row).
 template <class First, class Second>
-std::vector<Vec3> lay(model::Walls& cuts, First&& first, Second&& second) {
+std::vector<Vec3> lay(model::CutFaces& cuts, First&& first, Second&& second) {
   std::vector<Vec3> position;
   cuts.size = {{columns, rows}};
   cuts.begin = {0};
@@ -33,7 +33,7 @@ std::vector<Vec3> lay(model::Walls& cuts, First&& first, Second&& second) {
 
 TEST(CutGaps, AreSignedDistancesBetweenPlaneSides) {
   for (const double distance : {0.8, 0.0, -0.6}) {
-    model::Walls cuts;
+    model::CutFaces cuts;
     const auto position = lay(
         cuts, [&](int i, int j) { return Vec3(2 * i + 0.4, 3 * j - 0.3, distance); },
         [](int i, int j) { return Vec3(2 * i, 3 * j, 0); });
@@ -45,7 +45,7 @@ TEST(CutGaps, AreSignedDistancesBetweenPlaneSides) {
 }
 
 TEST(CutGaps, AreDistancesWhereNothingIsOpposite) {
-  model::Walls cuts;
+  model::CutFaces cuts;
   const auto position = lay(
       cuts, [](int i, int j) { return Vec3(i + 20, j, 1); },
       [](int i, int j) { return Vec3(i, j, 0); });
@@ -61,12 +61,12 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
     return Vec3(x, y, z + 0.04 * x * x - 0.05 * y * y) +
            Vec3(off(random), off(random), off(random));
   };
-  model::Walls cuts;
+  model::CutFaces cuts;
   const auto position = lay(
       cuts, [&](int i, int j) { return bent(i + 0.4, j - 0.2, -0.8); },
       [&](int i, int j) { return bent(i, j, 0); });
-  mechanics::WallLoop solver(cuts, 1);
-  solver.look(position);
+  mechanics::CutFaceContact solver(cuts, 1);
+  solver.update_gaps(position);
   const std::vector<CutGap> gaps = cut_gaps(cuts, position);
   ASSERT_EQ(gaps.size(), solver.size());
   int behind = 0;
@@ -78,7 +78,7 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
 }
 
 TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
-  model::Walls cuts;
+  model::CutFaces cuts;
   // Along the ends the nearest place is not at the same parameter as the nearest control.
   const auto skew = [](double i, double j, double z) -> Vec3 {
     return Vec3(2.5 * i + 1.4 * j, 2 * j + 0.6 * i, z + 0.02 * i * j);
@@ -86,8 +86,8 @@ TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
   const auto position = lay(
       cuts, [&](int i, int j) { return skew(i + 3.3, j + 2.6, 1.5); },
       [&](int i, int j) { return skew(i, j, 0); });
-  mechanics::WallLoop solver(cuts, 1);
-  solver.look(position);
+  mechanics::CutFaceContact solver(cuts, 1);
+  solver.update_gaps(position);
   const std::vector<CutGap> gaps = cut_gaps(cuts, position);
   ASSERT_EQ(gaps.size(), solver.size());
   for (size_t w = 0; w < gaps.size(); ++w) EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-7) << w;

@@ -49,9 +49,9 @@ TEST(Isosurface, sphere_on_an_oblique_grid_has_its_area_and_volume) {
   EXPECT_NEAR(area_of(ball), 4 * pi * radius * radius, 0.005 * 4 * pi * radius * radius);
   EXPECT_NEAR(volume_of(ball), 4.0 / 3 * pi * std::pow(radius, 3),
               0.005 * 4.19 * std::pow(radius, 3));
-  double most = 0;
-  for (const Vec3& p : ball.points) most = std::max(most, std::abs(p.norm() - radius));
-  EXPECT_LT(most, 0.03) << "mm; linear interpolation of a distance";
+  double maximum = 0;
+  for (const Vec3& p : ball.points) maximum = std::max(maximum, std::abs(p.norm() - radius));
+  EXPECT_LT(maximum, 0.03) << "mm; linear interpolation of a distance";
 }
 
 TEST(Isosurface, torus_has_one_handle) {
@@ -74,7 +74,7 @@ TEST(Isosurface, a_mirrored_grid_still_faces_outward) {
   EXPECT_EQ(fault(ball, false), "");
 }
 
-// Every one of the 256 cases and every pair of neighbours occurs in noise; few values make many
+// Every one of the 256 cases and every pair of neighbors occurs in noise; few values make many
 // voxels lie exactly on the level.
 TEST(Isosurface, noise_gives_closed_manifolds) {
   for (unsigned seed = 0; seed < 60; ++seed)
@@ -94,14 +94,14 @@ TEST(Isosurface, noise_with_an_open_border_is_a_manifold_whose_rim_is_there) {
   }
 }
 
-TEST(Isosurface, caps_lie_in_the_outermost_voxel_centres) {
+TEST(Isosurface, caps_lie_in_the_outermost_voxel_centers) {
   const Surface block = isosurface(
       sampled(11, Mat3::Identity(), [](const Vec3& p) { return p.x() > -4 ? 1.0 : 0.0; }), 0.5);
   EXPECT_EQ(fault(block, false), "");
   EXPECT_NEAR(volume_of(block), 8.5 * 10 * 10, 0.01 * 850);
 }
 
-TEST(Isosurface, diagonal_neighbours_are_parted) {
+TEST(Isosurface, diagonal_neighbors_are_parted) {
   Volume volume = sampled(6, Mat3::Identity(), [](const Vec3&) { return 0; });
   volume.values[volume.index(2, 2, 2)] = volume.values[volume.index(3, 3, 2)] = 1;
   volume.values[volume.index(4, 4, 3)] = 1;
@@ -161,20 +161,20 @@ TEST(Taubin, a_rim_stays) {
 
 TEST(Extract, says_what_it_did) {
   const Volume volume = sampled(40, Mat3::Identity(), [](const Vec3& p) { return -p.norm(); });
-  Extraction wanted;
-  wanted.level = -12;
-  wanted.box = {{Vec3(-30, -30, -30), Vec3(30, 0.4, 30)}};
-  wanted.voxel = 2;
-  wanted.largest = true;
-  wanted.smooth = 3;
-  const Extracted half = extract(volume, wanted);
+  Extraction requested;
+  requested.level = -12;
+  requested.box = {{Vec3(-30, -30, -30), Vec3(30, 0.4, 30)}};
+  requested.voxel = 2;
+  requested.largest = true;
+  requested.smooth = 3;
+  const Extracted half = extract(volume, requested);
   EXPECT_EQ(fault(half.surface, false), "");
   EXPECT_NEAR(volume_of(half.surface), 2.0 / 3 * pi * 1728, 0.06 * 3619);
   ASSERT_EQ(half.remarks.size(), 4u);
   EXPECT_EQ(half.remarks[0], "cropped to 40 × 21 × 40 voxels of 1 × 1 × 1 mm");
   EXPECT_EQ(half.remarks[1], "averaged to 20 × 11 × 20 voxels of 2 × 1.91 × 2 mm");
-  wanted.otsu = true;
-  EXPECT_NE(refusal([&] { extract(volume, wanted); }).find("in one way"), std::string::npos);
+  requested.otsu = true;
+  EXPECT_NE(refusal([&] { extract(volume, requested); }).find("in one way"), std::string::npos);
 }
 
 }  // namespace isosurface_test

@@ -52,11 +52,11 @@ void expect_closed(const Surface& surface) {
 }
 
 TEST_F(RealVolume, skin_lies_within_a_voxel_of_the_reference) {
-  Extraction wanted;
-  wanted.level = -300;
-  wanted.box = {{Vec3(-200, -500, 0), Vec3(200, -108, 900)}};  // without the headrest
-  wanted.largest = true;
-  const Surface skin = extract(read_volume(data("head_hu.mhd")), wanted).surface;
+  Extraction requested;
+  requested.level = -300;
+  requested.box = {{Vec3(-200, -500, 0), Vec3(200, -108, 900)}};  // without the headrest
+  requested.largest = true;
+  const Surface skin = extract(read_volume(data("head_hu.mhd")), requested).surface;
   expect_closed(skin);
   const Surface reference = read_surface(data("skin.ply"));
   EXPECT_LT(percentile_95(reference, skin), voxel);
@@ -65,12 +65,12 @@ TEST_F(RealVolume, skin_lies_within_a_voxel_of_the_reference) {
 
 TEST_F(RealVolume, labels_give_skull_and_mandible_apart) {
   const Volume labels = read_volume(data("labels.nii.gz"));
-  Extraction wanted;
-  wanted.largest = true;
-  wanted.label = 2;
-  const Surface mandible = extract(labels, wanted).surface;
-  wanted.label = 1;
-  const Surface skull = extract(labels, wanted).surface;
+  Extraction requested;
+  requested.largest = true;
+  requested.label = 2;
+  const Surface mandible = extract(labels, requested).surface;
+  requested.label = 1;
+  const Surface skull = extract(labels, requested).surface;
   expect_closed(mandible);
   expect_closed(skull);
   EXPECT_LT(volume_of(mandible), 0.2 * volume_of(skull));

@@ -38,7 +38,7 @@ TEST(VolumeFilter, crop_keeps_every_voxel_in_its_place) {
             std::string::npos);
 }
 
-// The mean of a linear function over a voxel is its value at the centre; parts of a voxel take the
+// The mean of a linear function over a voxel is its value at the center; parts of a voxel take the
 // value of the whole, which shifts by an eighth of it at most.
 TEST(VolumeFilter, coarsen_keeps_the_mean_and_the_place) {
   const Mat3 axes = Vec3(1, 1, 2).asDiagonal();

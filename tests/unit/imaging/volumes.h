@@ -10,7 +10,7 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// A volume of n³ voxels around the origin whose values are those of `value` at their centres.
+/// A volume of n³ voxels around the origin whose values are those of `value` at their centers.
 inline Volume sampled(int64_t n, const Mat3& axes,
                       const std::function<double(const Vec3&)>& value) {
   Volume volume{"sampled", {n, n, n}, axes, {}, {}, {}};

@@ -70,8 +70,8 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
                                        add(i, j, -block);
                                        add(j, i, -block);
                                      });
-  std::vector<double> most_slope = slopes;
-  most_slope.resize(loops.prisms.size(), 0.0);
+  std::vector<double> max_slope = slopes;
+  max_slope.resize(loops.prisms.size(), 0.0);
   const bool exact = curvature == mechanics::Curvature::exact;
   for (int64_t e = 0; e < loops.edges.size(); ++e) {
     const auto [i, j] = loops.edges.points[e];
@@ -82,7 +82,7 @@ inline Eigen::MatrixXd assemble(const mechanics::Loops& loops, const mechanics::
     add(j, i, -block);
   }
   if (exact && !loops.nodal.empty()) add_nodal_coupling(loops.nodal, weights, x, matrix);
-  mechanics::for_each_prism_block(loops, x, weights, exact ? std::span<const double>() : most_slope,
+  mechanics::for_each_prism_block(loops, x, weights, exact ? std::span<const double>() : max_slope,
                                   [&](int64_t e, const mechanics::PrismBlocks& blocks) {
                                     const auto& corner = loops.prisms.points[e];
                                     for (int i = 0; i < 6; ++i)

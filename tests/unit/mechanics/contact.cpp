@@ -1,4 +1,4 @@
-#include "repose/mechanics/wall_contact.h"
+#include "repose/mechanics/cut_face_contact.h"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ Vec3 gone(const Vec3& at) { return turn * at + shift; }
 
 /// Points at `distance` mm from a capsule and a ball that have moved, on all sides.
 struct Touching {
-  TouchLoop loop;
+  BodyContact loop;
   std::vector<Vec3> position;
 };
 Touching touching(double distance, model::Binding binding) {
@@ -34,39 +34,39 @@ Touching touching(double distance, model::Binding binding) {
       RigidBody(scene::Capsule{{0, 0, 0}, {4, 1, 0}, 3}, -1, Vec3::Zero()),
       RigidBody(scene::Sphere{{30, 0, 0}, 2.5}, -1, Vec3::Zero())};
   for (RigidBody& body : bodies) body.place(turn, shift);
-  model::Touches touches;
+  model::ContactPairs pairs;
   Touching made;
-  for (const Vec3& way : random_points(20, 1, 7))
+  for (const Vec3& direction : random_points(20, 1, 7))
     for (int32_t b = 0; b < 2; ++b) {
-      Vec3 at = gone(b == 0 ? Vec3(2, 0.5, 0) : Vec3(30, 0, 0)) + 9 * way.normalized();
+      Vec3 at = gone(b == 0 ? Vec3(2, 0.5, 0) : Vec3(30, 0, 0)) + 9 * direction.normalized();
       for (int n = 0; n < 50; ++n) {
         const surface::Distance d = bodies[b].distance(bodies[b].beside(at));
         at -= (d.value - distance) * d.gradient;
       }
-      touches.point.push_back(static_cast<int64_t>(made.position.size()));
-      touches.body.push_back(b);
-      touches.binding.push_back(binding);
-      touches.area.push_back(1.5 + way.x());
-      touches.offset.push_back(0);
+      pairs.point.push_back(static_cast<int64_t>(made.position.size()));
+      pairs.body.push_back(b);
+      pairs.binding.push_back(binding);
+      pairs.area.push_back(1.5 + direction.x());
+      pairs.offset.push_back(0);
       made.position.push_back(at);
     }
-  made.loop = TouchLoop(touches, 0.7, bodies);
+  made.loop = BodyContact(pairs, 0.7, bodies);
   return made;
 }
 
 template <class Value, class Blocks>
 void expect_taylor(const std::vector<Vec3>& position, Value&& value, Blocks&& blocks) {
-  const std::vector<Vec3> way = random_points(static_cast<int>(position.size()), 1, 9);
+  const std::vector<Vec3> direction = random_points(static_cast<int>(position.size()), 1, 9);
   const auto at = [&](double step) {
     std::vector<Vec3> moved = position;
-    for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * way[i];
+    for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * direction[i];
     return moved;
   };
   std::vector<Vec3> gradient(position.size(), Vec3::Zero());
   const double start = value(position, gradient);
   double slope = 0;
-  for (size_t i = 0; i < way.size(); ++i) slope += gradient[i].dot(way[i]);
-  const double bend = blocks(way);
+  for (size_t i = 0; i < direction.size(); ++i) slope += gradient[i].dot(direction[i]);
+  const double bend = blocks(direction);
   double first = 0, last = 0;
   for (const double step : {1e-3, 1e-4}) {
     std::vector<Vec3> unused(position.size(), Vec3::Zero());
@@ -89,17 +89,18 @@ TEST(TouchDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
           [&](std::span<const Vec3> x, std::span<Vec3> g) {
             return made.loop.add_gradient(x, 1, g);
           },
-          [&](const std::vector<Vec3>& way) {
-            made.loop.look(made.position);
+          [&](const std::vector<Vec3>& direction) {
+            made.loop.update_gaps(made.position);
             double sum = 0;
-            made.loop.for_each_block(
-                true, [&](int64_t i, const Mat3& block) { sum += way[i].dot(block * way[i]); });
+            made.loop.for_each_block(true, [&](int64_t i, const Mat3& block) {
+              sum += direction[i].dot(block * direction[i]);
+            });
             return sum;
           });
     }
 }
 
-TEST(TouchLoop, PressesWithoutAJumpOfEnergy) {
+TEST(BodyContact, PressesWithoutAJumpOfEnergy) {
   constexpr double multiplier = 0.02, stiffness = 0.7, step = 1e-6;
   double value[2];
   for (const int after : {0, 1}) {
@@ -123,21 +124,21 @@ surface::Surface box(const Vec3& half) {
   return s;
 }
 
-TEST(TouchLoop, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
+TEST(BodyContact, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
   constexpr double stiffness = 0.7;
   const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
   std::vector<Vec3> position = random_points(300, 9, 11);
   const auto count = static_cast<int64_t>(position.size());
-  model::Touches touches;
-  for (int64_t p = 0; p < count; ++p) touches.point.push_back(p);
-  touches.body.assign(count, 0);
-  touches.binding.assign(count, model::Binding::touches);
-  touches.area.assign(count, 1);
-  touches.offset.assign(count, 0);
+  model::ContactPairs pairs;
+  for (int64_t p = 0; p < count; ++p) pairs.point.push_back(p);
+  pairs.body.assign(count, 0);
+  pairs.binding.assign(count, model::Binding::touches);
+  pairs.area.assign(count, 1);
+  pairs.offset.assign(count, 0);
   std::vector<double> multiplier;
   for (const Vec3& p : random_points(static_cast<int>(count), 0.3, 2))
     multiplier.push_back(std::max(0.0, p.x()));
-  TouchLoop loop(touches, stiffness, {body});
+  BodyContact loop(pairs, stiffness, {body});
   loop.set_multipliers(multiplier);
   for (int step = 0; step < 8; ++step) {
     std::vector<Vec3> gradient(count, Vec3::Zero());
@@ -150,22 +151,22 @@ TEST(TouchLoop, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
       ASSERT_LT((gradient[p] + pressure * d.gradient).norm(), 1e-12) << step << " " << p;
     }
     EXPECT_GT(acting, 20);
-    const std::vector<Vec3> way = random_points(static_cast<int>(count), 1, 20 + step);
-    for (int64_t p = 0; p < count; ++p) position[p] += 0.6 * way[p];
+    const std::vector<Vec3> direction = random_points(static_cast<int>(count), 1, 20 + step);
+    for (int64_t p = 0; p < count; ++p) position[p] += 0.6 * direction[p];
   }
 }
 
-TEST(TouchLoop, StatesDistancesBeyondAMillimeterExactly) {
+TEST(BodyContact, StatesDistancesBeyondAMillimeterExactly) {
   const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
-  model::Touches touches;
-  touches.point = {0, 1, 2};
-  touches.body = {0, 0, 0};
-  touches.binding.assign(3, model::Binding::touches);
-  touches.area = {1, 1, 1};
-  touches.offset = {0, 0, 0};
+  model::ContactPairs pairs;
+  pairs.point = {0, 1, 2};
+  pairs.body = {0, 0, 0};
+  pairs.binding.assign(3, model::Binding::touches);
+  pairs.area = {1, 1, 1};
+  pairs.offset = {0, 0, 0};
   const std::vector<Vec3> position = {{7, 6, 0}, {5.2, 0, 0}, {40, 0, 0}};
-  TouchLoop loop(touches, 0.7, {body});
-  loop.look_at_all(position);
+  BodyContact loop(pairs, 0.7, {body});
+  loop.update_all_gaps(position);
   EXPECT_NEAR(loop.gaps()[0], std::sqrt(8.0), 1e-12);
   EXPECT_NEAR(loop.gaps()[1], 0.2, 1e-6);
   EXPECT_EQ(loop.gaps()[2], 6);
@@ -174,13 +175,13 @@ TEST(TouchLoop, StatesDistancesBeyondAMillimeterExactly) {
 /// Two sides of a bent cut, 5 × 4 controls of which the first and the last of a column are means of
 /// two points, the first side `distance` mm from the second and slid along it by more than a patch.
 struct Facing {
-  model::Walls walls;
+  model::CutFaces cut_faces;
   std::vector<Vec3> position;
 };
 Facing facing(double distance) {
   Facing made;
-  made.walls.size = {{5, 4}};
-  made.walls.begin = {0};
+  made.cut_faces.size = {{5, 4}};
+  made.cut_faces.begin = {0};
   const std::vector<Vec3> noise = random_points(80, 0.05, 3);
   for (int side = 0; side < 2; ++side)
     for (int i = 0; i < 5; ++i)
@@ -188,14 +189,14 @@ Facing facing(double distance) {
         const bool wrap = j == 0 || j == 3;
         for (int k = 0; k < (wrap ? 2 : 1); ++k) {
           const double u = 3 * i + (side == 0 ? 3.7 : 0), v = 3 * j + (side == 0 ? 0.8 : 0);
-          made.walls.point.push_back(static_cast<int64_t>(made.position.size()));
-          made.walls.weight.push_back(wrap ? 0.5 : 1);
+          made.cut_faces.point.push_back(static_cast<int64_t>(made.position.size()));
+          made.cut_faces.weight.push_back(wrap ? 0.5 : 1);
           made.position.push_back(Vec3(u, v + 0.2 * k, 0.02 * u * u - 0.03 * v * v + 0.4 * k) +
                                   (side == 0 ? distance : 0) * Vec3::UnitZ() +
                                   noise[made.position.size()]);
         }
-        made.walls.begin.push_back(static_cast<int64_t>(made.walls.point.size()));
-        if (side == 0) made.walls.area.push_back(wrap ? 0 : 2 + i);
+        made.cut_faces.begin.push_back(static_cast<int64_t>(made.cut_faces.point.size()));
+        if (side == 0) made.cut_faces.area.push_back(wrap ? 0 : 2 + i);
       }
   return made;
 }
@@ -204,21 +205,21 @@ TEST(WallDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
   for (const double distance : {0.8, 0.0, -0.9}) {
     SCOPED_TRACE(distance);
     const Facing made = facing(distance);
-    WallLoop loop(made.walls, 0.7);
+    CutFaceContact loop(made.cut_faces, 0.7);
     EXPECT_EQ(loop.size(), 10u);
     loop.set_multipliers(std::vector<double>(loop.size(), 1.5));
-    loop.look(made.position);
+    loop.update_gaps(made.position);
     int acting = 0;
     for (size_t w = 0; w < loop.size(); ++w) acting += loop.pressure(w) > 0 ? 1 : 0;
     EXPECT_GE(acting, 6);
     expect_taylor(
         made.position,
         [&](std::span<const Vec3> x, std::span<Vec3> g) { return loop.add_gradient(x, 1, g); },
-        [&](const std::vector<Vec3>& way) {
+        [&](const std::vector<Vec3>& direction) {
           double sum = 0;
-          loop.look(made.position);
+          loop.update_gaps(made.position);
           loop.for_each_block(true, [&](int32_t p, int32_t q, const Mat3& block) {
-            sum += (p == q ? 1 : 2) * way[p].dot(block * way[q]);
+            sum += (p == q ? 1 : 2) * direction[p].dot(block * direction[q]);
           });
           return sum;
         });
@@ -229,15 +230,15 @@ TEST(WallDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
 template <class Gaps>
 void expect_linear(const std::vector<Vec3>& position, Gaps&& gaps) {
   constexpr double step = 1e-5;
-  const std::vector<Vec3> way = random_points(static_cast<int>(position.size()), 1, 9);
+  const std::vector<Vec3> direction = random_points(static_cast<int>(position.size()), 1, 9);
   std::vector<Vec3> moved = position;
-  for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * way[i];
+  for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * direction[i];
   const std::vector<LinearGap> before = gaps(position), after = gaps(moved);
   ASSERT_EQ(before.size(), after.size());
   ASSERT_GE(before.size(), 6u);
   for (size_t k = 0; k < before.size(); ++k) {
     double slope = 0;
-    for (const auto& [p, gradient] : before[k].gradient) slope += gradient.dot(way[p]);
+    for (const auto& [p, gradient] : before[k].gradient) slope += gradient.dot(direction[p]);
     EXPECT_NEAR((after[k].gap - before[k].gap) / step, slope, 1e-4);
   }
 }
@@ -247,9 +248,9 @@ TEST(LinearGap, HasTheGradientOfTheGap) {
   expect_linear(made.position,
                 [&](const std::vector<Vec3>& x) { return made.loop.linear_gaps(x, 5); });
   const Facing sides = facing(0.3);
-  WallLoop loop(sides.walls, 0.7);
+  CutFaceContact loop(sides.cut_faces, 0.7);
   expect_linear(sides.position, [&](const std::vector<Vec3>& x) {
-    loop.look(x);
+    loop.update_gaps(x);
     return loop.linear_gaps(5);
   });
 }
@@ -285,7 +286,7 @@ TEST(SplineWeights, ReproduceStraightLinesAndGoOnStraight) {
     }
 }
 
-TEST(TouchLoop, LooksAgainAsSoonAsAPointMayHaveComeNear) {
+TEST(BodyContact, LooksAgainAsSoonAsAPointMayHaveComeNear) {
   Touching made = touching(4.0, model::Binding::touches);
   std::vector<Vec3> gradient(made.position.size(), Vec3::Zero());
   EXPECT_EQ(made.loop.add_gradient(made.position, 1, gradient), 0);

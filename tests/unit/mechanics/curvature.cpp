@@ -32,7 +32,7 @@ TEST(ConvexCurvature, BlocksArePositiveSemidefiniteInEveryState) {
       SCOPED_TRACE(info.name);
       const auto x = test::positions(model, info.state);
       for (const SpringLoop& loop : loops.springs)
-        for_each_spring_block(loop, x, 0.7, Curvature::convex,
+        for_each_spring_block(loop, x, 0.7, Curvature::semidefinite,
                               [](int64_t, const Mat3& block) { expect_semidefinite(block); });
       for_each_prism_block(loops, x, {0.7, volume, 1.3},
                            std::vector<double>(loops.prisms.size(), 0.0),
@@ -53,9 +53,12 @@ TEST(ConvexCurvature, BlocksArePositiveSemidefiniteForExtremeSprings) {
       for (double stiffness : {1e-9, 1.0, 1e12})
         for (double inverse : {1e-3, 1.0, 1e3}) {
           const Vec3 d = length * random.vector();
-          expect_semidefinite(spring_block<0>(d, stiffness, rest, inverse, Curvature::convex));
-          expect_semidefinite(spring_block<1>(d, stiffness, rest, inverse, Curvature::convex));
-          expect_semidefinite(spring_block<2>(d, stiffness, rest, inverse, Curvature::convex));
+          expect_semidefinite(
+              spring_block<0>(d, stiffness, rest, inverse, Curvature::semidefinite));
+          expect_semidefinite(
+              spring_block<1>(d, stiffness, rest, inverse, Curvature::semidefinite));
+          expect_semidefinite(
+              spring_block<2>(d, stiffness, rest, inverse, Curvature::semidefinite));
         }
 }
 
@@ -66,7 +69,7 @@ TEST(ConvexCurvature, IsTheExactOneWhereAllSpringsAreStretched) {
   const auto difference = [&](State state) {
     const auto x = test::positions(model, state);
     const Eigen::MatrixXd exact = test::assemble(loops, springs_only, x, Curvature::exact);
-    return (exact - test::assemble(loops, springs_only, x, Curvature::convex)).norm() /
+    return (exact - test::assemble(loops, springs_only, x, Curvature::semidefinite)).norm() /
            exact.norm();
   };
   EXPECT_EQ(difference(State::stretched), 0.0);
@@ -76,7 +79,7 @@ TEST(ConvexCurvature, IsTheExactOneWhereAllSpringsAreStretched) {
 TEST(ExactCurvature, SeesThatCompressedSpringsBuckle) {
   const Mat3 block = spring_block<2>(Vec3(0.5, 0, 0), 1.0, 1.0, 1.0, Curvature::exact);
   EXPECT_LT(block(1, 1), 0);
-  EXPECT_EQ(spring_block<2>(Vec3(0.5, 0, 0), 1.0, 1.0, 1.0, Curvature::convex)(1, 1), 0);
+  EXPECT_EQ(spring_block<2>(Vec3(0.5, 0, 0), 1.0, 1.0, 1.0, Curvature::semidefinite)(1, 1), 0);
 }
 
 /// Energy, gradient, Hessian blocks and action of one spring along a slanted line.
@@ -90,7 +93,7 @@ void expect_finite(int exponent, double length, double rest) {
       exponent, [&]<int p>() { return std::abs(spring_tension<p>(length - rest, 2.0, 1.0)); });
   for (const Vec3& g : gradient) EXPECT_LE(g.norm(), 1.5 * tension);
   EXPECT_EQ(gradient[0], -gradient[1]);
-  for (Curvature curvature : {Curvature::exact, Curvature::convex})
+  for (Curvature curvature : {Curvature::exact, Curvature::semidefinite})
     for_each_spring_block(loop, x, 1.0, curvature,
                           [](int64_t, const Mat3& block) { EXPECT_TRUE(block.allFinite()); });
   std::vector<Vec3> product(2, Vec3::Zero());

@@ -19,7 +19,7 @@ using test::StateInfo;
 /// A volume term with springs of the laws named.
 template <VolumeTerm volume, int... exponents>
 struct Term {
-  static constexpr double least_step = 0;
+  static constexpr double min_step = 0;
   static constexpr Weights weights{0.7, volume, 1.3};
 
   static model::Model model() { return test::uneven_patch(); }
@@ -36,7 +36,7 @@ constexpr VolumeTerm none = VolumeTerm::none, paper = VolumeTerm::paper,
                      penalty = VolumeTerm::penalty;
 /// The neo-Hookean solid.
 struct Solid {
-  static constexpr double least_step = 1.0 / 1024;  // below, rounding of a larger energy shows
+  static constexpr double min_step = 1.0 / 1024;  // below, rounding of a larger energy shows
   static constexpr Weights weights{0.7, VolumeTerm::penalty, 1.3};
   static model::Model model() { return test::uneven_solid(); }
   static Loops loops(const model::Model& model) {
@@ -89,7 +89,7 @@ TYPED_TEST(Derivatives, TaylorRemaindersFallAsTheyShould) {
   this->in_every_state([this](const std::vector<Vec3>& x, const StateInfo& info) {
     const auto here = test::evaluate(this->loops_, this->weights_, x);
     const auto hessian = test::assemble(this->loops_, this->weights_, x, Curvature::exact);
-    const double step = std::max(info.step, TypeParam::least_step);
+    const double step = std::max(info.step, TypeParam::min_step);
     Remainder gradient, blocks, action;
     for (uint32_t seed = 2; seed < 8; ++seed) {
       const auto directions = test::random_directions(x.size(), seed);

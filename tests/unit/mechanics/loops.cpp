@@ -15,10 +15,11 @@ int64_t count(const auto& rows) { return static_cast<int64_t>(rows.size()); }
 
 /// How many of the first `owned` elements have a soft-tissue point and satisfy `wanted`.
 template <class Elements, class Wanted>
-int64_t soft(const model::Model& model, const Elements& elements, int64_t owned, Wanted&& wanted) {
+int64_t soft(const model::Model& model, const Elements& elements, int64_t owned,
+             Wanted&& requested) {
   int64_t n = 0;
   for (int64_t e = 0; e < owned; ++e)
-    if (wanted(e) && std::any_of(elements[e].begin(), elements[e].end(), [&](int64_t i) {
+    if (requested(e) && std::any_of(elements[e].begin(), elements[e].end(), [&](int64_t i) {
           return model.points.set[i] == PointSet::soft_tissue;
         }))
       ++n;

@@ -47,7 +47,7 @@ Prism mapped(const Prism& p, Map&& map) {
   return q;
 }
 
-Prism relabelled(const Prism& p, const std::array<int, 6>& order) {
+Prism relabeled(const Prism& p, const std::array<int, 6>& order) {
   Prism q;
   for (int c = 0; c < 6; ++c) q[c] = p[order[c]];
   return q;
@@ -94,9 +94,9 @@ TEST(PrismVolume, IsTheSumOfThreeTetrahedraWhereFacesArePlane) {
 }
 
 TEST(PrismVolume, SignFollowsTheOrder) {
-  EXPECT_DOUBLE_EQ(volume(relabelled(unit, {3, 4, 5, 0, 1, 2})), -0.5);
-  EXPECT_DOUBLE_EQ(volume(relabelled(unit, {0, 2, 1, 3, 5, 4})), -0.5);
-  EXPECT_DOUBLE_EQ(volume(relabelled(unit, {3, 5, 4, 0, 2, 1})), 0.5);
+  EXPECT_DOUBLE_EQ(volume(relabeled(unit, {3, 4, 5, 0, 1, 2})), -0.5);
+  EXPECT_DOUBLE_EQ(volume(relabeled(unit, {0, 2, 1, 3, 5, 4})), -0.5);
+  EXPECT_DOUBLE_EQ(volume(relabeled(unit, {3, 5, 4, 0, 2, 1})), 0.5);
   EXPECT_DOUBLE_EQ(volume(mapped(unit, [](const Vec3& x) { return Vec3(-x.x(), x.y(), x.z()); })),
                    -0.5);
   EXPECT_EQ(volume(mapped(unit, [](const Vec3& x) { return Vec3(x.x(), x.y(), 0); })), 0.0);
@@ -109,8 +109,8 @@ TEST(PrismVolume, RigidMotionAndTurningTheLabelsChangeNothing) {
     const Vec3 shift(3, -5, 7);
     EXPECT_NEAR(volume(mapped(p, [&](const Vec3& x) { return Vec3(turn * x + shift); })), volume(p),
                 1e-12);
-    EXPECT_NEAR(volume(relabelled(p, {1, 2, 0, 4, 5, 3})), volume(p), 1e-12);
-    EXPECT_NEAR(volume(relabelled(p, {2, 0, 1, 5, 3, 4})), volume(p), 1e-12);
+    EXPECT_NEAR(volume(relabeled(p, {1, 2, 0, 4, 5, 3})), volume(p), 1e-12);
+    EXPECT_NEAR(volume(relabeled(p, {2, 0, 1, 5, 3, 4})), volume(p), 1e-12);
   }
 }
 

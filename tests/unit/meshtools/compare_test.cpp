@@ -25,7 +25,7 @@ TEST(Compare, spheres_lie_apart_by_the_difference_of_their_radii) {
   EXPECT_NEAR(s.rms, 3, 0.03);
   EXPECT_NEAR(s.percentile_90, 3, 0.05);
   EXPECT_NEAR(s.percentile_95, 3, 0.05);
-  EXPECT_NEAR(s.most, 3, 0.1);
+  EXPECT_NEAR(s.maximum, 3, 0.1);
   EXPECT_NEAR(s.area, 4 * M_PI * 144, 20);
   const auto back = statistics(sample_distances(large, SignedDistance(small), 1));
   EXPECT_NEAR(back.mean_signed, 3, 0.03);
@@ -86,11 +86,11 @@ TEST(Compare, what_lies_beyond_the_rim_is_known) {
   EXPECT_NEAR(std::abs(distance.at({-4, -3, 0}).distance), 5, 1e-12);
 }
 
-TEST(Compare, colours_go_from_blue_over_white_to_red) {
-  EXPECT_EQ(distance_colour(0, 2), (std::array<uint8_t, 3>{255, 255, 255}));
-  EXPECT_EQ(distance_colour(-9, 2), distance_colour(-2, 2));
-  EXPECT_GT(distance_colour(-2, 2)[2], distance_colour(-2, 2)[0]);
-  EXPECT_GT(distance_colour(2, 2)[0], distance_colour(2, 2)[2]);
+TEST(Compare, colors_go_from_blue_over_white_to_red) {
+  EXPECT_EQ(distance_color(0, 2), (std::array<uint8_t, 3>{255, 255, 255}));
+  EXPECT_EQ(distance_color(-9, 2), distance_color(-2, 2));
+  EXPECT_GT(distance_color(-2, 2)[2], distance_color(-2, 2)[0]);
+  EXPECT_GT(distance_color(2, 2)[0], distance_color(2, 2)[2]);
 }
 
 }  // namespace compare_test

@@ -40,7 +40,7 @@ Decimated decimated(const Surface& surface, double distance) {
   return decimate(surface, {.distance = distance}, [](int64_t) {});
 }
 
-/// Of many points spread over the first surface the largest distance to the second.
+/// Largest distance of many points of the first surface to the second.
 double sampled_distance(const Surface& from, const Surface& to, int per_edge) {
   const DistanceTree tree(to);
   double largest = 0;
@@ -107,9 +107,10 @@ TEST(Decimate, borders_and_landmarks_stay) {
   EXPECT_EQ(inspect(result.surface).border_loops, 1);
   ASSERT_EQ(result.landmark_distance.size(), 2u);
   for (size_t i = 0; i < 2; ++i) {
-    double least = 1e9;
-    for (const Vec3& p : result.surface.points) least = std::min(least, (p - landmarks[i]).norm());
-    EXPECT_NEAR(least, result.landmark_distance[i], 1e-12);
+    double minimum = 1e9;
+    for (const Vec3& p : result.surface.points)
+      minimum = std::min(minimum, (p - landmarks[i]).norm());
+    EXPECT_NEAR(minimum, result.landmark_distance[i], 1e-12);
   }
 }
 
@@ -117,7 +118,7 @@ TEST(Decimate, thin_walls_do_not_run_through_each_other) {
   Surface outer = bumpy_ball(24, 0, 1), inner = outer;
   for (Vec3& p : inner.points) p *= 0.992;  // a wall of 0.4 mm
   for (auto& t : inner.triangles) turn(t);
-  const Surface shell = together(outer, inner);
+  const Surface shell = collective_try(outer, inner);
   ASSERT_EQ(inspect(shell).self_intersections, 0);
   const Decimated result = decimated(shell, 1.5);
   EXPECT_EQ(inspect(result.surface).self_intersections, 0);
@@ -164,7 +165,7 @@ TEST(Decimate, a_target_count_is_met_and_its_distance_measured) {
   }
 }
 
-// A count costs about the distance that, asked for, leads to that count.
+// A count costs about the distance that, requested, leads to that count.
 TEST(Decimate, a_count_costs_no_more_than_it_must) {
   const Surface input = bumpy_ball(26, 4, 2);
   const auto count = static_cast<int64_t>(decimated(input, 1.0).surface.triangles.size());
@@ -187,8 +188,8 @@ TEST_F(DecimateFiles, a_mesh_with_three_triangles_at_an_edge_is_refused) {
   fins.points.push_back({10, 10, 30});
   fins.triangles.push_back({4, 1, 9});
   write_ply(folder_ / "fins.ply", fins);
-  const std::string said = refusal([&] { load_surface(folder_ / "fins.ply", Role::mesh); });
-  EXPECT_NE(said.find("fins.ply: 1 non-manifold edge"), std::string::npos) << said;
+  const std::string message = refusal([&] { load_surface(folder_ / "fins.ply", Role::mesh); });
+  EXPECT_NE(message.find("fins.ply: 1 non-manifold edge"), std::string::npos) << message;
 }
 
 TEST(Hausdorff, closed_forms) {

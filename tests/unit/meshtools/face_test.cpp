@@ -130,7 +130,7 @@ TEST(SolvableFace, lies_on_the_given_skin_and_is_well_shaped) {
     FaceRequest request{4};
     request.places = {Vec3(0, -radius, 0)};
     const Face face = solvable_face(given, request);
-    EXPECT_GT(face.least_angle, 20);
+    EXPECT_GT(face.min_angle, 20);
     EXPECT_LT(face.off_95, 0.2 + noise);
     const Defects defects = inspect(face.skin);
     EXPECT_EQ(defects.components, 1);

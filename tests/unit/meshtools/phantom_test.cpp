@@ -31,13 +31,13 @@ int64_t edge_count(const Surface& surface) {
 std::vector<double> smallest_angles(const Surface& surface) {
   std::vector<double> result;
   for (const auto& t : surface.triangles) {
-    double least = 180;
+    double minimum = 180;
     for (int i = 0; i < 3; ++i) {
       const Vec3 a = surface.points[t[(i + 1) % 3]] - surface.points[t[i]];
       const Vec3 b = surface.points[t[(i + 2) % 3]] - surface.points[t[i]];
-      least = std::min(least, std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi);
+      minimum = std::min(minimum, std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi);
     }
-    result.push_back(least);
+    result.push_back(minimum);
   }
   std::sort(result.begin(), result.end());
   return result;
@@ -58,13 +58,13 @@ std::vector<Vec3> samples(const Surface& surface) {
 /// Least and greatest distance from one surface's samples to the other surface.
 std::pair<double, double> distances(const Surface& from, const Surface& to) {
   const DistanceTree tree(to);
-  double least = 1e300, greatest = 0;
+  double minimum = 1e300, greatest = 0;
   for (const Vec3& point : samples(from)) {
     const double d = tree.nearest(point).distance;
-    least = std::min(least, d);
+    minimum = std::min(minimum, d);
     greatest = std::max(greatest, d);
   }
-  return {least, greatest};
+  return {minimum, greatest};
 }
 
 double gap(const Surface& a, const Surface& b) {

@@ -135,9 +135,9 @@ TEST(Register, too_few_or_collinear_landmarks_are_refused) {
             std::string::npos);
   std::vector<Vec3> line;
   for (int i = 0; i < 5; ++i) line.emplace_back(i, 2 * i, 0.001 * (i % 2));
-  const auto said = refusal([&] { fit_landmarks(line, line, false); });
-  EXPECT_NE(said.find("on a line"), std::string::npos);
-  EXPECT_NE(said.find("moving"), std::string::npos);
+  const auto message = refusal([&] { fit_landmarks(line, line, false); });
+  EXPECT_NE(message.find("on a line"), std::string::npos);
+  EXPECT_NE(message.find("moving"), std::string::npos);
   auto bent = line;
   bent[2].y() += 3;
   EXPECT_NE(refusal([&] { fit_landmarks(bent, line, false); }).find("fixed"), std::string::npos);

@@ -120,7 +120,7 @@ TEST(Build, a_remeshed_skin_is_lifted_off_bone_that_reaches_through_it) {
   for (Vec3& x : anatomy.bones[0].points) x.z() += 25.6;  // 0.6 mm beyond the skin
   anatomy.bones[0].name = "skull";
   EXPECT_THROW(build_model(anatomy), RefusedPlaces);
-  solve_remeshed(anatomy);
+  remesh_skin(anatomy);
   ASSERT_TRUE(anatomy.given_skin.has_value());
   const BuiltModel built = build_model(anatomy);
   EXPECT_TRUE(remarked(built.report, "inside bone and were moved out"));
@@ -252,8 +252,8 @@ TEST(Build, a_plan_makes_attachment_and_contact_the_same_for_all_its_moves) {
   };
   const auto same = [](const Model& a, const Model& b) {
     return a.points.set == b.points.set && a.points.bone == b.points.bone &&
-           a.contact.touches.point == b.contact.touches.point &&
-           a.contact.touches.body == b.contact.touches.body;
+           a.contact.pairs.point == b.contact.pairs.point &&
+           a.contact.pairs.body == b.contact.pairs.body;
   };
   EXPECT_FALSE(same(built(5, 5), built(5, 6)));
   jaws.scene.plan = scene::Plan{{0, 1}, {0, 6, 0}, {0, 0, 0}};

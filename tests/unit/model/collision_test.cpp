@@ -83,8 +83,8 @@ TEST(Collisions, both_may_move) {
 TEST(Collisions, a_fresh_cut_may_part_and_slide_but_not_press) {
   const meshtools::Pieces parts = meshtools::cut_bone(
       box("bone", {0, 0, 0}, {60, 50, 40}), {"piece", {{{30, 0, 0}, {1, 0, 0.5}}}, {}, 0, {}});
-  const auto report = [&](const Vec3& way) {
-    return follow_moves({parts.rest, parts.piece}, {{}, RigidMotion::translation(way)}, {});
+  const auto report = [&](const Vec3& translation) {
+    return follow_moves({parts.rest, parts.piece}, {{}, RigidMotion::translation(translation)}, {});
   };
   EXPECT_EQ(report({5, 0, 0}).safe_load, 1) << "apart";
   EXPECT_EQ(report({-2, 0, 4}).safe_load, 1) << "along the cut";
@@ -99,7 +99,7 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
       scene_of(jaws, {RigidMotion::translation({4, 0, 0}), RigidMotion::translation({0, 0, 20})});
   scene.collision = scene::Collision{scene::CollisionMode::clamp, 0.5, 0.01};
   std::vector<std::string> remarks;
-  heed_collisions(jaws, scene, remarks);
+  resolve_collisions(jaws, scene, remarks);
   const Vec3 lower = scene.moves[1].apply(Vec3::Zero()), upper = scene.moves[0].apply(Vec3::Zero());
   EXPECT_LE(lower.z(), 9.5);
   EXPECT_GE(lower.z(), 9.49 - 1e-3);
@@ -111,17 +111,17 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
 TEST(Collisions, report_and_none_change_nothing) {
   scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({8, 0, 20})});
   std::vector<std::string> remarks;
-  heed_collisions(jaws, scene, remarks);
+  resolve_collisions(jaws, scene, remarks);
   ASSERT_EQ(remarks.size(), 1u);
   EXPECT_EQ(remarks[0].find("bones 'upper' and 'lower' end 5.0 mm inside one another"), 0u)
       << remarks[0];
   scene.moves[1] = RigidMotion::translation({8, 0, 10.9});
   remarks.clear();
-  heed_collisions(jaws, scene, remarks);
+  resolve_collisions(jaws, scene, remarks);
   EXPECT_TRUE(remarks.empty());
   scene.moves[1] = RigidMotion::translation({8, 0, 20});
   scene.collision = scene::Collision{};
-  heed_collisions(jaws, scene, remarks);
+  resolve_collisions(jaws, scene, remarks);
   EXPECT_EQ(scene.moves[1].apply(Vec3::Zero()).z(), 20);
   ASSERT_EQ(remarks.size(), 1u);
   EXPECT_NE(remarks[0].find("bones 'upper' and 'lower', 10.00 mm apart at the start: come within"),
@@ -134,7 +134,7 @@ TEST(Collisions, stop_refuses_the_scene) {
   scene.collision = scene::Collision{scene::CollisionMode::stop, 0, 0.05};
   std::vector<std::string> remarks;
   try {
-    heed_collisions(jaws, scene, remarks);
+    resolve_collisions(jaws, scene, remarks);
     FAIL() << "accepted";
   } catch (const base::InputError& error) {
     const std::string why = error.what();
@@ -142,7 +142,7 @@ TEST(Collisions, stop_refuses_the_scene) {
     EXPECT_EQ(why.find('\n'), std::string::npos);
   }
   scene.moves[1] = RigidMotion::translation({0, 0, 5});
-  heed_collisions(jaws, scene, remarks);
+  resolve_collisions(jaws, scene, remarks);
 }
 
 }  // namespace collision_test

@@ -19,7 +19,7 @@ Columns lay(const SkinMesh& mesh, const std::vector<surface::Surface>& bones,
   const BoneField field(bones);
   std::vector<BoneField::Nearest> nearest;
   for (const Vec3& x : mesh.points) nearest.push_back(field.nearest(x));
-  return lay_columns(mesh, field, nearest, tissue, "skin.ply");
+  return compute_columns(mesh, field, nearest, tissue, "skin.ply");
 }
 
 void expect_unfolded(const SkinMesh& mesh, const Columns& columns) {

@@ -90,8 +90,8 @@ TEST(CutPath, refuses_what_cannot_be_cut) {
     EXPECT_EQ(text.find("scene.yaml: incisions["), 0u) << text;
   };
   says({{{{15, 15, 0}, {15, 30, 7}}, 1}}, "7.0 mm from the skin, allowed are 5 mm");
-  says({{{{15, 15, 0}, {63, 30, 0}}, 1}}, "comes to the rim");
-  says({{{{15, 0, 0}, {45, 0, 0}}, 1}}, "comes to the rim");
+  says({{{{15, 15, 0}, {63, 30, 0}}, 1}}, "reaches the rim");
+  says({{{{15, 0, 0}, {45, 0, 0}}, 1}}, "reaches the rim");
   says({{{{15, 15, 0}, {20, 15, 0}}, 1}}, "no longer than an edge");
   const std::vector<Vec3> loop = {{12, 12, 0}, {48, 13, 0}, {47, 40, 0}, {30, 41, 0}, {29, 5, 0}};
   says({{loop, 1}}, "meets itself");
@@ -264,13 +264,13 @@ TEST_F(CutSolid, keeps_the_tension_that_its_edges_carry) {
 
 TEST(CutTouches, both_sides_share_the_area_that_touches) {
   Model m;
-  m.contact.touches = {{3, 5}, {0, 1}, {Binding::touches, Binding::slides}, {4, 6}};
-  share_touches({{5, 9}, {7, 10}}, m);
-  const Touches& touches = m.contact.touches;
-  EXPECT_EQ(touches.point, (std::vector<int64_t>{3, 5, 9}));
-  EXPECT_EQ(touches.body, (std::vector<int32_t>{0, 1, 1}));
-  EXPECT_EQ(touches.binding[2], Binding::slides);
-  EXPECT_EQ(touches.area, (std::vector<double>{4, 3, 3}));
+  m.contact.pairs = {{3, 5}, {0, 1}, {Binding::touches, Binding::slides}, {4, 6}};
+  share_pairs({{5, 9}, {7, 10}}, m);
+  const ContactPairs& pairs = m.contact.pairs;
+  EXPECT_EQ(pairs.point, (std::vector<int64_t>{3, 5, 9}));
+  EXPECT_EQ(pairs.body, (std::vector<int32_t>{0, 1, 1}));
+  EXPECT_EQ(pairs.binding[2], Binding::slides);
+  EXPECT_EQ(pairs.area, (std::vector<double>{4, 3, 3}));
 }
 
 }  // namespace cut_test

@@ -4,20 +4,20 @@
 
 #include "quadratic.h"
 #include "repose/discrete/tangent.h"
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 namespace repose::paper {
 namespace polak_ribiere_test {
 
-/// With exact line minima a quadratic of four curvatures is minimised in four iterations.
-TEST(PolakRibiere, MinimisesAQuadraticInItsNumberOfCurvatures) {
+/// With exact line minima a quadratic of four curvatures is minimized in four iterations.
+TEST(PolakRibiere, MinimizesAQuadraticInItsNumberOfCurvatures) {
   const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
   discrete::Positions positions(MPI_COMM_WORLD, part);
   testing::Quadratic function(positions, 4);
   const base::VecHandle x = positions.make_vector();
   PolakRibiereSettings settings;
   settings.line_tolerance = 1e-8;
-  settings.most_iterations = 4;
+  settings.max_iterations = 4;
   const PolakRibiereOutcome outcome = polak_ribiere(function, x, settings);
   EXPECT_LT(outcome.value, 1e-12);
   base::check(VecShift(x, -1));
@@ -44,7 +44,7 @@ TEST(PolakRibiere, FindsTheRestPositionOfTissue) {
   discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 0.3});
   discrete::Tangent tangent(objective);
   linear::TangentSolver solver(positions, tangent);
-  solve::Minimiser newton(objective, solver, nullptr);
+  solve::Minimizer newton(objective, solver, nullptr);
   const base::VecHandle x = positions.make_vector(), rest = positions.make_vector();
   ASSERT_TRUE(newton.run(rest, 1e-9).converged);
   polak_ribiere(objective, x);

@@ -40,12 +40,12 @@ TEST(NameLock, NamesAProcessThatMayLiveOrHasEnded) {
   const NameLock lock(folder.path("a"));
   std::string mine;
   std::getline(std::ifstream(folder.path("a.lock")), mine);
-  EXPECT_TRUE(may_live(mine)) << mine;
-  EXPECT_FALSE(may_live(mine + "0")) << "its number was given to another process";
+  EXPECT_TRUE(may_be_running(mine)) << mine;
+  EXPECT_FALSE(may_be_running(mine + "0")) << "its number was given to another process";
   const auto host = mine.find(" on ");
-  EXPECT_FALSE(may_live("process 99999999" + mine.substr(host)));
-  EXPECT_TRUE(may_live("process 99999999 on another-host since tick 1"));
-  EXPECT_TRUE(may_live("process 99999999 on a host of an earlier version"));
+  EXPECT_FALSE(may_be_running("process 99999999" + mine.substr(host)));
+  EXPECT_TRUE(may_be_running("process 99999999 on another-host since tick 1"));
+  EXPECT_TRUE(may_be_running("process 99999999 on a host of an earlier version"));
 }
 
 TEST(NameLock, AMissingFolderIsRefused) {

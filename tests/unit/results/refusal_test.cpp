@@ -323,11 +323,11 @@ model::Model touching_model() {
   m.bone_surfaces[0].points = {{0, 0, -5}, {2, 0, -5}, {0, 2, -5}, {0, 0, -3}};
   m.bone_surfaces[0].triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   m.contact.bodies = {{m.bones[0], 0}};
-  m.contact.touches = {{4}, {0}, {model::Binding::touches}, {2.0}};
-  m.contact.walls = {{{2, 2}}, {0}, {}, std::vector<double>(8, 1.0), {0, 1, 0, 0}};
+  m.contact.pairs = {{4}, {0}, {model::Binding::touches}, {2.0}};
+  m.contact.cut_faces = {{{2, 2}}, {0}, {}, std::vector<double>(8, 1.0), {0, 1, 0, 0}};
   for (int64_t c = 0; c < 8; ++c) {
-    m.contact.walls.point.push_back(c % static_cast<int64_t>(m.points.position.size()));
-    m.contact.walls.begin.push_back(c + 1);
+    m.contact.cut_faces.point.push_back(c % static_cast<int64_t>(m.points.position.size()));
+    m.contact.cut_faces.begin.push_back(c + 1);
   }
   return m;
 }
@@ -339,7 +339,7 @@ TEST_P(ContactDefect, IsRefusedByName) {
   write_small_result(folder.path("a"), touching_model());
   model::Model back;
   ASSERT_EQ(refusal([&] { back = read_model(folder.path("a.h5")); }), "accepted");
-  EXPECT_EQ(back.contact.walls.begin, touching_model().contact.walls.begin);
+  EXPECT_EQ(back.contact.cut_faces.begin, touching_model().contact.cut_faces.begin);
   GetParam().spoil(Spoiler(folder.path("a.h5")));
   const std::string text = refusal([&] { read_model(folder.path("a.h5")); });
   EXPECT_EQ(text.rfind(folder.path("a.h5").string() + ": ", 0), 0u) << text;

@@ -8,20 +8,20 @@
 namespace repose::results {
 namespace restart_test {
 
-struct Told {
+struct StepState {
   double load;
   bool converged;
 };
 
 /// What a file with such steps lets a run go on from.
-Restart restart_of(const std::vector<Told>& steps) {
+Restart restart_of(const std::vector<StepState>& steps) {
   const Folder folder;
   const model::Model m = small_model();
   ResultFile file(MPI_COMM_SELF, folder.path("a"), m, Kind::checkpoint);
-  for (const Told& told : steps) {
-    model::StepNumbers numbers = small_numbers(told.load);
-    numbers.converged = told.converged;
-    file.append(numbers, small_rows(m, told.load));
+  for (const StepState& step : steps) {
+    model::StepNumbers numbers = small_numbers(step.load);
+    numbers.converged = step.converged;
+    file.append(numbers, small_rows(m, step.load));
   }
   file.commit();
   EXPECT_TRUE(is_checkpoint(folder.path("a.h5")));
@@ -36,7 +36,8 @@ TEST(Restart, IsFromTheLastRestPosition) {
 }
 
 TEST(Restart, IsByAGuessWhereOnlyASearchAtTheEndWasUnderWay) {
-  for (const std::vector<Told>& steps : {std::vector<Told>{{0, true}, {1, false}}, {{1, false}}}) {
+  for (const std::vector<StepState>& steps :
+       {std::vector<StepState>{{0, true}, {1, false}}, {{1, false}}}) {
     const Restart restart = restart_of(steps);
     EXPECT_EQ(restart.load, 0);
     EXPECT_TRUE(restart.guess);
@@ -54,7 +55,7 @@ TEST(Restart, IsFromTheStartWhereNothingWasReached) {
   const Restart restart = restart_of({{0, false}});
   EXPECT_EQ(restart.load, 0);
   EXPECT_FALSE(restart.guess);
-  EXPECT_NE(refusal([] { restart_of({}); }).find("no step to go on from"), std::string::npos);
+  EXPECT_NE(refusal([] { restart_of({}); }).find("no step to resume from"), std::string::npos);
 }
 
 /// Of a result with steps at these loads, all at rest, of `m`.

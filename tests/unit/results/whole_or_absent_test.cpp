@@ -61,7 +61,7 @@ TEST(WholeOrAbsent, WhatIsSavedOnTheWayIsAResultAndTheRunGoesOn) {
     numbers.converged = converged;
     return numbers;
   };
-  file.append_under_way(at(0, false), small_rows(m, 0));  // which is saved, as was wanted before
+  file.append_provisional(at(0, false), small_rows(m, 0));  // which is saved, as was wanted before
   EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
   EXPECT_EQ(steps_of(folder, m), (Steps{{0, false}}));
   EXPECT_FALSE(file.save()) << "it is saved";

@@ -77,9 +77,9 @@ TEST(Landmarks, AFrameThatIsNotSaidIsRefused) {
   for (const auto& [name, text] :
        {std::pair("a.mrk.json", markups("", point)), std::pair("a.csv", std::string("a,1,2,3\n")),
         std::pair("a.fcsv", std::string("a,1,2,3,0,0,0,1,1,1,0,chin,,\n"))}) {
-    const std::string said = refused(name, text);
-    EXPECT_NE(said.find(std::string(name) + ":1"), std::string::npos) << said;
-    EXPECT_NE(said.find("LPS"), std::string::npos) << said;
+    const std::string message = refused(name, text);
+    EXPECT_NE(message.find(std::string(name) + ":1"), std::string::npos) << message;
+    EXPECT_NE(message.find("LPS"), std::string::npos) << message;
   }
   EXPECT_NE(refused("a.mrk.json", markups(R"("coordinateSystem": "IJK",)", point)).find("'IJK'"),
             std::string::npos);
@@ -88,8 +88,8 @@ TEST(Landmarks, AFrameThatIsNotSaidIsRefused) {
 
 TEST(Landmarks, BadFilesAreRefusedInOneLine) {
   const std::string lps = R"("coordinateSystem": "LPS",)", csv = "# CoordinateSystem = LPS\n";
-  const auto expect = [](const std::string& said, const std::string& word) {
-    EXPECT_NE(said.find(word), std::string::npos) << said;
+  const auto expect = [](const std::string& message, const std::string& word) {
+    EXPECT_NE(message.find(word), std::string::npos) << message;
   };
   expect(refused("a.mrk.json", "{\"markups\": ["), "not valid JSON");
   expect(refused("a.json", "{\"chin\": [1, 2]}"), "markups");

@@ -109,8 +109,8 @@ TEST(RigidMotion, TinyTurnKeepsItsDigits) {
   const Mat4 half = RigidMotion::rotation({0, 0, 1}, {0, 0, 0}, degrees).matrix(0.5);
   EXPECT_NEAR(half(1, 0) / (0.5 * degrees * degree), 1, 1e-12);
   const Vec3 arm(1, 0, 0), center(0, 0, 0);
-  const double way = RigidMotion::rotation({0, 0, 1}, center, degrees).apply(arm, 0.5).y();
-  EXPECT_NEAR(way / (0.5 * degrees * degree), 1, 1e-12);
+  const double height = RigidMotion::rotation({0, 0, 1}, center, degrees).apply(arm, 0.5).y();
+  EXPECT_NEAR(height / (0.5 * degrees * degree), 1, 1e-12);
 }
 
 TEST(RigidMotion, PartOfATranslationIsStraight) {
@@ -185,7 +185,7 @@ TEST(RigidFit, MirroredPointsGiveARotation) {
 }
 
 // Kabsch is the least-squares optimum: no small turn of it does better.
-TEST(RigidFit, IsTheBestOfItsNeighbours) {
+TEST(RigidFit, IsTheBestOfItsNeighbors) {
   const std::vector<Vec3> from = cloud(15), noise = cloud(15, 8);
   std::vector<Vec3> to = moved(from, example(50));
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += 0.1 * noise[i];

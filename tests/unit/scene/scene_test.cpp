@@ -84,17 +84,17 @@ TEST(Scene, PlanRefusesWhatItDoesNotHold) {
 TEST(Scene, TableHasTheDefaultsOfTheCode) {
   const Scene plain = read(minimal);
   const auto standard = [](const char* path) { return find_key(path).standard; };
-  const Scene spelt = read(fmt::format(
+  const Scene spelled = read(fmt::format(
       "{}boundary: {{rim: {}}}\nsolve: {{functional: {}, lambda: {}, "
       "accuracy: {}, load_steps: {}}}\n",
       minimal, standard("boundary.rim"), standard("solve.functional"), standard("solve.lambda"),
       standard("solve.accuracy"), standard("solve.load_steps")));
-  EXPECT_EQ(plain.rim, spelt.rim);
-  EXPECT_EQ(plain.solve.functional, spelt.solve.functional);
-  EXPECT_EQ(plain.solve.volume, spelt.solve.volume);
-  EXPECT_EQ(plain.solve.lambda, spelt.solve.lambda);
-  EXPECT_EQ(plain.solve.accuracy, spelt.solve.accuracy);
-  EXPECT_EQ(plain.solve.load_steps, spelt.solve.load_steps);
+  EXPECT_EQ(plain.rim, spelled.rim);
+  EXPECT_EQ(plain.solve.functional, spelled.solve.functional);
+  EXPECT_EQ(plain.solve.volume, spelled.solve.volume);
+  EXPECT_EQ(plain.solve.lambda, spelled.solve.lambda);
+  EXPECT_EQ(plain.solve.accuracy, spelled.solve.accuracy);
+  EXPECT_EQ(plain.solve.load_steps, spelled.solve.load_steps);
   const Tissue& tissue = plain.tissue;
   EXPECT_EQ(base::parse_number(standard("tissue.attach_within")), tissue.attach_within);
   EXPECT_EQ(base::parse_number(standard("tissue.free_thickness")), tissue.free_thickness);
@@ -193,7 +193,7 @@ TEST(Scene, FullRest) {
   const Scene scene = read(full);
   EXPECT_EQ(scene.bones[1].surface.file.filename(), "mandible.ply");
   EXPECT_EQ(scene.bones[1].surface.file.parent_path(), scene.skin.file.parent_path())
-      << "normalised";
+      << "normalized";
   EXPECT_EQ(*scene.gravity, Vec3(0, 0, -9.80665));
   EXPECT_EQ(scene.rim, Rim::free);
   ASSERT_EQ(scene.forces.size(), 1u);
@@ -648,11 +648,11 @@ TEST(Scene, SurfacesFromVolumes) {
   EXPECT_EQ(skin.voxel, 2);
   EXPECT_EQ(skin.close_holes, 3);
   EXPECT_EQ(skin.smooth, 0);
-  const VolumeEntry& labelled = scene.bones[0].surface.volume.value();
-  EXPECT_EQ(labelled.label, 2);
-  EXPECT_FALSE(labelled.level || labelled.box || labelled.open);
-  EXPECT_EQ(labelled.voxel, 0);
-  EXPECT_EQ(labelled.smooth, 10);
+  const VolumeEntry& labeled = scene.bones[0].surface.volume.value();
+  EXPECT_EQ(labeled.label, 2);
+  EXPECT_FALSE(labeled.level || labeled.box || labeled.open);
+  EXPECT_EQ(labeled.voxel, 0);
+  EXPECT_EQ(labeled.smooth, 10);
   const VolumeEntry& otsu = scene.bones[1].surface.volume.value();
   EXPECT_FALSE(otsu.level || otsu.label);
 }
@@ -715,7 +715,7 @@ TEST(SceneRefuses, DamagedFilesWithoutHarm) {
 TEST(Keys, EveryRowIsComplete) {
   for (const Key& key : all_keys()) {
     EXPECT_FALSE(key.sentence.empty()) << key.path;
-    EXPECT_FALSE(wanted(key).empty()) << key.path;
+    EXPECT_FALSE(expected(key).empty()) << key.path;
     EXPECT_EQ(&find_key(key.path), &key) << "twice in the table: " << key.path;
     if (key.kind == KeyKind::choice) {
       EXPECT_GE(key.choices.size(), 1u) << key.path;

@@ -77,7 +77,7 @@ TEST_P(Laws, HangingChain) {
 }
 
 /// A regular lattice whose border is pushed by an affine map follows it: every inner point is a
-/// centre of symmetry.
+/// center of symmetry.
 TEST_P(Laws, PushedPatchIsAffine) {
   model::Model m = testing::block(7, 6, 5, GetParam(), [](int i, int j, int a) {
     const bool inner = i > 0 && i < 6 && j > 0 && j < 5 && a > 0 && a < 4;

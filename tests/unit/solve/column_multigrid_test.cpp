@@ -30,7 +30,7 @@ struct Preconditioned : testing::MovedBlock {
   discrete::Objective objective;
   discrete::Tangent tangent{objective};
   linear::BlockSource blocks = [this](const discrete::BlockVisitor& visit) {
-    tangent.visit_convex(visit);
+    tangent.visit_spd_blocks(visit);
   };
   base::VecHandle at = vector(1, 0.05);
 
@@ -50,7 +50,7 @@ struct Preconditioned : testing::MovedBlock {
     check(KSPCreate(MPI_COMM_WORLD, krylov.out()));
     check(KSPSetType(krylov, KSPCG));
     check(KSPSetPC(krylov, solver.preconditioner()));
-    check(KSPSetOperators(krylov, tangent.convex(), tangent.convex()));
+    check(KSPSetOperators(krylov, tangent.spd_approximation(), tangent.spd_approximation()));
     check(KSPSetTolerances(krylov, 1e-8, 0, PETSC_DEFAULT, 500));
     check(KSPSolve(krylov, vector(3, 1.0), answer));
     PetscInt iterations = 0;
@@ -107,14 +107,14 @@ TEST(ColumnMultigrid, SolvesColumnsThatAreNotCoupledAtOnce) {
   base::VecHandle answer = s.positions.make_vector();
   multigrid.apply(rhs, answer);
   std::vector<Vec3> x(part.point_row.size(), Vec3::Zero()), left = x;
-  s.positions.spread(answer, x);
+  s.positions.scatter_to_local(answer, x);
   for_each_point([&](int32_t i, bool above) {
     left[i] += 4 * x[i];
     if (!above) return;
     left[i] += link * x[i + 1];
     left[i + 1] += link.transpose() * x[i];
   });
-  s.positions.keep_owned(left, answer);
+  s.positions.restrict_to_owned(left, answer);
   check(VecAXPY(answer, -1, rhs));
   EXPECT_LT(discrete::largest_block(answer), 1e-3);
 }

@@ -53,10 +53,10 @@ void bind_face(model::Model& m, model::Body body, Binding binding,
   m.contact.bodies.push_back(std::move(body));
   for (size_t i = 0; i < area.size(); ++i) {
     if (area[i] == 0 || m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.touches.point.push_back(static_cast<int64_t>(i));
-    m.contact.touches.body.push_back(row);
-    m.contact.touches.binding.push_back(binding);
-    m.contact.touches.area.push_back(area[i]);
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(row);
+    m.contact.pairs.binding.push_back(binding);
+    m.contact.pairs.area.push_back(area[i]);
   }
   m.contact.stiffness = 0.05;
 }

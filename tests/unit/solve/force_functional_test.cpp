@@ -86,7 +86,7 @@ class Reference {
  private:
   std::vector<Vec3> spread(Vec v) const {
     std::vector<Vec3> local(f_.part.point_row.size(), Vec3::Zero());
-    f_.positions.spread(v, local);
+    f_.positions.scatter_to_local(v, local);
     return local;
   }
   base::VecHandle action(Vec direction) {
@@ -102,7 +102,7 @@ class Reference {
       const Vec3 unit = force[i] / length;
       scaled[i] = (scaled[i] - unit * unit.dot(scaled[i])) / length;
     }
-    f_.positions.keep_owned(scaled, v);
+    f_.positions.restrict_to_owned(scaled, v);
   }
   /// v is affine in each corner: its difference quotients are its derivatives.
   static Vec3 slope(std::array<Vec3, 6> corners, int c) {
@@ -130,7 +130,7 @@ class Reference {
         sum[prism[c]] += 2 * f_.functional.weights().volume_weight * along * slopes[c];
     }
     base::VecHandle out = f_.positions.make_vector();
-    f_.positions.keep_owned(sum, out);
+    f_.positions.restrict_to_owned(sum, out);
     return out;
   }
 
@@ -174,7 +174,7 @@ TEST_P(ForceTerms, GaussNewtonIsTheForcesPart) {
     base::VecHandle at = f.vector(seed, 0.4), direction = f.vector(seed + 1, 1.0);
     operator_of.assemble(at);
     base::VecHandle product = f.positions.make_vector();
-    check(MatMult(operator_of.convex(), direction, product));
+    check(MatMult(operator_of.spd_approximation(), direction, product));
     base::VecHandle expected = Reference(f).product(at, direction);
     const double size = discrete::largest_block(expected);
     check(VecAXPY(expected, -1, product));
@@ -191,8 +191,8 @@ TEST_P(ForceTerms, GaussNewtonIsSymmetricAndPositive) {
   base::VecHandle from_a = f.positions.make_vector(), from_b = f.positions.make_vector();
   for (unsigned seed = 2; seed < 8; ++seed) {
     base::VecHandle a = f.vector(seed, 1.0), b = f.vector(seed + 10, 1.0);
-    check(MatMult(operator_of.convex(), a, from_a));
-    check(MatMult(operator_of.convex(), b, from_b));
+    check(MatMult(operator_of.spd_approximation(), a, from_a));
+    check(MatMult(operator_of.spd_approximation(), b, from_b));
     EXPECT_GT(dot(a, from_a), 0);
     EXPECT_NEAR(dot(a, from_b), dot(b, from_a), 1e-12 * dot(a, from_a));
   }

@@ -21,7 +21,7 @@ model::Model slab_on_moving_bone() {
 }
 
 /// A search that ends where a test says: `move(step)` is how far from its start all tissue goes,
-/// mm, and `fails(step)` whether it comes to no end, by the part of the load since the last step.
+/// mm, and `fails(step)` whether it does not converge, by the part of the load since the last step.
 class Scripted : public solve::RestSearch {
  public:
   std::function<Vec3(double step)> move = [](double) { return Vec3::Zero(); };
@@ -34,13 +34,14 @@ class Scripted : public solve::RestSearch {
       : problem_(problem), positions_(problem.objective().positions()) {}
   solve::Outcome run(Vec displacement, double) override {
     const double step = positions_.load() - accepted;
-    const base::VecHandle way = positions_.make_vector();
-    positions_.keep_owned(std::vector<Vec3>(positions_.local().size(), move(step)), way);
-    check(VecAXPY(displacement, 1, way));
+    const base::VecHandle increment = positions_.make_vector();
+    positions_.restrict_to_owned(std::vector<Vec3>(positions_.local().size(), move(step)),
+                                 increment);
+    check(VecAXPY(displacement, 1, increment));
     solve::Outcome outcome;
     outcome.converged = !fails(step);
     for (int k = 0; k < evaluations_of_failures && !outcome.converged; ++k)
-      problem_.function().evaluate(displacement, way);
+      problem_.function().evaluate(displacement, increment);
     return outcome;
   }
   void go_back(Vec) override { ++taken_back; }
@@ -67,7 +68,7 @@ struct Path : testing::MovedBlock {
   /// All tissue lies deeper by so much, mm.
   base::VecHandle lowered(double depth) const {
     base::VecHandle v = positions.make_vector();
-    positions.keep_owned(std::vector<Vec3>(positions.local().size(), Vec3(0, 0, -depth)), v);
+    positions.restrict_to_owned(std::vector<Vec3>(positions.local().size(), Vec3(0, 0, -depth)), v);
     return v;
   }
 };
@@ -128,8 +129,8 @@ TEST(LoadPath, HalvesAStepThatEndsFarFromThePrediction) {
   path.search.move = [](double step) { return Vec3(4 * step * step, 0, 0); };
   const solve::PathOutcome result = path.run();
   EXPECT_TRUE(result.complete());
-  EXPECT_GE(result.halvings.strayed, 1);
-  EXPECT_EQ(result.halvings.strayed, result.halvings.count());
+  EXPECT_GE(result.halvings.off_prediction, 1);
+  EXPECT_EQ(result.halvings.off_prediction, result.halvings.count());
   for (size_t i = 1; i < path.loads.size(); ++i)
     EXPECT_NEAR(path.loads[i] - path.loads[i - 1], 0.125, 1e-12);
 }
@@ -139,7 +140,7 @@ TEST(LoadPath, TakesAJumpThatHalvingDoesNotShrink) {
   path.search.move = [](double step) { return Vec3(step > 0 ? 0.2 : 0, 0, 0); };
   const solve::PathOutcome result = path.run();
   EXPECT_TRUE(result.complete());
-  EXPECT_GT(result.halvings.strayed, 0);
+  EXPECT_GT(result.halvings.off_prediction, 0);
   for (size_t i = 1; i < path.loads.size(); ++i)
     EXPECT_GE(path.loads[i] - path.loads[i - 1], 0.124);
 }

@@ -19,7 +19,7 @@ inline base::VecHandle random_vector(const discrete::Positions& positions, unsig
     std::mt19937 random(seed + 1000003u * static_cast<unsigned>(row[i]));
     for (double& x : values[i]) x = size * (random() / 2147483648.0 - 1.0);
   }
-  positions.keep_owned(values, v);
+  positions.restrict_to_owned(values, v);
   return v;
 }
 

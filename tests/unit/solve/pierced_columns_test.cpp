@@ -27,10 +27,10 @@ solve::PiercedColumns push_plate(double start, double motion) {
   m.contact.stiffness = 0.05;
   for (size_t i = 0; i < m.points.position.size(); ++i) {
     if (m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.touches.point.push_back(static_cast<int64_t>(i));
-    m.contact.touches.body.push_back(0);
-    m.contact.touches.binding.push_back(model::Binding::touches);
-    m.contact.touches.area.push_back(25);
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(25);
   }
   return testing::find_rest(m, testing::settings(1e-3)).summary.pierced;
 }

@@ -62,8 +62,8 @@ TEST_P(PrestressOf, BalancesEveryFreePointAndEndsOnTheBone) {
   EXPECT_LE(residual, 1.1e-12 * result.largest_force);
   EXPECT_NEAR(result.residual, residual, 1e-13);
   EXPECT_LT((all - weight).norm(), 1e-10);
-  EXPECT_GT(result.least_rest_ratio, 0);
-  EXPECT_LT(result.least_rest_ratio, 1);
+  EXPECT_GT(result.min_rest_ratio, 0);
+  EXPECT_LT(result.min_rest_ratio, 1);
 }
 
 TEST_P(PrestressOf, GivesTheSkinItsTurgor) {

@@ -14,7 +14,7 @@ using testing::Rest;
 constexpr int columns = 9, rows = 7, layers = 4;
 
 /// A solid whose depth is held and whose ends go apart; the ends' skin may be free.
-model::Model stretched(double way, bool free_skin = false) {
+model::Model stretched(double travel, bool free_skin = false) {
   model::Model m = testing::solid_block(columns, rows, layers, 0.45, 0.3, [](int i, int, int a) {
     const bool end = i == 0 || i == columns - 1;
     return a == layers - 1 || (end && a > 0) ? PointSet::held : PointSet::soft_tissue;
@@ -24,7 +24,7 @@ model::Model stretched(double way, bool free_skin = false) {
     if (column == 0 || column == columns - 1) m.points.set[i] = PointSet::held;
   }
   testing::aim(m, [&](const Vec3& x) -> Vec3 {
-    return x + way * Vec3(x.x() > 25 ? 1 : 0, 0.2 * x.z(), 0.1);
+    return x + travel * Vec3(x.x() > 25 ? 1 : 0, 0.2 * x.z(), 0.1);
   });
   return m;
 }
@@ -36,10 +36,10 @@ model::Model pressed(double push) {
       {"plane", -1, scene::HalfSpace{{0, 0, 0.2}, {0, 0.05, -1}}, {0, 0, -push}});
   for (size_t i = 0; i < m.points.position.size(); ++i) {
     if (m.points.layer[i] != 0 || m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.touches.point.push_back(static_cast<int64_t>(i));
-    m.contact.touches.body.push_back(0);
-    m.contact.touches.binding.push_back(model::Binding::touches);
-    m.contact.touches.area.push_back(25);
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(25);
   }
   m.contact.stiffness = 0.05;
   return m;

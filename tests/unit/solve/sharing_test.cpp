@@ -25,7 +25,7 @@ model::Model patch() {
   return m;
 }
 
-TEST(Sharing, ColumnsAreNeighboursWhereAnElementJoinsThem) {
+TEST(Sharing, ColumnsAreNeighborsWhereAnElementJoinsThem) {
   const model::Model m = patch();
   std::set<std::array<int64_t, 2>> joined;
   const auto join = [&](const auto& points) {
@@ -39,9 +39,9 @@ TEST(Sharing, ColumnsAreNeighboursWhereAnElementJoinsThem) {
   std::vector<std::array<int64_t, 2>> found;
   for (int64_t c = 0; c < graph.columns(); ++c)
     for (int64_t k = graph.row_begin[c]; k < graph.row_begin[c + 1]; ++k)
-      found.push_back({c, graph.neighbour[k]});
+      found.push_back({c, graph.neighbor[k]});
   EXPECT_EQ(found, std::vector(joined.begin(), joined.end()));
-  EXPECT_EQ(graph.neighbour.size(), joined.size());
+  EXPECT_EQ(graph.neighbor.size(), joined.size());
 }
 
 TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {

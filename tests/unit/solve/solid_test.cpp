@@ -51,9 +51,9 @@ model::Model twisted_block(double poisson) {
     return i == 0 ? PointSet::boundary : i == 8 ? PointSet::held : PointSet::soft_tissue;
   });
   testing::aim(m, [](const Vec3& x) -> Vec3 {
-    const Vec3 centre(40, 10, -4.5), d = x - centre;
+    const Vec3 center(40, 10, -4.5), d = x - center;
     const double c = std::cos(0.6), s = std::sin(0.6);
-    return centre + Vec3(4, c * d.y() - s * d.z(), s * d.y() + c * d.z());
+    return center + Vec3(4, c * d.y() - s * d.z(), s * d.y() + c * d.z());
   });
   return m;
 }

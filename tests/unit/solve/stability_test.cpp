@@ -68,7 +68,7 @@ TEST_P(Solver, StretchedChainHasTheEigenvaluesOfAString) {
   const double expected = across * (2 - 2 * std::cos(M_PI / links));
   EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * expected);
   std::vector<Vec3> mode(energy.positions.local().size(), Vec3::Zero());
-  energy.positions.spread(energy.mode, mode);
+  energy.positions.scatter_to_local(energy.mode, mode);
   for (size_t i = 0; i < mode.size(); ++i)
     EXPECT_NEAR(mode[i].norm(), std::sin(M_PI * energy.part.point_row[i] / links), 1e-5);
   const double along = k * (2 + 2 * std::cos(M_PI / links));

@@ -41,7 +41,7 @@ struct Solved : testing::MovedBlock {
     std::vector<Vec3> values = part.model.points.position;
     for (Vec3& at : values) at = {5e-3 * at.x() * at.x(), 0, 0};
     base::VecHandle v = positions.make_vector();
-    positions.keep_owned(values, v);
+    positions.restrict_to_owned(values, v);
     return v;
   }
   bool solve(Vec at, double tolerance) {
@@ -90,7 +90,7 @@ TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
 }
 
 TEST(Predictor, RenewsThePreconditionerWhereIterationsRunOut) {
-  const base::ScopedOption most("-ksp_max_it", "90");
+  const base::ScopedOption maximum("-ksp_max_it", "90");
   Solved s(mechanics::VolumeTerm::none, slab_on_moving_bone());
   solve::Predictor predictor(s.objective, s.solver);
   s.positions.set_load(0);
@@ -100,7 +100,7 @@ TEST(Predictor, RenewsThePreconditionerWhereIterationsRunOut) {
 }
 
 TEST(Predictor, PredictsNothingWhereIterationsRunOut) {
-  const base::ScopedOption most("-ksp_max_it", "2");
+  const base::ScopedOption maximum("-ksp_max_it", "2");
   Solved s(mechanics::VolumeTerm::none, slab_on_moving_bone());
   solve::Predictor predictor(s.objective, s.solver);
   s.positions.set_load(0);

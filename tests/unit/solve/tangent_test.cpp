@@ -33,7 +33,7 @@ TEST_P(Terms, TheMatrixActsAsTheHessian) {
   base::VecHandle product = m.positions.make_vector(), action = m.positions.make_vector();
   check(MatMult(tangent.exact(), direction, product));
   std::vector<Vec3> local(m.part.point_row.size(), Vec3::Zero());
-  m.positions.spread(direction, local);
+  m.positions.scatter_to_local(direction, local);
   m.objective.hessian_action(local, action);
   check(VecAXPY(action, -1, product));
   EXPECT_LT(discrete::largest_block(action), 1e-12 * discrete::largest_block(product));

@@ -72,7 +72,7 @@ TEST(FurtherTerms, AnEdgeWrittenAsOneComesToTheSameFace) {
               1e-9 * std::abs(edges.summary.last.f_e));
 }
 
-TEST(FurtherTerms, WhatIsNotConvexIsMinimisedByNewtonsMethodToo) {
+TEST(FurtherTerms, WhatIsNotConvexIsMinimizedByNewtonsMethodToo) {
   mechanics::add_term<Pressure>("pressure");
   model::Model m = drawn_block();
   model::TermElements pressed{"pressure", 3, 1, {}, {}};

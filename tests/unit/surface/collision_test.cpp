@@ -112,8 +112,8 @@ class Random {
     std::normal_distribution<double> n;
     return Vec3(n(engine_), n(engine_), n(engine_)).normalized();
   }
-  Mat3 turn(double most = M_PI) {
-    return Eigen::AngleAxisd(uniform(0, most), direction()).toRotationMatrix();
+  Mat3 turn(double maximum = M_PI) {
+    return Eigen::AngleAxisd(uniform(0, maximum), direction()).toRotationMatrix();
   }
 
  private:
@@ -126,16 +126,16 @@ Mat4 grazing_pose(const CollisionTree& a, const CollisionTree& b, const Vec3& mi
                   const Vec3& middle_b, double play, Random& random) {
   Mat4 pose = Mat4::Identity();
   pose.topLeftCorner<3, 3>() = random.turn();
-  const Vec3 way = random.direction();
+  const Vec3 direction = random.direction();
   const Vec3 aim = middle_a + 30 * random.uniform(0, 1) * random.direction();
   double away = 600;
   for (int step = 0; step < 400; ++step) {
-    pose.topRightCorner<3, 1>() = aim + away * way - pose.topLeftCorner<3, 3>() * middle_b;
+    pose.topRightCorner<3, 1>() = aim + away * direction - pose.topLeftCorner<3, 3>() * middle_b;
     const double gap = nearest(a, b, pose)->distance;
     if (gap < 1e-3 || away < 0) break;
     away -= gap;
   }
-  pose.topRightCorner<3, 1>() += random.uniform(-play, play) * way;
+  pose.topRightCorner<3, 1>() += random.uniform(-play, play) * direction;
   return pose;
 }
 
@@ -154,9 +154,9 @@ int agree(const Surface& one, const Surface& other, int poses, double play) {
   for (int i = 0; i < poses; ++i) {
     const Mat4 pose =
         grazing_pose(a, b, middle_of(one), middle_of(other), i % 4 ? play : 20 * play, random);
-    const bool wanted = reference.touched_by(other, pose);
-    EXPECT_EQ(touch(a, b, pose), wanted) << "pose " << i;
-    touching += wanted;
+    const bool requested = reference.touched_by(other, pose);
+    EXPECT_EQ(touch(a, b, pose), requested) << "pose " << i;
+    touching += requested;
   }
   return touching;
 }
@@ -175,27 +175,27 @@ TEST(Collision, nearest_is_the_least_of_all_pairs) {
   for (int i = 0; i < 20; ++i) {
     Mat4 pose = shifted(random.uniform(40, 80) * random.direction());
     pose.topLeftCorner<3, 3>() = random.turn();
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (const Triangle& s : one.triangles)
       for (const Triangle& t : other.triangles) {
         const CollisionTree p(
             {"one", {one.points[s[0]], one.points[s[1]], one.points[s[2]]}, {{0, 1, 2}}}),
             q({"two", {other.points[t[0]], other.points[t[1]], other.points[t[2]]}, {{0, 1, 2}}});
-        least = std::min(least, nearest(p, q, pose)->distance);
+        minimum = std::min(minimum, nearest(p, q, pose)->distance);
       }
-    EXPECT_EQ(nearest(a, b, pose)->distance, least);
-    if (least == 0) continue;
+    EXPECT_EQ(nearest(a, b, pose)->distance, minimum);
+    if (minimum == 0) continue;
     ++apart;
-    EXPECT_FALSE(nearest(a, b, pose, 0.99 * least));
-    EXPECT_EQ(pairs_within(a, b, pose, 1.01 * least).empty(), false);
-    EXPECT_TRUE(pairs_within(a, b, pose, 0.99 * least).empty());
+    EXPECT_FALSE(nearest(a, b, pose, 0.99 * minimum));
+    EXPECT_EQ(pairs_within(a, b, pose, 1.01 * minimum).empty(), false);
+    EXPECT_TRUE(pairs_within(a, b, pose, 0.99 * minimum).empty());
   }
   EXPECT_GT(apart, 8);
 }
 
 /// By sampling both triangles.
 double sampled_distance(const Corners& a, const Corners& b, int n) {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   const auto at = [n](const Corners& t, int i, int j) -> Vec3 {
     return t[0] + (t[1] - t[0]) * i / n + (t[2] - t[0]) * j / n;
   };
@@ -203,8 +203,8 @@ double sampled_distance(const Corners& a, const Corners& b, int n) {
     for (int j = 0; i + j <= n; ++j)
       for (int k = 0; k <= n; ++k)
         for (int l = 0; k + l <= n; ++l)
-          least = std::min(least, (at(a, i, j) - at(b, k, l)).norm());
-  return least;
+          minimum = std::min(minimum, (at(a, i, j) - at(b, k, l)).norm());
+  return minimum;
 }
 
 TEST(Collision, distance_of_two_triangles) {
@@ -288,11 +288,11 @@ TEST(Encounter, a_thin_plate_that_passes_quickly_is_not_missed) {
 
 TEST(Encounter, faces_that_touch_from_the_start_may_slide_and_part) {
   const CollisionTree a(cube()), b(cube({0, 0, 100}, 100));
-  for (const Vec3& way : {Vec3(7, 0, 0), Vec3(0, 0, 9), Vec3(3, 4, 5)}) {
-    Encounter encounter(a, b, {}, {Vec3::Zero(), way}, 0.1);
+  for (const Vec3& direction : {Vec3(7, 0, 0), Vec3(0, 0, 9), Vec3(3, 4, 5)}) {
+    Encounter encounter(a, b, {}, {Vec3::Zero(), direction}, 0.1);
     EXPECT_GT(encounter.ignored_triangles(), 3);
     EXPECT_EQ(first_contact(
-                  encounter, [&](double s) { return shifted(s * way); }, 0, 0.05),
+                  encounter, [&](double s) { return shifted(s * direction); }, 0, 0.05),
               2);
   }
 }
@@ -349,8 +349,8 @@ TEST(Collision, no_contact_of_real_bones_is_missed) {
     GTEST_SKIP() << "the real head is not here (" << folder << "): not tested";
   const Surface skull = load_surface(folder / "skull.ply", Role::bone),
                 mandible = load_surface(folder / "mandible.ply", Role::bone);
-  const char* wanted = std::getenv("REPOSE_POSES");
-  const int poses = wanted ? std::atoi(wanted) : 200;
+  const char* requested = std::getenv("REPOSE_POSES");
+  const int poses = requested ? std::atoi(requested) : 200;
   const int touching = agree(skull, mandible, poses, 0.05);
   EXPECT_GT(touching, poses / 5);
   EXPECT_LT(touching, 4 * poses / 5);

@@ -8,15 +8,15 @@
 namespace repose::surface {
 namespace distance_test {
 
-/// A closed bumpy ball of radius about 50 around `centre`; longitude × latitude.
-Surface ball(const Vec3& centre, int n = 24) {
-  Surface s{"ball", {centre + Vec3(0, 0, 50), centre - Vec3(0, 0, 50)}, {}};
+/// A closed bumpy ball of radius about 50 around `center`; longitude × latitude.
+Surface ball(const Vec3& center, int n = 24) {
+  Surface s{"ball", {center + Vec3(0, 0, 50), center - Vec3(0, 0, 50)}, {}};
   for (int j = 1; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double a = 2 * M_PI * i / n, b = M_PI * j / n;
       const double r = 50 + 6 * std::sin(3 * a) * std::sin(b) * std::sin(2 * b);
       s.points.push_back(
-          centre + r * Vec3(std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b)));
+          center + r * Vec3(std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b)));
     }
   s.triangles = longitude_latitude(n);
   return s;
@@ -41,24 +41,24 @@ double distance_to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const V
 }
 
 double brute_distance(const Surface& s, const Vec3& q) {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const auto& t : s.triangles)
-    least =
-        std::min(least, distance_to_triangle(s.points[t[0]], s.points[t[1]], s.points[t[2]], q));
-  return least;
+    minimum =
+        std::min(minimum, distance_to_triangle(s.points[t[0]], s.points[t[1]], s.points[t[2]], q));
+  return minimum;
 }
 
 /// Möller and Trumbore, 1997; infinity for none.
 double brute_hit(const Surface& s, const Vec3& origin, const Vec3& direction) {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const auto& t : s.triangles) {
     const Vec3 e1 = s.points[t[1]] - s.points[t[0]], e2 = s.points[t[2]] - s.points[t[0]];
     const Vec3 from = origin - s.points[t[0]], p = direction.cross(e2), q = from.cross(e1);
     const double det = e1.dot(p);
     const double u = from.dot(p) / det, v = direction.dot(q) / det, r = e2.dot(q) / det;
-    if (det != 0 && u >= 0 && v >= 0 && u + v <= 1 && r >= 0) least = std::min(least, r);
+    if (det != 0 && u >= 0 && v >= 0 && u + v <= 1 && r >= 0) minimum = std::min(minimum, r);
   }
-  return least;
+  return minimum;
 }
 
 /// The solid angle under which the surface is seen, in turns (van Oosterom and Strackee, 1983).
@@ -90,13 +90,13 @@ class Random {
 
 TEST(Distance, nearest_equals_brute_force) {
   for (const double offset : {0.0, 1e6}) {
-    const Vec3 centre = Vec3::Constant(offset);
-    const Surface s = ball(centre);
+    const Vec3 center = Vec3::Constant(offset);
+    const Surface s = ball(center);
     const DistanceTree tree(s);
     const double tolerance = offset == 0 ? 1e-10 : 1e-6;
     Random random;
     for (int i = 0; i < 400; ++i) {
-      const Vec3 q = centre + random.point(i % 2 ? 60 : 300);
+      const Vec3 q = center + random.point(i % 2 ? 60 : 300);
       const auto found = tree.nearest(q);
       ASSERT_NEAR(found.distance, brute_distance(s, q), tolerance);
       ASSERT_NEAR((found.point - q).norm(), found.distance, tolerance);
@@ -114,15 +114,15 @@ TEST(Distance, first_hit_equals_brute_force) {
   int hits = 0;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 origin = random.point(60), direction = random.direction();
-    const double wanted = brute_hit(s, origin, direction);
+    const double requested = brute_hit(s, origin, direction);
     const auto found = tree.first_hit(origin, direction, 1000);
-    ASSERT_EQ(found.has_value(), wanted < 1000);
+    ASSERT_EQ(found.has_value(), requested < 1000);
     if (!found) continue;
     ++hits;
-    ASSERT_NEAR(found->distance, wanted, 1e-9);
-    ASSERT_NEAR((origin + wanted * direction - found->point).norm(), 0, 1e-9);
-    EXPECT_TRUE(tree.first_hit(origin, direction, wanted + 1e-9));
-    EXPECT_FALSE(tree.first_hit(origin, direction, wanted - 1e-9));
+    ASSERT_NEAR(found->distance, requested, 1e-9);
+    ASSERT_NEAR((origin + requested * direction - found->point).norm(), 0, 1e-9);
+    EXPECT_TRUE(tree.first_hit(origin, direction, requested + 1e-9));
+    EXPECT_FALSE(tree.first_hit(origin, direction, requested - 1e-9));
   }
   EXPECT_GT(hits, 300);
   EXPECT_LT(hits, 900);
@@ -161,7 +161,7 @@ TEST(Distance, hits_at_distance_zero_count_and_reach_bounds) {
 }
 
 TEST(Distance, contains_equals_the_winding_number) {
-  const Surface s = together(ball(Vec3::Zero()), ball(Vec3(120, 0, 0)));
+  const Surface s = collective_try(ball(Vec3::Zero()), ball(Vec3(120, 0, 0)));
   const DistanceTree tree(s);
   Random random;
   int inside = 0;

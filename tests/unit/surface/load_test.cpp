@@ -29,7 +29,7 @@ Surface scaled(Surface s, double factor) {
 TEST_F(Load, good_surfaces_of_either_role) {
   const auto open = write("open.off", off_text(patch()));
   EXPECT_EQ(load_surface(open, Role::skin).triangles, patch().triangles);
-  const auto two = write("two.off", off_text(together(cube(), cube(Vec3(300, 0, 0)))));
+  const auto two = write("two.off", off_text(collective_try(cube(), cube(Vec3(300, 0, 0)))));
   EXPECT_EQ(inspect(load_surface(two, Role::bone)).components, 2);
   EXPECT_EQ(load_surface(write("cube.stl", stl_binary(cube())), Role::skin).points.size(), 8u);
 }
@@ -40,16 +40,16 @@ TEST_F(Load, a_turned_bone_comes_back_outward) {
   EXPECT_TRUE(inspect(load_surface(write("in.off", off_text(s)), Role::bone)).outward);
 }
 
-TEST_F(Load, metres_and_micrometres) {
-  const std::string metres = refused(scaled(cube(), 1e-3), Role::skin);
-  EXPECT_TRUE(says(metres, "0.1732 mm across"));
-  EXPECT_TRUE(says(metres, "in metres; scale the mesh to millimetres (times 1000)"));
-  EXPECT_TRUE(says(refused(scaled(cube(), 1e3), Role::bone), "in micrometres; scale the mesh"));
+TEST_F(Load, meters_and_micrometers) {
+  const std::string meters = refused(scaled(cube(), 1e-3), Role::skin);
+  EXPECT_TRUE(says(meters, "0.1732 mm across"));
+  EXPECT_TRUE(says(meters, "in meters; scale the mesh to millimeters (times 1000)"));
+  EXPECT_TRUE(says(refused(scaled(cube(), 1e3), Role::bone), "in micrometers; scale the mesh"));
   const double side = 20 / std::sqrt(3);
   EXPECT_EQ(load_surface(write("small.off", off_text(cube(Vec3::Zero(), 1.001 * side))), Role::bone)
                 .points.size(),
             8u);
-  EXPECT_TRUE(says(refused(cube(Vec3::Zero(), 0.999 * side), Role::bone), "in metres"));
+  EXPECT_TRUE(says(refused(cube(Vec3::Zero(), 0.999 * side), Role::bone), "in meters"));
 }
 
 TEST_F(Load, non_manifold_edges_and_vertices_of_either_role) {
@@ -93,7 +93,7 @@ TEST_F(Load, a_moebius_strip_has_no_orientation) {
 }
 
 TEST_F(Load, a_skin_in_pieces_and_an_open_bone) {
-  EXPECT_TRUE(says(refused(together(patch(), cube(Vec3(0, 0, 50))), Role::skin),
+  EXPECT_TRUE(says(refused(collective_try(patch(), cube(Vec3(0, 0, 50))), Role::skin),
                    "2 separate components (the largest of 32 and 12 triangles)"));
   Surface open = cube();
   open.triangles.erase(open.triangles.begin() + 3);

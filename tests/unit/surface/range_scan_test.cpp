@@ -14,7 +14,7 @@ struct Relief {
   int columns = 9, rows = 7;
   std::function<double(int, int)> height = [](int, int) { return 0; };
   std::function<bool(int, int)> hole = [](int, int) { return false; };
-  bool colours = false;
+  bool colors = false;
 
   std::string text() const {
     std::string vertices, cells;
@@ -26,7 +26,7 @@ struct Relief {
           continue;
         }
         vertices += fmt::format("{} {} {}", i, j, height(i, j));
-        if (colours) vertices += fmt::format(" {} {} 7 0.5", 10 * i, 10 * j);
+        if (colors) vertices += fmt::format(" {} {} 7 0.5", 10 * i, 10 * j);
         vertices += "\n";
         cells += fmt::format("1 {}\n", points++);
       }
@@ -36,9 +36,9 @@ struct Relief {
                "property float z\n{}element range_grid {}\n"
                "property list uchar int vertex_indices\nend_header\n",
                columns, rows, points,
-               colours ? "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                         "property float confidence\n"
-                       : "",
+               colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                        "property float confidence\n"
+                      : "",
                columns * rows) +
            vertices + cells;
   }
@@ -104,17 +104,17 @@ TEST_F(RangeScan, sheets_that_meet_in_a_point_are_parted) {
             parted.surface.triangles.size());
 }
 
-TEST_F(RangeScan, colours_and_other_numbers_are_kept) {
-  Relief coloured;
-  coloured.colours = true;
-  coloured.hole = [](int i, int j) { return i < 2 && j < 2; };
-  const ScanMesh kept = mesh(coloured);
-  ASSERT_EQ(kept.data.colours.size(), kept.surface.points.size());
+TEST_F(RangeScan, colors_and_other_numbers_are_kept) {
+  Relief colored;
+  colored.colors = true;
+  colored.hole = [](int i, int j) { return i < 2 && j < 2; };
+  const ScanMesh kept = mesh(colored);
+  ASSERT_EQ(kept.data.colors.size(), kept.surface.points.size());
   for (size_t i = 0; i < kept.surface.points.size(); ++i) {
     const Vec3& p = kept.surface.points[i];
-    EXPECT_EQ(kept.data.colours[i][0], 10 * p.x());
-    EXPECT_EQ(kept.data.colours[i][1], 10 * p.y());
-    EXPECT_EQ(kept.data.colours[i][2], 7);
+    EXPECT_EQ(kept.data.colors[i][0], 10 * p.x());
+    EXPECT_EQ(kept.data.colors[i][1], 10 * p.y());
+    EXPECT_EQ(kept.data.colors[i][2], 7);
   }
   ASSERT_EQ(kept.data.fields.size(), 1u);
   EXPECT_EQ(kept.data.fields[0].name, "confidence");
@@ -173,7 +173,7 @@ TEST_F(RangeScan, what_is_no_range_grid_is_refused) {
   says(refused("no ply\n"), "not a PLY file");
   Relief empty;
   empty.hole = [](int i, int j) { return (i + j) % 2 == 0; };
-  says(refused(empty.text()), "no two neighbouring cells hold points");
+  says(refused(empty.text()), "no two neighboring cells hold points");
 }
 
 }  // namespace range_scan_test

@@ -78,8 +78,8 @@ TEST_F(Read, ply_with_comments_first_other_types_and_more_elements) {
       "property float green\nproperty list uint8 uint32 vertex_index\nend_header\n"
       "2 5 6 0.5\n0 1\n255 3 2 1\n0 30 2 1\n0 3 20 1\n0.5 3 0 1 2\n";
   const Surface read = read_surface(write("mesh.ply", text));
-  const Corners wanted = {{Vec3(1, 2, 3), Vec3(1, 2, 30), Vec3(1, 20, 3)}};
-  EXPECT_EQ(corners(read), wanted);
+  const Corners requested = {{Vec3(1, 2, 3), Vec3(1, 2, 30), Vec3(1, 20, 3)}};
+  EXPECT_EQ(corners(read), requested);
 }
 
 TEST_F(Read, rows_of_nothing_are_not_walked) {

@@ -36,12 +36,12 @@ TEST_F(Write, what_is_written_is_read_back) {
   }
 }
 
-TEST_F(Write, colours_and_fields_go_along) {
+TEST_F(Write, colors_and_fields_go_along) {
   const Surface s = uneven_cube();
   PointData data;
   data.fields.push_back({"distance", {}});
   for (size_t p = 0; p < s.points.size(); ++p) {
-    data.colours.push_back({255, static_cast<uint8_t>(p), 0});
+    data.colors.push_back({255, static_cast<uint8_t>(p), 0});
     data.fields[0].values.push_back(-1.5 * static_cast<double>(p));
   }
   write_surface(folder_ / "a.ply", s, data);
@@ -53,7 +53,7 @@ TEST_F(Write, colours_and_fields_go_along) {
   write_surface(folder_ / "a.vtp", s, data);
   const std::string vtp = content("a.vtp");
   EXPECT_NE(vtp.find("<PointData Scalars=\"distance\">"), std::string::npos);
-  EXPECT_NE(vtp.find("<DataArray type=\"UInt8\" Name=\"colour\" NumberOfComponents=\"3\""),
+  EXPECT_NE(vtp.find("<DataArray type=\"UInt8\" Name=\"color\" NumberOfComponents=\"3\""),
             std::string::npos);
 }
 

@@ -16,7 +16,7 @@ struct PartedBones {
 };
 
 /// Parts what lies at or above `level` into two bones by the minimum cut of the graph of its voxels
-/// (6 neighbours; Boykov and Jolly, 2001): an edge costs the area of the face, eight times as much
+/// (6 neighbors; Boykov and Jolly, 2001): an edge costs the area of the face, eight times as much
 /// where both voxels are well above the level. `points` lie in the first and in the second, mm,
 /// LPS; too few, or too far from where the bones meet, and the least cut is around them. What hangs
 /// together with neither goes to the first. The isosurfaces of the two parts are those of the

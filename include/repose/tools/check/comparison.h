@@ -23,7 +23,7 @@ class Comparison {
              std::span<const double> recomputed, double scale);
   /// Checks a number that cannot be recomputed: within [least, most], and not NaN. The table says
   /// "range only".
-  void range(const std::string& name, double stored, double least, double most);
+  void range(const std::string& name, double stored, double minimum, double maximum);
   /// A statement about the file that holds or does not.
   void statement(const std::string& text, bool holds);
 
@@ -44,7 +44,7 @@ class Comparison {
     std::string section, name;
     double stored = 0, recomputed = 0, difference = 0;
     int64_t entries = 1, wrong = 0;
-    enum Kind { recalculated, range_only, said } kind = recalculated;
+    enum Kind { recalculated, range_only, stated } kind = recalculated;
   };
   static double relative(double stored, double recomputed, double scale);
   void add(Row row);

@@ -28,17 +28,17 @@ std::vector<Sample> sample_distances(const Surface& from, const SignedDistance& 
 /// All weighted by area; the percentiles and `most` of |distance|.
 struct DistanceStatistics {
   int64_t samples = 0;
-  double area = 0;                                        ///< mm²
-  double mean_signed = 0, mean = 0, rms = 0;              ///< mm
-  double median = 0;                                      ///< mm
-  double percentile_90 = 0, percentile_95 = 0, most = 0;  ///< mm
+  double area = 0;                                           ///< mm²
+  double mean_signed = 0, mean = 0, rms = 0;                 ///< mm
+  double median = 0;                                         ///< mm
+  double percentile_90 = 0, percentile_95 = 0, maximum = 0;  ///< mm
   double within_1 = 0, within_2 = 0;  ///< share of the area with |distance| of at most 1, 2 mm
 };
 
 /// Returns the statistics of samples; zeros without samples.
 DistanceStatistics statistics(const std::vector<Sample>& samples);
 
-/// A colour map for distances from −reach (blue) over 0 (white) to +reach (red), mm.
-std::array<uint8_t, 3> distance_colour(double distance, double reach);
+/// A color map for distances from −reach (blue) over 0 (white) to +reach (red), mm.
+std::array<uint8_t, 3> distance_color(double distance, double reach);
 
 }  // namespace repose::tools::comparison

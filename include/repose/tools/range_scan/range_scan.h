@@ -18,7 +18,7 @@ struct RangeGrid {
   int64_t columns = 0, rows = 0;
   std::vector<int64_t> cell;  ///< [rows][columns] row of points, −1 for nothing
   std::vector<Vec3> points;   ///< in the file's unit
-  PointData data;             ///< colours, and other numbers of each point by their names
+  PointData data;             ///< colors, and other numbers of each point by their names
 };
 
 /// Reads a Cyberware or Stanford range-grid PLY (text or binary; obj_info num_cols and num_rows,
@@ -28,7 +28,7 @@ RangeGrid read_range_grid(const std::filesystem::path& file);
 
 struct ScanOptions {
   double scale = 1;         ///< mm per unit of the file
-  double longest_edge = 0;  ///< mm; 0: four times the median distance of neighbouring points
+  double longest_edge = 0;  ///< mm; 0: four times the median distance of neighboring points
   double steepest = 80;     ///< degrees between a triangle's normal and the way to the scanner
   bool cylinder = false;    ///< the scanner went round the y axis: columns close to a ring, and it
                             ///< looks at that axis; otherwise it looks along −z
@@ -46,7 +46,7 @@ struct ScanMesh {
   int64_t unused = 0;       ///< points in no triangle, left out
 };
 
-/// Triangles between neighbouring cells: two where all four corners of a square hold points, cut
+/// Triangles between neighboring cells: two where all four corners of a square hold points, cut
 /// along the shorter diagonal, one where three do. A triangle across a step in depth is left out:
 /// one with too long an edge, or too steep. Throws InputError where none is left.
 ScanMesh mesh_of(const RangeGrid& grid, const ScanOptions& options);

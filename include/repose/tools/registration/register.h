@@ -14,7 +14,7 @@ using surface::Surface;
 using base::Similarity;
 
 /// Least breadth of landmarks (base::breadth); below it, the turn about their line is noise.
-constexpr double least_breadth = 0.01;
+constexpr double min_breadth = 0.01;
 
 struct LandmarkFit {
   Similarity transform;           ///< from the landmarks that were not left out
@@ -38,7 +38,7 @@ LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec
 
 struct IcpOptions {
   double trim = 0.8;  ///< share of the pairs, the nearest, that counts, (0, 1]
-  int most_steps = 100;
+  int max_steps = 100;
   int64_t samples = 20000;  ///< vertices of the moving surface that are used, evenly
   double tolerance = 1e-5;  ///< converged when a step moves no point by more, × extent
 };
@@ -56,7 +56,7 @@ struct IcpResult {
 /// Refines `start` by iterated closest points (Chen and Medioni, 1992: point to plane; Chetverikov
 /// et al., 2005: trimmed). Each step pairs samples of the moving surface with their closest points
 /// on the fixed one, drops pairs on the fixed surface's border and those whose normals differ by
-/// over 60°, keeps the nearest share, and turns and shifts (never scales) by the linearised least
+/// over 60°, keeps the nearest share, and turns and shifts (never scales) by the linearized least
 /// squares. A step that does not lower the trimmed error is halved. Throws InputError where fewer
 /// than six pairs remain.
 IcpResult refine_by_icp(const Surface& moving, const Surface& fixed, const Similarity& start,

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """What each stage of a large solid costs before its search, by ranks: a table.
 
-    tests/benchmark/raise.py [-bin build/bin] [-sizes 25000,125000,750000] [-ranks 2]
+    tests/benchmark/build_local.py [-bin build/bin] [-sizes 25000,125000,750000] [-ranks 2]
                              [-output docs/measurements/growth.md]
 
 Synthetic heads of the given numbers of skin vertices, four layers, with contact, the jaw 6 mm forward:
-benchmark_raise builds the model of each whole on rank 0 and shares it out, or lets all ranks raise their
+benchmark_build_local builds the model of each whole on rank 0 and shares it out, or lets all ranks build their
 parts of it. Bytes are those of the most that was in use during a stage, beyond the surfaces and the
 program. Needs: cmake --preset release -DREPOSE_BENCHMARKS=ON
 """
@@ -34,7 +34,7 @@ def rows_of(program, size, ranks):
 
 def main():
     chosen = option_parser(__doc__, sizes="25000,125000,750000", ranks=2).parse_args()
-    program = chosen.bin / "benchmark_raise"
+    program = chosen.bin / "benchmark_build_local"
     rows = (row for size in chosen.sizes.split(",")
             for row in rows_of(program, size, chosen.ranks))
     print_table(HEAD, rows, chosen.output, "raised")

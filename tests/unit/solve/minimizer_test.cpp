@@ -1,4 +1,4 @@
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "repose/base/options.h"
 
 namespace repose {
-namespace minimiser_test {
+namespace minimizer_test {
 
 using base::check;
 
@@ -68,7 +68,7 @@ class Curvatures : public discrete::Hessian {
     ++assemblies_;
   }
   Mat exact() override { return matrix_; }
-  Mat convex() override { return matrix_; }
+  Mat spd_approximation() override { return matrix_; }
   bool elliptic() const override { return false; }
 
  private:
@@ -90,7 +90,7 @@ struct Search : testing::MovedBlock {
   Search(Curve curve, double start, double accuracy)
       : MovedBlock(testing::resting_block()), sum(positions, curve) {
     check(VecSet(x, start));
-    outcome = solve::Minimiser(sum, solver, {}).run(x, accuracy);
+    outcome = solve::Minimizer(sum, solver, {}).run(x, accuracy);
   }
 };
 
@@ -131,5 +131,5 @@ TEST(Estimate, IsNotTrustedWhereTheSlopeDoesNotFall) {
   EXPECT_GE(s.outcome.displacement_error + std::sqrt(3) * height, discrete::largest_block(s.x));
 }
 
-}  // namespace minimiser_test
+}  // namespace minimizer_test
 }  // namespace repose

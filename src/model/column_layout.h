@@ -12,7 +12,7 @@
 namespace repose::model {
 
 /// The columns of a scene's tissue, laid and attached.
-struct Foundation {
+struct ColumnLayout {
   SkinMesh mesh;  ///< with the paths of the incisions as edges
   std::vector<Cut> cuts;
   BoneField field;
@@ -22,9 +22,9 @@ struct Foundation {
   BuildReport report;     ///< with the remarks so far
 };
 
-/// As build_model(), of which it is the part that knows no layers.
-Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& skin,
-                          const std::vector<surface::Surface>& bones);
+/// As build_model(), without the layers.
+ColumnLayout lay_out_columns(const scene::Scene& scene, const surface::Surface& skin,
+                             const std::vector<surface::Surface>& bones);
 
 /// Gives a model of make_layers the scene's bones, as they are and go.
 void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& bones, Model& model);
@@ -33,6 +33,6 @@ void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& b
 void prepend_messages(const Anatomy& anatomy, BuildReport& report);
 
 /// Into the report: what became of the columns, and how many points and bones they hold to.
-void report_columns(const Foundation& on, int64_t attached, BuildReport& report);
+void report_columns(const ColumnLayout& layout, int64_t attached, BuildReport& report);
 
 }  // namespace repose::model

@@ -11,9 +11,10 @@ namespace {
 
 /// The sides of a cut as nets: a column for each of the path's, a row for each layer and two more
 /// round either edge, on the skin and, of a cut through all layers, inside.
-class Wall {
+class CutFaceBuilder {
  public:
-  Wall(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, const Model& model)
+  CutFaceBuilder(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs,
+                 const Model& model)
       : cut_(cut), model_(model) {
     const Points& points = model.points;
     for (const auto& [row, twin] : pairs) twin_of_[row] = twin;
@@ -31,23 +32,23 @@ class Wall {
     find_skin_beside();
   }
 
-  void build(Walls& walls) const {
+  void build(CutFaces& cut_faces) const {
     const auto columns = static_cast<int64_t>(cut_.columns.size());
     const int64_t rows = deepest_ + 1 + beyond + (through_ ? beyond : 0);
-    walls.size.push_back({columns, rows});
-    if (walls.begin.empty()) walls.begin.push_back(0);
+    cut_faces.size.push_back({columns, rows});
+    if (cut_faces.begin.empty()) cut_faces.begin.push_back(0);
     const bool swapped = faces_away();
     for (const bool left : {swapped, !swapped})
       for (int64_t c = 0; c < columns * rows; ++c) {
         for (const auto& [point, weight] :
              control(c / rows, static_cast<int>(c % rows) - beyond, left)) {
-          walls.point.push_back(point);
-          walls.weight.push_back(weight);
+          cut_faces.point.push_back(point);
+          cut_faces.weight.push_back(weight);
         }
-        walls.begin.push_back(static_cast<int64_t>(walls.point.size()));
+        cut_faces.begin.push_back(static_cast<int64_t>(cut_faces.point.size()));
       }
     for (int64_t c = 0; c < columns * rows; ++c)
-      walls.area.push_back(area(c / rows, static_cast<int>(c % rows) - beyond));
+      cut_faces.area.push_back(area(c / rows, static_cast<int>(c % rows) - beyond));
   }
 
  private:
@@ -83,17 +84,17 @@ class Wall {
     const int inner = std::clamp(layer, 0, deepest_);
     Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
     if (layer == inner) return shares;
-    const Shares way = way_round(i, inner, left);
+    const Shares direction = shares_around(i, inner, left);
     Vec3 length = Vec3::Zero();
-    for (const auto& [point, weight] : way) length += weight * position(point);
-    for (const auto& [point, weight] : way)
+    for (const auto& [point, weight] : direction) length += weight * position(point);
+    for (const auto& [point, weight] : direction)
       shares.emplace_back(point, std::abs(layer - inner) * step * edge_ / length.norm() * weight);
     return shares;
   }
   /// The way from an edge's points to those beside them, as a mean over the columns nearby.
-  Shares way_round(size_t i, int layer, bool left) const {
+  Shares shares_around(size_t i, int layer, bool left) const {
     constexpr double reach = 1.5;  // edges
-    Shares way;
+    Shares direction;
     double sum = 0;
     for (size_t k = 0; k < along_.size(); ++k) {
       const double weight = 1 - std::abs(along_[k] - along_[i]) / (reach * edge_);
@@ -101,13 +102,13 @@ class Wall {
       const auto beside = beside_.find(side_of(row, left));
       if (weight <= 0 || !twin_of_.contains(row) || beside == beside_.end()) continue;
       for (const int64_t p : beside->second)
-        way.emplace_back(layer == 0 ? p : node(model_.points.column[p], layer),
-                         weight / static_cast<double>(beside->second.size()));
-      way.emplace_back(side_of(node(cut_.columns[k], layer), left), -weight);
+        direction.emplace_back(layer == 0 ? p : node(model_.points.column[p], layer),
+                               weight / static_cast<double>(beside->second.size()));
+      direction.emplace_back(side_of(node(cut_.columns[k], layer), left), -weight);
       sum += weight;
     }
-    for (auto& share : way) share.second /= sum;
-    return way;
+    for (auto& share : direction) share.second /= sum;
+    return direction;
   }
 
   /// mm², what a place stands for; 0 where the sides hang together.
@@ -172,8 +173,8 @@ class Wall {
 
 }  // namespace
 
-void add_walls(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
-  Wall(cut, pairs, model).build(model.contact.walls);
+void add_cut_faces(const Cut& cut, const std::vector<std::array<int64_t, 2>>& pairs, Model& model) {
+  CutFaceBuilder(cut, pairs, model).build(model.contact.cut_faces);
 }
 
 }  // namespace repose::model

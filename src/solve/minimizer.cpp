@@ -1,4 +1,4 @@
-#include "repose/solve/minimiser.h"
+#include "repose/solve/minimizer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +24,7 @@ constexpr double closing = 5, negligible = 1e-6;
 constexpr double farthest_closing = 0.2;  // mm, whatever the accuracy
 constexpr double sure_share = 0.05;       // of the accuracy, what a linear system may leave unknown
 // A step by which the next is not shorter than this is no measure: the search goes on.
-constexpr double trusted_contraction = 0.7, most_contraction = 0.99;
+constexpr double trusted_contraction = 0.7, max_contraction = 0.99;
 // Newton's linear systems are solved to this much of their right-hand side: roughly far from the
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
@@ -68,10 +68,10 @@ std::string reason_text(TaoConvergedReason reason) {
 }  // namespace
 
 /// The C functions TAO calls. Nothing is thrown through C: an exception is kept for run().
-struct Minimiser::Callbacks {
+struct Minimizer::Callbacks {
   template <class Work>
   static PetscErrorCode guarded(void* context, Work&& work) {
-    auto* self = static_cast<Minimiser*>(context);
+    auto* self = static_cast<Minimizer*>(context);
     try {
       work(*self);
       return PETSC_SUCCESS;
@@ -82,18 +82,18 @@ struct Minimiser::Callbacks {
   }
 
   static PetscErrorCode value_and_gradient(Tao, Vec x, PetscReal* value, Vec gradient, void* me) {
-    return guarded(me, [&](Minimiser& self) { *value = self.function_.evaluate(x, gradient); });
+    return guarded(me, [&](Minimizer& self) { *value = self.function_.evaluate(x, gradient); });
   }
 
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
-    return guarded(me, [&](Minimiser& self) {
+    return guarded(me, [&](Minimizer& self) {
       self.solver_.prepare(x);
       self.set_forcing();
     });
   }
 
   static PetscErrorCode converged(Tao tao, void* me) {
-    return guarded(me, [&](Minimiser& self) {
+    return guarded(me, [&](Minimizer& self) {
       PetscInt iteration = 0;
       PetscReal value = 0, length = 0;
       check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, &length, nullptr));
@@ -121,11 +121,11 @@ struct Minimiser::Callbacks {
   }
 };
 
-Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver,
                      const Watch& watch)
-    : Minimiser(function, solver, {function, solver}, watch) {}
+    : Minimizer(function, solver, {function, solver}, watch) {}
 
-Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver,
                      const ErrorEstimate& estimate, const Watch& watch)
     : function_(function),
       solver_(solver),
@@ -139,9 +139,9 @@ Minimiser::Minimiser(discrete::Function& function, linear::TangentSolver& solver
   make_tao();
 }
 
-Minimiser::~Minimiser() = default;
+Minimizer::~Minimizer() = default;
 
-void Minimiser::make_tao() {
+void Minimizer::make_tao() {
   require_supported_types();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
@@ -155,12 +155,12 @@ void Minimiser::make_tao() {
   base::check_options(TaoSetFromOptions(tao_));
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_ = std::make_unique<InitialHessian>(tao_, solver_);
-  closes_ = initial_ && function_.positions().part().solid;
+  newton_finish_enabled_ = initial_ && function_.positions().part().solid;
   newton_ = uses_hessian(tao_);
   if (!newton_) return;
   KSP inner = nullptr;
   check(TaoGetKSP(tao_, &inner));
-  solver_.lend_preconditioner(inner);
+  solver_.share_preconditioner(inner);
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   base::check_options(KSPSetFromOptions(inner));
@@ -171,7 +171,7 @@ void Minimiser::make_tao() {
   automatic_forcing_ = !given;
 }
 
-void Minimiser::set_forcing() {
+void Minimizer::set_forcing() {
   if (!newton_ || !automatic_forcing_ || first_force_ == 0) return;
   KSP inner = nullptr;
   check(TaoGetKSP(tao_, &inner));
@@ -180,7 +180,7 @@ void Minimiser::set_forcing() {
   check(KSPSetTolerances(inner, forcing, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
-bool Minimiser::step_was_cut() const {
+bool Minimizer::step_was_cut() const {
   KSP inner = nullptr;
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(TaoGetKSP(tao_, &inner));
@@ -189,7 +189,7 @@ bool Minimiser::step_was_cut() const {
          reason != KSP_CONVERGED_ITS && reason != KSP_DIVERGED_ITS;
 }
 
-double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
+double Minimizer::strict_estimate(Vec displacement, Vec gradient, bool last) {
   if (&estimate_.function != &function_) {
     estimate_.function.evaluate(displacement, estimate_gradient_);
     gradient = estimate_gradient_;
@@ -197,8 +197,8 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
   double step = estimate_.solver.newton_distance(displacement, gradient);
   double unsure = 0;
   if (last || safety * step <= accuracy_) {
-    step = estimate_.solver.sure_distance(displacement, gradient, sure_share * accuracy_);
-    unsure = estimate_.solver.unsure();
+    step = estimate_.solver.error_bound(displacement, gradient, sure_share * accuracy_);
+    unsure = estimate_.solver.error_slack();
   }
   const double estimate = safety * step + unsure;
   const bool curved = estimate > linear && estimate <= accuracy_;
@@ -209,53 +209,53 @@ double Minimiser::strict_estimate(Vec displacement, Vec gradient, bool last) {
   return std::max(estimate, step / (1 - left));
 }
 
-double Minimiser::contraction(Vec displacement) {
+double Minimizer::contraction(Vec displacement) {
   linear::TangentSolver& solver = estimate_.solver;
   if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
-  check(VecWAXPY(trial_, -1.0, solver.latest(), displacement));
+  check(VecWAXPY(trial_, -1.0, solver.newton_step(), displacement));
   estimate_.function.evaluate(trial_, estimate_gradient_);
   const double found = solver.contraction(displacement, trial_, estimate_gradient_);
-  contraction_ = found <= trusted_contraction ? found : most_contraction;
+  contraction_ = found <= trusted_contraction ? found : max_contraction;
   contracted_at_ = solver.hessian().assemblies();
   return contraction_;
 }
 
-double Minimiser::at_balance(Vec displacement) {
+double Minimizer::distance_without_force(Vec displacement) {
   return estimate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
 }
 
 /// An estimate costs the solution of a linear system: only where the force that went with a
 /// distance at the last one says that it is worth it. A Newton method's steps go further, but one
 /// cut off by the trust region or negative curvature hardly comes to a convex place.
-bool Minimiser::worth_estimating(double largest_force) const {
-  if (softest_ == 0 || rough_) return true;
+bool Minimizer::worth_estimating(double largest_force) const {
+  if (softest_ == 0 || presolving_) return true;
   const double hopeful = newton_ ? 20 : 2;
   constexpr int64_t seldom = 20;  // evaluations: it costs other methods as much as many of them
   const bool far = largest_force > hopeful * softest_ * accuracy_;
-  const bool soon = !newton_ && !initial_ && function_.evaluations() - looked_at_ < seldom;
+  const bool soon = !newton_ && !initial_ && function_.evaluations() - estimated_at_ < seldom;
   return !far && !soon && !cut_;
 }
 
 /// By the preconditioned gradient alone; nothing where the estimate has to tell.
-std::optional<bool> Minimiser::near_enough_at_a_step(Vec gradient) {
+std::optional<bool> Minimizer::near_enough_at_a_step(Vec gradient) {
   const bool preconditioned = newton_ || initial_;
   if (!preconditioned || &estimate_.function != &function_) return {};
   const double step = estimate_.solver.preconditioned_step(gradient);
   const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
   std::optional<bool> answer;
-  if (rough_)
+  if (presolving_)
     answer = step <= accuracy_;
-  else if (step > (may_close_ ? near : accuracy_))
+  else if (step > (newton_finish_allowed_ ? near : accuracy_))
     answer = false;
-  else if (closes_ && step < negligible * accuracy_)
+  else if (newton_finish_enabled_ && step < negligible * accuracy_)
     answer = true;
   if (answer) error_ = safety * step;
   return answer;
 }
 
-bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force) {
+bool Minimizer::near_enough(Vec displacement, Vec gradient, double largest_force) {
   if (largest_force == 0) {
-    error_ = at_balance(displacement);
+    error_ = distance_without_force(displacement);
     return error_ == 0;
   }
   if (accuracy_ == 0) return false;
@@ -264,22 +264,22 @@ bool Minimiser::near_enough(Vec displacement, Vec gradient, double largest_force
     return false;
   }
   if (const auto answer = near_enough_at_a_step(gradient)) return *answer;
-  looked_at_ = function_.evaluations();
+  estimated_at_ = function_.evaluations();
   error_ = strict_estimate(displacement, gradient, false);
   if (std::isfinite(error_))
     softest_ = largest_force / error_;
   else
     softest_ = 2 * std::max(softest_, largest_force / accuracy_);
-  closed_ = may_close_ && error_ > accuracy_ && error_ <= farthest_correction();
-  return error_ <= accuracy_ || closed_;
+  newton_finish_ = newton_finish_allowed_ && error_ > accuracy_ && error_ <= farthest_correction();
+  return error_ <= accuracy_ || newton_finish_;
 }
 
-double Minimiser::farthest_correction() const {
+double Minimizer::farthest_correction() const {
   constexpr double finest = 1e-3;  // mm
   return std::max(finest, 10 * accuracy_);
 }
 
-bool Minimiser::stalled(int64_t iteration, double value) {
+bool Minimizer::stalled(int64_t iteration, double value) {
   constexpr int64_t patience = 20;
   constexpr double rounding = 1e-14;  // of the value
   if (iteration == 0 || value < lowest_ - rounding * std::abs(lowest_)) {
@@ -290,14 +290,14 @@ bool Minimiser::stalled(int64_t iteration, double value) {
   return stalled_;
 }
 
-int Minimiser::polish(Vec displacement) {
-  constexpr int most = 8;
+int Minimizer::polish(Vec displacement) {
+  constexpr int maximum = 8;
   int corrections = 0;
-  while (corrections < most && error_ > accuracy_ && error_ <= farthest_correction()) {
+  while (corrections < maximum && error_ > accuracy_ && error_ <= farthest_correction()) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
-    check(VecAXPY(displacement, -1.0, estimate_.solver.latest()));
-    taken_ = discrete::largest_block(estimate_.solver.latest());
+    check(VecAXPY(displacement, -1.0, estimate_.solver.newton_step()));
+    taken_ = discrete::largest_block(estimate_.solver.newton_step());
     measure(displacement, true);
     taken_ = 0;
     if (error_ > 0.5 * before) {
@@ -310,20 +310,20 @@ int Minimiser::polish(Vec displacement) {
   return corrections;
 }
 
-double Minimiser::measure(Vec displacement, bool last) {
+double Minimizer::measure(Vec displacement, bool last) {
   const double objective = function_.evaluate(displacement, gradient_);
-  error_ = discrete::largest_block(gradient_) == 0 ? at_balance(displacement)
+  error_ = discrete::largest_block(gradient_) == 0 ? distance_without_force(displacement)
                                                    : strict_estimate(displacement, gradient_, last);
   return objective;
 }
 
-std::string Minimiser::reason_of(const Outcome& outcome, TaoConvergedReason reason) const {
+std::string Minimizer::reason_of(const Outcome& outcome, TaoConvergedReason reason) const {
   if (stopped_ && (!outcome.converged || function_.positions().load() < 1)) return stopped_reason;
   if (outcome.converged) return reason_text(TAO_CONVERGED_USER);
   return stalled_ ? "the objective no longer decreases beyond rounding" : reason_text(reason);
 }
 
-std::string Minimiser::no_progress(Vec displacement) {
+std::string Minimizer::no_progress(Vec displacement) {
   function_.positions().update(displacement);
   const Vec3 at = place_of_largest(function_.positions(), gradient_);
   return fmt::format(
@@ -332,8 +332,8 @@ std::string Minimiser::no_progress(Vec displacement) {
       ProgressTest::patience, progress_->smallest_force(), at.x(), at.y(), at.z());
 }
 
-Outcome Minimiser::summary(Vec displacement) {
-  measure(displacement, !closed_);
+Outcome Minimizer::summary(Vec displacement) {
+  measure(displacement, !newton_finish_);
   const int corrections = polish(displacement);
   Outcome outcome;
   outcome.objective = function_.evaluate(displacement, gradient_);
@@ -353,21 +353,21 @@ Outcome Minimiser::summary(Vec displacement) {
   if (!outcome.stable)
     outcome.reason += ", at a point that is not a minimum";
   else if (!std::isfinite(error_))
-    outcome.reason += ", where stiffnesses lie too far apart to tell the distance to rest";
+    outcome.reason += ", where stiffnesses lie too far apart to estimate the distance to rest";
   return outcome;
 }
 
-bool Minimiser::worth_going_on(int64_t iterations) {
-  PetscInt most = 0;
+bool Minimizer::should_restart(int64_t iterations) {
+  PetscInt maximum = 0;
   TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
-  check(TaoGetMaximumIterations(tao_, &most));
+  check(TaoGetMaximumIterations(tao_, &maximum));
   check(TaoGetConvergedReason(tao_, &reason));
-  if (!initial_ || iterations_ >= most) return false;
+  if (!initial_ || iterations_ >= maximum) return false;
   // The iteration in which a line search fails counts too.
   return slowed_ || (reason == TAO_DIVERGED_LS_FAILURE && iterations > 1);
 }
 
-void Minimiser::search(Vec displacement, bool near) {
+void Minimizer::search(Vec displacement, bool near) {
   PetscInt iterations = 0;
   iterations_ = 0;
   progress_->begin();
@@ -382,18 +382,18 @@ void Minimiser::search(Vec displacement, bool near) {
     check(code);
     check(TaoGetIterationNumber(tao_, &iterations));
     iterations_ += iterations;
-  } while (worth_going_on(iterations));
+  } while (should_restart(iterations));
 }
 
-Outcome Minimiser::approach(Vec displacement, double distance, bool near) {
+Outcome Minimizer::presolve(Vec displacement, double distance, bool near) {
   if (!initial_) return run(displacement, distance);
   accuracy_ = distance;
   thrown_ = nullptr;
   stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
-  rough_ = true;
+  presolving_ = true;
   search(displacement, near);
-  rough_ = false;
+  presolving_ = false;
   Outcome outcome;
   outcome.iterations = iterations_;
   outcome.stopped = stopped_;
@@ -405,25 +405,26 @@ Outcome Minimiser::approach(Vec displacement, double distance, bool near) {
   return outcome;
 }
 
-Outcome Minimiser::finish(Vec displacement, double accuracy) {
+Outcome Minimizer::finish(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
-  stopped_ = closed_ = false;
+  stopped_ = newton_finish_ = false;
   iterations_ = 0;
   return summary(displacement);
 }
 
-Outcome Minimiser::run(Vec displacement, double accuracy) {
+Outcome Minimizer::run(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
   stopped_ = false;
   check(TaoSetSolution(tao_, displacement));
-  may_close_ = closes_;
-  closed_ = false;
+  newton_finish_allowed_ = newton_finish_enabled_;
+  newton_finish_ = false;
   search(displacement);
   Outcome outcome = summary(displacement);
-  if (!closed_ || outcome.converged || outcome.stopped) return outcome;
-  may_close_ = closed_ = false;  // Newton steps do not end it: it goes on where they led
+  if (!newton_finish_ || outcome.converged || outcome.stopped) return outcome;
+  newton_finish_allowed_ = newton_finish_ =
+      false;  // Newton steps do not end it: it goes on where they led
   const int64_t iterations = outcome.iterations;
   search(displacement);
   outcome = summary(displacement);

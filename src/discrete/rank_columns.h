@@ -9,10 +9,10 @@
 namespace repose::discrete {
 
 /// Columns given to a rank, and their place in the whole model.
-struct Deal {
+struct RankColumns {
   model::Piece piece;
   std::vector<int> owner;                          ///< [C] rank of each column
-  std::vector<int64_t> place;                      ///< [C] of its first point, as in Plan
+  std::vector<int64_t> place;                      ///< [C] of its first point, as in Distribution
   std::vector<int64_t> unknown;                    ///< [C] block number of its first unknown
   int64_t layers = 0, columns = 0, triangles = 0;  ///< of the whole
   int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;
@@ -20,9 +20,10 @@ struct Deal {
   std::vector<scene::RigidMotion> moves;  ///< [bones]
 };
 
-/// Deals the `ground` out, which rank 0 alone looks at: to every rank its piece, and the bones; to
-/// rank 0 the model's frame. Columns are shared out as by distribute(). Collective.
-Deal deal_out(MPI_Comm comm, const model::Ground* ground, const scene::Scene& scene,
-              model::Model& frame, std::vector<surface::Surface>& bones);
+/// Distributes the `geometry`, which rank 0 alone reads: to every rank its piece, and the bones; to
+/// rank 0 the model's global metadata. Columns are shared out as by distribute(). Collective.
+RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
+                               const scene::Scene& scene, model::Model& global_metadata,
+                               std::vector<surface::Surface>& bones);
 
 }  // namespace repose::discrete

@@ -20,10 +20,10 @@ SplineWeights spline_weights(double at, int controls);
 /// The sides of cuts against one another: places of one side, the other as a bicubic B-spline
 /// surface through which they do not pass (docs/theory/contact.md). The gap is the signed distance
 /// to the surface where it is now, so that all of it is a function of the positions alone.
-class WallLoop {
+class CutFaceContact {
  public:
-  WallLoop() = default;
-  WallLoop(const model::Walls& walls, double stiffness);  ///< with local point numbers
+  CutFaceContact() = default;
+  CutFaceContact(const model::CutFaces& cut_faces, double stiffness);  ///< with local point numbers
   bool empty() const { return places_.empty(); }
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
@@ -33,9 +33,9 @@ class WallLoop {
   /// Adds scale · gradient; returns the value, N·mm, unscaled.
   double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient);
   /// Finds the feet of all places, for all functions below.
-  void look(std::span<const Vec3> position);
+  void update_gaps(std::span<const Vec3> position);
   /// Calls visit(p, q, block) for every two points of each place that acts, p before q or the same,
-  /// at the latest look: the Hessian, or a semidefinite relative.
+  /// at the latest update: the Hessian, or a semidefinite relative.
   template <class Visit>
   void for_each_block(bool exact, Visit&& visit) const {
     for (size_t w = 0; w < places_.size(); ++w) {
@@ -46,9 +46,9 @@ class WallLoop {
         visit_products(lumped(w), places_[w].area * stiffness_, visit);
     }
   }
-  /// The gaps below `reach` mm at the latest look, to first order.
+  /// The gaps below `reach` mm at the latest update, to first order.
   std::vector<LinearGap> linear_gaps(double reach) const;
-  /// Calls visit(p, q, block) for the curvature −a p ∂²g of the multipliers at the latest look.
+  /// Calls visit(p, q, block) for the curvature −a p ∂²g of the multipliers at the latest update.
   template <class Visit>
   void for_each_curvature(std::span<const LinearGap> gaps, Visit&& visit) const {
     for (const LinearGap& g : gaps)
@@ -58,7 +58,7 @@ class WallLoop {
   /// Points that may come to face each other, one before the other, sorted.
   std::span<const std::array<int32_t, 2>> links() const { return links_; }
   /// Gaps (mm; where nothing is opposite the distance) and pressures p − k g (N/mm²) at the latest
-  /// look.
+  /// update.
   double gap(size_t w) const { return feet_[w].gap; }
   double pressure(size_t w) const { return now(w).pressure; }
   const Vec3& normal(size_t w) const { return feet_[w].normal; }  ///< out of the other side
@@ -94,7 +94,7 @@ class WallLoop {
     }
     Vec3 sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const;
     Eigen::Matrix2d metric() const;
-    Eigen::Matrix2d bend(const Vec3& way) const;  ///< second derivatives in a direction
+    Eigen::Matrix2d bend(const Vec3& offset) const;  ///< second derivatives in a direction
 
     int rows = 0;
     SplineWeights along, inwards;
@@ -109,7 +109,7 @@ class WallLoop {
 
   Pressing now(size_t w) const;
   bool acts(size_t w) const { return now(w).stiffness > 0; }
-  void add_net(const model::Walls& walls, size_t cut, size_t first);
+  void add_net(const model::CutFaces& cut_faces, size_t cut, size_t first);
   void add_place(int64_t point, double area, const Eigen::Vector2d& at);
   void link(const Net& own, const Net& other);
   std::vector<Touched> touched(size_t w) const;  // of a place that acts, by point

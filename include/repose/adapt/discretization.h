@@ -22,14 +22,14 @@ struct Convergence {
 /// Where the scene lets both the skin's edges (tissue.edge) and the layers be any number, up to two
 /// finer than its own, of at most `most_unknowns`. On rank 0.
 Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
-                           int64_t most_unknowns = 5'000'000);
+                           int64_t max_unknowns = 5'000'000);
 
-/// A row about the last model of a convergence, which was solved to `wanted` mm.
-std::string describe_convergence(const GridSequence& sequence, double wanted,
+/// A row about the last model of a convergence, which was solved to `requested` mm.
+std::string describe_convergence(const GridSequence& sequence, double requested,
                                  const std::string& limit);
 
 /// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
-struct Discretisation {
+struct Discretization {
   double order = 1;              ///< with which differences fall when all lengths are halved
   bool observed = false;         ///< in three resolutions; else the 1 that is assumed
   double mean = 0, largest = 0;  ///< over the skin points that move
@@ -41,10 +41,10 @@ struct Discretisation {
 /// |u_h − u_2h| / (2^p − 1) is left. p is observed where `sequence` has two resolutions, and is
 /// kept within 1/2 and 2. `position` [N] is the rest position of `fine`, the scene's own model. On
 /// rank 0.
-Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
+Discretization discretization_of(const model::Model& fine, const std::vector<Vec3>& position,
                                  const GridSequence& sequence);
 
 /// One row for a person.
-std::string describe_discretisation(const Discretisation& found);
+std::string describe_discretization(const Discretization& found);
 
 }  // namespace repose::adapt

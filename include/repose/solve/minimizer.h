@@ -16,39 +16,40 @@ class ProgressTest;
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
-/// What tells how far a state is from rest: the Newton step of `function`, whose linear systems
+/// Estimates how far a state is from rest by the Newton step of `function`, whose linear systems
 /// `solver` solves.
 struct ErrorEstimate {
   discrete::Function& function;
   linear::TangentSolver& solver;
 };
 
-/// Minimises a function with TAO until the rest position is near enough, in mm. Newton by default;
+/// Minimizes a function with TAO until the rest position is near enough, in mm. Newton by default;
 /// `-tao_type` chooses any unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options
 /// apply. `-tao_type lmvm -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the
 /// stiffness at the start of the search, and again where it has slowed (initial_hessian.h). All
 /// members collective.
-class Minimiser : public RestSearch {
+class Minimizer : public RestSearch {
  public:
-  /// Sees each iteration; returns whether to go on, the same on all ranks.
+  /// Receives each iteration; returns whether to continue, the same on all ranks.
   using Watch = std::function<bool(const Iteration&)>;
   /// `solver` is for Newton methods; the distance to the rest position is its Newton step too, or
   /// that of another function with the same rest position.
-  Minimiser(discrete::Function& function, linear::TangentSolver& solver, const Watch& watch);
-  Minimiser(discrete::Function& function, linear::TangentSolver& solver,
+  Minimizer(discrete::Function& function, linear::TangentSolver& solver, const Watch& watch);
+  Minimizer(discrete::Function& function, linear::TangentSolver& solver,
             const ErrorEstimate& estimate, const Watch& watch);
-  ~Minimiser() override;
+  ~Minimizer() override;
 
   /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
   /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
   /// `near`: the search begins where the last one ended, but for contact.
-  Outcome approach(Vec displacement, double distance, bool near = false);
+  Outcome presolve(Vec displacement, double distance, bool near = false);
 
   /// Estimates the distance to the rest position and ends the search by Newton steps, where these
   /// are short enough; no search of TAO's.
   Outcome finish(Vec displacement, double accuracy);
 
-  /// With accuracy 0 the distance is not looked at on the way: TAO goes on as long as it can.
+  /// With accuracy 0 the distance is not estimated during the search: TAO goes on as long as it
+  /// can.
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
@@ -56,18 +57,18 @@ class Minimiser : public RestSearch {
   void make_tao();
   void set_forcing();
   void search(Vec displacement, bool near = false);
-  /// Whether the search that ended after so many iterations is to be begun again where it ended.
-  bool worth_going_on(int64_t iterations);
-  /// `last`: the search is over, so the estimate is told.
+  /// Returns whether the search that ended after `iterations` begins again where it ended.
+  bool should_restart(int64_t iterations);
+  /// `last`: the search is over, so the estimate is reported.
   double strict_estimate(Vec displacement, Vec gradient, bool last);
-  /// Of the latest Newton step δ, from `displacement`, and the next: θ (TangentSolver), of which
-  /// the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004, Newton
-  /// Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic model
-  /// misleads.
+  /// Returns θ (TangentSolver) of the latest Newton step δ, from `displacement`, and the next,
+  /// where the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004,
+  /// Newton Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic
+  /// model misleads.
   double contraction(Vec displacement);
   bool step_was_cut() const;
   /// Where no force is left: 0, or infinite at a saddle.
-  double at_balance(Vec displacement);
+  double distance_without_force(Vec displacement);
   bool worth_estimating(double largest_force) const;
   std::optional<bool> near_enough_at_a_step(Vec gradient);
   bool near_enough(Vec displacement, Vec gradient, double largest_force);
@@ -86,25 +87,25 @@ class Minimiser : public RestSearch {
   Watch watch_;
   std::unique_ptr<ProgressTest> progress_;
   TaoHandle tao_;
-  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is asked for
-  bool may_close_ = false;                   // … in the search under way
-  bool closed_ = false;                      // it did
-  bool closes_ = false;                      // near rest its search gives way to Newton steps
+  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is requested
+  bool newton_finish_allowed_ = false;       // … in the present search
+  bool newton_finish_ = false;               // it did
+  bool newton_finish_enabled_ = false;       // near rest its search is finished by Newton steps
   bool newton_ = true;                       // the TAO method uses the Hessian
   bool slowed_ = false;                      // the initial Hessian is to be renewed
-  int64_t iterations_ = 0;                   // of the run under way, before TAO's present ones
+  int64_t iterations_ = 0;                   // of the present run, before TAO's present ones
   bool automatic_forcing_ = true;
   bool cut_ = false;                    // the latest Newton step was
   double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate
-  double accuracy_ = 0;                 // mm, of the run under way
+  double accuracy_ = 0;                 // mm, of the present run
   double error_ = 0;                    // mm, latest strict estimate
   double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
-  int64_t looked_at_ = 0;               // evaluations at that estimate
-  double lowest_ = 0;                   // value, of the run under way
+  int64_t estimated_at_ = 0;            // evaluations at that estimate
+  double lowest_ = 0;                   // value, of the present run
   int64_t lowered_at_ = 0;              // iteration at which it was found
   bool stalled_ = false;                // the value has not fallen for long
-  bool rough_ = false;                  // the search under way is an approach
-  bool stopped_ = false;                // the watcher did not want to go on
+  bool presolving_ = false;             // the present search is a presolve
+  bool stopped_ = false;                // the watcher stopped the search
   double taken_ = 0;                    // mm, the Newton step that led here, or 0
   double contraction_ = 0;              // of the latest Newton step, …
   int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian

@@ -1,4 +1,4 @@
-#include "repose/mechanics/wall_contact.h"
+#include "repose/mechanics/cut_face_contact.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -43,7 +43,8 @@ SplineWeights spline_weights(double at, int controls) {
   return weights;
 }
 
-WallLoop::Patch::Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at)
+CutFaceContact::Patch::Patch(const Net& net, const std::vector<Vec3>& controls,
+                             const Eigen::Vector2d& at)
     : rows(net.rows),
       along(spline_weights(at[0], net.columns)),
       inwards(spline_weights(at[1], net.rows)),
@@ -54,36 +55,39 @@ WallLoop::Patch::Patch(const Net& net, const std::vector<Vec3>& controls, const 
       first_second(sum(controls, 1, 1)),
       second_second(sum(controls, 0, 2)) {}
 
-Vec3 WallLoop::Patch::sum(const std::vector<Vec3>& controls, int d_along, int d_inwards) const {
+Vec3 CutFaceContact::Patch::sum(const std::vector<Vec3>& controls, int d_along,
+                                int d_inwards) const {
   Vec3 total = Vec3::Zero();
   for_each(d_along, d_inwards,
            [&](int control, double weight) { total += weight * controls[control]; });
   return total;
 }
 
-Eigen::Matrix2d WallLoop::Patch::metric() const {
+Eigen::Matrix2d CutFaceContact::Patch::metric() const {
   Eigen::Matrix2d m;
   m << first.dot(first), first.dot(second), first.dot(second), second.dot(second);
   return m;
 }
 
-Eigen::Matrix2d WallLoop::Patch::bend(const Vec3& way) const {
+Eigen::Matrix2d CutFaceContact::Patch::bend(const Vec3& offset) const {
   Eigen::Matrix2d b;
-  b << way.dot(first_first), way.dot(first_second), way.dot(first_second), way.dot(second_second);
+  b << offset.dot(first_first), offset.dot(first_second), offset.dot(first_second),
+      offset.dot(second_second);
   return b;
 }
 
-WallLoop::WallLoop(const model::Walls& walls, double stiffness) : stiffness_(stiffness) {
+CutFaceContact::CutFaceContact(const model::CutFaces& cut_faces, double stiffness)
+    : stiffness_(stiffness) {
   size_t first = 0, place = 0;
-  for (size_t cut = 0; cut < walls.size.size(); ++cut) {
-    const auto rows = static_cast<size_t>(walls.size[cut][1]);
-    const size_t count = static_cast<size_t>(walls.size[cut][0]) * rows;
-    add_net(walls, cut, first);
-    add_net(walls, cut, first + count);
+  for (size_t cut = 0; cut < cut_faces.size.size(); ++cut) {
+    const auto rows = static_cast<size_t>(cut_faces.size[cut][1]);
+    const size_t count = static_cast<size_t>(cut_faces.size[cut][0]) * rows;
+    add_net(cut_faces, cut, first);
+    add_net(cut_faces, cut, first + count);
     for (size_t c = 0; c < count; ++c, ++place) {
       const size_t column = c / rows, row = c % rows;
-      if (walls.area[place] > 0)
-        add_place(walls.point[walls.begin[first + c]], walls.area[place],
+      if (cut_faces.area[place] > 0)
+        add_place(cut_faces.point[cut_faces.begin[first + c]], cut_faces.area[place],
                   {static_cast<double>(column), static_cast<double>(row)});
     }
     link(nets_[nets_.size() - 2], nets_.back());
@@ -95,19 +99,19 @@ WallLoop::WallLoop(const model::Walls& walls, double stiffness) : stiffness_(sti
   feet_.resize(places_.size());
 }
 
-void WallLoop::add_net(const model::Walls& walls, size_t cut, size_t first) {
+void CutFaceContact::add_net(const model::CutFaces& cut_faces, size_t cut, size_t first) {
   Net& net = nets_.emplace_back();
-  net.columns = static_cast<int>(walls.size[cut][0]);
-  net.rows = static_cast<int>(walls.size[cut][1]);
+  net.columns = static_cast<int>(cut_faces.size[cut][0]);
+  net.rows = static_cast<int>(cut_faces.size[cut][1]);
   for (size_t c = first; c < first + static_cast<size_t>(net.columns) * net.rows; ++c) {
     auto& shares = net.controls.emplace_back();
-    for (auto k = walls.begin[c]; k < walls.begin[c + 1]; ++k)
-      shares.emplace_back(static_cast<int32_t>(walls.point[k]), walls.weight[k]);
+    for (auto k = cut_faces.begin[c]; k < cut_faces.begin[c + 1]; ++k)
+      shares.emplace_back(static_cast<int32_t>(cut_faces.point[k]), cut_faces.weight[k]);
   }
 }
 
 /// A place of the last net but one, against the last.
-void WallLoop::add_place(int64_t point, double area, const Eigen::Vector2d& at) {
+void CutFaceContact::add_place(int64_t point, double area, const Eigen::Vector2d& at) {
   const Net& own = nets_[nets_.size() - 2];
   const std::vector<Vec3> nowhere(own.controls.size(), Vec3::Zero());
   std::map<int32_t, double> shares;
@@ -118,7 +122,7 @@ void WallLoop::add_place(int64_t point, double area, const Eigen::Vector2d& at) 
   places_.push_back({nets_.size() - 1, point, area, {shares.begin(), shares.end()}});
 }
 
-void WallLoop::link(const Net& own, const Net& other) {
+void CutFaceContact::link(const Net& own, const Net& other) {
   constexpr int reach = 4;  // columns, by which sides slide along each other
   for (const Net* a : {&own, &other})
     for (const Net* b : {&own, &other})
@@ -135,12 +139,13 @@ namespace {
 /// Newton's step towards the place of a patch that is nearest to `way` beyond its point; parameters
 /// at an end, `least` or `most`, that the nearest place lies beyond stay.
 template <class Patch>
-Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& way, const Eigen::Vector2d& where,
-                                const Eigen::Vector2d& least, const Eigen::Vector2d& most) {
-  const Eigen::Vector2d slope(patch.first.dot(way), patch.second.dot(way));
-  Eigen::Matrix2d bend = patch.metric() - patch.bend(way);
+Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& offset,
+                                const Eigen::Vector2d& where, const Eigen::Vector2d& minimum,
+                                const Eigen::Vector2d& maximum) {
+  const Eigen::Vector2d slope(patch.first.dot(offset), patch.second.dot(offset));
+  Eigen::Matrix2d bend = patch.metric() - patch.bend(offset);
   const auto held = [&](int d) {
-    return slope[d] < 0 ? where[d] <= least[d] : where[d] >= most[d];
+    return slope[d] < 0 ? where[d] <= minimum[d] : where[d] >= maximum[d];
   };
   if (held(0) || held(1)) {
     const int d = held(0) ? 1 : 0;
@@ -153,48 +158,49 @@ Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& way, const Eigen
 }
 
 /// Where on a surface of `columns` × `rows` controls `at` is nearest to, by Newton's method;
-/// whether that is not its end. `look` gives the surface at a place.
-template <class Look>
-auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& most, const Vec3& at,
-                   Look&& look) {
-  constexpr int most_steps = 60, most_halved = 20;
+/// whether that is not its end. `evaluate` returns the surface at a place.
+template <class Evaluate>
+auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& maximum, const Vec3& at,
+                   Evaluate&& evaluate) {
+  constexpr int max_steps = 60, max_halved = 20;
   constexpr double longest = 0.5, exact = 1e-13;  // of a patch
-  const Eigen::Vector2d least(-1, -1);
-  auto patch = look(where);
-  for (int n = 0; n < most_steps; ++n) {
-    const Vec3 way = at - patch.point;
-    Eigen::Vector2d step = step_to_nearest(patch, way, where, least, most);
+  const Eigen::Vector2d minimum(-1, -1);
+  auto patch = evaluate(where);
+  for (int n = 0; n < max_steps; ++n) {
+    const Vec3 offset = at - patch.point;
+    Eigen::Vector2d step = step_to_nearest(patch, offset, where, minimum, maximum);
     if (!step.allFinite()) break;
     step *= std::min(1.0, longest / std::max(step.cwiseAbs().maxCoeff(), exact));
-    Eigen::Vector2d next = (where + step).cwiseMax(least).cwiseMin(most);
-    auto there = look(next);
-    for (int k = 0; k < most_halved && (at - there.point).squaredNorm() > way.squaredNorm(); ++k) {
+    Eigen::Vector2d next = (where + step).cwiseMax(minimum).cwiseMin(maximum);
+    auto there = evaluate(next);
+    for (int k = 0; k < max_halved && (at - there.point).squaredNorm() > offset.squaredNorm();
+         ++k) {
       next = (where + next) / 2;
-      there = look(next);
+      there = evaluate(next);
     }
     const double moved = (next - where).cwiseAbs().maxCoeff();
     where = next;
     patch = there;
     if (moved < exact) break;
   }
-  return std::pair(patch, (where - least).minCoeff() > 0 && (most - where).minCoeff() > 0);
+  return std::pair(patch, (where - minimum).minCoeff() > 0 && (maximum - where).minCoeff() > 0);
 }
 
 }  // namespace
 
-std::vector<WallLoop::Touched> WallLoop::touched(size_t w) const {
+std::vector<CutFaceContact::Touched> CutFaceContact::touched(size_t w) const {
   std::map<int32_t, Eigen::Matrix<double, 3, 5>> touched;
   const auto at_point = [&](int32_t p) -> Eigen::Matrix<double, 3, 5>& {
     return touched.try_emplace(p, Eigen::Matrix<double, 3, 5>::Zero()).first->second;
   };
   const Foot& foot = feet_[w];
-  Eigen::Matrix3d ways;
-  ways << foot.normal, foot.patch.first, foot.patch.second;
+  Eigen::Matrix3d axes;
+  axes << foot.normal, foot.patch.first, foot.patch.second;
   const auto& controls = nets_[places_[w].net].controls;
-  for (const auto& [p, share] : places_[w].shares) at_point(p).leftCols<3>() += share * ways;
+  for (const auto& [p, share] : places_[w].shares) at_point(p).leftCols<3>() += share * axes;
   foot.patch.for_each(0, 0, [&](int control, double weight) {
     for (const auto& [p, share] : controls[control])
-      at_point(p).leftCols<3>() -= weight * share * ways;
+      at_point(p).leftCols<3>() -= weight * share * axes;
   });
   for (int d = 0; d < 2; ++d)
     foot.patch.for_each(1 - d, d, [&](int control, double weight) {
@@ -204,7 +210,7 @@ std::vector<WallLoop::Touched> WallLoop::touched(size_t w) const {
   return {touched.begin(), touched.end()};
 }
 
-void WallLoop::look(std::span<const Vec3> position) {
+void CutFaceContact::update_gaps(std::span<const Vec3> position) {
   const auto mean = [&](const std::vector<Share>& shares) {
     Vec3 sum = Vec3::Zero();
     for (const auto& [p, share] : shares) sum += share * position[p];
@@ -230,23 +236,23 @@ void WallLoop::look(std::span<const Vec3> position) {
     const auto [patch, opposite] =
         nearest_place(Eigen::Vector2d(number / net.rows, number % net.rows),
                       Eigen::Vector2d(net.columns, net.rows), at, patch_at);
-    const Vec3 across = patch.first.cross(patch.second), way = at - patch.point;
+    const Vec3 across = patch.first.cross(patch.second), offset = at - patch.point;
     Foot& foot = feet_[w];
     foot.patch = patch;
     foot.normal = across.normalized();
     foot.opposite = opposite && across.norm() > 0;
-    foot.gap = foot.opposite ? foot.normal.dot(way) : way.norm();
+    foot.gap = foot.opposite ? foot.normal.dot(offset) : offset.norm();
   }
 }
 
-Pressing WallLoop::now(size_t w) const {
+Pressing CutFaceContact::now(size_t w) const {
   const double far = std::numeric_limits<double>::max();
   return press(feet_[w].opposite ? feet_[w].gap : far, multiplier_[w], stiffness_, false);
 }
 
-double WallLoop::add_gradient(std::span<const Vec3> position, double scale,
-                              std::span<Vec3> gradient) {
-  look(position);
+double CutFaceContact::add_gradient(std::span<const Vec3> position, double scale,
+                                    std::span<Vec3> gradient) {
+  update_gaps(position);
   double value = 0;
   for (size_t w = 0; w < places_.size(); ++w) {
     const Pressing pressing = now(w);
@@ -262,7 +268,7 @@ double WallLoop::add_gradient(std::span<const Vec3> position, double scale,
   return value;
 }
 
-std::vector<LinearGap> WallLoop::linear_gaps(double reach) const {
+std::vector<LinearGap> CutFaceContact::linear_gaps(double reach) const {
   std::vector<LinearGap> gaps;
   for (size_t w = 0; w < places_.size(); ++w) {
     const Foot& foot = feet_[w];
@@ -276,7 +282,7 @@ std::vector<LinearGap> WallLoop::linear_gaps(double reach) const {
 
 /// The gap's gradient as that between the point of either side that counts most: spread over all,
 /// a preconditioner that couples neighbors only would keep but a part of it.
-LinearGap::Gradient WallLoop::lumped(size_t w) const {
+LinearGap::Gradient CutFaceContact::lumped(size_t w) const {
   constexpr double weight = 0.7;  // between 1, what smooth motion meets, and that of one point
   const Vec3& normal = feet_[w].normal;
   std::pair<double, int32_t> own{0, -1}, other{0, -1};
@@ -292,10 +298,10 @@ LinearGap::Gradient WallLoop::lumped(size_t w) const {
   return lumped;
 }
 
-/// Of the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r,
+/// Returns the Hessian in the columns of Touched: a k ∂g ∂g − a p ∂²g, where with a = T·∂r,
 /// e = n·∂S₂,
 ///     ∂²g = −aᵀ m⁻¹ κ A⁻¹ a − aᵀ A⁻¹ e − eᵀ A⁻¹ a − g eᵀ A⁻¹ e,   A = m − g κ.
-WallLoop::Form WallLoop::bilinear(size_t w, const Pressing& pressing) const {
+CutFaceContact::Form CutFaceContact::bilinear(size_t w, const Pressing& pressing) const {
   const Foot& foot = feet_[w];
   Form form = Form::Zero();
   form(0, 0) = pressing.stiffness;

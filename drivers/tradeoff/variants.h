@@ -4,8 +4,8 @@
 namespace repose::tradeoff {
 
 /// The scene as it stands, by the first method and the second of the accuracies.
-Way usual_way(const Plan& plan);
+Variant usual_variant(const Plan& plan);
 /// All ways of a plan, those of one model one after another.
-std::vector<Way> ways_of(const Plan& plan);
+std::vector<Variant> variants_of(const Plan& plan);
 
 }  // namespace repose::tradeoff

@@ -1,8 +1,8 @@
 /// What every stage of a large solid's way costs before it is searched, built whole by rank 0 and
-/// shared out, or raised by all ranks from their columns: a synthetic head with contact. Prints a
-/// line a stage (stage_clock.h), of which raise.py makes a table.
+/// shared out, or built by all ranks from their columns: a synthetic head with contact. Prints a
+/// line a stage (stage_clock.h), of which build_local.py makes a table.
 ///
-///     mpirun -n 2 benchmark_raise SKIN_VERTICES FILE whole|raised
+///     mpirun -n 2 benchmark_build_local SKIN_VERTICES FILE whole|raised
 #include <optional>
 
 #include "repose/base/petsc.h"
@@ -56,17 +56,19 @@ discrete::Part whole(const model::Anatomy& anatomy, const std::string& name, Fil
   return part;
 }
 
-discrete::Part raised(const model::Anatomy& anatomy, const std::string& name, File& file,
-                      Clock& clock) {
-  std::optional<model::Ground> ground;
-  if (base::rank(comm) == 0) ground.emplace(anatomy);
+discrete::Part local_model(const model::Anatomy& anatomy, const std::string& name, File& file,
+                           Clock& clock) {
+  std::optional<model::ColumnGeometry> geometry;
+  if (base::rank(comm) == 0) geometry.emplace(anatomy);
   clock.end("ground");
-  discrete::RaisedPart raised = discrete::raise(comm, ground ? &*ground : nullptr, anatomy.scene);
-  ground.reset();
+  discrete::LocalModel local_model =
+      discrete::build_local(comm, geometry ? &*geometry : nullptr, anatomy.scene);
+  geometry.reset();
   clock.end("raise");
-  file.emplace(comm, name, raised.frame, discrete::NaturalRows::of_model(comm, raised));
+  file.emplace(comm, name, local_model.global_metadata,
+               discrete::NaturalRows::of_model(comm, local_model));
   clock.end("write");
-  return std::move(raised.part);
+  return std::move(local_model.part);
 }
 
 void measure(int64_t skin_vertices, const std::string& name, bool is_whole) {
@@ -75,7 +77,7 @@ void measure(int64_t skin_vertices, const std::string& name, bool is_whole) {
   clock.end("surfaces");
   File file;
   const discrete::Part part =
-      is_whole ? whole(anatomy, name, file, clock) : raised(anatomy, name, file, clock);
+      is_whole ? whole(anatomy, name, file, clock) : local_model(anatomy, name, file, clock);
   if (base::rank(comm) == 0) std::printf("points %ld\n", static_cast<long>(part.total_points));
   discrete::Positions positions(comm, part);
   discrete::Objective objective(positions, mechanics::solid_weights);
@@ -94,7 +96,7 @@ void measure(int64_t skin_vertices, const std::string& name, bool is_whole) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fprintf(stderr, "usage: benchmark_raise SKIN_VERTICES FILE whole|raised\n");
+    std::fprintf(stderr, "usage: benchmark_build_local SKIN_VERTICES FILE whole|raised\n");
     return 1;
   }
   const base::Session session(1, argv, nullptr);

@@ -1,4 +1,4 @@
-#include "repose/adapt/discretisation.h"
+#include "repose/adapt/discretization.h"
 
 #include <fmt/format.h>
 
@@ -43,7 +43,7 @@ std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy) {
 }
 
 Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
-                           int64_t most_unknowns) {
+                           int64_t max_unknowns) {
   constexpr int finer = 2, growth = 8;  // of the unknowns
   const scene::Tissue& tissue = anatomy.scene.tissue;
   Convergence found{halved_resolutions(anatomy), "these are the finest that are tried"};
@@ -57,7 +57,7 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
   int gaps = tissue.layers - 1;
   for (int k = 0; k < finer; ++k) {
     unknowns *= growth;
-    if (unknowns > most_unknowns) {
+    if (unknowns > max_unknowns) {
       found.limit = fmt::format("a finer one has about {:.2g} million unknowns",
                                 1e-6 * static_cast<double>(unknowns));
       break;
@@ -67,21 +67,21 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
   return found;
 }
 
-std::string describe_convergence(const GridSequence& sequence, double wanted,
+std::string describe_convergence(const GridSequence& sequence, double requested,
                                  const std::string& limit) {
   const Level& last = sequence.levels.back();
   const std::string why = sequence.refusal.empty() ? limit : sequence.refusal;
   return fmt::format(
       "  {:<22} of these, the last; mesh and layers leave its skin {:.2g} mm from the continuum at "
       "most, by its distance from the one before{}\n",
-      "solved model", last.discretisation_error,
+      "solved model", last.discretization_error,
       sequence.near_enough ? ""
-                           : fmt::format(": MORE THAN THE {:g} mm ASKED FOR: {}", wanted, why));
+                           : fmt::format(": MORE THAN THE {:g} mm REQUESTED: {}", requested, why));
 }
 
-Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec3>& position,
+Discretization discretization_of(const model::Model& fine, const std::vector<Vec3>& position,
                                  const GridSequence& sequence) {
-  Discretisation found;
+  Discretization found;
   found.at_point.assign(position.size(), 0.0);
   if (!sequence.before.empty()) {
     const double last = mean_difference(fine, position, position, sequence.position);
@@ -105,7 +105,7 @@ Discretisation discretisation_of(const model::Model& fine, const std::vector<Vec
   return found;
 }
 
-std::string describe_discretisation(const Discretisation& d) {
+std::string describe_discretization(const Discretization& d) {
   return fmt::format(
       "  {:<22} leave the moving skin {:.2g} mm from the continuum on average, {:.2g} mm at 95 %, "
       "{:.2g} mm at most (order {:.2g} {})\n",

@@ -47,10 +47,10 @@ model::Anatomy rich(int squares) {
   return anatomy;
 }
 
-discrete::RaisedPart raise(const model::Anatomy& anatomy) {
-  std::optional<model::Ground> ground;
-  base::on_first_rank(comm, [&] { ground.emplace(anatomy); });
-  return discrete::raise(comm, ground ? &*ground : nullptr, anatomy.scene);
+discrete::LocalModel build_local(const model::Anatomy& anatomy) {
+  std::optional<model::ColumnGeometry> geometry;
+  base::on_root(comm, [&] { geometry.emplace(anatomy); });
+  return discrete::build_local(comm, geometry ? &*geometry : nullptr, anatomy.scene);
 }
 
 void expect_same(const model::Model& one, const model::Model& other) {
@@ -72,11 +72,11 @@ void expect_same(const model::Model& one, const model::Model& other) {
   EXPECT_EQ(one.edges.weight, other.edges.weight);
   EXPECT_EQ(one.contact.stiffness, other.contact.stiffness);
   EXPECT_EQ(one.contact.spacing, other.contact.spacing);
-  EXPECT_EQ(one.contact.touches.point, other.contact.touches.point);
-  EXPECT_EQ(one.contact.touches.body, other.contact.touches.body);
-  EXPECT_EQ(one.contact.touches.binding, other.contact.touches.binding);
-  EXPECT_EQ(one.contact.touches.area, other.contact.touches.area);
-  EXPECT_EQ(one.contact.touches.offset, other.contact.touches.offset);
+  EXPECT_EQ(one.contact.pairs.point, other.contact.pairs.point);
+  EXPECT_EQ(one.contact.pairs.body, other.contact.pairs.body);
+  EXPECT_EQ(one.contact.pairs.binding, other.contact.pairs.binding);
+  EXPECT_EQ(one.contact.pairs.area, other.contact.pairs.area);
+  EXPECT_EQ(one.contact.pairs.offset, other.contact.pairs.offset);
   EXPECT_EQ(one.bone_transform, other.bone_transform);
 }
 
@@ -118,29 +118,29 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
   for (const model::Anatomy& anatomy : {jaws(squares()), rich(squares())}) {
     const model::BuiltModel built = model::build_model(anatomy);
     const Part part = discrete::distribute(comm, built.model);
-    const discrete::RaisedPart raised = raise(anatomy);
-    expect_same(raised.part, part);
-    expect_same_masses(raised.part, part);
+    const discrete::LocalModel local_model = build_local(anatomy);
+    expect_same(local_model.part, part);
+    expect_same_masses(local_model.part, part);
     EXPECT_TRUE(part.contact);
     const model::Counts all = model::count(built.model);
-    EXPECT_EQ(raised.counts.points, all.points);
-    EXPECT_EQ(raised.counts.soft, all.soft);
-    EXPECT_EQ(raised.counts.boundary, all.boundary);
-    EXPECT_EQ(raised.counts.bone, all.bone);
-    EXPECT_EQ(raised.counts.prisms, all.prisms);
-    EXPECT_EQ(raised.counts.edges, all.edges);
+    EXPECT_EQ(local_model.counts.points, all.points);
+    EXPECT_EQ(local_model.counts.soft, all.soft);
+    EXPECT_EQ(local_model.counts.boundary, all.boundary);
+    EXPECT_EQ(local_model.counts.bone, all.bone);
+    EXPECT_EQ(local_model.counts.prisms, all.prisms);
+    EXPECT_EQ(local_model.counts.edges, all.edges);
     if (base::rank(comm) > 0) continue;
-    EXPECT_EQ(raised.frame.skin, built.model.skin);
-    EXPECT_EQ(raised.frame.bones, built.model.bones);
-    EXPECT_EQ(raised.frame.contact.bodies.size(), built.model.contact.bodies.size());
-    EXPECT_NEAR(raised.effective_modulus, built.report.effective_modulus, 1e-12);
+    EXPECT_EQ(local_model.global_metadata.skin, built.model.skin);
+    EXPECT_EQ(local_model.global_metadata.bones, built.model.bones);
+    EXPECT_EQ(local_model.global_metadata.contact.bodies.size(), built.model.contact.bodies.size());
+    EXPECT_NEAR(local_model.effective_modulus, built.report.effective_modulus, 1e-12);
   }
 }
 
 TEST(Raise, a_rank_without_columns_has_an_empty_part) {
   const model::Anatomy anatomy = jaws(1);  // four columns
   const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
-  expect_same(raise(anatomy).part, part);
+  expect_same(build_local(anatomy).part, part);
 }
 
 /// This rank's slab of rows.
@@ -154,7 +154,7 @@ std::vector<Value> slab(const std::vector<Value>& whole) {
 TEST(Raise, its_rows_are_those_of_the_whole_model) {
   const model::Anatomy anatomy = rich(24);
   const model::Model whole = model::build_model(anatomy).model;
-  const model::ModelRows rows = discrete::NaturalRows::of_model(comm, raise(anatomy));
+  const model::ModelRows rows = discrete::NaturalRows::of_model(comm, build_local(anatomy));
   EXPECT_EQ(rows.points.position, slab(whole.points.position));
   EXPECT_EQ(rows.points.set, slab(whole.points.set));
   EXPECT_EQ(rows.points.target, slab(whole.points.target));
@@ -167,12 +167,12 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
   EXPECT_EQ(rows.prisms.nodal_modulus, slab(whole.prisms.nodal_modulus));
   EXPECT_EQ(rows.edges.points, slab(whole.edges.points));
   EXPECT_EQ(rows.edges.weight, slab(whole.edges.weight));
-  EXPECT_EQ(rows.touch.point, slab(whole.contact.touches.point));
-  EXPECT_EQ(rows.touch.body, slab(whole.contact.touches.body));
-  EXPECT_EQ(rows.touch.binding, slab(whole.contact.touches.binding));
-  EXPECT_EQ(rows.touch.area, slab(whole.contact.touches.area));
+  EXPECT_EQ(rows.pairs.point, slab(whole.contact.pairs.point));
+  EXPECT_EQ(rows.pairs.body, slab(whole.contact.pairs.body));
+  EXPECT_EQ(rows.pairs.binding, slab(whole.contact.pairs.binding));
+  EXPECT_EQ(rows.pairs.area, slab(whole.contact.pairs.area));
   EXPECT_EQ(rows.outward, slab(model::outward_normals(whole)));
-  EXPECT_EQ(rows.touches, static_cast<int64_t>(whole.contact.touches.point.size()));
+  EXPECT_EQ(rows.contact_pairs, static_cast<int64_t>(whole.contact.pairs.point.size()));
 }
 
 /// The jaws turn together about each corner.
@@ -184,13 +184,13 @@ TEST(Raise, every_rank_reads_the_same_distances_to_bodies) {
     anatomy.bones = {patches::box({-20, -20, -80}, {51.2, 120, -10}),
                      patches::box({51.3, -20, -80}, {120, 120, -10})};
     const auto bodies = mechanics::make_bodies(model::build_model(anatomy).model);
-    const discrete::RaisedPart raised = raise(anatomy);
-    ASSERT_EQ(raised.part.bodies.size(), bodies.size());
+    const discrete::LocalModel local_model = build_local(anatomy);
+    ASSERT_EQ(local_model.part.bodies.size(), bodies.size());
     for (size_t k = 0; k < bodies.size(); ++k)
       for (double x = 2; x < 100; x += 8)
         for (double y = 2; y < 100; y += 8)
           for (const double z : {-8.0, -12.0, -40.0})
-            ASSERT_EQ(raised.part.bodies[k].distance({x, y, z}).value,
+            ASSERT_EQ(local_model.part.bodies[k].distance({x, y, z}).value,
                       bodies[k].distance({x, y, z}).value);
   }
 }
@@ -214,17 +214,17 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   anatomy.scene.rim = scene::Rim::fixed;  // where parts meet there are fixed points
   anatomy.scene.tissue.material->dilatation = scene::Dilatation::prism;
   model::Model whole = model::build_model(anatomy).model;
-  discrete::RaisedPart raised = raise(anatomy);
-  const solve::Recording as{0.05, Vec3(0, 0, -9.81)};
+  discrete::LocalModel local_model = build_local(anatomy);
+  const solve::ReferenceState as{0.05, Vec3(0, 0, -9.81)};
   const solve::Prestress one = solve::prestress(comm, whole, as);
-  const solve::Prestress other = solve::prestress(comm, raised.part, as);
+  const solve::Prestress other = solve::prestress(comm, local_model.part, as);
   EXPECT_GT(one.largest_force, 0);
   EXPECT_NEAR(one.largest_force, other.largest_force, 1e-12 * one.largest_force);
   EXPECT_NEAR(one.largest_pressure, other.largest_pressure, 1e-6 * one.largest_pressure);
   EXPECT_LE(other.residual, 1e-10 * one.largest_force);
-  EXPECT_EQ(raised.part.model.gravity, Vec3(0, 0, -9.81));
+  EXPECT_EQ(local_model.part.model.gravity, Vec3(0, 0, -9.81));
   // What is written is what was balanced, whoever owns it.
-  EXPECT_LE(largest_force(raised.part), 1e-10 * one.largest_force);
+  EXPECT_LE(largest_force(local_model.part), 1e-10 * one.largest_force);
   EXPECT_LE(largest_force(discrete::distribute(comm, whole)), 1e-10 * one.largest_force);
 }
 
@@ -236,7 +236,7 @@ TEST(Raise, a_prestress_of_next_to_no_weight_is_balanced_to_rounding) {
     model::Model whole = model::build_model(anatomy).model;
     const solve::Prestress of_weight = solve::prestress(comm, whole, {0.05, Vec3(0, 0, -9.81e-8)});
     EXPECT_GT(of_weight.largest_force, 0);
-    EXPECT_LT(of_weight.residual, 1e-13);  // N; tissue of 0.015 N/mm² on some millimetres
+    EXPECT_LT(of_weight.residual, 1e-13);  // N; tissue of 0.015 N/mm² on some millimeters
   }
 }
 
@@ -244,20 +244,20 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
   model::Anatomy anatomy = rich(12);
   anatomy.scene.tissue.material->regions = {
       {scene::Region{scene::SphereRegion{{0, 0, 500}, 1}}, {0.05, 0.3}}};
-  EXPECT_THROW(raise(anatomy), base::InputError);
+  EXPECT_THROW(build_local(anatomy), base::InputError);
 }
 
 TEST(Raise, what_needs_more_than_columns_is_said) {
   scene::Scene scene = jaws(4).scene;
-  EXPECT_EQ(model::beyond_columns(scene), "");
+  EXPECT_EQ(model::explain_central_build(scene), "");
   scene.forces = {{Vec3::Zero(), 5, Vec3::UnitX()}};
-  EXPECT_EQ(model::beyond_columns(scene), "it has forces");
+  EXPECT_EQ(model::explain_central_build(scene), "it has forces");
   scene = jaws(4).scene;
   scene.tissue.material.reset();
-  EXPECT_EQ(model::beyond_columns(scene), "its tissue is springs");
+  EXPECT_EQ(model::explain_central_build(scene), "its tissue is springs");
   scene = jaws(4).scene;
   scene.tissue.mass = {1, 1, 1, 1};
-  EXPECT_EQ(model::beyond_columns(scene), "its layers have masses");
+  EXPECT_EQ(model::explain_central_build(scene), "its layers have masses");
 }
 
 }  // namespace raise_test

@@ -1,4 +1,4 @@
-#include "foundation.h"
+#include "column_layout.h"
 
 #include <algorithm>
 
@@ -57,7 +57,7 @@ std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range
     const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
     rim[c] = rim[c] && bone >= 0 && range.travel(columns.deep[c], bone) <= negligible_travel;
   }
-  const bool held = std::ranges::any_of(rim, [](char on) { return on != 0; }) ||
+  const bool held = std::ranges::any_of(rim, [](char layout) { return layout != 0; }) ||
                     std::ranges::any_of(attachment.bone, [](int32_t bone) { return bone >= 0; });
   if (!held) rim = border;  // nothing else holds the tissue
   let_go();
@@ -66,8 +66,8 @@ std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range
 
 }  // namespace
 
-Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& skin,
-                          const std::vector<surface::Surface>& bones) {
+ColumnLayout lay_out_columns(const scene::Scene& scene, const surface::Surface& skin,
+                             const std::vector<surface::Surface>& bones) {
   require_one_of_each(scene, bones);
   const MotionRange range(scene, bones);
   std::vector<Cut> cuts;
@@ -80,7 +80,7 @@ Foundation lay_foundation(const scene::Scene& scene, const surface::Surface& ski
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
   report.warnings = check_anatomy(scene, range, mesh, bones);
-  Columns columns = lay_columns(mesh, field, nearest, scene.tissue, skin.name);
+  Columns columns = compute_columns(mesh, field, nearest, scene.tissue, skin.name);
   open_gaps(mesh.points, scene, columns);
   Attachment attachment = attach_columns(columns, field, scene);
   std::vector<char> rim = settle_rim(scene, range, mesh, columns, field, attachment);
@@ -108,14 +108,15 @@ void prepend_messages(const Anatomy& anatomy, BuildReport& report) {
   report.warnings.insert(report.warnings.begin(), anatomy.warnings.begin(), anatomy.warnings.end());
 }
 
-void report_columns(const Foundation& on, int64_t attached, BuildReport& report) {
-  const Columns& columns = on.columns;
-  const Attachment& attachment = on.attachment;
-  report.skin_vertices = static_cast<int64_t>(on.mesh.points.size());
-  report.skin_edges = static_cast<int64_t>(on.mesh.edges.size());
-  report.skin_triangles = static_cast<int64_t>(on.mesh.triangles.size());
+void report_columns(const ColumnLayout& layout, int64_t attached, BuildReport& report) {
+  const Columns& columns = layout.columns;
+  const Attachment& attachment = layout.attachment;
+  report.skin_vertices = static_cast<int64_t>(layout.mesh.points.size());
+  report.skin_edges = static_cast<int64_t>(layout.mesh.edges.size());
+  report.skin_triangles = static_cast<int64_t>(layout.mesh.triangles.size());
   report.attached = attached;
-  report.free_deep = report.skin_vertices - attached - std::count(on.rim.begin(), on.rim.end(), 1);
+  report.free_deep =
+      report.skin_vertices - attached - std::count(layout.rim.begin(), layout.rim.end(), 1);
   std::vector<double> sorted = columns.thickness;
   std::sort(sorted.begin(), sorted.end());
   report.thickness_min = sorted.front();
@@ -126,10 +127,10 @@ void report_columns(const Foundation& on, int64_t attached, BuildReport& report)
   report.remarks.insert(report.remarks.end(), attachment.remarks.begin(), attachment.remarks.end());
   if (columns.bent > 0)
     report.remarks.push_back(fmt::format(
-        "{} columns were bent towards their neighbours, which they crossed", columns.bent));
+        "{} columns were bent towards their neighbors, which they crossed", columns.bent));
   if (columns.shortened > 0)
-    report.remarks.push_back(fmt::format(
-        "{} columns were shortened so that neighbours do not cross", columns.shortened));
+    report.remarks.push_back(
+        fmt::format("{} columns were shortened so that neighbors do not cross", columns.shortened));
   if (attachment.largest_gap > gap_worth_saying)
     report.remarks.push_back(
         fmt::format("deepest points attached to bone end up to {:.2f} mm short of it, where bone "

@@ -9,7 +9,7 @@
 namespace repose::discrete {
 
 /// Assignment of a model's points, or of those of a piece, to ranks and unknowns.
-struct Plan {
+struct Distribution {
   const model::Model& model;         ///< of which rows are meant
   std::vector<int> owner;            ///< [N] rank of each point
   std::vector<int64_t> place;        ///< [N] of each point, rank after rank, column after column
@@ -17,12 +17,12 @@ struct Plan {
   std::vector<model::PointSet> set;  ///< [N] with points of non-rigid bones as held
   std::vector<Mat4> bone_transform;  ///< [bones]
   std::vector<mechanics::RigidBody> bodies;
-  std::vector<double> touch_offset;  ///< [touches] mm
+  std::vector<double> contact_offset;  ///< [touches] mm
   int64_t total_points = 0, total_unknowns = 0;
 };
 
 /// Points owned by one rank.
-struct Share {
+struct OwnedRange {
   int rank;
   std::span<const int64_t> points;  ///< rows, by their places
   int64_t first_unknown, unknowns;
@@ -50,9 +50,10 @@ class LocalNumbers {
 };
 
 /// Sets, and how bones move.
-void plan_motion(Plan& plan);
+void distribute_motion(Distribution& distribution);
 
-/// The part of one rank; the rows of points, prisms and edges are those of the plan's model.
-Part make_part(const Plan& plan, const Share& share, LocalNumbers& local);
+/// The part of one rank; the rows of points, prisms and edges are those of the distribution's
+/// model.
+Part make_part(const Distribution& distribution, const OwnedRange& owned, LocalNumbers& local);
 
 }  // namespace repose::discrete

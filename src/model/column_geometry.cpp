@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "add_contact.h"
-#include "foundation.h"
+#include "column_layout.h"
 #include "layers.h"
 #include "loads.h"
 #include "point_sets.h"
@@ -11,7 +11,7 @@
 
 namespace repose::model {
 
-std::string beyond_columns(const scene::Scene& scene) {
+std::string explain_central_build(const scene::Scene& scene) {
   if (!scene.tissue.material) return "its tissue is springs";
   if (!scene.incisions.empty()) return "it has incisions";
   if (!scene.instruments.empty()) return "it has instruments";
@@ -20,53 +20,53 @@ std::string beyond_columns(const scene::Scene& scene) {
   return "";
 }
 
-struct Ground::State {
+struct ColumnGeometry::State {
   scene::Scene scene;
   std::vector<surface::Surface> bones;
-  Foundation on;
+  ColumnLayout layout;
   int64_t layers;
 };
 
 namespace {
 
 /// Counts the points and elements that the layers will have.
-Counts count(const Foundation& on, int64_t layers) {
+Counts count(const ColumnLayout& layout, int64_t layers) {
   Counts counts;
-  for (size_t c = 0; c < on.rim.size(); ++c) {
-    const int64_t bone = !on.rim[c] && on.attachment.bone[c] >= 0;
-    counts.boundary += on.rim[c] ? layers : 0;
+  for (size_t c = 0; c < layout.rim.size(); ++c) {
+    const int64_t bone = !layout.rim[c] && layout.attachment.bone[c] >= 0;
+    counts.boundary += layout.rim[c] ? layers : 0;
     counts.bone += bone;
-    counts.soft += on.rim[c] ? 0 : layers - bone;
+    counts.soft += layout.rim[c] ? 0 : layers - bone;
   }
   return counts;
 }
 
 }  // namespace
 
-Ground::Ground(const Anatomy& anatomy) {
+ColumnGeometry::ColumnGeometry(const Anatomy& anatomy) {
   static const PetscLogEvent event = base::log_event("RpBuild");
   const base::Logged logged(event);
   const auto layers = static_cast<int64_t>(layer_depths(anatomy.scene.tissue).size());
-  state_ = std::make_unique<State>(State{anatomy.scene, anatomy.bones,
-                                         lay_foundation(anatomy.scene, anatomy.skin, anatomy.bones),
-                                         layers});
-  Foundation& on = state_->on;
-  const Counts counts = count(on, layers);
-  require_held(anatomy.scene, on.mesh, on.field, counts, on.attachment);
-  prepend_messages(anatomy, on.report);
-  report_columns(on, counts.bone, on.report);
+  state_ = std::make_unique<State>(
+      State{anatomy.scene, anatomy.bones,
+            lay_out_columns(anatomy.scene, anatomy.skin, anatomy.bones), layers});
+  ColumnLayout& layout = state_->layout;
+  const Counts counts = count(layout, layers);
+  require_held(anatomy.scene, layout.mesh, layout.field, counts, layout.attachment);
+  prepend_messages(anatomy, layout.report);
+  report_columns(layout, counts.bone, layout.report);
 }
 
-Ground::~Ground() = default;
-Ground::Ground(Ground&&) noexcept = default;
+ColumnGeometry::~ColumnGeometry() = default;
+ColumnGeometry::ColumnGeometry(ColumnGeometry&&) noexcept = default;
 
-const SkinMesh& Ground::skin() const { return state_->on.mesh; }
-int64_t Ground::layers() const { return state_->layers; }
-BuildReport Ground::report() const { return state_->on.report; }
+const SkinMesh& ColumnGeometry::skin() const { return state_->layout.mesh; }
+int64_t ColumnGeometry::layers() const { return state_->layers; }
+BuildReport ColumnGeometry::report() const { return state_->layout.report; }
 
-int64_t Ground::soft_points(int64_t column) const {
-  if (state_->on.rim[column]) return 0;
-  return state_->layers - (state_->on.attachment.bone[column] >= 0 ? 1 : 0);
+int64_t ColumnGeometry::soft_points(int64_t column) const {
+  if (state_->layout.rim[column]) return 0;
+  return state_->layers - (state_->layout.attachment.bone[column] >= 0 ? 1 : 0);
 }
 
 namespace {
@@ -97,42 +97,44 @@ std::vector<int64_t> columns_of(const SkinMesh& mesh, const std::vector<int64_t>
 
 }  // namespace
 
-Piece Ground::piece(const std::vector<int64_t>& columns) const {
-  const Foundation& on = state_->on;
+Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
+  const ColumnLayout& layout = state_->layout;
   Piece piece;
-  piece.triangle = triangles_at(on.mesh, columns_of(on.mesh, triangles_at(on.mesh, columns)));
-  piece.column = columns_of(on.mesh, piece.triangle);
+  piece.triangle =
+      triangles_at(layout.mesh, columns_of(layout.mesh, triangles_at(layout.mesh, columns)));
+  piece.column = columns_of(layout.mesh, piece.triangle);
   for (const int64_t c : piece.column) {
-    piece.skin.push_back(on.mesh.points[c]);
-    piece.deep.push_back(on.columns.deep[c]);
-    piece.bone.push_back(on.attachment.bone[c]);
-    piece.slides.push_back(on.attachment.slides_on[c]);
-    piece.free.push_back(on.attachment.free[c]);
-    piece.rim.push_back(on.rim[c]);
+    piece.skin.push_back(layout.mesh.points[c]);
+    piece.deep.push_back(layout.columns.deep[c]);
+    piece.bone.push_back(layout.attachment.bone[c]);
+    piece.slides.push_back(layout.attachment.slides_on[c]);
+    piece.free.push_back(layout.attachment.free[c]);
+    piece.rim.push_back(layout.rim[c]);
   }
   for (const int64_t t : piece.triangle) {
     Triangle& corner = piece.corner.emplace_back();
     for (int k = 0; k < 3; ++k)
       corner[k] =
-          std::lower_bound(piece.column.begin(), piece.column.end(), on.mesh.triangles[t][k]) -
+          std::lower_bound(piece.column.begin(), piece.column.end(), layout.mesh.triangles[t][k]) -
           piece.column.begin();
   }
   return piece;
 }
 
-Model Ground::frame() const {
-  const Foundation& on = state_->on;
-  Model frame;
-  for (const Triangle& t : on.mesh.triangles)
-    frame.skin.push_back({t[0] * state_->layers, t[1] * state_->layers, t[2] * state_->layers});
-  frame.gravity = state_->scene.gravity.value_or(Vec3::Zero());
-  add_bones(state_->scene, state_->bones, frame);
-  frame.contact.spacing = grid_spacing(state_->scene, on);
-  return frame;
+Model ColumnGeometry::global_metadata() const {
+  const ColumnLayout& layout = state_->layout;
+  Model global_metadata;
+  for (const Triangle& t : layout.mesh.triangles)
+    global_metadata.skin.push_back(
+        {t[0] * state_->layers, t[1] * state_->layers, t[2] * state_->layers});
+  global_metadata.gravity = state_->scene.gravity.value_or(Vec3::Zero());
+  add_bones(state_->scene, state_->bones, global_metadata);
+  global_metadata.contact.spacing = grid_spacing(state_->scene, layout);
+  return global_metadata;
 }
 
-Model raise(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
-            const Piece& piece, std::vector<int64_t>& found) {
+Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
+                  const Piece& piece, std::vector<int64_t>& found) {
   SkinMesh mesh;
   mesh.points = piece.skin;
   mesh.triangles = piece.corner;
@@ -150,7 +152,7 @@ Model raise(const scene::Scene& scene, const std::vector<surface::Surface>& bone
     found = set_material(scene.tissue, scene.file.string(), model);
     set_masses(scene.tissue, mesh, model);
   }
-  touch_bones(scene, mesh, attachment, model);
+  add_bone_contact(scene, mesh, attachment, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
 }

@@ -1,0 +1,186 @@
+#include <algorithm>
+
+#include "by_column.h"
+#include "distribution.h"
+#include "rank_columns.h"
+#include "repose/base/agreement.h"
+#include "repose/base/geometry.h"
+#include "repose/base/log.h"
+#include "repose/discrete/message.h"
+#include "repose/discrete/part.h"
+
+namespace repose::discrete {
+
+namespace {
+
+using base::pick;
+using model::PointSet;
+
+/// The model of a rank's piece; refuses regions that hold no prism of any.
+/// Collective.
+model::Model build_piece(MPI_Comm comm, const scene::Scene& scene,
+                         const std::vector<surface::Surface>& bones,
+                         const RankColumns& rank_columns) {
+  model::Model model;
+  std::vector<int64_t> found;
+  base::collective_try(
+      comm, [&] { model = model::build_local(scene, bones, rank_columns.piece, found); });
+  model.contact.spacing = rank_columns.spacing;
+  MPI_Allreduce(MPI_IN_PLACE, found.data(), static_cast<int>(found.size()), MPI_INT64_T, MPI_SUM,
+                comm);
+  base::on_root(comm, [&] { model::require_regions(found, scene.file.string()); });
+  return model;
+}
+
+/// Rows of the piece's columns that a rank owns.
+std::vector<int64_t> own_columns(const RankColumns& rank_columns, int rank) {
+  std::vector<int64_t> own;
+  for (size_t c = 0; c < rank_columns.owner.size(); ++c)
+    if (rank_columns.owner[c] == rank) own.push_back(static_cast<int64_t>(c));
+  return own;
+}
+
+/// The means over the whole tissue: rank 0's effective modulus and, for all,
+/// contact's stiffness. Collective.
+void set_mean_moduli(MPI_Comm comm, const scene::Scene& scene, const RankColumns& rank_columns,
+                     const std::vector<int64_t>& own, model::Model& model,
+                     LocalModel& local_model) {
+  const auto mine = pick(model::column_sums(model, rank_columns.layers), own);
+  const auto sums =
+      gather_by_column(comm, rank_columns.columns, pick(rank_columns.piece.column, own), mine);
+  base::on_root(comm, [&] {
+    local_model.effective_modulus = model::effective_modulus(sums);
+    model.contact.stiffness = model::contact_stiffness(scene, sums);
+  });
+  MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
+}
+
+/// Distributes contact of the piece's points, where any rank has contact.
+/// Collective.
+void distribute_contact(MPI_Comm comm, model::Model& model, Distribution& distribution) {
+  int64_t touching = !model.contact.pairs.point.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT64_T, MPI_MAX, comm);
+  if (touching == 0) {
+    model.contact.bodies.clear();
+    return;
+  }
+  base::collective_try(comm, [&] { distribution.bodies = mechanics::make_bodies(model); });
+  distribution.contact_offset = mechanics::contact_offsets(model, distribution.bodies);
+}
+
+/// By the columns of a piece what a plan says of its points.
+void number_points(const RankColumns& rank_columns, Distribution& distribution) {
+  for (size_t c = 0; c < rank_columns.owner.size(); ++c) {
+    int64_t unknown = rank_columns.unknown[c];
+    for (int64_t a = 0; a < rank_columns.layers; ++a) {
+      distribution.owner.push_back(rank_columns.owner[c]);
+      distribution.place.push_back(rank_columns.place[c] + a);
+      const bool soft = distribution.set[distribution.unknown.size()] == PointSet::soft_tissue;
+      distribution.unknown.push_back(soft ? unknown++ : -1);
+    }
+  }
+  distribution.total_points = rank_columns.columns * rank_columns.layers;
+  distribution.total_unknowns = rank_columns.total_unknowns;
+}
+
+/// Rows of the piece's points that a rank owns, by their places.
+std::vector<int64_t> own_points(const RankColumns& rank_columns, std::vector<int64_t> own) {
+  std::sort(own.begin(), own.end(),
+            [&](int64_t a, int64_t b) { return rank_columns.place[a] < rank_columns.place[b]; });
+  std::vector<int64_t> rows;
+  for (const int64_t c : own)
+    for (int64_t a = 0; a < rank_columns.layers; ++a) rows.push_back(c * rank_columns.layers + a);
+  return rows;
+}
+
+/// The whole model's rows in place of the piece's. `edge_row` [edges of the
+/// piece].
+void number_rows(const RankColumns& rank_columns, const std::vector<int64_t>& edge_row,
+                 Part& part) {
+  const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
+  for (int64_t& row : part.point_row)
+    row = rank_columns.piece.column[row / rank_columns.layers] * rank_columns.layers +
+          row % rank_columns.layers;
+  for (int64_t& row : part.prism_row)
+    row = row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
+  for (int64_t& row : part.edge_row) row = edge_row[row];
+  part.total_springs = 0;
+  part.total_prisms = (rank_columns.layers - 1) * rank_columns.triangles;
+}
+
+/// Rows of the piece's edges in the whole model, −1 of those of others.
+/// Collective.
+ColumnRows rows_of_edges(MPI_Comm comm, int rank, const RankColumns& rank_columns,
+                         const model::Model& model) {
+  std::vector<int64_t> mine, column;
+  for (size_t e = 0; e < model.edges.points.size(); ++e) {
+    const int64_t c = model.edges.points[e][0] / rank_columns.layers;
+    if (rank_columns.owner[c] != rank) continue;
+    mine.push_back(static_cast<int64_t>(e));
+    column.push_back(rank_columns.piece.column[c]);
+  }
+  const ColumnRows rows = rows_by_column(comm, rank_columns.columns, column);
+  ColumnRows all{std::vector<int64_t>(model.edges.points.size(), -1), rows.total};
+  for (size_t k = 0; k < mine.size(); ++k) all.row[mine[k]] = rows.row[k];
+  return all;
+}
+
+/// Rows of contact in the whole model. Collective.
+void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& local_model) {
+  const model::Model& model = local_model.part.model;
+  std::vector<int64_t> column;
+  for (const int64_t point : model.contact.pairs.point)
+    column.push_back(model.points.column[point]);
+  ColumnRows rows = rows_by_column(comm, rank_columns.columns, column);
+  local_model.pair_row = std::move(rows.row);
+  local_model.contact_pairs = rows.total;
+}
+
+model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
+  int64_t of[4] = {};
+  for (int64_t i = 0; i < part.owned_points; ++i) ++of[static_cast<int>(part.model.points.set[i])];
+  MPI_Allreduce(MPI_IN_PLACE, of, 4, MPI_INT64_T, MPI_SUM, comm);
+  model::Counts counts;
+  counts.points = part.total_points;
+  counts.soft = of[0], counts.boundary = of[1], counts.bone = of[2], counts.held = of[3];
+  counts.prisms = part.total_prisms;
+  counts.edges = edges;
+  return counts;
+}
+
+}  // namespace
+
+LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene) {
+  static const PetscLogEvent event = base::log_event("RpPartition");
+  const base::Logged logged(event);
+  const int rank = base::rank(comm);
+  LocalModel local_model;
+  std::vector<surface::Surface> bones;
+  const RankColumns rank_columns =
+      distribute_columns(comm, geometry, scene, local_model.global_metadata, bones);
+  scene.moves = rank_columns.moves;
+  model::Model model = build_piece(comm, scene, bones, rank_columns);
+  const std::vector<int64_t> own = own_columns(rank_columns, rank);
+  set_mean_moduli(comm, scene, rank_columns, own, model, local_model);
+  Distribution distribution{model, {}, {}, {}, {}, {}, {}, {}};
+  distribute_motion(distribution);
+  distribute_contact(comm, model, distribution);
+  number_points(rank_columns, distribution);
+  const std::vector<int64_t> points = own_points(rank_columns, own);
+  LocalNumbers local(static_cast<int64_t>(distribution.owner.size()));
+  Part& part = local_model.part;
+  part = make_part(distribution, {rank, points, rank_columns.first_unknown, rank_columns.unknowns},
+                   local);
+  part.solid = true;
+  part.contact = !model.contact.bodies.empty();
+  const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, model);
+  number_rows(rank_columns, edges.row, part);
+  number_pairs(comm, rank_columns, local_model);
+  local_model.outward = pick(model::outward_normals(model), points);
+  local_model.counts = count_all(comm, part, edges.total);
+  local_model.global_metadata.contact.bodies = model.contact.bodies;
+  local_model.global_metadata.contact.stiffness = model.contact.stiffness;
+  return local_model;
+}
+
+}  // namespace repose::discrete

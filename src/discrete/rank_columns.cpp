@@ -1,0 +1,138 @@
+#include "rank_columns.h"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+#include "countable.h"
+#include "partition.h"
+#include "repose/base/agreement.h"
+#include "repose/base/geometry.h"
+#include "repose/discrete/message.h"
+
+namespace repose::discrete {
+
+namespace {
+
+using base::pick;
+
+template <class Archive>
+void pass(Archive& archive, RankColumns& d) {
+  model::Piece& p = d.piece;
+  archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.corner, p.triangle);
+  archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.total_unknowns,
+          d.first_unknown, d.unknowns, d.spacing, d.moves);
+}
+
+template <class Archive>
+void pass(Archive& archive, std::vector<surface::Surface>& bones) {
+  auto count = static_cast<int64_t>(bones.size());
+  archive(count);
+  bones.resize(count);
+  for (surface::Surface& bone : bones) archive(bone.points, bone.triangles);
+}
+
+/// As column_graph() of the model, but for the columns of its points.
+ColumnGraph graph_of(const model::ColumnGeometry& geometry) {
+  const model::SkinMesh& skin = geometry.skin();
+  ColumnGraph graph;
+  graph.row_begin.push_back(0);
+  for (int64_t c = 0; c < static_cast<int64_t>(skin.points.size()); ++c) {
+    graph.weight.push_back(1 + geometry.soft_points(c));
+    for (const int64_t edge : skin.edges_of[c]) graph.neighbor.push_back(skin.other_end(edge, c));
+    std::sort(graph.neighbor.begin() + graph.row_begin.back(), graph.neighbor.end());
+    graph.row_begin.push_back(static_cast<int64_t>(graph.neighbor.size()));
+  }
+  return graph;
+}
+
+/// Distributes columns from rank 0.
+class Distributor {
+ public:
+  Distributor(const model::ColumnGeometry& geometry, const scene::Scene& scene,
+              const ColumnGraph& graph, const std::vector<int>& owner, int ranks)
+      : geometry_(geometry), scene_(scene), owner_(owner), own_(ranks), first_unknown_(ranks + 1) {
+    const auto columns = static_cast<int64_t>(owner.size());
+    const std::vector<int64_t> memory = memory_order(graph);
+    std::vector<int64_t> order(columns);
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](int64_t a, int64_t b) {
+      return std::pair(owner[a], memory[a]) < std::pair(owner[b], memory[b]);
+    });
+    place_.resize(columns);
+    unknown_.resize(columns);
+    for (int64_t k = 0; k < columns; ++k) {
+      const int64_t c = order[k];
+      place_[c] = k * geometry.layers();
+      unknown_[c] = unknowns_;
+      unknowns_ += geometry.soft_points(c);
+      first_unknown_[owner[c] + 1] += geometry.soft_points(c);
+    }
+    std::partial_sum(first_unknown_.begin(), first_unknown_.end(), first_unknown_.begin());
+    for (int64_t c = 0; c < columns; ++c) own_[owner[c]].push_back(c);
+  }
+
+  RankColumns columns_of(int rank, double spacing) const {
+    RankColumns rank_columns;
+    rank_columns.piece = geometry_.piece(own_[rank]);
+    rank_columns.owner = pick(owner_, rank_columns.piece.column);
+    rank_columns.place = pick(place_, rank_columns.piece.column);
+    rank_columns.unknown = pick(unknown_, rank_columns.piece.column);
+    rank_columns.layers = geometry_.layers();
+    rank_columns.columns = static_cast<int64_t>(owner_.size());
+    rank_columns.triangles = static_cast<int64_t>(geometry_.skin().triangles.size());
+    rank_columns.total_unknowns = unknowns_;
+    rank_columns.first_unknown = first_unknown_[rank];
+    rank_columns.unknowns = first_unknown_[rank + 1] - first_unknown_[rank];
+    rank_columns.spacing = spacing;
+    rank_columns.moves = scene_.moves;
+    return rank_columns;
+  }
+
+ private:
+  const model::ColumnGeometry& geometry_;
+  const scene::Scene& scene_;
+  const std::vector<int>& owner_;
+  std::vector<std::vector<int64_t>> own_;  // [ranks] columns
+  std::vector<int64_t> place_, unknown_;   // [columns] as in RankColumns
+  std::vector<int64_t> first_unknown_;     // [ranks + 1]
+  int64_t unknowns_ = 0;
+};
+
+}  // namespace
+
+RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
+                               const scene::Scene& scene, model::Model& global_metadata,
+                               std::vector<surface::Surface>& bones) {
+  const int ranks = base::size(comm), rank = base::rank(comm);
+  ColumnGraph graph;
+  base::on_root(comm, [&] {
+    require_countable(static_cast<int64_t>(geometry->skin().points.size()) * geometry->layers());
+    graph = graph_of(*geometry);
+    global_metadata = geometry->global_metadata();
+    bones = global_metadata.bone_surfaces;
+  });
+  const std::vector<int> owner = partition(comm, graph);
+  std::optional<Distributor> distributor;  // on rank 0
+  base::on_root(comm, [&] { distributor.emplace(*geometry, scene, graph, owner, ranks); });
+  RankColumns rank_columns;
+  for (int r = ranks - 1; r >= 0; --r) {
+    base::on_root(
+        comm, [&] { rank_columns = distributor->columns_of(r, global_metadata.contact.spacing); });
+    if (r == 0) break;
+    base::collective_try(comm, [&] {
+      if (rank == 0) {
+        Sender sender(comm, r);
+        pass(sender, rank_columns);
+        pass(sender, bones);
+      } else if (rank == r) {
+        Receiver receiver(comm, 0);
+        pass(receiver, rank_columns);
+        pass(receiver, bones);
+      }
+    });
+  }
+  return rank_columns;
+}
+
+}  // namespace repose::discrete
