@@ -27,7 +27,14 @@ GROUPS = [
     {"ranks": ([], "")},
 ]
 PAIRS = [(one, other) for a, b in itertools.combinations(GROUPS, 2) for one in a for other in b]
+QUICK = {("force", "steps"), ("ntr", "none"), ("lmvm", "restart"), ("cg", "weight"), ("nls", "ranks"),
+         ("paper", "steps")}  # every feature once
 REFUSED = {"force": "functional force"}
+
+
+def test_the_quick_pairs_hold_every_feature():
+    assert QUICK <= set(PAIRS)
+    assert {name for pair in QUICK for name in pair} == {name for group in GROUPS for name in group}
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +47,8 @@ def folder(tmp_path_factory, environment):
     return top
 
 
-@pytest.mark.parametrize("pair", PAIRS, ids="-".join)
+@pytest.mark.parametrize("pair", [
+    pytest.param(pair, id="-".join(pair), marks=[] if pair in QUICK else pytest.mark.long) for pair in PAIRS])
 def test_a_search_that_ends_well_has_kept_tissue_out(folder, environment, pair):
     run = runner(folder, environment)
     features = {name: of for group in GROUPS for name, of in group.items()}

@@ -71,7 +71,8 @@ def busy():
         loop.wait()
 
 
-@pytest.mark.parametrize("lines", [1, 1, 1, 1, 8, 8, 8, 8])
+@pytest.mark.parametrize("lines", [1, 8, *[pytest.param(lines, marks=pytest.mark.long)
+                                           for lines in (1, 1, 1, 8, 8, 8)]])
 def test_ctrl_c_at_mpirun_leaves_a_result_though_ranks_are_killed(run, environment, tmp_path, busy,
                                                                   lines):
     process = begin(tmp_path, environment, SCENE, "-output", "early", ranks=2)
