@@ -122,9 +122,12 @@ class Sheet {
     tip.hidden = !hit;
     if (!hit) return;
     const box = bySheetId("view").getBoundingClientRect();
-    tip.style.left = `${Math.min(event.clientX - box.left, box.width - 190)}px`;
-    tip.style.top = `${Math.min(event.clientY - box.top, box.height - 70)}px`;
     tip.textContent = this.sentence(hit);
+    tip.style.left = tip.style.top = "0px"; // as wide as it can be
+    const left = Math.min(event.clientX - box.left, box.width - tip.offsetWidth - 20);
+    const top = Math.min(event.clientY - box.top, box.height - tip.offsetHeight - 20);
+    tip.style.left = `${Math.max(0, left)}px`;
+    tip.style.top = `${Math.max(0, top)}px`;
   }
 
   sentence({surface, state, at}) {

@@ -26,15 +26,25 @@ for (const type of ["pointerdown", "pointerup"]) canvas.dispatchEvent(new Pointe
   clientY: box.top + 0.72 * box.height}));"""
 
 
+def patient(page, *options, size):
+    """Browses; a Chromium that hangs, as it does now and then, is started again."""
+    for last in (False, False, True):
+        try:
+            return browse(page, *options, size=size, seconds=90)
+        except subprocess.TimeoutExpired:
+            if last:
+                raise
+
+
 def pictures(page, folder):
     name = folder / page.stem
     later = "--virtual-time-budget=4000"  # before the pictures for the print are made
     for suffix, size, script in (("1400", (1400, 1500), ""), ("420", (500, 4200), NARROW),
                                  ("touch", (500, 860), NARROW + TOUCH)):
         with scripted(page, script) as copy:
-            browse(copy, later, f"--screenshot={name}_{suffix}.png", size=size, seconds=300)
-    browse(page, "--virtual-time-budget=60000", "--no-pdf-header-footer",
-           f"--print-to-pdf={name}_print.pdf", size=(900, 700), seconds=300)
+            patient(copy, later, f"--screenshot={name}_{suffix}.png", size=size)
+    patient(page, "--virtual-time-budget=60000", "--no-pdf-header-footer",
+           f"--print-to-pdf={name}_print.pdf", size=(900, 700))
     if shutil.which("pdftoppm"):
         subprocess.run(["pdftoppm", "-r", "80", "-png", f"{name}_print.pdf", f"{name}_print"],
                        check=True)
