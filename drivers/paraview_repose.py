@@ -18,7 +18,7 @@ import os
 import sys
 
 try:
-    from paraview.simple import (AddCameraLink, AssignViewToLayout, Calculator, ColorBy,
+    from paraview.simple import (AddCameraLink, AssignViewToLayout, ColorBy,
                                  CreateLayout, CreateRenderView, GetActiveSource, GetAnimationScene,
                                  GetColorTransferFunction, GetParaViewVersion, GetScalarBar,
                                  RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show,
@@ -107,17 +107,17 @@ def shown(source, made, color, opacity=1.0):
 
 def initial(source, name):
     """A surface where it was before."""
-    made = Calculator(registrationName=name, Input=source)
-    made.CoordinateResults = 1
-    made.Function = "initial_position"
-    return made
+    return WarpByVector(registrationName=name, Input=source, Vectors=["POINTS", "displacement (mm)"],
+                        ScaleFactor=-1.0)
 
 
 def colored_by_movement(source, made):
     drawn = shown(source, made, SKIN, 0.75)
-    ColorBy(drawn, ("POINTS", "displacement", "Magnitude"))
+    data = source.PointData
+    array = next(name for name in ("displacement (mm)", "displacement") if data.GetArray(name))
+    ColorBy(drawn, ("POINTS", array, "Magnitude"))
     drawn.RescaleTransferFunctionToDataRange(False)
-    table = GetColorTransferFunction("displacement")
+    table = GetColorTransferFunction(array)
     low, high = table.RGBPoints[0], table.RGBPoints[-4]
     table.ColorSpace = "RGB"
     table.RGBPoints = [value for i, color in enumerate(RAMP) for value in (

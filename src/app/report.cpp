@@ -182,12 +182,12 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
 
 std::string describe_other_rest(const solve::Outcome& last) {
   if (!last.other) return "";
-  const auto& [distance, place] = *last.other;
+  const auto& place = last.other->place;
   return report_row("other rest position",
                     fmt::format("the skin is up to {:.2g} mm away there, most at ({:.1f}, {:.1f}, "
                                 "{:.1f}) mm: tissue rests on either side of an edge of bone, and "
                                 "this result has less energy",
-                                distance, place[0], place[1], place[2]));
+                                last.other->distance, place[0], place[1], place[2]));
 }
 
 }  // namespace

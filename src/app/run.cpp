@@ -21,6 +21,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
 #include "repose/discrete/gather.h"
+#include "repose/results/given_skin.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
@@ -272,7 +273,7 @@ std::vector<Vec3> Run::positions(const Writer& writer) const {
 }
 
 /// Writes the displacement of the given skin, in the place of which another was solved, to
-/// NAME_given_skin.vtp. Collective; `position` as positions() returns it.
+/// NAME_given_skin.vtp and into the result. Collective; `position` as positions() returns it.
 std::string Run::write_given_skin(const std::vector<Vec3>& position) const {
   if (!job_.remeshed) return "";
   const std::string file = name_ + "_given_skin.vtp";
@@ -280,14 +281,17 @@ std::string Run::write_given_skin(const std::vector<Vec3>& position) const {
     std::vector<Vec3> displacement(position.size());
     for (size_t i = 0; i < position.size(); ++i) displacement[i] = position[i] - initial[i];
     const surface::Surface& given = *job_.anatomy->given_skin;
-    surface::write_surface(file, given, adapt::displacement_of_given(given, solved, displacement));
+    const surface::PointData data = adapt::displacement_of_given(given, solved, displacement);
+    surface::write_surface(file, given, data);
+    results::add_given_skin(name_ + ".h5", {given.points, given.triangles, data.vectors[0].values,
+                                            data.fields[0].values});
   };
   base::on_root(comm, [&] {
     if (job_.local_model) return write(job_.anatomy->skin, job_.anatomy->skin.points);
     const model::Model model = results::read_model(name_ + ".h5");
     write(model, model.points.position);
   });
-  return report_row("given skin", file + ": its vertices, with displacement");
+  return report_row("given skin", file + ", and in the result: its vertices, with displacement");
 }
 
 /// Skin that ends inside other skin at load 1. Collective.

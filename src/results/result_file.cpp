@@ -126,6 +126,7 @@ struct ResultFile::State {
   base::Hdf5File file;                       // open while a step is written
   FileCounts counts;
   MergedBones bones;                              // rank 0
+  std::vector<NamedBone> named_bones;             // rank 0
   std::optional<model::PrescribedMotion> motion;  // rank 0
   std::vector<Vec3> initial;                      // this rank's slab of point/position
   std::vector<Vec3> outward;                      // likewise, of the skin's normals
@@ -152,6 +153,7 @@ struct ResultFile::State {
     return (88 + 24 * static_cast<int64_t>(fields.size())) * counts.points + 16 * counts.springs +
            48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
   }
+  void name_bones(const model::Model& model);
   void create(const model::Model& model, const model::ModelRows* slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
@@ -178,11 +180,23 @@ struct ResultFile::State {
   void publish();
 };
 
+void ResultFile::State::name_bones(const model::Model& model) {
+  int64_t first = 0;
+  for (size_t b = 0; b < model.bone_surfaces.size(); ++b) {
+    const auto points = static_cast<int64_t>(model.bone_surfaces[b].points.size());
+    named_bones.push_back({b < model.bones.size() ? model.bones[b] : fmt::format("bone {}", b),
+                           first, points,
+                           static_cast<int64_t>(model.bone_surfaces[b].triangles.size())});
+    first += points;
+  }
+}
+
 void ResultFile::State::create(const model::Model& model, const model::ModelRows* slabs,
                                Kind kind) {
   unfinished.emplace(with_ending(name, ".h5"));
   part = unfinished->part();
   bones = merge_bones(model.bone_surfaces);
+  name_bones(model);
   motion.emplace(model);
   with_file_name(unfinished->file(), [&] {
     base::Hdf5File whole = base::create_hdf5(part);
@@ -333,16 +347,21 @@ void ResultFile::State::add_vtkhdf(const std::vector<XdmfBlock>& blocks) const {
 /// describe nothing is removed.
 std::vector<std::unique_ptr<UnfinishedFile>> ResultFile::State::describe() const {
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
-  for (const XdmfBlock& block : views_of_steps()) {
-    const std::filesystem::path document = with_ending(name, "_" + block.name + ".xdmf");
-    if (block.cells == 0) {
+  const std::string h5 = name.filename().string() + ".h5";
+  const auto describe_as = [&](const std::string& view, bool requested, const auto& shown) {
+    const std::filesystem::path document = with_ending(name, "_" + view + ".xdmf");
+    if (!requested) {
       std::error_code ignored;
       std::filesystem::remove(document, ignored);
-      continue;
+      return;
     }
     documents.push_back(std::make_unique<UnfinishedFile>(document));
-    documents.back()->write(xdmf_document(block, name.filename().string() + ".h5", loads));
-  }
+    documents.back()->write(xdmf_document(shown, h5, loads));
+  };
+  const std::vector<XdmfBlock> all = views_of_steps();
+  for (const XdmfBlock& block : all) describe_as(block.name, block.cells > 0, block);
+  const std::vector<XdmfBlock> named = named_blocks(all, named_bones);
+  describe_as("blocks", named.size() > 1, named);
   return documents;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 namespace repose::results {
 
 namespace {
@@ -28,6 +30,28 @@ void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
                             .at_points = true,
                             .vector = field.vector,
                             .in_steps = field.in_step});
+}
+
+/// Unit of a field of a result; MPa is N/mm², in a name without a slash.
+std::string unit_of(const std::string& name) {
+  if (name.starts_with("tangent_"))
+    return name[name.size() - 2] == 't' ? "mm per mm" : "mm per degree";
+  static const std::map<std::string, std::string> units = {{"displacement", "mm"},
+                                                           {"initial_position", "mm"},
+                                                           {"advance", "mm"},
+                                                           {"discretisation_error", "mm"},
+                                                           {"contact_gap", "mm"},
+                                                           {"elongation", "mm"},
+                                                           {"other_rest_displacement", "mm"},
+                                                           {"rest_length", "mm"},
+                                                           {"residual_force", "N"},
+                                                           {"contact_force", "N"},
+                                                           {"tension", "N"},
+                                                           {"contact_pressure", "MPa"},
+                                                           {"pressure", "MPa"},
+                                                           {"von_mises", "MPa"}};
+  const auto found = units.find(name);
+  return found == units.end() ? "" : found->second;
 }
 
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
@@ -115,7 +139,33 @@ std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<Optiona
   std::vector<XdmfBlock> all = {tissue(counts, steps), springs(counts, steps), skin(counts, steps),
                                 bones(counts, bones_moved)};
   for (const size_t block : {0, 2}) add_fields(fields, all[block]);
+  for (XdmfBlock& block : all)
+    for (XdmfArray& array : block.arrays) array.unit = unit_of(array.name);
   return all;
+}
+
+std::vector<XdmfBlock> named_blocks(const std::vector<XdmfBlock>& views,
+                                    const std::vector<NamedBone>& bones) {
+  std::vector<XdmfBlock> blocks;
+  for (const XdmfBlock& view : views) {
+    if (view.cells == 0) continue;
+    blocks.push_back(view);
+    if (view.name != "bones") continue;
+    const XdmfBlock all = std::move(blocks.back());
+    blocks.pop_back();
+    for (size_t b = 0; b < bones.size(); ++b) {
+      if (bones[b].triangles == 0) continue;
+      XdmfBlock& bone = blocks.emplace_back(all);
+      bone.name = bones[b].name;
+      bone.connectivity = fmt::format("/model/bone_surface/{}/triangles", b);
+      bone.points = bones[b].points;
+      bone.cells = bones[b].triangles;
+      bone.first = bones[b].first_point;
+      bone.merged = all.points;
+      std::erase_if(bone.arrays, [](const XdmfArray& array) { return !array.at_points; });
+    }
+  }
+  return blocks;
 }
 
 }  // namespace repose::results

@@ -27,4 +27,14 @@ struct OptionalField {
 std::vector<XdmfBlock> views(const FileCounts& counts, const std::vector<OptionalField>& fields,
                              const std::vector<bool>& bones_moved);
 
+/// A bone's rows in the merged surfaces.
+struct NamedBone {
+  std::string name;
+  int64_t first_point = 0, points = 0, triangles = 0;
+};
+
+/// The views that have cells by name, with a block for each bone in the place of that of all.
+std::vector<XdmfBlock> named_blocks(const std::vector<XdmfBlock>& views,
+                                    const std::vector<NamedBone>& bones);
+
 }  // namespace repose::results

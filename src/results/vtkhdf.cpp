@@ -84,11 +84,11 @@ std::vector<VirtualPiece> pieces_of(const Blocks& blocks, const XdmfArray& like,
 void write_array_of(hid_t file, hid_t data, hid_t begin, const Blocks& blocks,
                     const XdmfArray& array, size_t steps) {
   const int64_t rows = rows_of(blocks, array.at_points);
-  write_numbers(begin, array.name.c_str(), beginnings(steps, array.moves() ? rows : 0));
+  write_numbers(begin, array.title().c_str(), beginnings(steps, array.moves() ? rows : 0));
   const size_t stored = array.moves() ? steps : 1;
   std::vector<hsize_t> shape = {stored * rows};
   if (array.vector) shape.push_back(3);
-  write_virtual(file, data, array.name, pieces_of(blocks, array, stored), shape);
+  write_virtual(file, data, array.title(), pieces_of(blocks, array, stored), shape);
 }
 
 /// The arrays at the points or at the cells of any part.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 namespace repose::results {
 
 namespace {
@@ -38,26 +40,65 @@ std::string data_item(const std::string& h5, const std::string& path, int64_t ro
                      dimensions, escaped(h5), path);
 }
 
+/// Rows of a dataset of `all`.
+std::string rows_item(const std::string& h5, const std::string& path,
+                      const std::array<int64_t, 3>& of, int columns, const char* type) {
+  const auto [first, rows, all] = of;
+  const bool flat = columns == 1;
+  const std::string slab = flat ? fmt::format("{} 1 {}", first, rows)
+                                : fmt::format("{} 0 1 1 {} {}", first, rows, columns);
+  return fmt::format(
+      "<DataItem ItemType=\"HyperSlab\" {} Dimensions=\"{}\"><DataItem Dimensions=\"3 {}\" "
+      "Format=\"XML\">{}</DataItem>{}</DataItem>",
+      type, flat ? fmt::format("{}", rows) : fmt::format("{} {}", rows, columns), flat ? 1 : 2,
+      slab, data_item(h5, path, all, columns, type));
+}
+
+std::string point_item(const XdmfBlock& block, const std::string& h5, const std::string& path,
+                       int columns, const char* type) {
+  if (block.merged == 0) return data_item(h5, path, block.points, columns, type);
+  return rows_item(h5, path, {block.first, block.points, block.merged}, columns, type);
+}
+
+/// Beside points that are rows of a dataset, corners are given so, too: VTK compares the text of
+/// both to see whether a mesh has moved, and reports an error where it has that of one only.
+std::string corner_item(const XdmfBlock& block, const std::string& h5) {
+  if (block.merged == 0)
+    return data_item(h5, block.connectivity, block.cells, block.corners, integer);
+  return rows_item(h5, block.connectivity, {0, block.cells, block.cells}, block.corners, integer);
+}
+
 std::string attribute(const XdmfBlock& block, const XdmfArray& array, const std::string& h5,
                       size_t step) {
-  const int64_t rows = array.at_points ? block.points : block.cells;
+  const int columns = array.vector ? 3 : 1;
+  const std::string path = array.in_step(step);
   return fmt::format(
       "        <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"{}\">{}</Attribute>\n",
-      array.name, array.vector ? "Vector" : "Scalar", array.at_points ? "Node" : "Cell",
-      data_item(h5, array.in_step(step), rows, array.vector ? 3 : 1, array.type));
+      array.title(), array.vector ? "Vector" : "Scalar", array.at_points ? "Node" : "Cell",
+      array.at_points ? point_item(block, h5, path, columns, array.type)
+                      : data_item(h5, path, block.cells, columns, array.type));
 }
 
 std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, double load) {
-  std::string text = fmt::format("      <Grid Name=\"{}\" GridType=\"Uniform\">\n", block.name);
+  std::string text =
+      fmt::format("      <Grid Name=\"{}\" GridType=\"Uniform\">\n", escaped(block.name));
   text += fmt::format("        <Time Value=\"{}\"/>\n", load);
   text += fmt::format("        <Topology {} NumberOfElements=\"{}\">{}</Topology>\n",
-                      block.topology, block.cells,
-                      data_item(h5, block.connectivity, block.cells, block.corners, integer));
+                      block.topology, block.cells, corner_item(block, h5));
   text += fmt::format("        <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
-                      data_item(h5, block.geometry[step], block.points, 3, real));
+                      point_item(block, h5, block.geometry[step], 3, real));
   for (const XdmfArray& array : block.arrays)
     if (array.is_in(step)) text += attribute(block, array, h5, step);
   return text + "      </Grid>\n";
+}
+
+/// A document of a collection of grids over time.
+std::string temporal(const std::string& name, const std::string& grids) {
+  return fmt::format(
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n{}"
+      "    </Grid>\n  </Domain>\n</Xdmf>\n",
+      name, grids);
 }
 
 }  // namespace
@@ -68,11 +109,21 @@ std::string XdmfArray::in_step(size_t step) const {
 
 std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
                           const std::vector<double>& loads) {
-  std::string text = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n";
-  text += fmt::format(
-      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n", block.name);
+  std::string text;
   for (size_t step = 0; step < loads.size(); ++step) text += grid(block, h5, step, loads[step]);
-  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
+  return temporal(block.name, text);
+}
+
+std::string xdmf_document(const std::vector<XdmfBlock>& blocks, const std::string& h5,
+                          const std::vector<double>& loads) {
+  std::string text;
+  for (size_t step = 0; step < loads.size(); ++step) {
+    text += "      <Grid Name=\"blocks\" GridType=\"Collection\" CollectionType=\"Spatial\">\n";
+    text += fmt::format("        <Time Value=\"{}\"/>\n", loads[step]);
+    for (const XdmfBlock& block : blocks) text += grid(block, h5, step, loads[step]);
+    text += "      </Grid>\n";
+  }
+  return temporal("blocks", text);
 }
 
 }  // namespace repose::results

@@ -13,9 +13,12 @@ struct XdmfArray {
   bool vector = false;     ///< [.,3], else [.]
   const char* type = "NumberType=\"Float\" Precision=\"8\"";
   std::vector<bool> in_steps = {};  ///< [steps] which have it; empty: all
+  std::string unit = {};            ///< without a slash; empty: none
 
   bool moves() const { return path.starts_with("step/"); }
   bool is_in(size_t step) const { return in_steps.empty() || in_steps[step]; }
+  /// Its name in ParaView, with the unit.
+  std::string title() const { return unit.empty() ? name : name + " (" + unit + ")"; }
   /// Its path in the file, at a step.
   std::string in_step(size_t step) const;
 };
@@ -29,12 +32,17 @@ struct XdmfBlock {
   std::string connectivity;   ///< path of the i64 [cells, corners] dataset
   int64_t points = 0, cells = 0;
   std::vector<std::string> geometry;  ///< [steps] path of the f64 [points, 3] dataset
+  int64_t first = 0, merged = 0;      ///< its rows in datasets of `merged` rows at points; 0: all
   std::vector<XdmfArray> arrays;
 };
 
 /// The XDMF document of a block: a temporal collection of Uniform grids, one for each load (its
 /// time). `h5` is the name of the HDF5 file in the same folder.
 std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
+                          const std::vector<double>& loads);
+
+/// The XDMF document of several blocks by name: a temporal collection of spatial ones.
+std::string xdmf_document(const std::vector<XdmfBlock>& blocks, const std::string& h5,
                           const std::vector<double>& loads);
 
 }  // namespace repose::results

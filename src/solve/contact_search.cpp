@@ -254,6 +254,16 @@ OtherRest ContactSearch::compare_skins(Vec displacement, Vec other) {
   return found;
 }
 
+/// Returns the displacements of this rank's points in a state. Collective.
+std::vector<Vec3> ContactSearch::displacements(Vec state) {
+  discrete::Positions& positions = objective_.positions();
+  positions.update(state);
+  std::vector<Vec3> found(positions.part().owned_points);
+  for (size_t i = 0; i < found.size(); ++i)
+    found[i] = positions.local()[i] - positions.part().model.points.position[i];
+  return found;
+}
+
 /// Energy of the tissue and its loads without contact, N mm.
 double ContactSearch::energy(Vec displacement) {
   const double value = objective_.evaluate(displacement, gradient_);
@@ -283,6 +293,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
       if (taken) outcome = there;
     }
   }
+  if (outcome.other) outcome.other->displacement = displacements(taken ? displacement : start_);
   if (taken)
     check(VecCopy(start_, displacement));
   else

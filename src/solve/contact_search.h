@@ -52,6 +52,7 @@ class ContactSearch : public RestSearch {
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, Vec other);
+  std::vector<Vec3> displacements(Vec state);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

@@ -301,6 +301,9 @@ class Steps {
     model::StepRows rows = natural_.rows(objective);
     if (stability && !std::isnan(stability->spectrum.smallest))
       rows.point_fields.push_back(natural_.field("stability_mode", stability->mode));
+    if (outcome.other)
+      rows.point_fields.push_back(
+          natural_.field("other_rest_displacement", outcome.other->displacement));
     if (!settings_.tangents.empty() && load == 1 && outcome.converged)
       for (model::PointField& field :
            plan_tangents(searcher_.problem(), natural_, displacement, settings_.tangents))

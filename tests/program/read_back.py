@@ -21,6 +21,21 @@ VIEWS = {"tissue": ("prism/points", "prism"), "springs": ("spring/points", "spri
          "skin": ("skin/points", ""), "bones": ("bone_surfaces/triangles", "")}
 
 
+# Units that readers see in names (docs/reference/formats.md).
+UNITS = {"mm": ("displacement", "initial_position", "advance", "discretisation_error", "contact_gap",
+                "other_rest_displacement", "elongation", "rest_length"),
+         "N": ("residual_force", "contact_force", "tension"),
+         "MPa": ("contact_pressure", "pressure", "von_mises")}
+UNIT = {name: unit for unit, names in UNITS.items() for name in names}
+
+
+def shown_name(name):
+    """The name of an array for readers."""
+    if name.startswith("tangent_"):
+        return f"{name} ({'mm per mm' if name[-2] == 't' else 'mm per degree'})"
+    return f"{name} ({UNIT[name]})" if name in UNIT else name
+
+
 def held_by(h5, step, view):
     """Points, corners of the cells, and numbers of points and of cells by name, as they are stored."""
     model, step = h5["model"], h5["step"][step]
@@ -42,8 +57,9 @@ def held_by(h5, step, view):
     if view == "springs":
         at_cells |= {name: model["spring"][name] for name in ("set", "rest_length")}
     where = moved["points" if view == "bones" else "position"]
-    return where[:], model[cells][:].ravel(), *({name: array[:] for name, array in numbers.items()}
-                                                for numbers in (at_points, at_cells))
+    return where[:], model[cells][:].ravel(), *(
+        {shown_name(name): array[:] for name, array in numbers.items()}
+        for numbers in (at_points, at_cells))
 
 
 def joined(one, other):

@@ -3,6 +3,7 @@ data are not shipped: they lie beside the project, in ../shared/data/head."""
 
 from itertools import combinations
 
+import h5py
 import meshio
 import numpy as np
 import pytest
@@ -45,6 +46,12 @@ def test_the_given_skin_keeps_its_vertices(folder, faces):
     mesh, skin = meshio.read(folder / "soup.ply"), read_vtp(folder / "soup_given_skin.vtp")
     assert np.array_equal(mesh.points, skin["Points"])
     assert np.array_equal(mesh.cells_dict["triangle"].ravel(), skin["connectivity"])
+    with h5py.File(folder / "soup.h5") as h5:
+        held = {name: array[:] for name, array in h5["given_skin"].items()}
+    assert np.array_equal(held["points"], mesh.points)
+    assert np.array_equal(held["triangles"], mesh.cells_dict["triangle"])
+    assert np.array_equal(held["displacement"].ravel(), skin["displacement"].ravel())
+    assert np.array_equal(held["solved"], skin["solved"])
 
 
 def test_the_chin_follows_the_jaw(faces):

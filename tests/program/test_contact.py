@@ -2,6 +2,7 @@
 
 import re
 
+import h5py
 import numpy as np
 import pytest
 
@@ -77,6 +78,11 @@ def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, e
         assert 2 * ACCURACY < distance < 1
         assert np.linalg.norm(place - np.array([3, -300, 340])) < 50, "beside the chin"
         assert " to find another rest position" in done.stdout
+        with h5py.File(folder / "other.h5") as h5:
+            point, of = h5["model/point"], h5["step"][sorted(h5["step"])[-1]]["point"]
+            apart = of["other_rest_displacement"][:] - of["displacement"][:]
+            skin_rows = point["layer"][:] == 0
+        assert np.linalg.norm(apart[skin_rows], axis=1).max() == pytest.approx(distance, rel=0.05)
     alone = run("repose-solve", *scene, "-skip_other_rest")
     assert alone.returncode == 0 and "other rest" not in alone.stdout
     quiet = run("repose-solve", "real_head_mouth.yaml", "-accuracy", ACCURACY, "-output", "quiet")

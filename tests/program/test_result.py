@@ -1,6 +1,7 @@
 """Which files a run of repose-solve writes, what is in them, and how a run is taken up again."""
 
 import shutil
+import xml.etree.ElementTree
 import signal
 import subprocess
 
@@ -27,7 +28,7 @@ def names(folder):
 
 
 def files_of(name):
-    return sorted([f"{name}.h5"] + [f"{name}_{view}.xdmf" for view in VIEWS])
+    return sorted([f"{name}.h5"] + [f"{name}_{view}.xdmf" for view in (*VIEWS, "blocks")])
 
 
 def shortened(file, copy, keep):
@@ -265,10 +266,10 @@ def test_what_is_not_converged_says_so(run, tmp_path, limit, ranks):
 
 CELLS = {"tissue": ("wedge", 2622, 1908), "springs": ("line", 14941, 1908),
          "skin": ("triangle", 874, 1908)}
-SHOWN = {"tissue": {"displacement": "point/displacement", "volume_ratio": "prism/volume_ratio",
-                    "residual_force": "point/residual_force"},
-         "springs": {"elongation": "spring/elongation", "tension": "spring/tension"},
-         "skin": {"displacement": "point/displacement"}}
+SHOWN = {"tissue": {"displacement (mm)": "point/displacement", "volume_ratio": "prism/volume_ratio",
+                    "residual_force (N)": "point/residual_force"},
+         "springs": {"elongation (mm)": "spring/elongation", "tension (N)": "spring/tension"},
+         "skin": {"displacement (mm)": "point/displacement"}}
 
 
 @pytest.mark.parametrize("view", VIEWS)
@@ -285,8 +286,8 @@ def test_views_open_as_time_series(face, view):
                         sum(len(s["points"]) for s in surfaces))
         assert (cells[0].type, len(cells[0].data), len(points)) == ("triangle", *expected)
         for (_, at_points, _), step in zip(series, path):
-            assert np.array_equal(at_points["displacement"], step["bone_surface/displacement"])
-            assert np.isfinite(at_points["displacement"]).all()
+            assert np.array_equal(at_points["displacement (mm)"], step["bone_surface/displacement"])
+            assert np.isfinite(at_points["displacement (mm)"]).all()
         return
     kind, count, point_count = CELLS[view]
     assert [(block.type, len(block.data)) for block in cells] == [(kind, count)]
@@ -295,3 +296,37 @@ def test_views_open_as_time_series(face, view):
         for name, array in SHOWN[view].items():
             shown = at_points[name] if name in at_points else at_cells[name][0]
             assert np.array_equal(shown, step[array])
+
+
+def rows_of(item, h5):
+    """What a DataItem of an XDMF file shows, also where it is part of a dataset."""
+    if item.get("ItemType") != "HyperSlab":
+        return h5[item.text.split(":")[1]][:]
+    slab, data = item
+    begin, stride, count = (int(row) for row in np.array(slab.text.split(), int).reshape(3, -1)[:, 0])
+    assert stride == 1
+    return rows_of(data, h5)[begin:begin + count]
+
+
+def test_blocks_are_named_and_each_bone_is_one(face):
+    root = xml.etree.ElementTree.parse(face.with_name(f"{face.stem}_blocks.xdmf")).getroot()
+    collections = root.findall("Domain/Grid/Grid")
+    with h5py.File(face) as h5:
+        bones = [name.decode() for name in h5["model/bone"]]
+        assert len(collections) == len(h5["step"])
+        for collection, step in zip(collections, h5["step"].values()):
+            assert float(collection.find("Time").get("Value")) == step.attrs["load"]
+            grids = {grid.get("Name"): grid for grid in collection.findall("Grid")}
+            assert list(grids) == ["tissue", "springs", "skin", *bones]
+            moved = step.get("bone_surface/points", h5["model/bone_surfaces/points"])[:]
+            bone = np.zeros(len(moved), int)
+            bone[h5["model/bone_surfaces/triangles"][:]] = h5["model/bone_surfaces/bone"][:][:, None]
+            for number, name in enumerate(bones):
+                shown = rows_of(grids[name].find("Geometry/DataItem"), h5)
+                assert np.array_equal(shown, moved[bone == number]), name
+                corners = rows_of(grids[name].find("Topology/DataItem"), h5)
+                assert corners.min() == 0 and corners.max() == len(shown) - 1
+                motion = next(array for array in grids[name].findall("Attribute")
+                              if array.get("Name") == "displacement (mm)")
+                assert np.array_equal(rows_of(motion.find("DataItem"), h5),
+                                      step["bone_surface/displacement"][:][bone == number])

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT, finish
+from read_back import shown_name
 from tissue import last, model_of, steps, write_model
 
 OPENING = "paper_jaw_opening.yaml"
-MOVING = {"PointData/displacement": "point/displacement", "PointData/advance": "point/advance",
-          "PointData/residual_force": "point/residual_force",
+MOVING = {"PointData/displacement (mm)": "point/displacement", "PointData/advance (mm)": "point/advance",
+          "PointData/residual_force (N)": "point/residual_force",
           "CellData/volume_ratio": "prism/volume_ratio", "Points": "point/position"}
 STAYING = {"PointData/set": "point/set", "PointData/layer": "point/layer",
-           "PointData/column": "point/column", "PointData/initial_position": "point/position"}
+           "PointData/column": "point/column", "PointData/initial_position (mm)": "point/position"}
 OF_BONES = {"CellData/bone": "bone_surfaces/bone",
-            "PointData/initial_position": "bone_surfaces/points",
-            "PointData/displacement": "bone_surface/displacement"}
+            "PointData/initial_position (mm)": "bone_surfaces/points",
+            "PointData/displacement (mm)": "bone_surface/displacement"}
 
 
 @pytest.fixture
@@ -87,9 +88,9 @@ def test_bones_have_their_motion_at_every_step(opening):
     jaw[model["bone_surfaces/triangles"][model["bone_surfaces/bone"] == 1]] = True
     with h5py.File(opening) as h5:
         root = h5["VTKHDF"]
-        for begin, load in zip(root["Steps/PointDataOffsets/displacement"][:],
+        for begin, load in zip(root["Steps/PointDataOffsets/displacement (mm)"][:],
                                root["Steps/Values"][:]):
-            shown = root["PointData/displacement"][begin + count:begin + count + len(before)]
+            shown = root["PointData/displacement (mm)"][begin + count:begin + count + len(before)]
             c, s = np.cos(np.radians(8 * load)), np.sin(np.radians(8 * load))
             turned = before @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]).T
             assert np.isfinite(shown).all() and (shown[~jaw] == 0).all()
@@ -117,10 +118,11 @@ def test_pressures_of_a_solid_are_shown(solved):
 
 def shows(h5, name, place="prism"):
     place_there = "PointData" if place == "point" else "CellData"
-    first = h5[f"VTKHDF/Steps/{place_there}Offsets/{name}"][:]
+    shown = shown_name(name)
+    first = h5[f"VTKHDF/Steps/{place_there}Offsets/{shown}"][:]
     for begin, step in zip(first, sorted(h5["step"])):
         stored = h5["step"][step][place][name][:]
-        assert np.array_equal(h5["VTKHDF"][place_there][name][begin:begin + len(stored)], stored)
+        assert np.array_equal(h5["VTKHDF"][place_there][shown][begin:begin + len(stored)], stored)
 
 
 def test_advance_is_the_way_along_the_normal_of_the_skin_above(opening):
@@ -186,5 +188,5 @@ def test_a_reader_that_shows_another_step_is_noticed(opening, environment, tmp_p
         shutil.copy(part, tmp_path)
     view = tmp_path / f"{opening.stem}_tissue.xdmf"
     view.write_text(view.read_text().replace("step/0002/point/adv", "step/0001/point/adv"))
-    with pytest.raises(AssertionError, match="tissue, step 0002, advance: .* they differ"):
+    with pytest.raises(AssertionError, match="tissue, step 0002, advance .mm.: .* they differ"):
         read_back(tmp_path / opening.name, environment)

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "repose/base/geometry.h"
+
 namespace repose::solve {
 
 /// State of a search after an iteration, for progress reports.
@@ -26,6 +28,7 @@ inline constexpr const char* stopped_reason =
 struct OtherRest {
   double distance = 0;   ///< mm, the largest of the skin from the one that was chosen
   double place[3] = {};  ///< mm, where on the initial skin
+  std::vector<Vec3> displacement = {};  ///< mm, [owned points] of this rank
 };
 
 /// Multipliers of contact between two searches, N/mm².

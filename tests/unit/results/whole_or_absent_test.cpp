@@ -25,7 +25,8 @@ std::string parts(const std::string& file, int count) {
 TEST(WholeOrAbsent, CommitLeavesTheResultAndItsDocuments) {
   const Folder folder;
   write_small_result(folder.path("a"), small_model());
-  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
+  EXPECT_EQ(folder.content(),
+            "a.h5 a_blocks.xdmf a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
 }
 
 TEST(WholeOrAbsent, NothingIsLeftWithoutCommit) {
@@ -62,7 +63,8 @@ TEST(WholeOrAbsent, WhatIsSavedOnTheWayIsAResultAndTheRunGoesOn) {
     return numbers;
   };
   file.append_provisional(at(0, false), small_rows(m, 0));  // which is saved, as was wanted before
-  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
+  EXPECT_EQ(folder.content(),
+            "a.h5 a_blocks.xdmf a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
   EXPECT_EQ(steps_of(folder, m), (Steps{{0, false}}));
   EXPECT_FALSE(file.save()) << "it is saved";
   file.append(at(0, true), small_rows(m, 0));
@@ -105,7 +107,7 @@ TEST(WholeOrAbsent, ADocumentOfAnEarlierRunThatDescribesNothingGoes) {
   model::Model m = small_model();
   m.skin.clear();
   write_small_result(folder.path("a"), m);
-  EXPECT_EQ(folder.content(), "a.h5 a_bones.xdmf a_springs.xdmf a_tissue.xdmf");
+  EXPECT_EQ(folder.content(), "a.h5 a_blocks.xdmf a_bones.xdmf a_springs.xdmf a_tissue.xdmf");
 }
 
 TEST(WholeOrAbsent, BytesDoNotDependOnTheTime) {
