@@ -3,13 +3,14 @@
 
     tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
                                     [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]
-                                    [-contacts off,on] [-output docs/measurements/solid.md] [-mark growth]
+                                    [-contacts off,on] [-dilatation prism]
+                                    [-output docs/measurements/solid.md] [-mark growth]
 
 Synthetic heads of the given numbers of skin vertices, four layers, the jaw opened by 8° and brought
-6 mm forward, to 0.01 mm, without contact unless -contacts says otherwise. lmvm is the default: limited-memory BFGS that begins with a
-multigrid cycle and ends with Newton steps; ntr, nls and cg are TAO's. Seconds are those of the search
-on its own model, the estimate of the distance to rest included. Needs: apt-get install
---no-install-recommends python3-h5py python3-numpy
+6 mm forward, to 0.01 mm, without contact unless -contacts says otherwise. lmvm is the default:
+limited-memory BFGS that begins with a multigrid cycle and ends with Newton steps; ntr, nls and cg are
+TAO's. Seconds are those of the search on its own model, the estimate of the distance to rest included.
+Needs: apt-get install --no-install-recommends python3-h5py python3-numpy
 """
 
 import h5py
@@ -25,7 +26,7 @@ bones:
 tissue:
   layers: 4
   edge: given
-  material: {young: 0.015, poisson: POISSON}
+  material: {young: 0.015, poisson: POISSON, dilatation: DILATATION}
 moves:
   - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}
   - {bone: mandible, translate: [0, -6, 0]}
@@ -38,7 +39,7 @@ HEAD = ("| unknowns | ν | method | evaluations | Hessians | search, s | µs/unk
 
 
 def rows_of(size, poisson, chosen):
-    text = SCENE.replace("POISSON", poisson)
+    text = SCENE.replace("POISSON", poisson).replace("DILATATION", chosen.dilatation)
     with synthetic(chosen.bin, size, text.replace("CONTACT", "")) as folder:
         for contact in chosen.contacts.split(","):
             (folder / "scene.yaml").write_text(text.replace("CONTACT", CONTACT[contact]))
@@ -62,7 +63,7 @@ def rows_of(size, poisson, chosen):
 
 def main():
     chosen = option_parser(__doc__, sizes="500,2500,12500,125000", methods="lmvm,ntr", poissons="0.45,0.49",
-                           ranks=1, contacts="off", mark="growth").parse_args()
+                           ranks=1, contacts="off", dilatation="prism", mark="growth").parse_args()
     rows = (row for size in chosen.sizes.split(",") for poisson in chosen.poissons.split(",")
             for row in rows_of(size, poisson, chosen))
     print_table(HEAD, rows, chosen.output, chosen.mark)
