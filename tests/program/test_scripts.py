@@ -78,7 +78,7 @@ def test_springs_are_named_where_a_result_has_none(script, solved):
 SIMPLE = """import sys
 from unittest.mock import MagicMock
 simple = sys.modules[__name__] = MagicMock(GetParaViewVersion=lambda: {version})
-for source in (simple.XDMFReader, simple.Calculator):
+for source in (simple.XDMFReader, simple.WarpByVector):
     source.return_value.GetDataInformation.return_value.GetBounds.return_value = (0, 1) * 3
 """
 
