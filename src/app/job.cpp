@@ -65,12 +65,14 @@ void build(const std::filesystem::path& input, Job& job) {
 }
 
 /// Every rank makes its part. Collective.
-void build_local(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
+void build_local(MPI_Comm comm, const std::filesystem::path& input,
+                 const scene::SceneChanges& changes, Job& job) {
   std::optional<model::ColumnGeometry> geometry;  // on rank 0
   base::on_root(comm, [&] { geometry.emplace(make<model::ColumnGeometry>(*job.anatomy, input)); });
   scene::Scene scene;
-  base::collective_try(
-      comm, [&] { scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input); });
+  base::collective_try(comm, [&] {
+    scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
+  });
   job.layers = scene.tissue.layers;
   job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
   base::on_root(comm, [&] {
@@ -85,7 +87,7 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input, Job& job) {
 
 /// Collective.
 void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
-          const Watch& watch, Job& job) {
+          const Watch& watch, const scene::SceneChanges& changes, Job& job) {
   bool distributed = false;
   const bool shared = base::size(comm) > 1;
   base::on_root(comm, [&] {
@@ -94,7 +96,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
       job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
       return;
     }
-    read_scene(scene::read_scene(input), job);
+    read_scene(scene::read_scene(input, changes), job);
     if (watch) watch(share_of_surfaces);
     const std::string why = explain_undistributed(comm, *job.anatomy, whole);
     distributed = shared && why.empty();
@@ -103,7 +105,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
     if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
   });
   MPI_Bcast(&distributed, 1, MPI_C_BOOL, 0, comm);
-  if (distributed) build_local(comm, input, job);
+  if (distributed) build_local(comm, input, changes, job);
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
@@ -142,9 +144,9 @@ void share(MPI_Comm comm, Job& job) {
 }  // namespace
 
 Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
-             const Watch& watch) {
+             const Watch& watch, const scene::SceneChanges& changes) {
   Job job;
-  read(comm, input, whole, watch, job);
+  read(comm, input, whole, watch, changes, job);
   bring_into_equilibrium(comm, job);
   base::on_root(comm, [&] {
     make_incisions(job);

@@ -142,11 +142,12 @@ solve::Start PlanSession::State::start_at(const Base& base, const Placements& pl
   return start;
 }
 
-PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input)
+PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
+                         const scene::SceneChanges& changes)
     : state_(std::make_unique<State>()) {
   State& s = *state_;
   s.comm = comm;
-  s.job = read_job(comm, input, "");
+  s.job = read_job(comm, input, "", {}, changes);
   base::on_root(comm, [&] {
     require_plan(input, s.job);
     s.box = *s.job.anatomy->scene.plan;

@@ -83,6 +83,14 @@ void read_output(const json& value, Request& request) {
   base::require_name(request.output);
 }
 
+template <const char* key>
+void read_change(const json& value, Request& request) {
+  request.changes[key] = value.dump();
+}
+
+constexpr char material[] = "tissue.material", attach_regions[] = "tissue.attach_regions",
+               release[] = "tissue.release", boundary[] = "boundary";
+
 struct Member {
   const char* name;
   void (*read)(const json& value, Request& request);
@@ -105,6 +113,12 @@ const std::vector<VerbMembers>& verbs() {
         {"tangents", read_tangents},
         {"base", read_base},
         {"points", read_points}}},
+      {"change",
+       Verb::change,
+       {{"material", read_change<material>},
+        {"attach_regions", read_change<attach_regions>},
+        {"release", read_change<release>},
+        {"boundary", read_change<boundary>}}},
       {"write", Verb::write, {{"output", read_output, true}}},
       {"quit", Verb::quit, {}}};
   return table;

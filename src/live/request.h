@@ -5,13 +5,14 @@
 #include <string>
 
 #include "repose/scene/placement.h"
+#include "repose/scene/scene.h"
 
 namespace repose::live {
 
 /// Longest line of a request, bytes.
 constexpr size_t longest_line = 1 << 20;
 
-enum class Verb { describe, solve, write, quit };
+enum class Verb { describe, solve, change, write, quit };
 
 /// Motions of pieces by name; those without an entry stay.
 using PlanMoves = std::map<std::string, scene::Placement>;
@@ -26,6 +27,7 @@ struct Request {
   bool from_rest = false;         ///< the search begins at the state before the bones move, …
   std::optional<PlanMoves> base;  ///< … or at this plan, else at the scene's
   bool all_points = false;        ///< the answer has all points, not those of the skin alone
+  scene::SceneChanges changes;    ///< in place of those before
   std::string output;             ///< path of the result without ending
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <memory>
 #include <optional>
 
 #include "listener.h"
@@ -36,7 +37,8 @@ bool ends_a_solve(const std::string& line) {
 /// Answers the requests of one channel about one scene.
 class Service {
  public:
-  Service(MPI_Comm comm, const std::filesystem::path& scene) : comm_(comm), session_(comm, scene) {}
+  Service(MPI_Comm comm, const std::filesystem::path& scene)
+      : comm_(comm), scene_(scene), session_(std::make_unique<PlanSession>(comm, scene)) {}
 
   /// Answers until the input ends, the output is closed, or a request says quit; returns whether
   /// one did. Collective.
@@ -57,6 +59,7 @@ class Service {
  private:
   bool answer(const std::string& line, bool& quits);
   void dispatch(const Request& request, Reply& reply);
+  void change(const scene::SceneChanges& changes);
   void describe(Reply& reply);
   void solve(const Request& request, Reply& reply);
   PlanSession::Placements place(const PlanMoves& plan) const;
@@ -65,7 +68,8 @@ class Service {
   void find_visible();
 
   MPI_Comm comm_;
-  PlanSession session_;
+  std::filesystem::path scene_;
+  std::unique_ptr<PlanSession> session_;
   Requests* requests_ = nullptr;  // of the channel that is answered, …
   int output_ = -1;               // … and where its answers go
   std::vector<int64_t> skin_;     // rows of the points of the skin, on rank 0
@@ -90,15 +94,22 @@ bool Service::answer(const std::string& line, bool& quits) {
 }
 
 void Service::dispatch(const Request& request, Reply& reply) {
-  if (request.verb == Verb::describe) describe(reply);
+  if (request.verb == Verb::change) change(request.changes);
+  if (request.verb == Verb::describe || request.verb == Verb::change) describe(reply);
   if (request.verb == Verb::solve) solve(request, reply);
-  if (request.verb == Verb::write) session_.write(request.output);
+  if (request.verb == Verb::write) session_->write(request.output);
+}
+
+/// Builds the scene with changes in place of those before. Where it cannot be, it stays as it is.
+void Service::change(const scene::SceneChanges& changes) {
+  session_ = std::make_unique<PlanSession>(comm_, scene_, changes);
+  skin_.clear();
 }
 
 /// The skin's points: those of layer 0 that its triangles have.
 void Service::find_visible() {
   if (!skin_.empty()) return;
-  for (const auto& triangle : session_.model().skin)
+  for (const auto& triangle : session_->model().skin)
     skin_.insert(skin_.end(), triangle.begin(), triangle.end());
   std::ranges::sort(skin_);
   skin_.erase(std::unique(skin_.begin(), skin_.end()), skin_.end());
@@ -132,21 +143,21 @@ void add_given_skin(const surface::Surface& given, const surface::Surface& skin,
 void Service::describe(Reply& reply) {
   find_visible();
   json& head = reply.head();
-  head["accuracy"] = session_.accuracy();
-  head["box"] = {{"translate", write_vector(session_.box().translate)},
-                 {"rotate", write_vector(session_.box().rotate)}};
-  for (const PlanSession::Piece& piece : session_.pieces())
+  head["accuracy"] = session_->accuracy();
+  head["box"] = {{"translate", write_vector(session_->box().translate)},
+                 {"rotate", write_vector(session_->box().rotate)}};
+  for (const PlanSession::Piece& piece : session_->pieces())
     head["pieces"].push_back({{"name", piece.name},
                               {"bone", piece.bone},
                               {"centroid", write_vector(piece.centroid)},
                               {"translate", write_vector(piece.scenes.translation)},
                               {"rotate", write_vector(piece.scenes.rotation)}});
-  const std::vector<Vec3> initial = session_.initial();
+  const std::vector<Vec3> initial = session_->initial();
   if (base::rank(comm_) > 0) return;
-  const model::Model& model = session_.model();
+  const model::Model& model = session_->model();
   head["points"] = initial.size();
   head["bones"] = model.bones;
-  head["cuts"] = session_.has_cuts();
+  head["cuts"] = session_->has_cuts();
   surface::Surface skin{"skin", visible(initial), {}};
   for (const auto& triangle : model.skin) {
     Triangle& corners = skin.triangles.emplace_back();
@@ -155,7 +166,7 @@ void Service::describe(Reply& reply) {
   }
   reply.add("position", skin.points);
   reply.add("triangles", skin.triangles);
-  if (session_.given_skin()) add_given_skin(*session_.given_skin(), skin, reply);
+  if (session_->given_skin()) add_given_skin(*session_->given_skin(), skin, reply);
   for (size_t b = 0; b < model.bone_surfaces.size(); ++b) {
     reply.add(fmt::format("bone_{}_points", b), model.bone_surfaces[b].points);
     reply.add(fmt::format("bone_{}_triangles", b), model.bone_surfaces[b].triangles);
@@ -164,16 +175,16 @@ void Service::describe(Reply& reply) {
 
 /// By the names of pieces; those that are not named stay.
 PlanSession::Placements Service::place(const PlanMoves& plan) const {
-  PlanSession::Placements placements(session_.pieces().size());
+  PlanSession::Placements placements(session_->pieces().size());
   for (const auto& [name, placement] : plan) {
-    const auto piece = std::ranges::find(session_.pieces(), name, &PlanSession::Piece::name);
-    if (piece == session_.pieces().end()) {
+    const auto piece = std::ranges::find(session_->pieces(), name, &PlanSession::Piece::name);
+    if (piece == session_->pieces().end()) {
       std::vector<std::string> names;
-      for (const PlanSession::Piece& other : session_.pieces()) names.push_back(other.name);
+      for (const PlanSession::Piece& other : session_->pieces()) names.push_back(other.name);
       base::refuse("plan: {} is no piece of the plan; its pieces are {}", base::quote(name),
                    fmt::join(names, ", "));
     }
-    placements[piece - session_.pieces().begin()] = placement;
+    placements[piece - session_->pieces().begin()] = placement;
   }
   return placements;
 }
@@ -182,15 +193,15 @@ void Service::solve(const Request& request, Reply& reply) {
   find_visible();
   PlanSession::Request requested;
   requested.plan = place(request.plan);
-  requested.accuracy = request.accuracy.value_or(session_.accuracy());
+  requested.accuracy = request.accuracy.value_or(session_->accuracy());
   requested.tangents = request.tangents;
   PlanSession::Placements scenes;
-  for (const PlanSession::Piece& piece : session_.pieces()) scenes.push_back(piece.scenes);
+  for (const PlanSession::Piece& piece : session_->pieces()) scenes.push_back(piece.scenes);
   const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
   if (!request.from_rest) requested.base = &from;
   requested.abandoned = [this] { return requests_->superseded(ends_a_solve); };
   const double before = base::cpu_seconds();
-  const PlanSession::Answer answer = session_.solve(requested);
+  const PlanSession::Answer answer = session_->solve(requested);
   const solve::PathOutcome& path = answer.summary.path;
   if (path.last.stopped) base::refuse("abandoned: a later request overtook it");
   json& head = reply.head();

@@ -335,6 +335,32 @@ void read_surroundings(Scene& scene, const Map& map) {
   if (const auto tearing = map.find("tearing")) scene.tearing = read_tearing(*tearing, scene);
 }
 
+/// Copies a node without its marks, which are places in another text than the file.
+YAML::Node copy_unmarked(const YAML::Node& node) {
+  if (node.IsScalar()) return YAML::Node(node.Scalar());
+  YAML::Node copy(node.Type());
+  if (node.IsSequence())
+    for (const YAML::Node& item : node) copy.push_back(copy_unmarked(item));
+  if (node.IsMap())
+    for (const auto& entry : node) copy[copy_unmarked(entry.first)] = copy_unmarked(entry.second);
+  return copy;
+}
+
+/// Puts a value, JSON, in the place of a key's. A scene that has no such map is left for the reader
+/// to refuse.
+void set_value(const std::string& key, const std::string& text, YAML::Node& root) {
+  if (!root.IsMap()) return;
+  const size_t dot = key.find('.');
+  YAML::Node map = root;
+  if (dot != std::string::npos) map.reset(root[key.substr(0, dot)]);
+  if (!map.IsMap()) return;
+  try {
+    map[key.substr(dot + 1)] = copy_unmarked(YAML::Load(text));
+  } catch (const YAML::Exception& error) {
+    base::refuse("{} is changed into what YAML does not hold: {}", key, error.msg);
+  }
+}
+
 }  // namespace
 
 void require_bones(const Scene& scene) {
@@ -343,8 +369,10 @@ void require_bones(const Scene& scene) {
                  scene.file.string());
 }
 
-Scene read_scene(const std::filesystem::path& file) {
-  const Map map(Value(file, read_yaml(file)));
+Scene read_scene(const std::filesystem::path& file, const SceneChanges& changes) {
+  YAML::Node root = read_yaml(file);
+  for (const auto& [key, text] : changes) set_value(key, text, root);
+  const Map map(Value(file, root));
   Scene scene;
   scene.file = file;
   scene.skin = read_skin(map.at("skin"));

@@ -33,8 +33,9 @@ Value::Value(const Value& parent, const YAML::Node& node, const YAML::Mark& mark
       place_(std::move(place)) {}
 
 void Value::refuse_at(const YAML::Mark& mark, const std::string& text) const {
-  base::refuse("{}:{}:{}: {} {}", file_->string(), mark.line + 1, mark.column + 1,
-               place_.empty() ? "the scene" : place_, text);
+  const std::string at =
+      mark.is_null() ? "" : fmt::format(":{}:{}", mark.line + 1, mark.column + 1);
+  base::refuse("{}{}: {} {}", file_->string(), at, place_.empty() ? "the scene" : place_, text);
 }
 
 void Value::refuse_kind() const {

@@ -182,7 +182,9 @@ inline std::vector<std::string> requests() {
           R"("rotate": [1, 0, 2]}, "chin": {}}, "accuracy": 0.05, "tangents": true, )"
           R"("base": "rest", "points": "all"})",
           R"({"do": "solve", "base": {"mandible": {"rotate": [0, 0, 1]}}, "points": "skin"})",
-          R"({"id": null, "do": "write", "output": "plans/first"})", R"({"do": "quit"})"};
+          R"({"id": null, "do": "write", "output": "plans/first"})",
+          R"({"do": "quit"})",
+          R"({"do": "change", "material": {"preset": "face"}, "boundary": {"rim": "free"}})"};
 }
 
 /// A model and a result; they are written with what writes them.

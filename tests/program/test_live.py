@@ -67,6 +67,28 @@ def test_refusals_name_the_place_and_the_session_goes_on(session):
     assert session.solve(B).converged
 
 
+def test_a_change_of_material_or_border_is_the_scene_with_these_values(session, environment, tmp_path):
+    before = session.solve(A)
+    text = SCENE.read_text().replace("material: {preset: face}", "material: {preset: face, young: 0.03}")
+    text = text.replace("release: 5", "release: 7").replace(": head_", f": {SCENE.parent}/head_")
+    (tmp_path / "changed.yaml").write_text(text + "boundary: {rim: fixed}\n")
+    session.change(material={"preset": "face", "young": 0.03}, release=7, boundary={"rim": "fixed"})
+    changed = session.solve(A)
+    with repose.Session(tmp_path / "changed.yaml", program=programs() / "repose-live") as other:
+        assert distance(changed, other.solve(A)) == 0
+    assert distance(changed, before) > 0.1
+    for values, words in (({"material": {"young": -1}}, "head_live.yaml: tissue.material.young"),
+                          ({"material": {"yuong": 1}}, "the nearest known one is 'young'"),
+                          ({"moves": []}, "no member 'moves'"), ({"material": 3}, "tissue.material"),
+                          ({"boundary": {"rim": None}}, "boundary has no value for 'rim'")):
+        with pytest.raises(repose.Refused, match=re.escape(words)) as refusal:
+            session.change(**values)
+        assert "\n" not in str(refusal.value)
+    assert distance(session.solve(A), changed) == 0, "a refused change leaves the scene as it was"
+    session.change()
+    assert distance(session.solve(A), before) == 0
+
+
 def test_a_later_solve_ends_the_one_under_way(session):
     outcome = []
 

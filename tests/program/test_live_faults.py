@@ -259,7 +259,7 @@ def damaged(random_numbers):
     line = bytearray(json.dumps(random_numbers.choice([
         {"do": "solve", "plan": PLAN, "accuracy": 0.1, "tangents": False, "base": "rest"},
         {"do": "solve", "plan": {"mandible": {"rotate": [1, 2, 1e400]}}}, {"do": "describe"},
-        {"do": "write", "output": "/nowhere/at/all"}, {"do": "solve", "points": 3, "base": PLAN}])).encode())
+        {"do": "change", "material": {"preset": "fat"}}, {"do": "write", "output": "/nowhere/at/all"}, {"do": "solve", "points": 3, "base": PLAN}])).encode())
     for _ in range(random_numbers.randrange(4)):
         place = random_numbers.randrange(len(line))
         kind = random_numbers.randrange(3)
@@ -293,7 +293,7 @@ def test_deep_long_and_odd_requests_are_refused_and_the_session_goes_on(small, e
         b"[" * deep + b"]" * deep: "a request nests at most 8 arrays and objects; this one nests 300000",
         b'{"id": ' + b"[" * deep + b"]" * deep + b', "do": "quit"}': "this one nests 300001",
         b'{"do": "describe", "id": "' + b"a" * (1 << 21) + b'"}': "a line of at most 1048576 bytes",
-        b'{"do": "dance"}': "do must be one of describe, solve, write, quit",
+        b'{"do": "dance"}': "do must be one of describe, solve, change, write, quit",
         b'{"do": "quit", "id": {}}': "id must be a text or a number, not '{}'",
         b'{"do": "quit", "now": 1}': "quit has no member 'now'; it has id, do",
         solve + b'"accuracy": true}': "accuracy must be a number, 1e-6",

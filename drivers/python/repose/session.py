@@ -146,11 +146,14 @@ class Session:
         self._writing, self._waiting, self._last = threading.Lock(), {}, 0
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+        self.changes = {}
         try:
-            head, arrays = self.describe()
+            self._take_description(*self.describe())
         except Refused:
             self.close()
             raise
+
+    def _take_description(self, head, arrays):
         self.pieces = [Piece(one["name"], one["bone"], *(np.array(one[key]) for key in
                                                          ("centroid", "translate", "rotate")))
                        for one in head["pieces"]]
@@ -163,6 +166,13 @@ class Session:
                                      ("position", "triangles", "rows", "weights")))
         self.bones = {name: (arrays[f"bone_{row}_points"], arrays[f"bone_{row}_triangles"])
                       for row, name in enumerate(head["bones"])}
+
+    def change(self, **values):
+        """Builds the scene again with other values of its keys: material, attach_regions, release or
+        boundary, as in a scene file. A key that is not named has the scene's own value, also where it was
+        changed before. A refused change leaves the scene as it was."""
+        self._take_description(*self.ask({"do": "change", **values}))
+        self.changes = values
 
     def solve(self, plan, accuracy=None, tangents=False, base="scene"):
         """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
@@ -190,7 +200,8 @@ class Session:
     def count_answer(self, plan, head, position, accuracy=None):
         """Counts an answer for verification; `solve` does so itself."""
         if self._verifier and head["converged"]:
-            self._verifier.add(_plain(plan), np.array(position), accuracy or self.accuracy)
+            self._verifier.add(_plain(plan), np.array(position), accuracy or self.accuracy,
+                               self.changes)
 
     @property
     def verifications(self):

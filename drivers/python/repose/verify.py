@@ -29,13 +29,13 @@ class Verifier:
         self._count, self._due, self._closed = 0, None, False
         self._lock, self._thread, self._cold = threading.Lock(), None, None
 
-    def add(self, plan, position, accuracy):
-        """Counts a converged answer."""
+    def add(self, plan, position, accuracy, changes=None):
+        """Counts a converged answer, of a scene with changes (Session.change)."""
         with self._lock:
             self._count += 1
             if self._closed or self._count % self.every:
                 return
-            self._due = plan, position, accuracy
+            self._due = plan, position, accuracy, changes
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, daemon=True)
                 self._thread.start()
@@ -74,11 +74,13 @@ class Verifier:
             if self.tell:
                 self.tell(outcome)
 
-    def _verify(self, plan, position, accuracy):
+    def _verify(self, plan, position, accuracy, changes):
         cold = self.start()
         with self._lock:
             self._cold = cold
         try:
+            if changes:
+                cold.change(**changes)
             face = cold.solve(plan, accuracy, base="rest")
         finally:
             with self._lock:

@@ -41,9 +41,10 @@ class PlanSession {
     bool from_base = false;                ///< the search began at the base and ended there
   };
 
-  /// Reads and builds a scene. Throws InputError where it has no plan, or what a session does not
-  /// solve: tearing, the functional force.
-  PlanSession(MPI_Comm comm, const std::filesystem::path& input);
+  /// Reads and builds a scene with changes. Throws InputError where it has no plan, or what a
+  /// session does not solve: tearing, the functional force.
+  PlanSession(MPI_Comm comm, const std::filesystem::path& input,
+              const scene::SceneChanges& changes = {});
   ~PlanSession();
   PlanSession(const PlanSession&) = delete;
   PlanSession& operator=(const PlanSession&) = delete;

@@ -305,9 +305,13 @@ struct Scene {
 /// Throws InputError if a scene lists no bone.
 void require_bones(const Scene& scene);
 
-/// Reads and checks a scene file. Every refusal is an InputError whose message starts with
-/// file:line:column and names the key, the value, the allowed range and, for an unknown key, the
-/// nearest known one. Files it names must exist.
-Scene read_scene(const std::filesystem::path& file);
+/// Values, as JSON, that stand in place of those of a scene file, by key: "boundary" or
+/// "tissue.material".
+using SceneChanges = std::map<std::string, std::string>;
+
+/// Reads and checks a scene file with changes. Every refusal is an InputError whose message starts
+/// with file:line:column and names the key, the value, the allowed range and, for an unknown key,
+/// the nearest known one; file alone for a changed value. Files it names must exist.
+Scene read_scene(const std::filesystem::path& file, const SceneChanges& changes = {});
 
 }  // namespace repose::scene
