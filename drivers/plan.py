@@ -8,8 +8,9 @@
 VOLUME is a CT or a segmentation of 3D Slicer (.seg.nrrd), whose segments' names decide what is skin,
 skull, maxilla and mandible; LABELS a label map or segmentation of the bones of a CT. Without it skull
 and jaw are taken apart where they touch least. Writes into the folder plan: surfaces, landmarks,
-scene.yaml to edit, pictures of both (landmarks.svg, proposal.png), and the solved face with a picture. Operations: Le Fort I, sagittal split, genioplasty, jaw; each with movements in mm (forward,
-back, up, down, left, right) and degrees (open, close, yaw, roll).
+scene.yaml to edit, pictures of both (landmarks.svg, proposal.png), and the solved face with a picture
+and its planning sheet (face.html). Operations: Le Fort I, sagittal split, genioplasty, jaw; each with
+movements in mm (forward, back, up, down, left, right) and degrees (open, close, yaw, roll).
 
   -level HU    of the skin in a CT (-300)
   -apart SKULL JAW    points in the two bones of a CT without LABELS, in the place of those that are
@@ -74,13 +75,13 @@ def run(*command):
 
 
 def draw(script, *arguments):
-    """Name of the picture that a script of this folder draws, to follow others; where it cannot, says
-    why, and there is none."""
+    """Returns the name of the picture or page that a script of this folder draws, to follow others; empty
+    where it cannot, which is reported."""
     command = [sys.executable, script, *arguments]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode == 0:
         return f", {arguments[-1]}"
-    print(f"no picture: {done.stderr.strip()}", flush=True)
+    print(f"{arguments[-1]} was not drawn: {done.stderr.strip()}", flush=True)
     return ""
 
 
@@ -340,7 +341,8 @@ def main():
     status = run("mpirun", "-n", options.ranks, program("repose-solve"), scene, "-output",
                  folder / "face")
     picture = draw(HERE / "render.py", folder / "face", "-output", folder / "face.png")
-    print(f"solved: {folder / 'face.h5'}{picture} ({time.monotonic() - begin:.0f} s)")
+    sheet = draw(HERE / "report.py", folder / "face", "-scene", scene, "-output", folder / "face.html")
+    print(f"solved: {folder / 'face.h5'}{picture}{sheet} ({time.monotonic() - begin:.0f} s)")
     return status
 
 

@@ -11,6 +11,7 @@ import pytest
 import volumes
 from conftest import PROJECT, can_draw, finish, programs, runner
 from heads import DATA
+from tissue import last
 
 SCRIPT = PROJECT / "drivers/plan.py"
 SPEC = importlib.util.spec_from_file_location("plan", SCRIPT)
@@ -169,3 +170,16 @@ def test_a_scene_is_proposed_that_can_be_solved(tmp_path, environment, labels):
     for side in ("left", "right"):
         name = f"condyle_{side}_center"
         assert np.linalg.norm(place[name] - reference[name]) < 3, "parted in the joints"
+
+
+@pytest.mark.long
+def test_a_face_is_solved_with_its_planning_sheet(parts, tmp_path, environment):
+    (tmp_path / "build").mkdir()
+    (tmp_path / "build/bin").symlink_to(programs())
+    result = finish([SCRIPT, segmentation_of(parts, tmp_path), "-operation", "open the jaw by 6 degrees",
+                     "-ranks", "1"], tmp_path, environment | {"REPOSE_BUILD": "build"}, 240)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "plan/face.html" in result.stdout
+    assert last(tmp_path / "plan/face.h5")["converged"] == 1
+    sheet = (tmp_path / "plan/face.html").read_text()
+    assert "Not all landmarks were given" not in sheet
