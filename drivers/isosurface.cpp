@@ -163,7 +163,7 @@ std::vector<Vec3> points_in(const std::string& file) {
   return points;
 }
 
-/// Points in skull and jaw, written beside the meshes so that a person may correct them.
+/// Proposes points in skull and jaw and writes them beside the meshes, for correction.
 std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, double level,
                                               const std::string& output) {
   auto points = tools::bone_separation::propose_points(volume, level);

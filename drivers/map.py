@@ -15,7 +15,6 @@ import argparse
 import html
 import json
 import pathlib
-import re
 import shlex
 import sys
 
@@ -208,9 +207,8 @@ def solve_plan(chosen, session, box, store):
               f"{off.max():.2f} mm; its bound holds on {100 * np.mean(off <= plan_map.bound(plan)):.0f} %")
 
 
-def show_progress(text):
+def show_progress(done, total, text):
     """A bar on a terminal; in a log the end alone, and plans that failed."""
-    done, total = map(int, re.match(r"(\d+) of (\d+)", text).groups())
     if sys.stderr.isatty():
         cells = 10 * done // total
         print(f"\r\033[K[{'#' * cells}{'.' * (10 - cells)}] {text}", end="\n" if done == total else "",

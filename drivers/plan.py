@@ -334,7 +334,7 @@ def main():
     scene = folder / "scene.yaml"
     scene.write_text(scene_text(options, read_landmarks(folder / "landmarks.mrk.json"), bones))
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")
-    print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): look at "
+    print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): check "
           "the pictures", flush=True)
     if options.propose:
         return

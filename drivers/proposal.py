@@ -27,29 +27,6 @@ SHORT = {"nasion_bone": "N", "nasal_spine": "ANS", "a_point": "A", "upper_inciso
          "gonion_left": "Go"}
 
 
-def refuse(message):
-    sys.exit(f"proposal.py: {message}")
-
-
-def read_mesh(file):
-    reader = {".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader, ".obj": vtk.vtkOBJReader,
-              ".vtp": vtk.vtkXMLPolyDataReader}[pathlib.Path(file).suffix.lower()]()
-    reader.SetFileName(str(file))
-    reader.Update()
-    return reader.GetOutput()
-
-
-def read_scene(file):
-    try:
-        import yaml
-    except ImportError:
-        refuse("PyYAML is missing: apt-get install python3-yaml, or pip install pyyaml")
-    try:
-        return yaml.safe_load(file.read_text())
-    except (OSError, yaml.YAMLError) as reason:
-        refuse(f"{file}: {' '.join(str(reason).split())}")
-
-
 def transform_of(moves, bone):
     """All moves of a bone one after another, as repose-solve takes them."""
     total = vtk.vtkTransform()
@@ -79,9 +56,9 @@ def run(*command):
     try:
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     except OSError as reason:
-        refuse(f"{command[0]}: {reason.strerror}")
+        render.refuse(f"{command[0]}: {reason.strerror}")
     if done.returncode:
-        refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
+        render.refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
 
 
 def parts_of(scene, file, work):
@@ -90,7 +67,7 @@ def parts_of(scene, file, work):
     if scene.get("osteotomies"):
         run(plan.program("repose-osteotomy"), file, "-output", work / "cut")
         names |= {made.stem.removeprefix("cut_"): made for made in work.glob("cut_*.ply")}
-    return {name: read_mesh(path) for name, path in names.items()}
+    return {name: render.read_mesh(path) for name, path in names.items()}
 
 
 def square(at, normal):
@@ -227,13 +204,13 @@ def arguments():
     parser = argparse.ArgumentParser(prog="proposal.py", description=__doc__, add_help=False,
                                      allow_abbrev=False,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.error = refuse
+    parser.error = render.refuse
     parser.add_argument("-help", action="help")
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("-output", type=pathlib.Path)
     chosen = parser.parse_args()
     if not chosen.scene.is_file():
-        refuse(f"{chosen.scene}: no such file")
+        render.refuse(f"{chosen.scene}: no such file")
     chosen.output = (chosen.output or chosen.scene.with_name("proposal.png")).absolute()
     return chosen
 
@@ -245,16 +222,16 @@ def main():
     render.load_modules()
     np, vtk = render.np, render.vtk
     file = chosen.scene
-    scene = read_scene(file)
+    scene = render.read_scene(file)
     if not isinstance(scene.get("skin"), str):
-        refuse(f"{file}: its skin is no file; make one with repose-isosurface")
+        render.refuse(f"{file}: its skin is no file; make one with repose-isosurface")
     marks = plan.read_landmarks(file.parent / scene["landmarks"]) if "landmarks" in scene else {}
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         parts = parts_of(scene, file, work)
         run(plan.program("repose-solve"), file, "-dry_run", "-output", work / "model")
-        solved = read_mesh(work / "model_solved_skin.ply")
-    skin = read_mesh(file.parent / scene["skin"])
+        solved = render.read_mesh(work / "model_solved_skin.ply")
+    skin = render.read_mesh(file.parent / scene["skin"])
     frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
                             for mesh in (*parts.values(), solved)])
     draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved)),

@@ -55,7 +55,7 @@ class Arguments(argparse.ArgumentParser):
 
 
 def refuse(message):
-    print(f"render.py: {message}", file=sys.stderr)
+    print(f"{os.path.basename(sys.argv[0])}: {message}", file=sys.stderr)
     sys.exit(1)
 
 
@@ -293,18 +293,33 @@ def surface(points, corners, numbers=None):
     return normals.GetOutput()
 
 
-def read_instruments(file):
-    """[(shape, push)] of a scene, the shapes as the scene gives them: before the push."""
+def read_mesh(file):
+    reader = {".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader, ".obj": vtk.vtkOBJReader}
+    source = reader[os.path.splitext(file)[1].lower()]()
+    source.SetFileName(str(file))
+    source.Update()
+    return source.GetOutput()
+
+
+def read_scene(file):
     try:
         import yaml
     except ImportError:
-        refuse("-scene needs PyYAML: pip install pyyaml, or apt-get install python3-yaml")
+        refuse("scenes need PyYAML: pip install pyyaml, or apt-get install python3-yaml")
     try:
         with open(file, encoding="utf-8") as text:
-            scene = yaml.safe_load(text)
+            return yaml.safe_load(text)
+    except (OSError, ValueError, yaml.YAMLError) as reason:
+        refuse(f"{file}: cannot be read: {' '.join(str(reason).split())}")
+
+
+def read_instruments(file):
+    """[(shape, push)] of a scene, the shapes as the scene gives them: before the push."""
+    scene = read_scene(file)
+    try:
         return [(shape_of(entry, os.path.dirname(os.path.abspath(file))), np.array(entry["push"]))
                 for entry in scene.get("instruments") or []]
-    except (AttributeError, KeyError, TypeError, ValueError, yaml.YAMLError) as reason:
+    except (AttributeError, KeyError, TypeError, ValueError) as reason:
         refuse(f"{file}: not a scene that repose-solve takes: {reason}")
 
 
@@ -338,9 +353,7 @@ def shape_of(entry, folder):
         source.SetRadius(60)
         source.SetNumberOfSides(64)
     else:
-        reader = {".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader, ".obj": vtk.vtkOBJReader}
-        source = reader[os.path.splitext(entry["mesh"])[1].lower()]()
-        source.SetFileName(os.path.join(folder, entry["mesh"]))
+        return read_mesh(os.path.join(folder, entry["mesh"]))
     source.Update()
     return source.GetOutput()
 

@@ -50,8 +50,14 @@ ContactPressures ContactSearch::pressures() const {
 }
 
 void ContactSearch::set_pressures(const ContactPressures& to) {
-  objective_.body_contact().set_multipliers(to.bodies);
-  objective_.cut_face_contact().set_multipliers(to.cut_faces);
+  const auto resized = [](std::vector<double> pressures, size_t size) {
+    pressures.resize(size, 0.0);
+    return pressures;
+  };
+  objective_.body_contact().set_multipliers(
+      resized(to.bodies, objective_.body_contact().multipliers().size()));
+  objective_.cut_face_contact().set_multipliers(
+      resized(to.cut_faces, objective_.cut_face_contact().size()));
   tangent_.forget_contact();
 }
 
@@ -97,7 +103,7 @@ void ContactSearch::move_multipliers() {
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
-  before_ = pressures();
+  const ContactPressures before = pressures();
   predicted_ = true;
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
@@ -117,7 +123,10 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   check(VecAXPY(slope_, 1.0, trial_));
   const bool found = qp_.solve(displacement, slope_, predicted_to, increment);
   tangent_.forget_contact();
-  if (!found) go_back(displacement);
+  if (!found) {
+    objective_.round_bodies(false);
+    set_pressures(before);
+  }
   return found;
 }
 
@@ -283,17 +292,19 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
       presolve(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
   bool taken = false;
   if (!near.stopped && newton(start_, accuracy, iterations) == End::reached) {
-    const OtherRest other = compare_skins(displacement, start_);
-    if (other.distance > 2 * accuracy) outcome.other = other;
-    if (outcome.other && energy(start_) < energy_here) {
-      Outcome there = finish(start_, accuracy);
-      taken = there.converged;
-      there.iterations += outcome.iterations + near.iterations + iterations;
-      there.other = other;
-      if (taken) outcome = there;
+    OtherRest other = compare_skins(displacement, start_);
+    const bool is_less = energy(start_) < energy_here;
+    const bool is_other = other.distance > 2 * accuracy;
+    Outcome there;
+    if (is_other && is_less) there = finish(start_, accuracy);
+    taken = there.converged;
+    there.iterations += outcome.iterations + near.iterations + iterations;
+    if (taken) outcome = there;
+    if (is_other && taken == is_less) {
+      other.displacement = displacements(taken ? displacement : start_);
+      outcome.other = std::move(other);
     }
   }
-  if (outcome.other) outcome.other->displacement = displacements(taken ? displacement : start_);
   if (taken)
     check(VecCopy(start_, displacement));
   else
@@ -306,7 +317,6 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, stiffest = 16;
   Outcome outcome;
   if (!predicted_) {
-    before_ = pressures();
     outcome = finish(displacement, accuracy);
     if (outcome.converged) return outcome;
   }
@@ -341,8 +351,6 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 }
 
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
-  before_ = {std::vector<double>(objective_.body_contact().multipliers().size(), 0.0),
-             std::vector<double>(objective_.cut_face_contact().size(), 0.0)};
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
   stiffen(1);
@@ -354,16 +362,11 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
     outcome.iterations += iterations;
     if (outcome.converged) return outcome;
   }
-  set_pressures(before_);
+  set_pressures({});
   check(VecCopy(guess, displacement));
   Outcome outcome = run(displacement, accuracy);
   outcome.iterations += iterations;
   return outcome;
-}
-
-void ContactSearch::go_back(Vec) {
-  objective_.round_bodies(false);
-  set_pressures(before_);
 }
 
 double penetration(discrete::Objective& objective) {

@@ -32,7 +32,6 @@ class ContactSearch : public RestSearch {
   Outcome run(Vec displacement, double accuracy) override;
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
-  void go_back(Vec displacement) override;
   ContactPressures pressures() const override;
   void set_pressures(const ContactPressures& to) override;
 
@@ -64,8 +63,7 @@ class ContactSearch : public RestSearch {
   bool finds_other_ = true;
   int64_t evaluations_for_other_ = 0;
   bool predicted_ = false;          // the next search begins with a prediction
-  ContactPressures before_;         // the last search, …
-  ContactPressures at_prediction_;  // … and where it began
+  ContactPressures at_prediction_;  // of the latest search
   std::vector<Vec3> places_;        // [touches] of points beside bodies before the first prediction
   base::VecHandle gradient_, slope_, step_, trial_, start_;
 };

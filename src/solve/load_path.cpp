@@ -77,9 +77,10 @@ int64_t LoadPath::inverted(Vec displacement) {
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   discrete::Positions& positions = objective_.positions();
   const int64_t folded_before = inverted(displacement), evaluated = function_.evaluations();
+  Attempt attempt;
+  attempt.before = search_.pressures();
   const auto own = search_.predict(displacement, load, increment_);
   const bool predicted = own ? *own : predictor_.predict(displacement, load, increment_);
-  Attempt attempt;
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
@@ -127,9 +128,9 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   objective_.positions().update(displacement);
 }
 
-void LoadPath::reject_step(const Attempt& tried, Vec displacement) {
+void LoadPath::reject_step(const Attempt& tried) {
   objective_.positions().set_load(result_.load);
-  search_.go_back(displacement);
+  search_.set_pressures(tried.before);
   refused_ += tried.evaluations;
   Halvings& h = result_.halvings;
   ++(!tried.outcome.converged ? h.failed : tried.folded ? h.folded : h.off_prediction);
@@ -139,6 +140,9 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   const Stopwatch watch;
   const double before = result_.load;
   const int64_t folded_before = inverted(displacement);
+  // Those at a near guess are not those at the start of the path.
+  const ContactPressures pressures =
+      settings_.near_guess ? ContactPressures{} : search_.pressures();
   check(VecCopy(guess, trial_));
   objective_.positions().set_load(1);
   const Outcome outcome = settings_.near_guess ? search_.run_near(trial_, settings_.accuracy)
@@ -151,7 +155,7 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   } else {
     objective_.positions().set_load(before);
     objective_.positions().update(displacement);
-    search_.go_back(displacement);
+    search_.set_pressures(pressures);
   }
 }
 
@@ -215,7 +219,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
       coarser.reset();
       on_step(result_.last, result_.load, watch.seconds());
     } else {
-      reject_step(tried, displacement);
+      reject_step(tried);
       step /= 2;
       ++halvings;
       coarser = tried;

@@ -4,6 +4,7 @@
     tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
                                [-output docs/measurements/contact.md] [-cases "jaw 8 mm back,…"]
                                [-tables cost,runs,searches,ways] [-picture contact.png]
+                               [-dilatation prism]
 
 cost: each move with parted and with fused lips, with contact and without it. runs: the same on 1, 2, 3
 and 5 ranks and in 2, 5 and 10 load steps, against one rank and automatic steps. searches: the present
@@ -83,7 +84,8 @@ def solve(text, chosen, folder, ranks=1, steps=0, options=(), program=None):
     for file in folder.iterdir():
         if file.is_symlink():
             (own / file.name).symlink_to(file.resolve())
-    (own / "scene.yaml").write_text(text)
+    dilatation = f"preset: face, dilatation: {chosen.dilatation}"
+    (own / "scene.yaml").write_text(text.replace("preset: face", dilatation))
     steps = ["-load_steps", steps] if steps else []
     done = run([(program or chosen.bin) / "repose-solve", "scene.yaml", "-output", "face",
                 "-accuracy", chosen.accuracy, *steps, *options], own, ranks)
@@ -223,7 +225,7 @@ def draw(faces, chosen):
             profile = profile[np.argsort(places[middle & (places[:, 1] < -285)][:, 2])]
             axis.plot(-profile[:, 1], profile[:, 2], label=way,
                       color="0.6" if way == "start" else None)
-        axis.set(title=case, aspect="equal", ylim=(325, 395))
+        axis.set(title=case, aspect="equal", xlim=(278, 322), ylim=(325, 395))
     axes[0][0].legend(loc="lower left")
     figure.tight_layout()
     figure.savefig(chosen.picture, dpi=110)
@@ -232,7 +234,7 @@ def draw(faces, chosen):
 def main():
     chosen = option_parser(__doc__, cases=",".join(CASES), tables="cost,runs,searches,ways",
                            accuracy=0.01, head=str(PROJECT.parent / "shared/data/head"),
-                           picture="").parse_args()
+                           picture="", dilatation="prism").parse_args()
     faces = {}
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)

@@ -218,7 +218,7 @@ BREAKS = [
         r"^mechanics\.contact",
     ),
     (
-        "points that come near are not looked at",
+        "points that come near have no contact",
         "constexpr double steepest = 1.1;",
         "constexpr double steepest = 0;",
         r"^mechanics\.contact",
@@ -291,7 +291,7 @@ BREAKS = [
         r"^solve\.contact|^program\.(contact|incisions)",
     ),
     (
-        "a surface of a cut bends nowhere",
+        "the curvature of a cut face is zero",
         "(metric - foot.gap * curvature).inverse();",
         "metric.inverse();",
         r"^mechanics\.contact",

@@ -71,15 +71,6 @@ def test_a_path_that_is_one(run, ranks):
     assert 0 < largest_difference(row) <= 0.2  # twice the accuracy
 
 
-def test_contact_ends_in_automatic_steps_whatever_steps_lead_there(solved):
-    """The states in between are those of the requested steps."""
-    accuracy = 0.01
-    automatic = solved("head_genioplasty.yaml", "-accuracy", accuracy)
-    more = solved("head_genioplasty.yaml", "-accuracy", accuracy, "-load_steps", 4)
-    assert [step["load"] for step in steps(more)] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
-    assert apart(last(automatic), last(more)) < accuracy
-
-
 @pytest.mark.parametrize("options, why", [
     (["-adapt"], "-adapt: the path is to be verified"),
     (["-restart", "a.h5"], "-verify_path: the run resumes from another result")])

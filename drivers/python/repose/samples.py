@@ -124,7 +124,7 @@ def rank_and_size():
 
 
 def solve_all(scene, box, points, store, accuracy, session, processes=1, program=None,
-              report=lambda text: None, tangents=True):
+              report=lambda done, total, text: None, tangents=True):
     """Samples at points [N, d], those of the store not solved again. Each of `processes` solvers takes
     the next plan; under mpirun a rank solves every size-th plan and the first returns all."""
     rank, size = rank_and_size()
@@ -142,7 +142,7 @@ def solve_all(scene, box, points, store, accuracy, session, processes=1, program
                 store.save(sample)
                 done[0] += 1
                 left = (time.monotonic() - began) / done[0] * (len(mine) - done[0])
-                report(f"{done[0]} of {len(mine)} plans solved, {left:.0f} s left" +
+                report(done[0], len(mine), f"{done[0]} of {len(mine)} plans solved, {left:.0f} s left" +
                        ("" if sample.converged else "; the last one did not converge"))
         except queue.Empty:
             pass

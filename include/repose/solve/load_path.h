@@ -79,6 +79,7 @@ class LoadPath {
     double expected = 0;  // largest predicted displacement, mm
     double miss = 0;      // largest distance of the end from the prediction, mm
     int64_t evaluations = 0;
+    ContactPressures before;  // of the step
   };
   double automatic_step() const;
   double requested_step() const;
@@ -92,7 +93,7 @@ class LoadPath {
                     const OnStep& on_step);
   void try_guess(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
-  void reject_step(const Attempt& tried, Vec displacement);
+  void reject_step(const Attempt& tried);
   bool in_vain(const Attempt& tried) const;
   void explain_failure();
 

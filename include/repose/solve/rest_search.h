@@ -65,12 +65,9 @@ class RestSearch {
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
   }
-  /// The last run's outcome is not taken: what it learned is forgotten, at the positions' load and
-  /// `displacement`, from which the path continues. Collective.
-  virtual void go_back(Vec /*displacement*/) {}
-  /// What the next search begins with, besides a displacement.
+  /// Returns the multipliers of contact with which the next search begins.
   virtual ContactPressures pressures() const { return {}; }
-  /// Sets what the next search begins with. Collective.
+  /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
   virtual void set_pressures(const ContactPressures& /*to*/) {}
 };
 

@@ -28,7 +28,7 @@ class Scripted : public solve::RestSearch {
   std::function<bool(double step)> fails = [](double) { return false; };
   int evaluations_of_failures = 0;
   double accepted = 0;
-  int taken_back = 0;
+  int rejected = 0;
 
   explicit Scripted(solve::Problem& problem)
       : problem_(problem), positions_(problem.objective().positions()) {}
@@ -44,7 +44,7 @@ class Scripted : public solve::RestSearch {
       problem_.function().evaluate(displacement, increment);
     return outcome;
   }
-  void go_back(Vec) override { ++taken_back; }
+  void set_pressures(const solve::ContactPressures&) override { ++rejected; }
 
  private:
   solve::Problem& problem_;
@@ -82,6 +82,45 @@ TEST(LoadPath, TakesStepsThatGoAsPredicted) {
   EXPECT_NEAR(discrete::largest_block(path.displacement), 1, 1e-6);  // with its bone
 }
 
+/// Tissue goes by 1 mm in every step, so that the number of steps shows.
+solve::PathOutcome run_with_contact(Path& path) {
+  path.part.contact = true;
+  path.search.move = [](double step) { return Vec3(0, 0, step > 0 ? 1 : 0); };
+  return path.run();
+}
+
+double depth(const Path& path) {
+  PetscReal deepest = 0;
+  check(VecNorm(path.displacement, NORM_INFINITY, &deepest));
+  return deepest;
+}
+
+TEST(LoadPath, EndsWithContactInAutomaticStepsFromTheStart) {
+  Path path;
+  const solve::PathOutcome result = run_with_contact(path);
+  EXPECT_TRUE(result.complete());
+  EXPECT_EQ(result.steps, 5);
+  EXPECT_EQ(path.loads, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
+  EXPECT_LT(depth(path), 2.5) << "one automatic step";
+}
+
+TEST(LoadPath, EndsWithContactAlongItsStepsWhereThatIsRequested) {
+  Path path;
+  path.settings.ends_along = true;
+  EXPECT_TRUE(run_with_contact(path).complete());
+  EXPECT_GT(depth(path), 3.5) << "four steps";
+}
+
+TEST(LoadPath, ContinuesAlongItsStepsWhereAutomaticOnesFail) {
+  Path path;
+  int automatic = 0;  // one step, halved five times
+  path.search.fails = [&](double) { return path.loads.size() == 4 && ++automatic <= 6; };
+  const solve::PathOutcome result = run_with_contact(path);
+  EXPECT_TRUE(result.complete());
+  EXPECT_EQ(result.steps, 5);
+  EXPECT_GT(depth(path), 3.5) << "four steps";
+}
+
 TEST(LoadPath, HalvesAStepThatFails) {
   Path path;
   path.search.fails = [](double step) { return step > 0.1; };
@@ -89,7 +128,7 @@ TEST(LoadPath, HalvesAStepThatFails) {
   EXPECT_TRUE(result.complete());
   EXPECT_GE(result.halvings.failed, 2);
   EXPECT_EQ(result.halvings.failed, result.halvings.count());
-  EXPECT_EQ(path.search.taken_back, result.halvings.count());
+  EXPECT_EQ(path.search.rejected, result.halvings.count());
   for (size_t i = 1; i < path.loads.size(); ++i) EXPECT_LE(path.loads[i] - path.loads[i - 1], 0.1);
 }
 
