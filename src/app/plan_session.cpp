@@ -17,7 +17,7 @@ namespace repose::app {
 
 namespace {
 
-constexpr size_t max_bases = 32;
+constexpr size_t max_bases = 32, max_preconditioners = 4;  // of the latest bases
 
 /// A solved plan that searches begin at: this rank's slabs.
 struct Base {
@@ -25,6 +25,7 @@ struct Base {
   std::vector<Vec3> position;
   std::vector<double> pressure;
   std::vector<model::PointField> tangents;  // empty: it is no rest position
+  std::shared_ptr<const linear::KeptPreconditioner> preconditioner;
 };
 
 bool same(const PlanSession::Placements& a, const PlanSession::Placements& b) {
@@ -70,12 +71,14 @@ struct PlanSession::State {
   solve::Settings settings;
   std::list<Base> bases;  // the latest first
   std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
+  std::optional<solve::RestSolver> solver;  // once a solve is requested
 
   discrete::Part& part() { return job.local_model ? job.local_model->part : own; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
   solve::Summary search(const solve::Settings& settings, const solve::Start& start);
-  const Base* base(const Placements& placements, const std::function<bool()>& abandoned);
+  Base* base(const Placements& placements, const std::function<bool()>& abandoned);
+  void precondition(Base& base);
   solve::Start start_at(const Base& base, const Placements& placements) const;
 };
 
@@ -91,17 +94,20 @@ void PlanSession::State::take(const Placements& placements) {
   for (size_t k = 0; k < plan.size(); ++k) plan[k].placement = placements[k];
   set_motions(plan, part().model);
   if (base::rank(comm) == 0) set_motions(plan, job.model);
+  if (!solver) solver.emplace(comm, part(), settings);
+  for (const solve::PlanPiece& piece : plan)
+    solver->set_motion(piece.bone, scene::motion_of(piece.placement, piece.centroid));
 }
 
 solve::Summary PlanSession::State::search(const solve::Settings& with, const solve::Start& start) {
-  return solve::find_repose(comm, part(), with, start, [&](const auto& numbers, const auto& rows) {
+  return solver->find(with, start, [&](const auto& numbers, const auto& rows) {
     last = {numbers, rows};
   });
 }
 
 /// Solves a base from the initial state, unless it is known; null where that was abandoned.
-const Base* PlanSession::State::base(const Placements& placements,
-                                     const std::function<bool()>& abandoned) {
+Base* PlanSession::State::base(const Placements& placements,
+                               const std::function<bool()>& abandoned) {
   const auto known =
       std::ranges::find_if(bases, [&](const Base& other) { return same(other.plan, placements); });
   if (known != bases.end()) {
@@ -114,7 +120,7 @@ const Base* PlanSession::State::base(const Placements& placements,
   with.tangents = plan;
   with.abandoned = abandoned;
   const solve::Summary summary = search(with, {});
-  Base base{placements, last->second.position, {}, {}};
+  Base base{placements, last->second.position, {}, {}, {}};
   for (model::PointField& field : last->second.point_fields) {
     if (field.name == "contact_pressure") base.pressure = field.values;
     if (is_tangent(field) && summary.path.complete()) base.tangents.push_back(field);
@@ -125,9 +131,19 @@ const Base* PlanSession::State::base(const Placements& placements,
   return &bases.front();
 }
 
+/// Makes the preconditioner of a base, of which only the latest few keep theirs.
+void PlanSession::State::precondition(Base& base) {
+  if (base.preconditioner) return;
+  take(base.plan);
+  base.preconditioner = solver->make_preconditioner({base.position, true, true, base.pressure, {}});
+  size_t kept = 0;
+  for (Base& other : bases)
+    if (other.preconditioner && ++kept > max_preconditioners) other.preconditioner.reset();
+}
+
 /// The rest position that the base's tangents predict.
 solve::Start PlanSession::State::start_at(const Base& base, const Placements& placements) const {
-  solve::Start start{base.position, true, true, base.pressure};
+  solve::Start start{base.position, true, true, base.pressure, base.preconditioner};
   size_t column = 0;
   for (size_t k = 0; k < placements.size(); ++k)
     for (int c = 0; c < 6; ++c, ++column) {
@@ -195,8 +211,11 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   Answer answer;
   solve::Start start;
   if (request.base) {
-    const Base* base = s.base(*request.base, request.abandoned);
-    if (base && !base->tangents.empty()) start = s.start_at(*base, request.plan);
+    Base* base = s.base(*request.base, request.abandoned);
+    if (base && !base->tangents.empty()) {
+      s.precondition(*base);
+      start = s.start_at(*base, request.plan);
+    }
   }
   s.take(request.plan);
   solve::Settings with = s.settings;

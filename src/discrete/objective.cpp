@@ -62,6 +62,19 @@ mechanics::BodyContact rounded_touches(MPI_Comm comm, const Part& part) {
   return {pairs, part.model.contact.stiffness, std::move(bodies)};
 }
 
+/// Pairs of different points that blocks of further terms and of cuts may couple, ascending.
+std::vector<std::array<int32_t, 2>> find_links(const mechanics::Loops& loops,
+                                               const mechanics::CutFaceContact& cut_faces) {
+  std::vector<std::array<int32_t, 2>> links(cut_faces.links().begin(), cut_faces.links().end());
+  for (const mechanics::TermLoop& loop : loops.terms)
+    loop.for_each_link([&](int32_t p, int32_t q) {
+      if (p != q) links.push_back({p, q});
+    });
+  std::ranges::sort(links);
+  links.erase(std::unique(links.begin(), links.end()), links.end());
+  return links;
+}
+
 /// Replaces what is not finite by nothing and cuts blocks to a length that can still be squared.
 void make_finite(std::span<Vec3> gradient) {
   constexpr double longest = 1e100;
@@ -95,6 +108,7 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
                         positions.part().model.contact.stiffness),
       load_force_(load_forces(positions.comm(), positions.part().model, loaded_)),
       initial_(mechanics::totals(loops_, positions.part().model.points.position)),
+      links_(find_links(loops_, cut_face_contact_)),
       work_(positions.local().size()) {}
 
 void Objective::round_bodies(bool rounded) {
@@ -112,6 +126,16 @@ void Objective::place_bodies() {
   mechanics::place_bodies(
       positions_.load(), [&](int32_t bone) { return positions_.bone_matrix(bone); },
       body_contact_.bodies());
+}
+
+void Objective::reset_contact() {
+  const double stiffness = positions_.part().model.contact.stiffness;
+  round_bodies(false);
+  body_contact_.reset(stiffness);
+  other_body_contact_.reset(stiffness);
+  cut_face_contact_.set_multipliers(std::vector<double>(cut_face_contact_.size(), 0.0));
+  cut_face_contact_.set_stiffness(stiffness);
+  placed_at_ = -1;
 }
 
 double Objective::add_contact(double scale, std::span<Vec3> gradient) {
@@ -159,18 +183,6 @@ std::vector<Objective::Block> Objective::contact_blocks(bool exact) {
   cut_face_contact_.update_gaps(positions_.local());
   cut_face_contact_.for_each_block(exact, add);
   return blocks;
-}
-
-std::vector<std::array<int32_t, 2>> Objective::links() const {
-  std::vector<std::array<int32_t, 2>> links(cut_face_contact_.links().begin(),
-                                            cut_face_contact_.links().end());
-  for (const mechanics::TermLoop& loop : loops_.terms)
-    loop.for_each_link([&](int32_t p, int32_t q) {
-      if (p != q) links.push_back({p, q});
-    });
-  std::ranges::sort(links);
-  links.erase(std::unique(links.begin(), links.end()), links.end());
-  return links;
 }
 
 void Objective::subtract_loads(double scale, std::span<Vec3> gradient) const {

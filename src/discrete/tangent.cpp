@@ -213,9 +213,8 @@ bool Tangent::level(int32_t p, int32_t q) const {
 
 void Tangent::visit_level(std::span<const Objective::Block> blocks,
                           const BlockVisitor& visit) const {
-  std::vector<std::array<int32_t, 2>> links;
+  const auto links = objective_.links();
   for (const auto& [p, q, block] : blocks) {
-    if (p != q && links.empty()) links = objective_.links();
     if (p == q || (level(p, q) && std::ranges::binary_search(links, std::array{p, q})))
       visit(p, q, block);
   }

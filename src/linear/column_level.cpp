@@ -34,9 +34,8 @@ ColumnLevel::ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<in
     : place_(std::move(place)),
       ghost_(std::move(ghost)),
       pattern_(std::move(pattern)),
-      block_(pattern_.column.size() + 1),
-      damping_(place_.size()),
-      inverse_(9 * place_.size() + 1) {
+      numbers_{std::vector<Eigen::Matrix3f>(pattern_.column.size() + 1),
+               std::vector<float>(place_.size()), std::vector<float>(9 * place_.size() + 1)} {
   find_columns();
   connect(comm);
 }
@@ -96,9 +95,9 @@ void ColumnLevel::fill(const UpperSums& sums) {
   for (int32_t i = 0; i < own(); ++i) {
     int64_t k = diagonal(i);
     for (const Eigen::Matrix3f& sum : sums.row(i)) {
-      block_[k] = std::isnormal(sum.cwiseAbs().maxCoeff()) ? sum : Eigen::Matrix3f::Zero();
+      numbers_.block[k] = std::isnormal(sum.cwiseAbs().maxCoeff()) ? sum : Eigen::Matrix3f::Zero();
       const int32_t j = pattern_.column[k];
-      if (j > i && j < own()) block_[next[j]++] = block_[k].transpose();
+      if (j > i && j < own()) numbers_.block[next[j]++] = numbers_.block[k].transpose();
       ++k;
     }
   }
@@ -107,8 +106,9 @@ void ColumnLevel::fill(const UpperSums& sums) {
 void ColumnLevel::add(int32_t row, int32_t column, const Eigen::Matrix3f& block) {
   const auto at = [&](int32_t i, int32_t j) -> Eigen::Matrix3f& {
     const auto begin = pattern_.column.begin() + pattern_.begin[i];
-    return block_[std::lower_bound(begin, pattern_.column.begin() + pattern_.begin[i + 1], j) -
-                  pattern_.column.begin()];
+    return numbers_
+        .block[std::lower_bound(begin, pattern_.column.begin() + pattern_.begin[i + 1], j) -
+               pattern_.column.begin()];
   };
   at(row, column) += block;
   if (row != column) at(column, row) += block.transpose();
@@ -120,7 +120,7 @@ void ColumnLevel::damp(int32_t i) {
   float beyond = 0;
   for (int64_t k = diagonal(i); k < pattern_.begin[i + 1]; ++k)
     if (pattern_.column[k] >= own()) beyond += block(k).norm();
-  damping_[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
+  numbers_.damping[i] = 0.5f * beyond + (stiffness > 0 ? lift * stiffness : 1.0f);
 }
 
 void ColumnLevel::factor_column(size_t c) {
@@ -132,10 +132,10 @@ void ColumnLevel::factor_column(size_t c) {
       const Mat3 link = block(diagonal(i) - 1).cast<double>();
       pivot -= link * above * link.transpose();
     }
-    pivot += damping_[i] * Mat3::Identity();
+    pivot += numbers_.damping[i] * Mat3::Identity();
     above = pivot.inverse();
     above = (0.5 * (above + above.transpose())).eval();
-    Eigen::Map<Eigen::Matrix3f>(inverse_.data() + int64_t{9} * i) = above.cast<float>();
+    Eigen::Map<Eigen::Matrix3f>(numbers_.inverse.data() + int64_t{9} * i) = above.cast<float>();
   }
 }
 
@@ -154,7 +154,7 @@ void ColumnLevel::factor(std::span<const int32_t> points) {
 
 Lanes ColumnLevel::row_product(int64_t k, int64_t end, std::span<const Lanes> x) const {
   Lanes sum{};
-  for (; k < end; ++k) sum += times(block_[k].data(), x[pattern_.column[k]]);
+  for (; k < end; ++k) sum += times(numbers_.block[k].data(), x[pattern_.column[k]]);
   return sum;
 }
 
@@ -163,11 +163,11 @@ void ColumnLevel::solve_column(int64_t column, std::span<Lanes> x) const {
   for (int32_t i = begin; i < end; ++i) {
     const int64_t above = pattern_.begin[i] + left_[i];
     if (i > begin) x[i] -= row_product(above, above + 1, x);
-    x[i] = times(inverse_.data() + int64_t{9} * i, x[i]);
+    x[i] = times(numbers_.inverse.data() + int64_t{9} * i, x[i]);
   }
   for (int32_t i = end - 2; i >= begin; --i) {
     const int64_t right = pattern_.begin[i] + left_[i] + within_[i];
-    x[i] -= times(inverse_.data() + int64_t{9} * i, row_product(right - 1, right, x));
+    x[i] -= times(numbers_.inverse.data() + int64_t{9} * i, row_product(right - 1, right, x));
   }
 }
 
@@ -182,7 +182,7 @@ void ColumnLevel::forward(std::span<const Lanes> b, std::span<Lanes> x) const {
 void ColumnLevel::residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const {
   for (int32_t i = 0; i < own(); ++i) {
     const int64_t right = pattern_.begin[i] + left_[i] + within_[i];
-    r[i] = damping_[i] * x[i] - row_product(right, pattern_.begin[i + 1], x);
+    r[i] = numbers_.damping[i] * x[i] - row_product(right, pattern_.begin[i + 1], x);
   }
 }
 
@@ -190,7 +190,7 @@ void ColumnLevel::backward(std::span<const Lanes> b, std::span<Lanes> x) const {
   for (size_t c = chain_.size() - 1; c-- > 0;) {
     for (int32_t i = chain_[c]; i < chain_[c + 1]; ++i) {
       const int64_t column = pattern_.begin[i] + left_[i];
-      x[i] = b[i] + damping_[i] * x[i] - row_product(pattern_.begin[i], column, x) -
+      x[i] = b[i] + numbers_.damping[i] * x[i] - row_product(pattern_.begin[i], column, x) -
              row_product(column + within_[i], pattern_.begin[i + 1], x);
     }
     solve_column(c, x);

@@ -151,12 +151,22 @@ class ColumnMultigrid::Coarsest {
         x[i][d] = static_cast<float>(right_side_[3 * (level_.first() + i) + d]);
   }
 
+  using Factors = Eigen::LLT<Eigen::MatrixXd>;
+  const Factors& factors() const { return factors_; }
+  void set_factors(const Factors& factors) { factors_ = factors; }
+
  private:
   MPI_Comm comm_;
   const ColumnLevel& level_;
   std::vector<int> count_, begin_;  // [ranks] scalars
   Eigen::VectorXd right_side_;
-  Eigen::LLT<Eigen::MatrixXd> factors_;
+  Factors factors_;
+};
+
+struct ColumnMultigrid::Numbers {
+  std::vector<ColumnLevel::Numbers> level;  // finest first
+  Coarsest::Factors factors;
+  Extra extra;
 };
 
 ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
@@ -218,7 +228,7 @@ void ColumnMultigrid::factor() {
 }
 
 void ColumnMultigrid::set_extra(const BlockSource& blocks) {
-  using Change = std::map<std::array<int32_t, 2>, Eigen::Matrix3f>;
+  using Change = Extra;
   const auto add = [](Change& to, int32_t i, int32_t j, const Eigen::Matrix3f& block) {
     to.try_emplace({i, j}, Eigen::Matrix3f::Zero()).first->second += block;
   };
@@ -256,6 +266,20 @@ void ColumnMultigrid::refill(const BlockSource& blocks) {
   fill_fine(blocks);
   for (size_t l = 0; l < coarsening_.size(); ++l) coarsening_[l]->refill(*levels_[l].matrix);
   factor();
+}
+
+std::shared_ptr<const ColumnMultigrid::Numbers> ColumnMultigrid::numbers() const {
+  auto numbers = std::make_shared<Numbers>();
+  for (const Level& level : levels_) numbers->level.push_back(level.matrix->numbers());
+  if (coarsest_) numbers->factors = coarsest_->factors();
+  numbers->extra = extra_;
+  return numbers;
+}
+
+void ColumnMultigrid::set_numbers(const Numbers& numbers) {
+  for (size_t l = 0; l < levels_.size(); ++l) levels_[l].matrix->set_numbers(numbers.level[l]);
+  if (coarsest_) coarsest_->set_factors(numbers.factors);
+  extra_ = numbers.extra;
 }
 
 void ColumnMultigrid::cycle(size_t l) {

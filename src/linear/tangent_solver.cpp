@@ -80,7 +80,11 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
       work_(positions.make_vector()),
       measured_(positions.make_vector()),
       lag_(price_of_renewal(price_of_factors)) {
-  check(KSPCreate(positions.comm(), krylov_.out()));
+  make_krylov();
+}
+
+void TangentSolver::make_krylov() {
+  check(KSPCreate(positions_.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
   check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
@@ -88,8 +92,51 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
   share_preconditioner(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
   choose_norm(krylov_);
-  if (is_columns(preconditioner())) lag_ = LagPolicy(price_of_renewal(price_of_columns));
+  const bool columns = is_columns(preconditioner());
+  lag_ = LagPolicy(price_of_renewal(columns ? price_of_columns : price_of_factors));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_matrix()));
+}
+
+struct KeptPreconditioner {
+  std::shared_ptr<ColumnMultigrid> columns;
+  std::shared_ptr<const ColumnMultigrid::Numbers> numbers;
+  double compliance;  // mm/N; −1: not known
+  double compliance_load;
+  bool convex;
+  LagPolicy lag;
+};
+
+void TangentSolver::reset() {
+  columns_.reset();
+  factors_ = {};
+  krylov_ = {};
+  make_krylov();
+  renewals_ = 0;
+  made_at_ = made_at_state_ = measured_at_ = bounded_at_ = compliance_at_ = -1;
+  convex_ = true;
+  negative_curvature_ = finished_ = false;
+}
+
+std::shared_ptr<const KeptPreconditioner> TangentSolver::make_kept(Vec displacement) {
+  reset();
+  renew(displacement);
+  largest_compliance(displacement);
+  if (!columns_) return nullptr;
+  const double compliance = compliance_at_ < 0 ? -1 : compliance_;
+  return std::make_shared<KeptPreconditioner>(KeptPreconditioner{
+      columns_, columns_->numbers(), compliance, compliance_load_, convex_, lag_});
+}
+
+void TangentSolver::restore(const KeptPreconditioner& kept) {
+  reset();
+  columns_ = kept.columns;
+  columns_->set_numbers(*kept.numbers);
+  lag_ = kept.lag;
+  renewals_ = 1;
+  compliance_ = kept.compliance;
+  compliance_load_ = kept.compliance_load;
+  compliance_at_ = compliance_ < 0 ? -1 : renewals_;
+  convex_ = kept.convex;
 }
 
 void TangentSolver::choose_preconditioner() {
@@ -188,7 +235,7 @@ void TangentSolver::renew_columns() {
   } else if (columns_) {
     columns_->refill(blocks);
   } else {
-    columns_ = std::make_unique<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
+    columns_ = std::make_shared<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
   }
   update_contact();
 }

@@ -23,15 +23,21 @@ Mat3 negative_part(const Mat3& symmetric) {
 
 BodyContact::BodyContact(const model::ContactPairs& pairs, double stiffness,
                          std::vector<RigidBody> bodies)
-    : pairs_(pairs),
-      stiffness_(stiffness),
-      bodies_(std::move(bodies)),
-      multiplier_(pairs.point.size(), 0.0),
-      seen_(pairs.point.size(), Vec3::Zero()),
-      distance_(pairs.point.size(), -infinite),
-      gap_(pairs.point.size(), infinite),
-      normal_(pairs.point.size(), Vec3::Zero()),
-      curvature_(pairs.point.size(), Mat3::Zero()) {}
+    : pairs_(pairs), bodies_(std::move(bodies)) {
+  reset(stiffness);
+}
+
+void BodyContact::reset(double stiffness) {
+  const size_t count = pairs_.point.size();
+  stiffness_ = stiffness;
+  multiplier_.assign(count, 0.0);
+  seen_.assign(count, Vec3::Zero());
+  distance_.assign(count, -infinite);
+  gap_.assign(count, infinite);
+  normal_.assign(count, Vec3::Zero());
+  curvature_.assign(count, Mat3::Zero());
+  acting_.clear();
+}
 
 double BodyContact::min_gap(size_t c, const Vec3& beside) const {
   constexpr double steepest = 1.1;  // of a distance read from a grid
@@ -151,16 +157,19 @@ void BodyContact::carry(std::span<const Vec3> position, std::span<const RigidBod
   }
 }
 
-void BodyContact::update_all_gaps(std::span<const Vec3> position) {
+double BodyContact::measure_gap(size_t c, std::span<const Vec3> position) {
   constexpr double smoothed_to = 1;  // mm
+  const RigidBody& body = bodies_[pairs_.body[c]];
+  const Vec3 beside = body.beside(position[pairs_.point[c]]);
+  const double needed = smoothed_to + pairs_.offset[c];
+  const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
+  set(c, beside, away ? body.outside(beside) : body.distance(beside));
+  return gap_[c];
+}
+
+void BodyContact::update_all_gaps(std::span<const Vec3> position) {
   update_gaps(position);
-  for (size_t c = 0; c < pairs_.point.size(); ++c) {
-    const RigidBody& body = bodies_[pairs_.body[c]];
-    const Vec3 beside = body.beside(position[pairs_.point[c]]);
-    const double needed = smoothed_to + pairs_.offset[c];
-    const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
-    set(c, beside, away ? body.outside(beside) : body.distance(beside));
-  }
+  for (size_t c = 0; c < pairs_.point.size(); ++c) measure_gap(c, position);
 }
 
 double BodyContact::add_gradient(std::span<const Vec3> position, double scale,

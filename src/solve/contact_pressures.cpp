@@ -15,14 +15,16 @@ void set_pressures(discrete::Objective& objective, const std::vector<Vec3>& pres
   const auto offer = [&](int64_t point, double gap, double& to) {
     if (gap < minimum[point]) std::tie(minimum[point], nearest[point]) = std::pair(gap, &to);
   };
-  body_contact.update_all_gaps(position);
+  const auto presses = [&](int64_t point) { return pressure[point].x() != 0; };
   for (size_t c = 0; c < multiplier.size(); ++c)
-    offer(body_contact.pairs().point[c], body_contact.gaps()[c], multiplier[c]);
+    if (const int64_t point = body_contact.pairs().point[c]; presses(point))
+      offer(point, body_contact.measure_gap(c, position), multiplier[c]);
   mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
   std::vector<double> wall_multiplier(cut_faces.size(), 0.0);
   cut_faces.update_gaps(position);
   for (size_t w = 0; w < cut_faces.size(); ++w)
-    offer(cut_faces.point(w), cut_faces.gap(w), wall_multiplier[w]);
+    if (presses(cut_faces.point(w)))
+      offer(cut_faces.point(w), cut_faces.gap(w), wall_multiplier[w]);
   for (size_t i = 0; i < pressure.size(); ++i)
     if (nearest[i]) *nearest[i] = pressure[i].x();
   body_contact.set_multipliers(multiplier);

@@ -169,7 +169,7 @@ Outcome ContactSearch::presolve(Vec displacement, double accuracy, const Presolv
 
 /// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
 /// from `tissue`, the value without contact. Its full length is tried first.
-bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
+double ContactSearch::take_step(Vec displacement, double tissue, double& value) {
   constexpr int max_halved = 6;
   constexpr double rounding = 1e-12;
   const auto try_step = [&](double share) {
@@ -182,9 +182,9 @@ bool ContactSearch::take_step(Vec displacement, double tissue, double& value) {
   double share = 1;
   value = try_step(share);
   for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
-  if (value > largest) return false;
+  if (value > largest) return 0;
   check(VecCopy(trial_, displacement));
-  return true;
+  return share;
 }
 
 /// Steps of quadratic programs until one is shorter than half of `accuracy`.
@@ -193,13 +193,16 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   double value = objective_.evaluate(displacement, gradient_);
+  taken_ = 0;
   for (int n = 0; n < max_steps; ++n) {
     subtract_contact();
     const double tissue = value - objective_.weights().elastic * objective_.contact_value();
     qp_.linearize(displacement);
     if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
-    if (!take_step(displacement, tissue, value)) return End::failed;
+    const double share = take_step(displacement, tissue, value);
+    if (share == 0) return End::failed;
+    taken_ = share == 1 ? length : 0;
     ++iterations;
     if (length <= (qp_.reduced() ? at_saddle : near * accuracy))
       return qp_.reduced() ? End::failed : End::reached;
@@ -214,7 +217,8 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
 /// Ends the search where a strict estimate says that it is over.
 Outcome ContactSearch::finish(Vec displacement, double accuracy) {
   tangent_.forget_contact();
-  Outcome outcome = minimizer_.finish(displacement, (1 - missed) * accuracy);
+  Outcome outcome =
+      minimizer_.finish(displacement, (1 - missed) * accuracy, std::exchange(taken_, 0.0));
   objective_.positions().update(displacement);
   outcome.displacement_error += contact_safety * violation();
   outcome.converged = outcome.converged && outcome.displacement_error <= accuracy;

@@ -44,7 +44,8 @@ class ContactSearch : public RestSearch {
   Outcome presolve(Vec displacement, double accuracy, const PresolveStage& to);
   enum class End { reached, failed, stopped };
   End newton(Vec displacement, double accuracy, int64_t& iterations);
-  bool take_step(Vec displacement, double tissue, double& value);
+  /// Returns the share of the step that was taken, 0 for none.
+  double take_step(Vec displacement, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   bool gone_round(Vec displacement);
@@ -62,6 +63,7 @@ class ContactSearch : public RestSearch {
   int times_ = 1;     // it is so many times the model's
   bool finds_other_ = true;
   int64_t evaluations_for_other_ = 0;
+  double taken_ = 0;                // mm, the full step that the latest newton() ended with, or 0
   bool predicted_ = false;          // the next search begins with a prediction
   ContactPressures at_prediction_;  // of the latest search
   std::vector<Vec3> places_;        // [touches] of points beside bodies before the first prediction

@@ -334,6 +334,7 @@ std::string Minimizer::no_progress(Vec displacement) {
 
 Outcome Minimizer::summary(Vec displacement) {
   measure(displacement, !newton_finish_);
+  taken_ = 0;
   const int corrections = polish(displacement);
   Outcome outcome;
   outcome.objective = function_.evaluate(displacement, gradient_);
@@ -405,11 +406,12 @@ Outcome Minimizer::presolve(Vec displacement, double distance, bool near) {
   return outcome;
 }
 
-Outcome Minimizer::finish(Vec displacement, double accuracy) {
+Outcome Minimizer::finish(Vec displacement, double accuracy, double taken) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
   stopped_ = newton_finish_ = false;
   iterations_ = 0;
+  taken_ = taken;
   return summary(displacement);
 }
 

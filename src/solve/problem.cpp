@@ -16,6 +16,13 @@ Problem::Problem(discrete::Positions& positions, const mechanics::Weights& weigh
   force_solver_.emplace(positions, *force_hessian_);
 }
 
+void Problem::reset() {
+  objective_.reset_contact();
+  tangent_.invalidate();
+  elastic_solver_.reset();
+  if (force_solver_) force_solver_->reset();
+}
+
 discrete::Function& Problem::function() {
   if (force_) return *force_;
   return objective_;

@@ -136,13 +136,15 @@ class Watcher {
 /// and end together.
 class Searcher {
  public:
-  Searcher(discrete::Positions& positions, const Settings& settings)
-      : problem_(positions, settings.weights, settings.functional == model::Functional::force),
-        watcher_(positions.comm(), settings),
+  Searcher(Problem& problem, const Settings& settings)
+      : problem_(problem),
+        watcher_(problem.objective().positions().comm(), settings),
+        evaluated_(problem.function().evaluations()),
+        assembled_(problem.assemblies()),
         minimizer_(problem_.function(), problem_.solver(), problem_.error_estimate(),
                    std::ref(watcher_)) {
     if (problem_.force()) force_search_.emplace(*problem_.force(), minimizer_);
-    if (positions.part().contact)
+    if (problem_.objective().positions().part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                        minimizer_, std::ref(watcher_));
     if (contact_) contact_->find_other_rest(settings.finds_other_rest);
@@ -159,14 +161,15 @@ class Searcher {
   Watcher& watcher() { return watcher_; }
   double epsilon() { return problem_.force() ? problem_.force()->epsilon() : 0; }
   /// Returns the evaluations of the searches alone.
-  int64_t evaluations() { return problem_.function().evaluations() - inspections_; }
+  int64_t evaluations() { return problem_.function().evaluations() - evaluated_ - inspections_; }
   int64_t evaluations_for_other() const { return contact_ ? contact_->evaluations_for_other() : 0; }
   void count_inspection() { ++inspections_; }
-  int64_t assemblies() const { return problem_.assemblies(); }
+  int64_t assemblies() const { return problem_.assemblies() - assembled_; }
 
  private:
-  Problem problem_;
+  Problem& problem_;
   Watcher watcher_;
+  int64_t evaluated_, assembled_;  // before this search
   Minimizer minimizer_;
   std::optional<ForceSearch> force_search_;
   std::optional<ContactSearch> contact_;
@@ -269,13 +272,13 @@ Stability stability_of(linear::TangentSolver& solver, const discrete::Positions&
 class Steps {
  public:
   Steps(Searcher& searcher, const Settings& settings, const discrete::NaturalRows& natural,
-        const Receiver& receive, Summary& summary)
+        ExactPenetration& penetration, const Receiver& receive, Summary& summary)
       : searcher_(searcher),
         settings_(settings),
         natural_(natural),
         receive_(receive),
         summary_(summary),
-        penetration_(searcher.objective().positions().part()) {}
+        penetration_(penetration) {}
 
   void add(const Outcome& outcome, double load, double seconds, Vec displacement) {
     discrete::Objective& objective = searcher_.objective();
@@ -320,7 +323,7 @@ class Steps {
   const discrete::NaturalRows& natural_;
   const Receiver& receive_;
   Summary& summary_;
-  ExactPenetration penetration_;
+  ExactPenetration& penetration_;
   std::vector<PenetrationDepth> depths_;
   int64_t evaluations_ = 0;  // up to the step before
 };
@@ -344,24 +347,63 @@ void end_stage(const Settings& settings, const char* name) {
 
 }  // namespace
 
-Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                    const Start& start, const Receiver& receive) {
+struct RestSolver::State {
+  State(MPI_Comm comm, const discrete::Part& part, const Settings& settings)
+      : positions(comm, part),
+        natural(comm, part),
+        problem(positions, settings.weights, settings.functional == model::Functional::force),
+        penetration(part) {}
+
+  discrete::Positions positions;
+  discrete::NaturalRows natural;
+  Problem problem;
+  ExactPenetration penetration;
+};
+
+RestSolver::RestSolver(MPI_Comm comm, const discrete::Part& part, const Settings& settings) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
-  discrete::Positions positions(comm, part);
-  const discrete::NaturalRows natural(comm, part);
+  state_ = std::make_unique<State>(comm, part, settings);
+  end_stage(settings, "distribute");
+}
+
+RestSolver::~RestSolver() = default;
+
+void RestSolver::set_motion(int32_t bone, const scene::RigidMotion& motion) {
+  state_->positions.set_motion(bone, motion);
+}
+
+std::shared_ptr<const linear::KeptPreconditioner> RestSolver::make_preconditioner(
+    const Start& rest) {
+  State& s = *state_;
+  const base::VecHandle displacement = s.positions.make_vector();
+  s.natural.set_unknowns(rest.position, s.positions, displacement);
+  s.problem.reset();
+  s.positions.set_load(1);
+  s.positions.update(displacement);
+  begin_near(rest, s.natural, displacement, s.problem.objective());
+  return s.problem.elastic_solver().make_kept(displacement);
+}
+
+Summary RestSolver::find(const Settings& settings, const Start& start, const Receiver& receive) {
+  discrete::Positions& positions = state_->positions;
+  const discrete::NaturalRows& natural = state_->natural;
+  const discrete::Part& part = positions.part();
+  const base::LogStage stage("Search");
   base::VecHandle displacement = positions.make_vector();
+  positions.set_load(0);
+  positions.update(displacement);
+  state_->problem.reset();
+  if (start.preconditioner) state_->problem.elastic_solver().restore(*start.preconditioner);
   base::VecHandle guess;
   if (start.guess) guess = positions.make_vector();
   if (start.guess || settings.path.start_load > 0)
     natural.set_unknowns(start.position, positions, start.guess ? guess : displacement);
-  end_stage(settings, "distribute");
 
-  const base::LogStage stage("Search");
-  Searcher searcher(positions, settings);
+  Searcher searcher(state_->problem, settings);
   if (settings.on_iterate) report_iterates(searcher, settings, natural);
   Summary summary;
-  Steps steps(searcher, settings, natural, receive, summary);
+  Steps steps(searcher, settings, natural, state_->penetration, receive, summary);
   PathSettings along = settings.path;
   along.near_guess = start.near && positions.largest_travel() > 0;
   if (along.near_guess) begin_near(start, natural, guess, searcher.objective());
@@ -379,6 +421,11 @@ Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& s
   summary.assemblies = searcher.assemblies();
   end_stage(settings, "solve");
   return summary;
+}
+
+Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
+                    const Start& start, const Receiver& receive) {
+  return RestSolver(comm, part, settings).find(settings, start, receive);
 }
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,

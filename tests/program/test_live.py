@@ -35,11 +35,15 @@ def distance(one, other):
 def test_answers_do_not_depend_on_their_order(session):
     first = session.solve(A)
     other = session.solve(B)
-    again = session.solve(A)
     assert first.converged and other.converged and first.error < 0.1
     assert distance(first, other) > 1
-    assert distance(first, again) == 0
+    assert distance(first, session.solve(A)) == 0
+    session.solve(A, base=B, tangents=True)
     assert distance(first, session.solve(A, base="rest")) < 0.2, "from another start, both to 0.1"
+    assert distance(first, session.solve(A)) == 0, "from a base that is not the latest"
+    with repose.Session(SCENE, program=programs() / "repose-live") as fresh:
+        assert distance(other, fresh.solve(B, base=A, accuracy=0.01)) < 0.2
+        assert distance(first, fresh.solve(A)) == 0
 
 
 def test_tangents_predict_a_face_nearby(session):

@@ -27,7 +27,7 @@ class Objective : public Function {
   std::vector<Block> term_blocks(bool exact) const;
   std::vector<Block> contact_blocks(bool exact);
   /// Pairs of different points that such blocks may couple, ascending.
-  std::vector<std::array<int32_t, 2>> links() const;
+  std::span<const std::array<int32_t, 2>> links() const { return links_; }
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
   mechanics::BodyContact& body_contact() { return body_contact_; }
@@ -38,6 +38,8 @@ class Objective : public Function {
   const mechanics::CutFaceContact& cut_face_contact() const { return cut_face_contact_; }
   /// Takes the bodies to where they are at the positions' load. Not collective.
   void place_bodies();
+  /// Takes contact back to the state after construction. Not collective.
+  void reset_contact();
   /// Contact's value, at the last update, summed over ranks, N·mm.
   double contact_value();
   /// N, of what is touched on each owned point, at the last update. Not collective.
@@ -72,7 +74,8 @@ class Objective : public Function {
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   mechanics::Totals initial_;     // this rank's share
-  std::vector<Vec3> work_;        // [local points]
+  std::vector<std::array<int32_t, 2>> links_;
+  std::vector<Vec3> work_;  // [local points]
 };
 
 /// Contact of points at the objective's last update, [owned points].

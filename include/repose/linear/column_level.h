@@ -66,7 +66,7 @@ class ColumnLevel {
   const std::vector<int32_t>& columns() const { return chain_; }
 
   /// The block at this place of the pattern.
-  const Eigen::Matrix3f& block(int64_t place) const { return block_[place]; }
+  const Eigen::Matrix3f& block(int64_t place) const { return numbers_.block[place]; }
   /// The place of the diagonal block of an own row, which those right of it follow.
   int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
   /// Sets all blocks again; those left of the diagonal are mirror images. Not collective.
@@ -77,6 +77,14 @@ class ColumnLevel {
   /// own points, ascending. Not collective.
   void factor();
   void factor(std::span<const int32_t> points);
+
+  /// What changes where the matrix takes other numbers.
+  struct Numbers {
+    std::vector<Eigen::Matrix3f> block;   ///< [blocks + 1]
+    std::vector<float> damping, inverse;  ///< [own] added to the columns' blocks; their factors
+  };
+  const Numbers& numbers() const { return numbers_; }
+  void set_numbers(const Numbers& numbers) { numbers_ = numbers; }  ///< of the same pattern
 
   /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0. D: the columns' blocks, and what keeps
   /// sweeps convergent although ranks sweep at once: half of the norms of the blocks of ghosts on
@@ -108,9 +116,7 @@ class ColumnLevel {
   std::vector<int32_t> chain_;          // [columns + 1] first points
   std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
   std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
-  std::vector<Eigen::Matrix3f> block_;  // [blocks + 1]
-  std::vector<float> damping_;          // [own] added to the columns' blocks
-  std::vector<float> inverse_;          // [9 own + 1] of what elimination down columns leaves
+  Numbers numbers_;  // inverse: [9 own + 1] of what elimination down columns leaves
   StarForest forest_;
   FloatsType lanes_{4};
 };

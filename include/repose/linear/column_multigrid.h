@@ -29,6 +29,10 @@ class ColumnMultigrid {
   /// Adds blocks of own points, in place of those that the last call since refill() added: on each
   /// level only what they change. Collective.
   void set_extra(const BlockSource& blocks);
+  /// What refill() and set_extra() set, to go back to; not collective.
+  struct Numbers;
+  std::shared_ptr<const Numbers> numbers() const;
+  void set_numbers(const Numbers& numbers);
   /// z ≈ A⁻¹ r, a symmetric positive definite map; both of 3 unknowns a point. Collective.
   void apply(Vec r, Vec z);
 
@@ -47,7 +51,8 @@ class ColumnMultigrid {
   std::vector<std::unique_ptr<Coarsening>> coarsening_;
   std::vector<Level> levels_;  // finest first
   std::unique_ptr<Coarsest> coarsest_;
-  std::map<std::array<int32_t, 2>, Eigen::Matrix3f> extra_;  // by own numbers, ascending
+  using Extra = std::map<std::array<int32_t, 2>, Eigen::Matrix3f>;
+  Extra extra_;  // by own numbers, ascending
 };
 
 }  // namespace repose::linear

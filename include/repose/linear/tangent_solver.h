@@ -9,6 +9,9 @@
 
 namespace repose::linear {
 
+/// A preconditioner and what has been found out with it.
+struct KeptPreconditioner;
+
 using KspHandle = base::Handle<KSP, KSPDestroy>;
 using PcHandle = base::Handle<PC, PCDestroy>;
 
@@ -34,6 +37,13 @@ class TangentSolver {
 
   /// Takes the Hessian to `displacement`, and of the preconditioner the contact alone.
   void refresh(Vec displacement);
+
+  /// Goes back to the state after construction.
+  void reset();
+  /// Makes a preconditioner at `displacement`, whatever was solved before, to which restore() goes
+  /// back; null where it is not multigrid.
+  std::shared_ptr<const KeptPreconditioner> make_kept(Vec displacement);
+  void restore(const KeptPreconditioner& kept);
 
   /// Makes `other` use the preconditioner, whose lag its solves add to.
   void share_preconditioner(KSP other);
@@ -89,6 +99,7 @@ class TangentSolver {
  private:
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
+  void make_krylov();
   void choose_preconditioner();
   bool use_direct_fallback() const;
   /// Says why no linear system can be solved. Collective.
@@ -107,7 +118,7 @@ class TangentSolver {
   discrete::Positions& positions_;
   discrete::Hessian& hessian_;
   int64_t unknowns_;  // scalar, of all ranks
-  std::unique_ptr<ColumnMultigrid> columns_;
+  std::shared_ptr<ColumnMultigrid> columns_;
   PcHandle factors_;  // in the place of columns_
   KspHandle krylov_;
   base::VecHandle next_;             // the Newton step at a trial

@@ -52,6 +52,9 @@ class BodyContact {
   /// `touches` with local point numbers.
   BodyContact(const model::ContactPairs& pairs, double stiffness, std::vector<RigidBody> bodies);
 
+  /// Forgets all positions and multipliers.
+  void reset(double stiffness);
+
   bool empty() const { return pairs_.point.empty(); }
   const model::ContactPairs& pairs() const { return pairs_; }
   std::span<const double> multipliers() const { return multiplier_; }
@@ -67,6 +70,8 @@ class BodyContact {
   /// Evaluates all gaps: by the exact distance (RigidBody::outside) where RigidBody::lower_bound
   /// shows them to be above 1 mm.
   void update_all_gaps(std::span<const Vec3> position);
+  /// Evaluates one gap as update_all_gaps() does.
+  double measure_gap(size_t c, std::span<const Vec3> position);
   /// Calls visit(point, block): the Hessian at the latest update, or a semidefinite relative.
   template <class Visit>
   void for_each_block(bool exact, Visit&& visit) const {

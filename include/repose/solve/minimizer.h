@@ -45,8 +45,8 @@ class Minimizer : public RestSearch {
   Outcome presolve(Vec displacement, double distance, bool near = false);
 
   /// Estimates the distance to the rest position and ends the search by Newton steps, where these
-  /// are short enough; no search of TAO's.
-  Outcome finish(Vec displacement, double accuracy);
+  /// are short enough; no search of TAO's. `taken`, mm: the full Newton step that led here, or 0.
+  Outcome finish(Vec displacement, double accuracy, double taken = 0);
 
   /// With accuracy 0 the distance is not estimated during the search: TAO goes on as long as it
   /// can.

@@ -14,6 +14,8 @@ class Problem {
   Problem(discrete::Positions& positions, const mechanics::Weights& weights,
           bool force);  ///< collective
 
+  /// Takes contact, Hessian and linear solvers back to the state after construction. Collective.
+  void reset();
   discrete::Function& function();
   linear::TangentSolver& solver();  ///< of function()
   ErrorEstimate error_estimate();   ///< whose Newton step estimates the distance from rest best

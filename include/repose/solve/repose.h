@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,10 @@
 #include "repose/model/step.h"
 #include "repose/solve/load_path.h"
 #include "repose/solve/stability.h"
+
+namespace repose::linear {
+struct KeptPreconditioner;
+}
 
 namespace repose::solve {
 
@@ -98,6 +103,33 @@ struct Start {
   /// The guess is near to rest: it is tried before anything else, with contact at `pressure`.
   bool near = false;
   std::vector<double> pressure = {};  ///< N/mm², [points] this rank's slab
+  /// Of RestSolver::make_preconditioner, where the guess is near to rest; or null.
+  std::shared_ptr<const linear::KeptPreconditioner> preconditioner = {};
+};
+
+/// Finds rest positions of one distributed model for any number of motions of its bones; what these
+/// do not change is made once. A search depends on its arguments and the motions alone, not on the
+/// searches before. All members are collective.
+class RestSolver {
+ public:
+  /// `part` outlives it; of the settings, weights and functional are those of all searches. Throws
+  /// InputError where nothing is free to move.
+  RestSolver(MPI_Comm comm, const discrete::Part& part, const Settings& settings);
+  ~RestSolver();
+  RestSolver(const RestSolver&) = delete;
+  RestSolver& operator=(const RestSolver&) = delete;
+
+  /// Gives a bone another whole motion.
+  void set_motion(int32_t bone, const scene::RigidMotion& motion);
+  /// Follows the rest position along the load path, hands every step to `receive`.
+  Summary find(const Settings& settings, const Start& start, const Receiver& receive);
+  /// Makes the preconditioner at a rest position of load 1 and of the present motions, for searches
+  /// near it; null where it is not multigrid.
+  std::shared_ptr<const linear::KeptPreconditioner> make_preconditioner(const Start& rest);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 /// The whole main job on a model (read on rank 0 only): distributes it, follows the rest
