@@ -60,6 +60,11 @@ std::vector<base::Option> option_table() {
            .help = "Lowest x y z and highest: only these voxels.",
            .unit = "MM",
            .values = 6},
+          {.name = "core",
+           .kind = OptionKind::number,
+           .default_text = "",
+           .help = "Keep what lies within 3 mm of the largest part from this value on.",
+           .unit = "HU"},
           {.name = "voxel",
            .kind = OptionKind::number,
            .default_text = "0",
@@ -107,6 +112,7 @@ imaging::Extraction requested_of(const base::Options& options) {
                    fmt::join(numbers, " "));
     requested.box = box;
   }
+  if (options.has("core")) requested.core = options.number("core");
   requested.voxel = options.number("voxel");
   requested.close_holes = options.number("close_holes");
   if (options.text("border") == "open") requested.border = imaging::VolumeBorder::open;
@@ -209,6 +215,8 @@ void run(const base::Options& options) {
   if (apart && (all || requested.label))
     base::refuse(
         "repose-isosurface: -apart and -jaw go with -level or -otsu: labels are apart already");
+  if (requested.core && (all || requested.label))
+    base::refuse("repose-isosurface: -core goes with -level or -otsu: labels hold no values");
   base::Progress progress(MPI_COMM_WORLD);
   progress.show("reading", -1);
   const imaging::Volume volume = imaging::read_volume(

@@ -42,6 +42,7 @@ ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{
          "maxilla": r"maxill|upper.?jaw", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
 OUTSIDE = r"table|head.?rest|background|^air$"
 OPERATIONS = (r"le ?fort|maxill", r"genio|chin", r"split|bsso", r"jaw|mandib|open")
+CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
 DIRECTIONS = {"forward": (0, -1, 0), "advance": (0, -1, 0), "back": (0, 1, 0), "setback": (0, 1, 0),
               "up": (0, 0, 1), "impact": (0, 0, 1), "down": (0, 0, -1), "left": (1, 0, 0),
@@ -323,8 +324,8 @@ def main():
     else:
         extract_labels(labels, folder)
     if not segmented:
-        run(program("repose-isosurface"), volume, "-level", options.level, "-largest", "-output",
-            folder / "skin.ply")
+        run(program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
+            "-largest", "-output", folder / "skin.ply")
     missing = [part for part in NEEDED if not (folder / f"{part}.ply").exists()]
     if missing:
         refuse(f"{labels}: no segment is named as {' or '.join(missing)}")

@@ -30,6 +30,11 @@ const Volume& prepare(const Volume& volume, const Extraction& requested, const S
   };
   if (requested.box) become(crop(*field, (*requested.box)[0], (*requested.box)[1]));
   if (requested.box) remarks.push_back("cropped to " + size_text(*field));
+  if (requested.core) {
+    become(keep_core(*field, *requested.core, core_reach));
+    remarks.push_back(fmt::format("kept within {:g} mm of the largest part from {:g} on",
+                                  core_reach, *requested.core));
+  }
   if (requested.label) become(label_field(*field, *requested.label, label_smoothing));
   if (requested.close_holes > 0) {
     become(close_gaps(*field, requested.close_holes, watch_step(watch, "closing holes")));

@@ -19,6 +19,7 @@ struct Extraction {
   bool otsu = false;                       ///< the level by Otsu's method
   std::optional<int64_t> label;            ///< of a label map
   std::optional<std::array<Vec3, 2>> box;  ///< mm, LPS: lowest and highest corner, see crop()
+  std::optional<double> core;              ///< HU, see keep_core()
   double close_holes = 0;                  ///< mm, see close_gaps(); 0: none
   double voxel = 0;                        ///< mm, see coarsen(); 0: as it is
   VolumeBorder border = VolumeBorder::closed;
@@ -29,6 +30,8 @@ struct Extraction {
 
 /// Standard deviation of the Gaussian that rounds the steps of a label's border, voxels.
 constexpr double label_smoothing = 0.7;
+
+constexpr double core_reach = 3;  ///< mm, see keep_core()
 
 struct Extracted {
   Surface surface;

@@ -61,6 +61,31 @@ TEST(VolumeFilter, coarsen_keeps_the_mean_and_the_place) {
   EXPECT_LT(largest_error(uneven), (1 + 2 + 2) / 8.0);
 }
 
+TEST(VolumeFilter, a_faint_sheet_leaves_the_body_that_it_touches) {
+  const Mat3 axes = Vec3(1, 1, 2).asDiagonal();
+  const auto value = [](const Vec3& p) {
+    if ((p - Vec3(0, -2, 0)).norm() < 8) return 0.0;
+    if (std::abs(p.x()) < 1 && std::abs(p.y() + 2) < 13 && std::abs(p.z()) < 3) return 0.0;  // ear
+    if ((p - Vec3(12, 12, 0)).norm() < 4) return 0.0;  // small, apart
+    return p.y() > 6 && p.y() < 9 ? -250.0 : -1000.0;  // foam
+  };
+  const Volume volume = sampled(33, axes, value);
+  const Volume kept = keep_core(volume, -150, 3);
+  const Surface given = largest_component(isosurface(volume, -300)),
+                body = largest_component(isosurface(kept, -300));
+  const auto highest = [](const Surface& surface, int axis) {
+    double extreme = -1e9;
+    for (const Vec3& point : surface.points) extreme = std::max(extreme, point[axis]);
+    return extreme;
+  };
+  EXPECT_GT(highest(given, 0), 15) << "the sheet reaches the border of the volume";
+  EXPECT_LT(highest(body, 0), 12);
+  EXPECT_GT(highest(body, 0), 7) << "the body keeps its size";
+  EXPECT_NEAR(highest(body, 1), 10.3, 0.1) << "thin parts of it stay";
+  EXPECT_NE(refusal([&] { keep_core(volume, 10, 3); }).find("no value is at or above"),
+            std::string::npos);
+}
+
 TEST(VolumeFilter, closing_fills_a_narrow_hole_and_leaves_a_wide_one) {
   const auto plate = [](double hole) {
     return sampled(31, Mat3::Identity(), [hole](const Vec3& p) {
