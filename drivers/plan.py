@@ -219,26 +219,32 @@ def along(mark, share, ahead, behind):
     return [mark[behind][k] + share * (mark[ahead][k] - mark[behind][k]) for k in range(3)]
 
 
-def osteotomy(operation, mark, up):
-    """(bone, piece, planes, kerf) of the operation that the text names; piece None: no cut."""
+def kerf_of(planes, shift):
+    """mm: the saw's, or so much that a piece which moves towards what it is cut from has room."""
+    inwards = [-sum(a * b for a, b in zip(normal, shift)) for _, normal in planes]
+    return min(20, max(0.5, max(inwards) + 1))
+
+
+def osteotomy(operation, mark):
+    """(bone, piece, planes) of the operation that the text names; piece None: no cut."""
     le_fort, genioplasty, split, _ = (re.search(words, operation) for words in OPERATIONS)
     if le_fort:
         level = [mark["nasal_spine"][0], mark["nasal_spine"][1], mark["nasal_spine"][2] + 5]
         joint = [sum(mark[f"condyle_{side}_center"][k] for side in ("left", "right")) / 2
                  for k in range(3)]
         back = [level[k] + 0.55 * (joint[k] - level[k]) for k in range(2)] + [level[2]]
-        return "skull", "maxilla", [(level, (0, 0, -1)), (back, (0, -1, 0))], max(0.5, up + 1)
+        return "skull", "maxilla", [(level, (0, 0, -1)), (back, (0, -1, 0))]
     if genioplasty:
         b = mark["b_point"]
-        return "mandible", "chin", [([b[0], b[1], b[2] - 4], (0, -0.42, -0.91))], 0.5
+        return "mandible", "chin", [([b[0], b[1], b[2] - 4], (0, -0.42, -0.91))]
     if split:
         low = along(mark, 0.13, "pogonion_bone", "gonion_left")
         high = along(mark, 0.5, "pogonion_bone", "condyle_left_center")
         y, z = high[1] - low[1], mark["condyle_left_center"][2] - mark["gonion_left"][2]
         place = [mark["pogonion_bone"][0], low[1], mark["gonion_left"][2]]
         length = (y * y + z * z)**0.5
-        return "mandible", "jaw", [(place, (0, -z / length, y / length))], 0.5
-    return "mandible", None, [], 0
+        return "mandible", "jaw", [(place, (0, -z / length, y / length))]
+    return "mandible", None, []
 
 
 def move_lines(operation, bone, mark):
@@ -259,8 +265,9 @@ def move_lines(operation, bone, mark):
 
 def scene_text(options, mark, bones):
     operation = options.operation.lower()
-    up = sum(n for n, word in movements(operation) if word in ("up", "impact"))
-    bone, piece, planes, kerf = osteotomy(operation, mark, up)
+    bone, piece, planes = osteotomy(operation, mark)
+    shift = [sum(n * DIRECTIONS[word][k] for n, word in movements(operation) if word in DIRECTIONS)
+             for k in range(3)]
     if piece in bones:  # segmented already
         bone, piece, planes = piece, None, []
     lines = [f"# {options.operation}. Proposed by drivers/plan.py: look at landmarks.svg, edit, and",
@@ -272,7 +279,7 @@ def scene_text(options, mark, bones):
         lines += ["osteotomies:", f"  - bone: {bone}", f"    piece: {piece}", "    planes:"]
         lines += [f"      - {{point: {point(at)}, normal: [{n[0]:g}, {n[1]:.3g}, {n[2]:.3g}]}}"
                   for at, n in planes]
-        lines += [f"    kerf: {kerf:g}   # mm, the saw, and bone taken out"]
+        lines += [f"    kerf: {kerf_of(planes, shift):.3g}   # mm, the saw, and bone taken out"]
     lips = [mark[name] for name in ("mouth_right", "stomion", "mouth_left") if name in mark]
     if len(lips) == 3:
         lines += ["mouth:   # the lips are parted from corner to corner",

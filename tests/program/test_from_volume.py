@@ -1,5 +1,6 @@
 """drivers/plan.py: from voxels and the name of an operation to a scene, landmarks and a picture."""
 
+import argparse
 import importlib.util
 import json
 import re
@@ -29,6 +30,17 @@ SPEC.loader.exec_module(plan)
     ("Le Fort I", [])])
 def test_movements_are_read_from_words(text, movements):
     assert plan.movements(text) == movements
+
+
+@pytest.mark.parametrize("operation, kerf", [
+    ("Le Fort I, 5 mm forward", 1), ("Le Fort I, 5 mm forward, 2 up", 3), ("Le Fort I, 4 mm back", 5),
+    ("genioplasty, 8 mm forward", 0.5), ("genioplasty, 4 mm back, 3 mm up", 5.41), ("BSSO set-back of 5 mm", 5.16)])
+def test_bone_is_taken_out_where_a_piece_moves_towards_it(operation, kerf):
+    mark = {"condyle_left_center": (50, 0, 0), "condyle_right_center": (-50, 0, 0), "gonion_left": (45, 0, -50),
+            "nasal_spine": (0, -90, -10), "b_point": (0, -90, -50), "pogonion_bone": (0, -90, -60)}
+    options = argparse.Namespace(operation=operation, edge=4)
+    scene = plan.scene_text(options, mark, ["skull", "mandible"])
+    assert float(re.search("kerf: ([0-9.]+)", scene)[1]) == pytest.approx(kerf, abs=0.01)
 
 
 def test_segments_of_slicer_are_known_by_their_names(tmp_path):
