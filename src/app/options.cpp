@@ -73,7 +73,7 @@ std::vector<base::Option> run_options() {
        "each."},
       {"tangents", OptionKind::flag, "",
        "Add the derivatives of the rest position by the motions of the plan's pieces, or of the "
-       "bones that move, to the result."},
+       "bones that move, and by the stiffnesses of the material's strata, to the result."},
       {"monitor_mm", OptionKind::flag, "",
        "Print time, evaluations and the estimated distance to go after each iteration."},
       {.name = "time_limit",

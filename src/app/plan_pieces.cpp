@@ -4,6 +4,7 @@
 
 #include "report.h"
 #include "repose/base/agreement.h"
+#include "repose/model/material.h"
 
 namespace repose::app {
 
@@ -25,6 +26,24 @@ std::vector<solve::PlanPiece> find_pieces(const Job& job) {
   return pieces;
 }
 
+/// On rank 0.
+std::vector<solve::Stratum> find_strata(const Job& job) {
+  if (!job.solid || !job.anatomy || job.initial_equilibrium) return {};
+  const scene::Tissue& tissue = job.anatomy->scene.tissue;
+  if (!tissue.material || tissue.turgor > 0 ||
+      tissue.material->dilatation == scene::Dilatation::nodal)
+    return {};
+  std::vector<solve::Stratum> strata;
+  const auto add = [&](double thickness, const scene::Elasticity& elasticity) {
+    const model::Moduli moduli = model::moduli(elasticity);
+    strata.push_back({thickness, moduli.shear, moduli.volume});
+  };
+  for (const scene::Stratum& stratum : tissue.material->strata)
+    add(stratum.thickness, stratum.elasticity);
+  add(0, tissue.material->deep);
+  return strata;
+}
+
 }  // namespace
 
 std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
@@ -41,6 +60,16 @@ std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
   return pieces;
 }
 
+std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job) {
+  std::vector<solve::Stratum> strata;
+  if (base::rank(comm) == 0) strata = find_strata(job);
+  auto count = static_cast<int>(strata.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  strata.resize(count);
+  MPI_Bcast(strata.data(), static_cast<int>(count * sizeof(solve::Stratum)), MPI_BYTE, 0, comm);
+  return strata;
+}
+
 std::string describe_tangents(const std::vector<model::PointField>& fields) {
   int columns = 0, found = 0;
   for (const model::PointField& field : fields) {
@@ -51,8 +80,10 @@ std::string describe_tangents(const std::vector<model::PointField>& fields) {
   if (columns == 0) return "";
   const std::string missing =
       found == columns ? "" : "; the others are 0, and their flags finished and convex say why";
-  return report_row("tangents", fmt::format("{} of {} derivatives by motions of pieces{}", found,
-                                            columns, missing));
+  return report_row(
+      "tangents",
+      fmt::format("{} of {} derivatives by motions of pieces and stiffnesses of strata{}", found,
+                  columns, missing));
 }
 
 }  // namespace repose::app

@@ -8,7 +8,12 @@ namespace repose::app {
 /// plan, or without one the bones that move. On all ranks. Collective.
 std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job);
 
-/// Row of the report: how many derivatives by the pieces' motions were found. On rank 0.
+/// Returns the strata by whose stiffnesses a rest position is differentiated, from the skin down:
+/// none where the tissue is springs, the skin is stretched initially (turgor), volumes are
+/// averaged, or an initial equilibrium was found. On all ranks. Collective.
+std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job);
+
+/// Row of the report: how many derivatives were found. On rank 0.
 std::string describe_tangents(const std::vector<model::PointField>& fields);
 
 }  // namespace repose::app

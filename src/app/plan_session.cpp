@@ -67,6 +67,7 @@ struct PlanSession::State {
   discrete::Part own;  // where the model was built on rank 0
   std::vector<Piece> pieces;
   std::vector<solve::PlanPiece> plan;
+  std::vector<solve::Stratum> strata;
   scene::Plan box;
   solve::Settings settings;
   std::list<Base> bases;  // the latest first
@@ -76,6 +77,7 @@ struct PlanSession::State {
   discrete::Part& part() { return job.local_model ? job.local_model->part : own; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
+  std::vector<Vec3> weights(const std::vector<std::pair<int64_t, Vec3>>& functional);
   solve::Summary search(const solve::Settings& settings, const solve::Start& start);
   Base* base(const Placements& placements, const std::function<bool()>& abandoned);
   void precondition(Base& base);
@@ -99,6 +101,20 @@ void PlanSession::State::take(const Placements& placements) {
     solver->set_motion(piece.bone, scene::motion_of(piece.placement, piece.centroid));
 }
 
+/// This rank's slab of the weights of points, which rank 0 has; empty if there are none.
+std::vector<Vec3> PlanSession::State::weights(
+    const std::vector<std::pair<int64_t, Vec3>>& functional) {
+  bool any = !functional.empty();
+  MPI_Bcast(&any, 1, MPI_C_BOOL, 0, comm);
+  if (!any) return {};
+  std::vector<Vec3> all;
+  if (base::rank(comm) == 0) {
+    all.assign(part().total_points, Vec3::Zero());
+    for (const auto& [point, weight] : functional) all.at(point) += weight;
+  }
+  return base::scatter(comm, all);
+}
+
 solve::Summary PlanSession::State::search(const solve::Settings& with, const solve::Start& start) {
   return solver->find(with, start, [&](const auto& numbers, const auto& rows) {
     last = {numbers, rows};
@@ -117,7 +133,7 @@ Base* PlanSession::State::base(const Placements& placements,
   require_inside(placements);
   take(placements);
   solve::Settings with = settings;
-  with.tangents = plan;
+  with.derivatives.pieces = plan;
   with.abandoned = abandoned;
   const solve::Summary summary = search(with, {});
   Base base{placements, last->second.position, {}, {}, {}};
@@ -175,6 +191,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
   s.settings.initial_equilibrium = s.job.initial_equilibrium;
   s.settings.finds_other_rest = false;
   s.plan = plan_pieces(comm, s.job);
+  s.strata = plan_strata(comm, s.job);
   for (const solve::PlanPiece& piece : s.plan) {
     std::string name = base::rank(comm) == 0 ? s.job.model.bones[piece.bone] : "";
     base::broadcast(comm, name);
@@ -205,6 +222,8 @@ std::vector<Vec3> PlanSession::initial() const {
   return discrete::gather_points(s.comm, natural.natural(s.part().model.points.position));
 }
 
+int64_t PlanSession::points() const { return state_->part().total_points; }
+
 PlanSession::Answer PlanSession::solve(const Request& request) {
   State& s = *state_;
   s.require_inside(request.plan);
@@ -221,7 +240,7 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   solve::Settings with = s.settings;
   with.path.accuracy = request.accuracy;
   with.abandoned = request.abandoned;
-  if (request.tangents) with.tangents = s.plan;
+  with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional)};
   answer.summary = s.search(with, start);
   answer.from_base = answer.summary.path.leapt;
   answer.position = discrete::gather_points(s.comm, s.last->second.position);

@@ -146,7 +146,7 @@ bool Run::is_done(const model::StepNumbers& end) const {
          end.functional == settings.functional && end.volume == weights.volume &&
          equal(end.lambda, weights.elastic) &&
          (!penalty || equal(end.bulk_modulus, weights.volume_weight)) && !settings.stability &&
-         !strategy_.sensitivity && strategy_.tangents.empty() && !strategy_.tears;
+         !strategy_.sensitivity && !strategy_.tangents.requested() && !strategy_.tears;
 }
 
 /// Makes a finished result that of this run's name, unless it is. On rank 0.
@@ -227,7 +227,7 @@ Coarser Run::solve_coarser() {
 /// it: of a large model it is a fifth of the memory.
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
-  settings.tangents = strategy_.tangents;
+  settings.derivatives = strategy_.tangents;
   settings.on_iterate = [&](double load, const auto& snapshot) {
     writer.on_iterate(load, snapshot);
   };

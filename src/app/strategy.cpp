@@ -175,8 +175,9 @@ void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job
   refuse_unless(!is_force(s), "the functional is force");
   refuse_unless(!s.tears, "the tissue may tear");
   refuse_unless(s.coarse != Coarse::instead, "a coarser model takes the place of the scene's own");
-  s.tangents = plan_pieces(comm, job);
-  refuse_unless(!s.tangents.empty(), "no bone moves, and the scene has no plan.pieces");
+  s.tangents.pieces = plan_pieces(comm, job);
+  s.tangents.strata = plan_strata(comm, job);
+  refuse_unless(!s.tangents.pieces.empty(), "no bone moves, and the scene has no plan.pieces");
 }
 
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {

@@ -23,7 +23,7 @@ struct Strategy {
   bool preview = false;                        ///< the last of them is taken in any case
   bool verifies_path = false;                  ///< solved again in twice the load steps
   bool sensitivity = false;                    ///< requested, of a rest position at load 1
-  std::vector<solve::PlanPiece> tangents;      ///< derivatives by their motions, on all ranks
+  solve::Derivatives tangents;                 ///< requested ones, on all ranks
   bool tears = false;                          ///< in rounds of searches, on all ranks
   std::string explanation;                     ///< what is done and why, a row each; on rank 0
 };

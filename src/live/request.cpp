@@ -65,6 +65,18 @@ void read_tangents(const json& value, Request& request) {
   request.tangents = value.get<bool>();
 }
 
+void read_gradient_of(const json& value, Request& request) {
+  if (!value.is_array() || value.empty())
+    refuse_value("gradient_of", "a list of {\"point\": row, \"weight\": [x, y, z]}", value);
+  for (const json& one : value) {
+    require_known(one, "gradient_of", {"point", "weight"});
+    if (!one.contains("point") || !one["point"].is_number_unsigned() || !one.contains("weight"))
+      refuse_value("gradient_of: point", "a row of the answer's points, from 0", one);
+    request.gradient_of.emplace_back(one["point"].get<int64_t>(),
+                                     read_vector(one, "gradient_of", "weight"));
+  }
+}
+
 void read_base(const json& value, Request& request) {
   request.from_rest = value == "rest";
   if (value == "rest" || value == "scene") return;
@@ -111,6 +123,7 @@ const std::vector<VerbMembers>& verbs() {
        {{"plan", [](const json& value, Request& r) { r.plan = read_plan(value, "plan"); }},
         {"accuracy", read_accuracy},
         {"tangents", read_tangents},
+        {"gradient_of", read_gradient_of},
         {"base", read_base},
         {"points", read_points}}},
       {"change",

@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "repose/scene/placement.h"
 #include "repose/scene/scene.h"
@@ -24,6 +26,7 @@ struct Request {
   PlanMoves plan;
   std::optional<double> accuracy;  ///< mm
   bool tangents = false;
+  std::vector<std::pair<int64_t, Vec3>> gradient_of;  ///< points of the answer and their weights
   bool from_rest = false;         ///< the search begins at the state before the bones move, …
   std::optional<PlanMoves> base;  ///< … or at this plan, else at the scene's
   bool all_points = false;        ///< the answer has all points, not those of the skin alone

@@ -66,6 +66,8 @@ class Service {
   template <class Row>
   std::vector<Row> visible(const std::vector<Row>& rows) const;
   void find_visible();
+  std::vector<std::pair<int64_t, Vec3>> functional(const Request& request) const;
+  nlohmann::json write_gradient(const solve::Gradient& gradient) const;
 
   MPI_Comm comm_;
   std::filesystem::path scene_;
@@ -189,12 +191,39 @@ PlanSession::Placements Service::place(const PlanMoves& plan) const {
   return placements;
 }
 
+/// Weights by rows of the model. On rank 0.
+std::vector<std::pair<int64_t, Vec3>> Service::functional(const Request& request) const {
+  const std::vector<int64_t>& rows = skin_;
+  const auto count = request.all_points ? session_->points() : static_cast<int64_t>(rows.size());
+  std::vector<std::pair<int64_t, Vec3>> functional;
+  for (const auto& [point, weight] : request.gradient_of) {
+    if (point >= count)
+      base::refuse("gradient_of: point {} is none of the answer's {} points", point, count);
+    functional.emplace_back(request.all_points ? point : rows[point], weight);
+  }
+  return functional;
+}
+
+json Service::write_gradient(const solve::Gradient& gradient) const {
+  json pieces = json::object();
+  for (size_t k = 0; k < session_->pieces().size(); ++k) {
+    const auto begin = gradient.by_pieces.begin() + static_cast<std::ptrdiff_t>(6 * k);
+    pieces[session_->pieces()[k].name] = {{"translate", std::vector<double>(begin, begin + 3)},
+                                          {"rotate", std::vector<double>(begin + 3, begin + 6)}};
+  }
+  return {{"pieces", pieces},
+          {"young", gradient.by_strata},
+          {"finished", gradient.finished},
+          {"convex", gradient.convex}};
+}
+
 void Service::solve(const Request& request, Reply& reply) {
   find_visible();
   PlanSession::Request requested;
   requested.plan = place(request.plan);
   requested.accuracy = request.accuracy.value_or(session_->accuracy());
   requested.tangents = request.tangents;
+  base::on_root(comm_, [&] { requested.functional = functional(request); });
   PlanSession::Placements scenes;
   for (const PlanSession::Piece& piece : session_->pieces()) scenes.push_back(piece.scenes);
   const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
@@ -211,6 +240,7 @@ void Service::solve(const Request& request, Reply& reply) {
   head["evaluations"] = answer.summary.evaluations;
   head["from_base"] = answer.from_base;
   head["seconds"] = base::cpu_seconds() - before;
+  if (answer.summary.gradient) head["gradient"] = write_gradient(*answer.summary.gradient);
   if (base::rank(comm_) > 0) return;
   const bool all = request.all_points;
   reply.add("position", all ? answer.position : visible(answer.position));

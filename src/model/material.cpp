@@ -64,33 +64,19 @@ Inside inside_of(const scene::SkinRegion& region) {
   };
 }
 
-/// Returns the depth of a prism's upper and lower triangle below the skin, mm.
-std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism) {
-  std::array<double, 2> depth{};
-  for (int c = 0; c < 6; ++c) {
-    const Vec3& skin = model.points.position[prism[c] - model.points.layer[prism[c]]];
-    depth[c / 3] += (model.points.position[prism[c]] - skin).norm() / 3;
-  }
-  return depth;
-}
-
 /// The means of the strata between two depths.
 Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>& depth) {
-  const double thickness = depth[1] - depth[0];
-  const Moduli deep = moduli(material.deep);
+  std::vector<double> thickness;
+  for (const scene::Stratum& stratum : material.strata) thickness.push_back(stratum.thickness);
+  const std::vector<double> share = strata_shares(thickness, depth);
   Moduli mean{0, 0};
-  double top = 0, left = 1;
-  for (const scene::Stratum& stratum : material.strata) {
-    const double bottom = top + stratum.thickness;
-    const double within = std::min(bottom, depth[1]) - std::max(top, depth[0]);
-    const double share = std::clamp(within / thickness, 0.0, left);
-    const Moduli here = moduli(stratum.elasticity);
-    mean.shear += share * here.shear;
-    mean.volume += share * here.volume;
-    left -= share;
-    top = bottom;
+  for (size_t s = 0; s < share.size(); ++s) {
+    const Moduli here =
+        moduli(s < material.strata.size() ? material.strata[s].elasticity : material.deep);
+    mean.shear += share[s] * here.shear;
+    mean.volume += share[s] * here.volume;
   }
-  return {mean.shear + left * deep.shear, mean.volume + left * deep.volume};
+  return mean;
 }
 
 void set_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
@@ -195,6 +181,28 @@ Moduli moduli(const scene::Elasticity& e) {
   return {shear, e.young * e.poisson / ((1 + e.poisson) * (1 - 2 * e.poisson)) + shear};
 }
 
+std::vector<double> strata_shares(const std::vector<double>& thickness,
+                                  const std::array<double, 2>& depth) {
+  std::vector<double> shares;
+  double top = 0, left = 1;
+  for (const double thick : thickness) {
+    const double within = std::min(top + thick, depth[1]) - std::max(top, depth[0]);
+    shares.push_back(std::clamp(within / (depth[1] - depth[0]), 0.0, left));
+    left -= shares.back();
+    top += thick;
+  }
+  shares.push_back(left);
+  return shares;
+}
+
+std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism,
+                               const std::vector<int64_t>& skin) {
+  const std::vector<Vec3>& x = model.points.position;
+  std::array<double, 2> depth{};
+  for (int c = 0; c < 6; ++c) depth[c / 3] += (x[prism[c]] - x[skin[prism[c]]]).norm() / 3;
+  return depth;
+}
+
 std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners) {
   constexpr double in_triangle[3][2] = {{1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3}};
   const double half = 0.5 / std::sqrt(3.0);
@@ -242,8 +250,11 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
   const size_t count = prisms.points.size();
   prisms.shear_modulus.resize(count);
   prisms.modulus.resize(count);
+  std::vector<int64_t> skin;
+  for (size_t i = 0; i < model.points.layer.size(); ++i)
+    skin.push_back(static_cast<int64_t>(i) - model.points.layer[i]);
   for (size_t m = 0; m < count; ++m)
-    set_moduli(mean_moduli(material, depth_of(model, prisms.points[m])), m, prisms);
+    set_moduli(mean_moduli(material, depth_of(model, prisms.points[m], skin)), m, prisms);
   std::vector<int64_t> found = set_region_moduli(material, model);
   if (material.dilatation == scene::Dilatation::nodal)
     for (size_t m = 0; m < count; ++m)

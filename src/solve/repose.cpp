@@ -13,13 +13,13 @@
 #include "contact_search.h"
 #include "exact_penetration.h"
 #include "pierced_columns.h"
-#include "plan_tangents.h"
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
+#include "rest_derivatives.h"
 
 namespace repose::solve {
 
@@ -307,10 +307,9 @@ class Steps {
     if (outcome.other)
       rows.point_fields.push_back(
           natural_.field("other_rest_displacement", outcome.other->displacement));
-    if (!settings_.tangents.empty() && load == 1 && outcome.converged)
-      for (model::PointField& field :
-           plan_tangents(searcher_.problem(), natural_, displacement, settings_.tangents))
-        rows.point_fields.push_back(std::move(field));
+    if (settings_.derivatives.requested() && load == 1 && outcome.converged)
+      summary_.gradient = differentiate(searcher_.problem(), natural_, displacement,
+                                        settings_.derivatives, rows.point_fields);
     receive_(last, rows);
   }
 

@@ -2,12 +2,13 @@
 """How far maps of plans are off at plans that they do not know, and how often their bound holds.
 
     tests/benchmark/map.py [-bin build/bin] [-head ../shared/data/head] [-samples 25,50,100]
-                           [-held_out 60] [-cache FOLDER] [-output docs/measurements/live.md]
+                           [-held_out 60] [-processes 1] [-cache FOLDER]
+                           [-output docs/measurements/live.md]
 
 The shipped head with one piece (the mandible) and with two (mandible and chin), and a real head with
-parted lips where it is there. Boxes: ±8 mm forward and back, ±4 mm and ±4° else. Held-out plans are
-random in the box; that of the real head is ±8 mm up and down and ±10° of pitch. -cache keeps solved plans between runs. Needs: apt-get install
---no-install-recommends python3-numpy python3-scipy
+parted lips and the mandible where it is there. Boxes: ±8 mm forward and back, ±4 mm and ±4° else.
+Held-out plans are random in the box. -cache keeps solved plans between runs; -processes solvers run at
+a time. Needs: apt-get install --no-install-recommends python3-numpy python3-scipy
 """
 
 import importlib.util
@@ -48,8 +49,9 @@ def scenes(folder, head):
         for mesh in head.glob("*.ply"):
             (folder / mesh.name).symlink_to(mesh)
         path = folder / "real_head_mouth.yaml"
-        path.write_text(path.read_text() + "plan:\n  pieces: [mandible]\n" +
-                        BOX.replace("8, 4], rotate: [4,", "8, 8], rotate: [10,"))
+        text = path.read_text()
+        path.write_text(f"{text[:text.index('moves:')]}moves:\n  - {{bone: mandible, translate: [0, -4, 0]}}\n"
+                        f"plan:\n  pieces: [mandible]\n{BOX}")
         yield "real head, one piece", path
 
 
@@ -67,9 +69,9 @@ def measure(name, path, chosen, cache):
     with repose.Session(path, program=program) as session:
         box = PlanBox([piece.name for piece in session.pieces], session.box)
         store = SampleStore(cache, repose.Scene(path).fingerprint(program))
-        tell = lambda text: print(f"{name}: {text}", file=sys.stderr)
+        tell = lambda done, total, text: done % 10 or print(f"{name}: {text}", file=sys.stderr)
         solve = lambda points, tangents: solve_all(path, box, points, store, ACCURACY, session,
-                                                   report=tell, tangents=tangents)
+                                                   chosen.processes, program, tell, tangents)
         held = [one for one in solve(box.held_out(chosen.held_out), False) if one.converged]
         samples = solve(box.points(max(counts)), True)
         for count in counts:
@@ -94,7 +96,7 @@ def rows(chosen):
 
 
 def main():
-    parser = option_parser(__doc__, samples="25,50,100", held_out=60)
+    parser = option_parser(__doc__, samples="25,50,100", held_out=60, processes=1)
     parser.add_argument("-head", type=pathlib.Path, default=PROJECT.parent / "shared/data/head")
     parser.add_argument("-cache", type=pathlib.Path)
     chosen = parser.parse_args()

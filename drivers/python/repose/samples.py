@@ -40,16 +40,15 @@ class PlanBox:
                          for piece, key, axis in self.coordinates]) / self.half
 
     def points(self, count):
-        """[count, d] the center, the ends of the axes, then Sobol points."""
+        """[count, d] the center, 4 d Sobol points, the ends of the axes, then more Sobol points. Those in the
+        inside come first: from few samples they tell more of random plans than the ends do."""
         from scipy.stats import qmc
         dimensions = len(self.half)
+        sobol = qmc.Sobol(dimensions, scramble=True, seed=1)
+        sobol = 2 * sobol.random_base2(int(np.ceil(np.log2(max(count, 2))))) - 1
         ends = np.concatenate([np.eye(dimensions), -np.eye(dimensions)])
-        first = np.concatenate([np.zeros((1, dimensions)), ends])[:count]
-        more = count - len(first)
-        if more == 0:
-            return first
-        sobol = qmc.Sobol(dimensions, scramble=True, seed=1).random_base2(int(np.ceil(np.log2(more + 1))))
-        return np.concatenate([first, 2 * sobol[:more] - 1])
+        first, more = sobol[:4 * dimensions], sobol[4 * dimensions:]
+        return np.concatenate([np.zeros((1, dimensions)), first, ends, more])[:count]
 
     def held_out(self, count):
         """[count, d] random points that are no samples."""

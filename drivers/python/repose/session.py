@@ -35,6 +35,8 @@ class Tangent:
     """∂x/∂p of the skin, [N, 3] for each component of each piece: mm per mm, mm per degree."""
     columns: dict          # (piece, "tx" … "rz") -> array
     missing: list          # those whose linear solve did not end or met negative curvature
+    young: list            # [N, 3] mm by ln of Young's modulus of each stratum from the skin down, the
+                           # last below all; empty where none is given
 
     def displacement(self, change):
         """First-order displacement of the skin by a change of the plan (as a plan)."""
@@ -46,6 +48,14 @@ class Tangent:
                 if value and (piece, name) in self.columns:
                     total = total + value * self.columns[piece, name]
         return total
+
+
+@dataclasses.dataclass
+class Gradient:
+    """Derivatives of a scalar of the skin, by one linear solve."""
+    pieces: dict           # {piece: {"translate": [3] per mm, "rotate": [3] per degree}}
+    young: np.ndarray      # by ln of Young's modulus of each stratum, as Tangent.young
+    complete: bool         # else the linear solve did not end or met negative curvature, and all are 0
 
 
 @dataclasses.dataclass
@@ -75,6 +85,7 @@ class Face:
     info: dict                # the answer's head
 
     given: object = None      # the scene's own skin where another is solved: GivenSkin
+    gradient: object = None   # Gradient, where requested
 
     @property
     def displacement(self):
@@ -174,19 +185,29 @@ class Session:
         self._take_description(*self.ask({"do": "change", **values}))
         self.changes = values
 
-    def solve(self, plan, accuracy=None, tangents=False, base="scene"):
+    def solve(self, plan, accuracy=None, tangents=False, base="scene", gradient_of=None):
         """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
-        "scene", the plan of the scene's moves, "rest", the initial state, or another plan."""
+        "scene", the plan of the scene's moves, "rest", the initial state, or another plan. `gradient_of`
+        {row: [x, y, z]}: weights of points of the skin, by the derivatives of whose sum Σ w · x the face
+        has a `gradient`."""
         request = {"do": "solve", "plan": _plain(plan), "tangents": tangents,
                    "base": base if isinstance(base, str) else _plain(base)}
         if accuracy is not None:
             request["accuracy"] = accuracy
+        if gradient_of:
+            request["gradient_of"] = [{"point": int(row), "weight": [float(w) for w in weight]}
+                                      for row, weight in gradient_of.items()]
         head, arrays = self.ask(request)
-        columns, missing, fields = {}, [], {}
+        columns, missing, young, fields = {}, [], [], {}
         names = {piece.bone: piece.name for piece in self.pieces}
         for name, values in arrays.items():
             if not name.startswith("tangent_"):
                 fields[name] = values
+                continue
+            if name.startswith("tangent_young_"):
+                young.append(values)
+                if not all(head["flags"][name].values()):
+                    missing.append(("young", len(young) - 1))
                 continue
             bone, component = name.split("_")[1:]
             columns[names[int(bone)], component] = values
@@ -194,8 +215,12 @@ class Session:
                 missing.append((names[int(bone)], component))
         position = fields.pop("position").astype(float)
         self.count_answer(plan, head, position, accuracy)
+        gradient = None
+        if told := head.get("gradient"):
+            gradient = Gradient(told["pieces"], np.array(told["young"]), told["finished"] and told["convex"])
         return Face(plan, position, self.initial, self.triangles, head["error"], head["converged"],
-                    fields, Tangent(columns, missing) if tangents else None, head, self.given)
+                    fields, Tangent(columns, missing, young) if tangents else None, head, self.given,
+                    gradient)
 
     def count_answer(self, plan, head, position, accuracy=None):
         """Counts an answer for verification; `solve` does so itself."""

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "repose/model/build.h"
@@ -29,8 +30,10 @@ class PlanSession {
   using Placements = std::vector<scene::Placement>;
   struct Request {
     Placements plan;
-    double accuracy = 0;               ///< mm
-    bool tangents = false;             ///< derivatives by the motions of the pieces
+    double accuracy = 0;    ///< mm
+    bool tangents = false;  ///< derivatives by the motions of pieces and stiffnesses of strata
+    /// Weights w by row of the point, on rank 0: the gradient of Σ w · x by the same; empty: none.
+    std::vector<std::pair<int64_t, Vec3>> functional = {};
     const Placements* base = nullptr;  ///< where it begins; null: the initial state
     std::function<bool()> abandoned;   ///< as solve::Settings
   };
@@ -56,6 +59,7 @@ class PlanSession {
   const surface::Surface* given_skin() const;  ///< in whose place another is solved, or null
   bool has_cuts() const;                       ///< incisions or parted lips
   std::vector<Vec3> initial() const;           ///< [N] mm
+  int64_t points() const;                      ///< N, on all ranks
   int64_t layers() const;               ///< points of a column where all have as many, else 0
   const std::string& building() const;  ///< report of the build
 

@@ -16,6 +16,16 @@ struct Moduli {
 };
 Moduli moduli(const scene::Elasticity& elasticity);
 
+/// Share of the depth between a prism's triangles, mm, that each stratum takes; the last is what
+/// lies below all.
+std::vector<double> strata_shares(const std::vector<double>& thickness,
+                                  const std::array<double, 2>& depth);
+
+/// Depth of a prism's upper and lower triangle below the skin, mm; `skin` [points] is the row of
+/// the point at the top of the column.
+std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism,
+                               const std::vector<int64_t>& skin);
+
 /// The pairs of a prism's six points, in the order of their weights.
 inline constexpr std::array<std::array<int, 2>, 15> prism_pairs = {{{0, 1},
                                                                     {0, 2},

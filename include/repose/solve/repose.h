@@ -31,6 +31,33 @@ struct PlanPiece {
   scene::Placement placement;    ///< at load 1
 };
 
+/// A layer of the tissue of one material, from the skin down.
+struct Stratum {
+  double thickness = 0;        ///< mm; of the last, below all others, without meaning
+  double shear = 0, bulk = 0;  ///< N/mm², model::Moduli
+};
+
+/// Derivatives of the rest position at load 1.
+struct Derivatives {
+  std::vector<PlanPiece> pieces = {};  ///< by their motions
+  std::vector<Stratum> strata = {};    ///< by the logarithms of their Young's moduli
+  bool fields = true;                  ///< point fields `tangent_…` of the last step
+  /// [points] w, this rank's slab: Summary::gradient is that of Σ w · x; empty: none.
+  std::vector<Vec3> functional = {};
+
+  bool requested() const {
+    return (fields || !functional.empty()) && !(pieces.empty() && strata.empty());
+  }
+};
+
+/// Derivatives of a scalar of the rest position.
+struct Gradient {
+  std::vector<double> by_pieces;  ///< [6 pieces] per mm and per degree
+  std::vector<double> by_strata;  ///< [strata] by ln of Young's modulus
+  bool finished = false;          ///< the linear solve reached the tolerance, …
+  bool convex = false;            ///< … and met no negative curvature; else all are 0
+};
+
 /// Settings of a solve.
 struct Settings {
   mechanics::Weights weights;                                ///< the objective
@@ -42,9 +69,7 @@ struct Settings {
   bool finds_other_rest = true;          ///< contact searches for another rest position at load 1
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene requests one
-  /// Pieces by whose motions the rest position at load 1 is differentiated: point fields
-  /// `tangent_…` of the last step.
-  std::vector<PlanPiece> tangents = {};
+  Derivatives derivatives = {};          ///< of a rest position at load 1
   /// Returns whether to end the search as if interrupted; called at each iteration, collective.
   std::function<bool()> abandoned = {};
   /// Called at each iteration, on all ranks.
@@ -87,6 +112,7 @@ struct Summary {
   int64_t evaluations_for_other = 0;         ///< of these, in search of another rest position
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where requested
+  std::optional<Gradient> gradient;          ///< where requested, of a rest position at load 1
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where requested
   std::vector<ContactSummary>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
