@@ -154,7 +154,16 @@ Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& offset,
     return step;
   }
   if (!(bend(0, 0) > 0 && bend.determinant() > 0)) bend = patch.metric();
-  return bend.inverse() * slope;
+  Eigen::Vector2d step = bend.inverse() * slope;
+  for (const int d : {0, 1}) {
+    const double beyond =
+        where[d] + step[d] - std::clamp(where[d] + step[d], minimum[d], maximum[d]);
+    if (beyond == 0) continue;
+    step[d] -= beyond;
+    step[1 - d] = (slope[1 - d] - bend(0, 1) * step[d]) / bend(1 - d, 1 - d);
+    break;
+  }
+  return step;
 }
 
 /// Where on a surface of `columns` × `rows` controls `at` is nearest to, by Newton's method;

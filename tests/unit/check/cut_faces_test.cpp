@@ -55,7 +55,7 @@ TEST(CutGaps, AreDistancesWhereNothingIsOpposite) {
 
 TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   std::mt19937 random(4);
-  std::uniform_real_distribution<double> off(-0.3, 0.3);
+  std::uniform_real_distribution<double> off(-0.1, 0.1);
   const auto bent = [&](double i, double j, double z) -> Vec3 {
     const double x = 2.5 * i, y = 2 * j;
     return Vec3(x, y, z + 0.04 * x * x - 0.05 * y * y) +
@@ -78,19 +78,26 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
 }
 
 TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
-  model::CutFaces cuts;
   // Along the ends the nearest place is not at the same parameter as the nearest control.
-  const auto skew = [](double i, double j, double z) -> Vec3 {
-    return Vec3(2.5 * i + 1.4 * j, 2 * j + 0.6 * i, z + 0.02 * i * j);
-  };
-  const auto position = lay(
-      cuts, [&](int i, int j) { return skew(i + 3.3, j + 2.6, 1.5); },
-      [&](int i, int j) { return skew(i, j, 0); });
-  mechanics::CutFaceContact solver(cuts, 1);
-  solver.update_gaps(position);
-  const std::vector<CutGap> gaps = cut_gaps(cuts, position);
-  ASSERT_EQ(gaps.size(), solver.size());
-  for (size_t w = 0; w < gaps.size(); ++w) EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-7) << w;
+  for (unsigned seed = 8; seed < 40; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> off(-0.1, 0.1);
+    const double length = 0.4 + 0.05 * seed;
+    const auto skew = [&](double i, double j, double z) -> Vec3 {
+      return Vec3(length * i + 1.4 * j, 2 * j + 0.6 * i, z + 0.02 * i * j) +
+             Vec3(off(random), off(random), off(random));
+    };
+    model::CutFaces cuts;
+    const auto position = lay(
+        cuts, [&](int i, int j) { return skew(i + 0.1 * seed, j + 0.6, 1.5); },
+        [&](int i, int j) { return skew(i, j, 0); });
+    mechanics::CutFaceContact solver(cuts, 1);
+    solver.update_gaps(position);
+    const std::vector<CutGap> gaps = cut_gaps(cuts, position);
+    ASSERT_EQ(gaps.size(), solver.size());
+    for (size_t w = 0; w < gaps.size(); ++w)
+      EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-7) << w << " of seed " << seed;
+  }
 }
 
 }  // namespace cut_faces_test
