@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -94,7 +95,7 @@ void for_each_spring_third(const SpringLoop& loop, std::span<const Vec3> positio
 }
 
 /// The volume term of one prism, and what it takes from averaged volumes: φ′, and a curvature that
-/// bounds theirs.
+/// stands for theirs.
 struct PrismTerm {
   double compliance, target_volume;
   double nodal_slope = 0, nodal_curvature = 0;
@@ -114,11 +115,13 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
 
 /// Calls visit(prism number, blocks) for each prism of the loops. `most_slope` [M], or empty for
 /// the exact Hessian, of which averaged volumes have more (nodal_gradients); else λ/V ∇v∇vᵀ of each
-/// prism is in their place, which is never less (Cauchy & Schwarz).
+/// prism is in their place, which is never less (Cauchy & Schwarz), with λ at most 20 μ: a
+/// multigrid that resists volume more corrects shear worse (docs/theory/linear_solver.md).
 template <class Visit>
 void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
                           const Weights& weights, std::span<const double> max_slope,
                           Visit&& visit) {
+  constexpr double max_bulk = 20;  // times μ
   if (weights.volume == VolumeTerm::none) return;
   const PrismLoop& prisms = loops.prisms;
   const std::vector<double> nodal = nodal_slopes(loops.nodal, position);
@@ -128,7 +131,8 @@ void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
     PrismTerm term{prisms.compliance[e], prisms.target_volume[e]};
     if (!nodal.empty()) term.nodal_slope = nodal[loops.nodal.place[prisms.row[e]]];
     if (!nodal.empty() && !max_slope.empty())
-      term.nodal_curvature = prisms.nodal_modulus[e] / prisms.rest_volume[e];
+      term.nodal_curvature = std::min(prisms.nodal_modulus[e], max_bulk * prisms.shear_modulus[e]) /
+                             prisms.rest_volume[e];
     const double maximum = max_slope.empty() ? std::numeric_limits<double>::max() : max_slope[e];
     visit(e, prism_blocks(corners, term, weights, maximum));
   }
