@@ -11,8 +11,8 @@
 namespace repose::model {
 namespace {
 
-constexpr double farthest = 1.5;            // mm
-constexpr double farthest_per_depth = 0.5;  // of the column's thickness
+constexpr double attached_within = 1.5;            // mm
+constexpr double attached_within_per_depth = 0.5;  // of the column's thickness
 
 /// Returns the requested attachment of each column, by region.
 std::vector<scene::Attach> requested_attachments(const Columns& columns, const scene::Scene& scene,
@@ -83,7 +83,9 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     if (!columns.holds[v]) continue;
     const BoneField::Nearest nearest = bones.nearest(columns.deep[v]);
-    if (nearest.distance > std::max(farthest, farthest_per_depth * columns.thickness[v])) continue;
+    if (nearest.distance >
+        std::max(attached_within, attached_within_per_depth * columns.thickness[v]))
+      continue;
     attachment.bone[v] = nearest.bone;
     attachment.largest_gap = std::max(attachment.largest_gap, nearest.distance);
     ++attachment.reached[nearest.bone];

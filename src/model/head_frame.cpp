@@ -26,7 +26,7 @@ BoneRole role_by_name(std::string name) {
   return name.find("jaw") != std::string::npos ? BoneRole::lower : BoneRole::unknown;
 }
 
-Vec3 farthest(const std::vector<Vec3>& points, const Vec3& direction) {
+Vec3 farthest_along(const std::vector<Vec3>& points, const Vec3& direction) {
   return *std::ranges::max_element(points, {}, [&](const Vec3& x) { return direction.dot(x); });
 }
 
@@ -102,18 +102,18 @@ JawPoints jaw_points(const BoneGroup& lower, const HeadFrame& frame) {
   const auto side = [&](const Vec3& x) { return frame.left.dot(x) - middle; };
   const Vec3 joint = frame.up - frame.forward;
   JawPoints points;
-  points.left_joint =
-      farthest(those(lower.points, [&](const Vec3& x) { return side(x) > near_middle; }), joint);
-  points.right_joint =
-      farthest(those(lower.points, [&](const Vec3& x) { return side(x) < -near_middle; }), joint);
+  points.left_joint = farthest_along(
+      those(lower.points, [&](const Vec3& x) { return side(x) > near_middle; }), joint);
+  points.right_joint = farthest_along(
+      those(lower.points, [&](const Vec3& x) { return side(x) < -near_middle; }), joint);
   const std::vector<Vec3> central =
       those(lower.points, [&](const Vec3& x) { return std::abs(side(x)) < near_middle; });
-  points.chin = farthest(central, frame.forward - 0.5 * frame.up);
-  const double front = frame.forward.dot(farthest(central, frame.forward));
+  points.chin = farthest_along(central, frame.forward - 0.5 * frame.up);
+  const double front = frame.forward.dot(farthest_along(central, frame.forward));
   const double depth = front_of_jaw * lower.box.diagonal().norm() / 2;
-  points.incisor =
-      farthest(those(central, [&](const Vec3& x) { return front - frame.forward.dot(x) < depth; }),
-               frame.up);
+  points.incisor = farthest_along(
+      those(central, [&](const Vec3& x) { return front - frame.forward.dot(x) < depth; }),
+      frame.up);
   return points;
 }
 

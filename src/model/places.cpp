@@ -27,7 +27,7 @@ std::vector<std::vector<int64_t>> groups_of(const SkinMesh& mesh,
   return groups;
 }
 
-surface::Surface triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
+surface::Surface surface_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
   std::vector<Triangle> triangles;
   std::vector<char> taken(mesh.triangles.size(), 0);
   for (const int64_t v : vertices)
@@ -51,7 +51,7 @@ void refuse_places(const std::string& skin_name, const SkinMesh& mesh,
   }
   throw RefusedPlaces(fmt::format("{}: {} in {} place{}, skin {}; {}", skin_name, what,
                                   groups.size(), groups.size() == 1 ? "" : "s", list, remedy),
-                      what, triangles_at(mesh, vertices));
+                      what, surface_at(mesh, vertices));
 }
 
 }  // namespace repose::model

@@ -9,7 +9,7 @@ constexpr double full_difference = 4;  // mm, of displacements, from which the d
 constexpr double alike = 1e-9;         // mm: pieces whose displacements differ by less move alike
 
 /// mm, up to which tissue is released from bone whose displacement differs by so many mm there.
-double reach(const Release& release, double difference) {
+double released_within(const Release& release, double difference) {
   if (difference <= alike) return -1;
   return release.distance * std::min(1.0, difference / full_difference);
 }
@@ -19,7 +19,7 @@ double reach(const Release& release, double difference) {
 bool is_near_other(const Vec3& point, int32_t own, const BoneField& bones, const MotionRange& range,
                    const Release& release) {
   for (int32_t piece = 0; piece < bones.size(); ++piece) {
-    const double near = reach(release, range.difference(point, own, piece));
+    const double near = released_within(release, range.difference(point, own, piece));
     if (near >= 0 && bones.distance(piece, point) <= near) return true;
   }
   return false;
@@ -47,7 +47,7 @@ void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& ri
     if (rim[v]) fixed.push_back(deep[v]);
   for (size_t v = 0; v < deep.size(); ++v) {
     if (attachment.bone[v] < 0) continue;
-    const double near = reach(release, range.travel(deep[v], attachment.bone[v]));
+    const double near = released_within(release, range.travel(deep[v], attachment.bone[v]));
     if (near < 0 || std::none_of(fixed.begin(), fixed.end(), [&](const Vec3& p) {
           return (p - deep[v]).squaredNorm() <= near * near;
         }))

@@ -19,8 +19,8 @@ namespace {
 using base::refuse;
 
 // No energy of numbers up to these overflows.
-constexpr double farthest = 1e7, largest = 1e30;
-constexpr Limits place{-farthest, farthest, "mm"}, any{-largest, largest, ""},
+constexpr double max_coordinate = 1e7, largest = 1e30;
+constexpr Limits place{-max_coordinate, max_coordinate, "mm"}, any{-largest, largest, ""},
     weight{-1000, 1000, ""};
 
 constexpr Limits at_least_zero(const char* unit) { return {0, largest, unit}; }
@@ -47,7 +47,7 @@ void check_springs(const Springs& s, size_t points, size_t sets, const ArrayChec
   const size_t n = s.points.size();
   check.indices("spring/points", s.points, points);
   check.integers("spring/set", s.set, n, 0, static_cast<int64_t>(sets) - 1);
-  check.numbers("spring/rest_length", s.rest_length, n, {0, farthest, "mm"});
+  check.numbers("spring/rest_length", s.rest_length, n, {0, max_coordinate, "mm"});
   check.numbers("spring/stiffness", s.stiffness, n, at_least_zero("N/mm"));
   check.integers("spring/exponent", s.exponent, n, 0, 2);
   check.numbers("spring/reference", s.reference, n,
@@ -108,7 +108,7 @@ void check_pairs(const Contact& contact, size_t points, size_t bones, const Arra
   const size_t n = pairs.point.size(), bodies = contact.bodies.size();
   constexpr double finest = 1e-3;  // mm, of a grid
   check.number("contact attribute stiffness", 0, contact.stiffness, positive("N/mm³", ""));
-  check.number("contact attribute grid", 0, contact.spacing, {finest, farthest, "mm"});
+  check.number("contact attribute grid", 0, contact.spacing, {finest, max_coordinate, "mm"});
   check.integers("contact/point", pairs.point, n, 0, static_cast<int64_t>(points) - 1);
   check.integers("contact/body_row", pairs.body, n, 0, static_cast<int64_t>(bodies) - 1);
   check.integers("contact/binding", pairs.binding, n, 0, 1);
@@ -285,8 +285,9 @@ class ShapeCheck {
     for (const double value : numbers) check_.number("contact/body_shape", row_, value, place);
   }
   void above_zero(double value) const {
-    check_.number("contact/body_shape", row_, value,
-                  {0, farthest, "mm", true, "a radius, a box's size, the length of a normal"});
+    check_.number(
+        "contact/body_shape", row_, value,
+        {0, max_coordinate, "mm", true, "a radius, a box's size, the length of a normal"});
   }
 
   size_t row_;

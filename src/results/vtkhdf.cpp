@@ -8,16 +8,16 @@ namespace repose::results {
 
 namespace {
 
-using Numbers = std::vector<int64_t>;
+using Indices = std::vector<int64_t>;
 using Blocks = std::vector<XdmfBlock>;
 
-void write_numbers(hid_t place, const char* name, const Numbers& values) {
+void write_numbers(hid_t place, const char* name, const Indices& values) {
   write_array(place, name, {values.size()}, values.data());
 }
 
 /// Where each step begins in an array with `rows` rows a step; the same place if it does not move.
-Numbers beginnings(size_t steps, int64_t rows) {
-  Numbers offsets(steps);
+Indices beginnings(size_t steps, int64_t rows) {
+  Indices offsets(steps);
   for (size_t step = 0; step < steps; ++step) offsets[step] = static_cast<int64_t>(step) * rows;
   return offsets;
 }
@@ -33,7 +33,7 @@ int64_t rows_of(const Blocks& blocks, bool at_points) {
 }
 
 void write_cells(hid_t file, hid_t root, const Blocks& blocks) {
-  Numbers points, cells, ids, offsets;
+  Indices points, cells, ids, offsets;
   std::vector<uint8_t> types;
   std::vector<VirtualPiece> connectivity;
   hsize_t corners = 0;
@@ -41,7 +41,7 @@ void write_cells(hid_t file, hid_t root, const Blocks& blocks) {
     points.push_back(block.points);
     cells.push_back(block.cells);
     ids.push_back(block.cells * block.corners);
-    const Numbers in_block = beginnings(block.cells + 1, block.corners);
+    const Indices in_block = beginnings(block.cells + 1, block.corners);
     offsets.insert(offsets.end(), in_block.begin(), in_block.end());
     types.insert(types.end(), block.cells, block.vtk_cell);
     connectivity.push_back({block.connectivity, corners});
@@ -112,7 +112,7 @@ void write_arrays(hid_t file, hid_t root, hid_t steps, const Blocks& blocks, boo
 void write_vtkhdf(hid_t file, const Blocks& blocks, const std::vector<double>& loads) {
   const size_t count = loads.size();
   const base::Hdf5Group root = base::create_hdf5_group(file, "VTKHDF");
-  write_attribute(root, "Version", Numbers{2, 0});
+  write_attribute(root, "Version", Indices{2, 0});
   write_attribute(root, "Type", std::string("UnstructuredGrid"));
   write_cells(file, root, blocks);
   write_points(file, root, blocks, count);
@@ -120,9 +120,9 @@ void write_vtkhdf(hid_t file, const Blocks& blocks, const std::vector<double>& l
   write_attribute(steps, "NSteps", static_cast<int64_t>(count));
   write_array(steps, "Values", {count}, loads.data());
   write_numbers(steps, "PartOffsets", beginnings(count, 0));
-  write_numbers(steps, "NumberOfParts", Numbers(count, static_cast<int64_t>(blocks.size())));
+  write_numbers(steps, "NumberOfParts", Indices(count, static_cast<int64_t>(blocks.size())));
   write_numbers(steps, "PointOffsets", beginnings(count, rows_of(blocks, true)));
-  const Numbers same = beginnings(count, 0);
+  const Indices same = beginnings(count, 0);
   write_array(steps, "CellOffsets", {count, 1}, same.data());
   write_array(steps, "ConnectivityIdOffsets", {count, 1}, same.data());
   for (const bool at_points : {true, false})

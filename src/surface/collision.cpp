@@ -195,7 +195,7 @@ bool is_near(const Corners& t, const CollisionTree& other, double near) {
   return nearest(alone, other, Mat4::Identity(), near).has_value();
 }
 
-void append(const Corners& t, Surface& soup) {
+void append_triangle(const Corners& t, Surface& soup) {
   const auto first = static_cast<int64_t>(soup.points.size());
   soup.points.insert(soup.points.end(), t.begin(), t.end());
   soup.triangles.push_back({first, first + 1, first + 2});
@@ -219,7 +219,7 @@ Surface refine_near(const Surface& surface, const CollisionTree& own, const Coll
     const Corners t = left.back();
     left.pop_back();
     if (longest_side(t) <= longest || !is_near(t, other, near)) {
-      append(t, result);
+      append_triangle(t, result);
       continue;
     }
     const Vec3 a = (t[1] + t[2]) / 2, b = (t[2] + t[0]) / 2, c = (t[0] + t[1]) / 2;
