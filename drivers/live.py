@@ -16,12 +16,13 @@ import pathlib
 import re
 import secrets
 import signal
+import subprocess
 import sys
 import urllib.parse
 import webbrowser
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE / "python"))
+sys.path[:0] = [str(HERE / "python"), str(HERE)]
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
@@ -30,6 +31,7 @@ PAGE = """<!doctype html>
 """
 LONGEST_REQUEST = 1 << 20
 VERIFY_EVERY = 20  # answers, of which one is solved again from a cold start
+ANGLES = ("facial convexity", "nasolabial angle", "nasolabial angle by the tip", "mentolabial angle")
 
 
 def page(scene):
@@ -63,8 +65,53 @@ def scene_with_moves(path, moves):
                       *kept, "moves:", *rows]) + "\n"
 
 
+class ProfileAngles:
+    """Angles of the profile, by the scene's landmarks and otherwise by the shape of the skin."""
+
+    def __init__(self, scene, session):
+        self.before, self.corners = session.initial, session.triangles
+        self.points = {}  # {landmark: place on the initial skin}
+        try:
+            import sheet.landmarks
+        except ImportError:
+            return  # they need h5py
+        self.points = self.by_shape() | self.given(scene)
+
+    def by_shape(self):
+        from sheet import landmarks, profile
+        tip = self.before[self.before[:, 1].argmin()]
+        for aside in (0, 1.5, -1.5, 3, -3):
+            segments = profile.cut(self.before, self.corners, ((tip[0] + aside, 0, 0), (1, 0, 0)))[0]
+            if found := landmarks.by_shape(segments):
+                return found
+        return {}
+
+    def given(self, scene):
+        from sheet import landmarks
+        named = re.search(r"\blandmarks:\s*['\"]?([^'\"\n#{},]+)", scene.read_text(encoding="utf-8"))
+        try:
+            read = landmarks.read_landmarks(scene.parent / named[1].strip()) if named else {}
+        except landmarks.Unusable:
+            return {}
+        near = {name: landmarks.on_surface(self.before, self.before, self.corners, point)
+                for name, point in read.items()}
+        placed = [{"name": name, "on": "skin", "before": place, "after": place}
+                  for name, (place, _, distance) in near.items() if distance <= landmarks.NEAR]
+        return {name: place for name, (place, _) in landmarks.known_places(placed).items()}
+
+    def of(self, position):
+        """[{name, before, after}] in degrees."""
+        if not self.points:
+            return []
+        from sheet import landmarks, measures
+        known = {name: landmarks.on_surface(self.before, position, self.corners, point)[:2]
+                 for name, point in self.points.items()}
+        return [{"name": one["name"], "before": one["values"][0], "after": one["values"][1]}
+                for one in measures.measured(known, []) if one["name"] in ANGLES]
+
+
 class Handler(http.server.BaseHTTPRequestHandler):
-    """Answers GET / (the page), /scene and /notice, POST /solve, /scene_file and /result."""
+    """Answers GET / (the page), /scene and /notice, POST /solve, /scene_file, /result and /report."""
     protocol_version = "HTTP/1.1"
 
     def allowed(self, token):
@@ -117,7 +164,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
                 return
             request = json.loads(content)
             work = {"/solve": self.solve, "/scene_file": self.scene_file,
-                    "/result": self.result}[self.path]
+                    "/result": self.result, "/report": self.report}[self.path]
             self.reply(200, work(request))
         except Refused as refusal:
             overtaken = str(refusal).startswith("abandoned")  # the page has requested another since
@@ -132,6 +179,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         head, arrays = session.ask({**request, "do": "solve"})
         if request.get("points", "skin") == "skin":
             session.count_answer(request["plan"], head, arrays["position"], request.get("accuracy"))
+            head["angles"] = self.server.angles.of(arrays["position"])
         return packed(head, arrays)
 
     def notice(self):
@@ -153,6 +201,15 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.server.session.write(output)
         return f"{output}.h5".encode()
 
+    def report(self, request):
+        """Writes the result and its planning sheet."""
+        name = pathlib.Path(self.result(request).decode()).with_suffix("")
+        done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
+                               self.server.scene], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "report.py failed")
+        return f"{name}.html".encode()
+
     def log_message(self, *_):
         pass
 
@@ -162,6 +219,7 @@ def make_server(session, scene, port=0):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
     server.daemon_threads = True
     server.session, server.scene = session, scene.resolve()
+    server.angles = ProfileAngles(server.scene, session)
     server.token, server.page = secrets.token_urlsafe(18), page(server.scene)
     return server, f"http://127.0.0.1:{server.server_address[1]}/?token={server.token}"
 

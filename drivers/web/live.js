@@ -125,7 +125,8 @@ class Planner {
     click("keep", () => this.keep());
     click("save_scene", () => this.saveScene());
     click("save_stl", () => this.saveStl());
-    click("save_result", () => this.writeResult());
+    click("save_result", () => this.write("/result"));
+    click("save_report", () => this.write("/report"));
     byId("mode").onchange = () => this.showMode();
     byId("look").onchange = () => this.viewer.look(byId("look").value);
     byId("colored").onchange = () => this.color();
@@ -296,6 +297,8 @@ class Planner {
       if (tangents) this.takeTangents(plan, head, arrays);
       if (!current()) return;
       this.showFace(arrays.position);
+      byId("angles").textContent = (head.angles ?? []).map(({name, before, after}) =>
+        `${name} ${after.toFixed(1)}° (before ${before.toFixed(1)}°)`).join("; ");
       if (!head.converged) this.mark("failed", `not converged: ${head.reason}`);
       else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm`);
       if (!tangents) this.timer = setTimeout(() => this.solve(true), 150);
@@ -397,9 +400,9 @@ class Planner {
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  async writeResult() {
+  async write(what) {
     try {
-      const path = new TextDecoder().decode(await ask("/result", {plan: this.plan}));
+      const path = new TextDecoder().decode(await ask(what, {plan: this.plan}));
       this.mark("exact", `written: ${path}`);
     } catch (error) {
       this.mark("failed", error.message);

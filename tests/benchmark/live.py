@@ -5,8 +5,8 @@
                             [-output docs/measurements/live.md]
 
 CPU seconds on one core, all in one run, so that their ratios count and not the machine's load. The
-changes are random: each component of one piece up to 1 mm or 1° from the scene's plan, or up to 4. A
-scene of a real head is passed over where it is missing. Needs: apt-get install --no-install-recommends
+changes are random: each component of one piece up to 1 mm or 1° from the scene's plan, or up to 2 or 4, a
+quarter as many. A scene of a real head is passed over where it is missing. Needs: apt-get install --no-install-recommends
 python3-numpy
 """
 
@@ -73,7 +73,7 @@ def measure(name, path, chosen, random):
         exact, shown = [], []
         for size in (1, 2, 4):
             off, seconds = [], []
-            for _ in range(chosen.changes):
+            for _ in range(chosen.changes if size == 1 else -(-chosen.changes // 4)):
                 piece = session.pieces[random.integers(len(session.pieces))].name
                 change = random.uniform(-size, size, 6)
                 predicted, took = preview(face, piece, change)

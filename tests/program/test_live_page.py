@@ -57,6 +57,7 @@ const exact = async () => { while (mark().className !== "exact") await sleep(30)
   await exact();
   const pixel = new Uint8Array(4 * canvas.width * canvas.height), gl = canvas.getContext("webgl2");
   gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  found.angles = document.getElementById("angles").textContent;
   found.colors = new Set(new Uint32Array(pixel.buffer)).size;
   found.wide = document.documentElement.scrollWidth - innerWidth;
   found.loaded = performance.getEntriesByType("resource").map(one => new URL(one.name).host)
@@ -139,6 +140,20 @@ def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
     assert run("repose-solve", scene, "-dry_run").returncode == 0
 
 
+def test_a_report_of_the_plan_is_written_beside_the_scene(served, tmp_path):
+    server, address = served
+    own, server.scene = server.scene, tmp_path / SCENE.name
+    server.scene.write_text(re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text()))
+    try:
+        code, path = status(address, "/report", {"X-Token": server.token},
+                            json.dumps({"plan": {"chin": {"translate": [0, -2, 0]}}}).encode())
+    finally:
+        server.scene = own
+    assert code == 200 and path.decode() == str(tmp_path / "head_live_plan.html"), path
+    text = (tmp_path / "head_live_plan.html").read_text()
+    assert "chin" in text and "<svg" in text and (tmp_path / "head_live_plan.h5").is_file()
+
+
 def test_a_bone_is_dragged_and_the_face_follows(live, served):
     needs_browser()
     server, address = served
@@ -153,4 +168,6 @@ def test_a_bone_is_dragged_and_the_face_follows(live, served):
     assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
     assert found["during"] == "preview" and found["undone"]
     assert 0.5 < abs(found["dragged"]) < 2 and 0 < found["off"] < 0.5
+    angles = [float(one) for one in re.findall(r"(?:angle by the tip|angle) ([\d.]+)° \(before", found["angles"])]
+    assert len(angles) == 2 and all(80 < one < 180 for one in angles), found["angles"]
     assert found["colors"] > 1000 and found["wide"] <= 0 and found["loaded"] == []
