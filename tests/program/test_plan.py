@@ -53,7 +53,7 @@ def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
         assert result.returncode == 0, result
         return result.stdout, f"{name}.h5"
     message, file = solve(-4, "-tangents")
-    assert "12 of 12 derivatives" in message
+    assert "13 of 13 derivatives" in message, "by two pieces and one stratum"
     assert run("repose-check", file).returncode == 0
     with h5py.File(file) as result:
         last = result["step"][sorted(result["step"])[-1]]["point"]
@@ -62,6 +62,8 @@ def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
         assert column.attrs["unit"].decode() == "mm/mm"
         assert column.attrs["finished"] == column.attrs["convex"] == 1
         tangent = column[:][result["model/point/layer"][:] == 0]
+        assert last["tangent_young_0"].attrs["unit"].decode() == "mm"
+        assert np.abs(last["tangent_young_0"][:]).max() < 0.01, "stiffer all over, nothing changes"
     step = 0.05
     faces = [skin(solve(-4 + shift)[1]) for shift in (-step, step)]
     difference = (faces[1] - faces[0]) / (2 * step)
