@@ -34,6 +34,7 @@ void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
 
 /// Unit of a field of a result; MPa is N/mm², in a name without a slash.
 std::string unit_of(const std::string& name) {
+  if (name.starts_with("tangent_young_")) return "mm";
   if (name.starts_with("tangent_"))
     return name[name.size() - 2] == 't' ? "mm per mm" : "mm per degree";
   static const std::map<std::string, std::string> units = {{"displacement", "mm"},

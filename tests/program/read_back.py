@@ -31,6 +31,8 @@ UNIT = {name: unit for unit, names in UNITS.items() for name in names}
 
 def shown_name(name):
     """The name of an array for readers."""
+    if name.startswith("tangent_young_"):
+        return f"{name} (mm)"
     if name.startswith("tangent_"):
         return f"{name} ({'mm per mm' if name[-2] == 't' else 'mm per degree'})"
     return f"{name} ({UNIT[name]})" if name in UNIT else name

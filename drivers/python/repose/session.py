@@ -153,7 +153,8 @@ class Session:
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                          stderr=subprocess.PIPE, cwd=path.parent,
                                          env=without_mpi(environment or os.environ))
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
         self._writing, self._waiting, self._last = threading.Lock(), {}, 0
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -275,6 +276,7 @@ class Session:
                 process.terminate()
                 process.wait()
         self._reader.join(timeout=5)
+        self._listener.join(timeout=5)
         process.stdout.close()
 
     def __enter__(self):
