@@ -284,8 +284,8 @@ void Options::read_database() {
                                    value.empty() ? "" : " ", value);
   }
   for (const std::string& name : left_in_database())
-    if (!begins_as_petsc(name) && name != "help")
-      (is_in_environment(name) ? ignored_ : unknown_).push_back(name);
+    if (!begins_as_petsc(name) && name != "help" && !is_in_environment(name))
+      unknown_.push_back(name);
 }
 
 void Options::refuse_unknown(const std::string& name) const {
@@ -367,7 +367,8 @@ std::vector<std::string> Options::unused() const {
   std::vector<std::string> result;
   for (const std::string& token : petsc_tokens_)
     if (std::find(left.begin(), left.end(), name_of(token)) != left.end()) result.push_back(token);
-  for (const std::string& name : ignored_) result.push_back("-" + name + " of PETSC_OPTIONS");
+  for (const std::string& name : left)
+    if (is_in_environment(name)) result.push_back("-" + name + " of PETSC_OPTIONS");
   return result;
 }
 

@@ -108,7 +108,6 @@ class Options {
   std::vector<Option> table_;
   std::map<std::string, std::vector<std::string>, std::less<>> given_;
   std::vector<std::string> positional_, unknown_, petsc_tokens_;
-  std::vector<std::string> ignored_;  // names in PETSC_OPTIONS that are neither ours nor PETSc's
   mutable std::vector<char*> petsc_pointers_;
   bool help_requested_ = false, version_requested_ = false;
 };

@@ -212,13 +212,16 @@ TEST(Options, ReadsPetscsDatabase) {
   EXPECT_EQ(again->texts("load_steps"), std::vector<std::string>{"9"}) << "the command line wins";
   EXPECT_TRUE(again->flag("dry_run"));
   EXPECT_EQ(again->unused(), std::vector<std::string>{"-pc_typo"});
-  setenv("PETSC_OPTIONS", "-of_another_program 3", 1);
+  setenv("PETSC_OPTIONS", "-of_another_program 3 -tao_misspelled 1", 1);
   ASSERT_EQ(PetscOptionsSetValue(nullptr, "-of_another_program", "3"), 0);
+  ASSERT_EQ(PetscOptionsSetValue(nullptr, "-tao_misspelled", "1"), 0);
   Line shared({"head.yaml"});
   shared->check();
-  EXPECT_EQ(shared->unused(), std::vector<std::string>{"-of_another_program of PETSC_OPTIONS"});
+  EXPECT_EQ(shared->unused(), (std::vector<std::string>{"-of_another_program of PETSC_OPTIONS",
+                                                        "-tao_misspelled of PETSC_OPTIONS"}));
   unsetenv("PETSC_OPTIONS");
   ASSERT_EQ(PetscOptionsClearValue(nullptr, "-of_another_program"), 0);
+  ASSERT_EQ(PetscOptionsClearValue(nullptr, "-tao_misspelled"), 0);
   ASSERT_EQ(PetscOptionsSetValue(nullptr, "-accuracy", "-1"), 0);
   EXPECT_NE(Line({"head.yaml"}).refusal().find("-accuracy '-1' must be"), std::string::npos);
   ASSERT_EQ(PetscOptionsClear(nullptr), 0);
