@@ -274,16 +274,13 @@ def scene_text(options, mark, bones):
              "# solve again: repose-solve scene.yaml. LPS, mm: +x patient left, +y back, +z up.",
              "skin: skin.ply", "bones:"]
     lines += [f"  - {{name: {name}, file: {name}.ply}}" for name in bones]
-    lines += ["landmarks: landmarks.mrk.json", f"tissue: {{layers: 4, edge: {options.edge:g}, release: 5}}"]
+    lines += [f"tissue: {{layers: 4, edge: {options.edge:g}}}",
+              "anatomy: {landmarks: landmarks.mrk.json}   # lips are parted, and free of the teeth"]
     if planes:
         lines += ["osteotomies:", f"  - bone: {bone}", f"    piece: {piece}", "    planes:"]
         lines += [f"      - {{point: {point(at)}, normal: [{n[0]:g}, {n[1]:.3g}, {n[2]:.3g}]}}"
                   for at, n in planes]
         lines += [f"    kerf: {kerf_of(planes, shift):.3g}   # mm, the saw, and bone taken out"]
-    lips = [mark[name] for name in ("mouth_right", "stomion", "mouth_left") if name in mark]
-    if len(lips) == 3:
-        lines += ["mouth:   # the lips are parted from corner to corner",
-                  "  path: [" + ", ".join(map(point, lips)) + "]"]
     return "\n".join(lines + ["moves:"] + move_lines(operation, piece or bone, mark)) + "\n"
 
 

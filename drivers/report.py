@@ -40,9 +40,10 @@ def refuse(message):
 
 
 def of_scene(scene, key):
-    """The file that a line `key: file` of a scene names, or nothing."""
-    text = pathlib.Path(scene).read_text(encoding="utf-8")
-    found = re.search(rf"^{key}:\s*['\"]?([^'\"\n#{{]+)", text, re.M)
+    """The file that a line `key: file` of a scene names, or the same key of its anatomy; or nothing."""
+    text, file = pathlib.Path(scene).read_text(encoding="utf-8"), r"\s*['\"]?([^'\"\n#{},]+)"
+    found = (re.search(rf"^{key}:{file}", text, re.M)
+             or re.search(rf"^anatomy:(?:.*\n[ \t]+)*?.*?\b{key}:{file}", text, re.M))
     return os.path.join(os.path.dirname(scene), found[1].strip()) if found else None
 
 
