@@ -362,6 +362,7 @@ struct RestSolver::State {
 RestSolver::RestSolver(MPI_Comm comm, const discrete::Part& part, const Settings& settings) {
   if (part.total_unknowns == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
+  const base::LogStage stage("Search");  // what makes the solvers counts with what uses them
   state_ = std::make_unique<State>(comm, part, settings);
   end_stage(settings, "distribute");
 }
