@@ -31,7 +31,8 @@ bool Tolerance::contains(const Corners& triangle, Vec3* outside) const {
     *outside = point;
     return false;
   };
-  pieces_.assign(1, Piece(triangle));
+  pieces_.clear();
+  pieces_.emplace_back(triangle);
   for (size_t i = 0; i < pieces_.size(); ++i) {  // large pieces first: they show a fault soonest
     Piece piece = pieces_[i];
     if (tree_.one_covers(piece.corners(), squared_, hint_)) continue;
