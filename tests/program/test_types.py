@@ -73,6 +73,8 @@ def test_a_type_of_the_table_works(run, scenes, tmp_path, expected, option, valu
     def solve(name, ranks, *more):
         result = run("repose-solve", scenes / f"{tissue}.yaml", "-accuracy", ACCURACY, "-output", name,
                      *more, ranks=ranks)
+        if "missing package" in result.stderr:
+            pytest.skip(f"this PETSc has no {value}")
         assert (result.returncode, result.stderr) == (0, ""), result
         return positions(tmp_path / f"{name}.h5")
 
@@ -113,12 +115,13 @@ def test_options_that_petsc_cannot_follow_are_refused(run, scenes, words, ranks)
     ["-tao_view", "ascii:log:paper"], ["-pc_type", "gamg", "-mg_levels_ksp_type", "fast"],
     ["-pc_type", "gamg", "-pc_mg_cycle_type", "z"], ["-pc_type", "hypre", "-pc_hypre_type", "ams"],
     ["-pc_type", "cholesky", "-pc_factor_mat_solver_type", "fast"],
-    ["-stability", "-eps_tol", "-1"], ["-stability", "-st_pc_type", "fast"]], ids=" ".join)
+    ["-stability", "-eps_tol", "-5"], ["-stability", "-st_pc_type", "fast"]], ids=" ".join)
 def test_options_at_which_petsc_fails_during_the_solve_are_named(run, scenes, tmp_path, words, ranks):
     result = run("repose-solve", scenes / "springs.yaml", *words, ranks=ranks)
     assert result.returncode == 1, result
     lines = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
-    assert len(lines) == 1 and " ".join(words[-2:]) in lines[0], result.stderr
+    named = " ".join(words[-2:]), f"viewer {words[-1]} "  # by PETSc 3.18 and 3.22
+    assert len(lines) == 1 and any(name in lines[0] for name in named), result.stderr
     assert not list(tmp_path.glob("springs*"))
 
 
