@@ -203,6 +203,14 @@ def test_a_socket_answers_clients_with_its_token_alone(environment):
     process.stderr.close()
 
 
+def test_what_libraries_print_is_no_answer(session, tmp_path):
+    noisy = tmp_path / "noisy"
+    noisy.write_text(f'#!/bin/sh\necho "UCX ERROR failed"\nexec {programs() / "repose-live"} "$@"\n')
+    noisy.chmod(0o755)
+    with repose.Session(SCENE, program=noisy) as other:
+        assert [piece.name for piece in other.pieces] == [piece.name for piece in session.pieces]
+
+
 def test_two_ranks_give_the_same_face(session, environment):
     with repose.Session(SCENE, ranks=2, program=programs() / "repose-live") as shared:
         assert distance(shared.solve(A), session.solve(A)) < 0.1

@@ -274,7 +274,11 @@ class Session:
                 process.wait(timeout=20)
             except (OSError, subprocess.TimeoutExpired):
                 process.terminate()
-                process.wait()
+                try:
+                    process.wait(timeout=20)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
         self._reader.join(timeout=5)
         self._listener.join(timeout=5)
         process.stdout.close()
@@ -293,6 +297,8 @@ class Session:
     def _read(self):
         stream = self._process.stdout
         while line := stream.readline():
+            if not line.startswith(b"{"):
+                continue  # of a library: UCX, below MPI, complains on standard output
             try:
                 head = json.loads(line)
             except ValueError:
