@@ -47,7 +47,7 @@ Session::Session(int argc, char** argv, const char* help) {
   if (const PetscErrorCode code = PetscInitialize(&argc, &argv, nullptr, help))
     refuse("PETSc does not start with its options (command line, -options_file, PETSC_OPTIONS): {}",
            text_of(code));
-  // PETSc 3.22 tells of unused options on standard output unasked, also where all are refused.
+  // PETSc 3.22 lists unused options on standard output by default, even when Repose refuses one.
   PetscBool asked = PETSC_FALSE;
   check(PetscOptionsHasName(nullptr, nullptr, "-options_left", &asked));
   if (!asked) check(PetscOptionsSetValue(nullptr, "-options_left", "no"));

@@ -24,9 +24,9 @@ Volume coarsen(const Volume& volume, double spacing);
 /// volume takes no part. O(voxels · voxels of the ball).
 Volume close_gaps(const Volume& volume, double radius, const Watch& watch = {});
 
-/// The volume with its least value wherever a voxel is farther than `reach` mm, along each axis in
-/// turn, from the largest connected part of {value ≥ core}: faint things that touch a body, such as
-/// the foam of a headrest, leave it. Throws InputError where no value reaches the core's.
+/// Removes faint things that touch a body, such as the foam of a headrest: sets to the volume's
+/// least value each voxel farther than `reach` mm, along each axis in turn, from the largest
+/// connected component of {value ≥ core}. Throws InputError where no value reaches the core's.
 Volume keep_core(const Volume& volume, double core, double reach);
 
 /// The labels of a label map in rising order, 0 (background) left out. Throws InputError where the

@@ -78,10 +78,11 @@ class ColumnLevel {
   void factor();
   void factor(std::span<const int32_t> points);
 
-  /// What changes where the matrix takes other numbers.
+  /// The values of the matrix and its factors, without the pattern.
   struct Numbers {
-    std::vector<Eigen::Matrix3f> block;   ///< [blocks + 1]
-    std::vector<float> damping, inverse;  ///< [own] added to the columns' blocks; their factors
+    std::vector<Eigen::Matrix3f> block;  ///< [blocks + 1]
+    std::vector<float> damping;          ///< [own] added to the diagonal of the columns' blocks
+    std::vector<float> inverse;          ///< [9 own + 1] factors of the columns' blocks
   };
   const Numbers& numbers() const { return numbers_; }
   void set_numbers(const Numbers& numbers) { numbers_ = numbers; }  ///< of the same pattern
@@ -116,7 +117,7 @@ class ColumnLevel {
   std::vector<int32_t> chain_;          // [columns + 1] first points
   std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
   std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
-  Numbers numbers_;  // inverse: [9 own + 1] of what elimination down columns leaves
+  Numbers numbers_;
   StarForest forest_;
   FloatsType lanes_{4};
 };

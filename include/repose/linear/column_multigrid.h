@@ -29,7 +29,7 @@ class ColumnMultigrid {
   /// Adds blocks of own points, in place of those that the last call since refill() added: on each
   /// level only what they change. Collective.
   void set_extra(const BlockSource& blocks);
-  /// What refill() and set_extra() set, to go back to; not collective.
+  /// The values on all levels, for set_numbers() to restore. Not collective.
   struct Numbers;
   std::shared_ptr<const Numbers> numbers() const;
   void set_numbers(const Numbers& numbers);

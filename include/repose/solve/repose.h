@@ -129,7 +129,7 @@ struct Start {
   /// The guess is near to rest: it is tried before anything else, with contact at `pressure`.
   bool near = false;
   std::vector<double> pressure = {};  ///< N/mm², [points] this rank's slab
-  /// Of RestSolver::make_preconditioner, where the guess is near to rest; or null.
+  /// From RestSolver::make_preconditioner, for a guess that is near rest; or null.
   std::shared_ptr<const linear::KeptPreconditioner> preconditioner = {};
 };
 
