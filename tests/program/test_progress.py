@@ -1,9 +1,12 @@
 """Long work shows where it is on a terminal, under mpirun too, and nothing of that in a log."""
 
+import contextlib
 import os
 import pty
 import re
+import signal
 import subprocess
+import threading
 
 import pytest
 
@@ -11,8 +14,37 @@ import volumes
 from conftest import PROJECT, TIME_LIMIT, programs
 
 
-def seen(command, folder, environment):
-    """What a terminal shows that is the command's stderr."""
+class Slowed:
+    """A process that runs only a share of the time: what lasts a moment is seen on any machine."""
+
+    def __init__(self, process, share):
+        self._process = process
+        self._share = share
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.end()
+
+    def end(self):
+        self._over.set()
+        self._thread.join()
+
+    def _run(self):
+        while not self._over.is_set() and self._process.poll() is None:
+            self._process.send_signal(signal.SIGSTOP)
+            self._over.wait(0.02 * (1 / self._share - 1))
+            self._process.send_signal(signal.SIGCONT)
+            self._over.wait(0.02)
+
+
+def seen(command, folder, environment, slow_until=None, share=1):
+    """Text that a terminal shows that is the command's stderr. If a pattern is given, the command
+    runs only that share of the time until the text matches it."""
     try:
         ours, its = pty.openpty()
     except OSError as none:
@@ -21,14 +53,17 @@ def seen(command, folder, environment):
                                stdout=subprocess.DEVNULL, stderr=its)
     os.close(its)
     text = b""
-    while True:
-        try:
-            part = os.read(ours, 65536)
-        except OSError:  # the other end is closed
-            break
-        if not part:
-            break
-        text += part
+    with Slowed(process, share) if slow_until else contextlib.nullcontext() as slowed:
+        while True:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # the other end is closed
+                break
+            if not part:
+                break
+            text += part
+            if slow_until and re.search(slow_until, text.decode(errors="replace")):
+                slowed.end()
     os.close(ours)
     assert process.wait(TIME_LIMIT) == 0
     return text.decode(errors="replace")
@@ -56,22 +91,32 @@ def test_a_search_of_one_load_step_tells_the_time_left(environment, tmp_path):
     assert " s left" in text
 
 
+def small_head(environment, folder, vertices=4000):
+    subprocess.run([programs() / "repose-phantom", "-skin_vertices", str(vertices), "-output", "head"],
+                   cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
 def test_a_model_that_takes_long_shows_that_it_is_built(environment, tmp_path):
-    subprocess.run([programs() / "repose-phantom", "-skin_vertices", "40000", "-output", "head"],
-                   cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
-    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-dry_run"], tmp_path, environment)
-    assert "building the model  " in text and text.endswith("\r\x1b[K")
-    assert re.search(r"\[#+\.+\] building the model  \d+ s  about \d+ s left", text)
+    small_head(environment, tmp_path, 8000)
+    built = r"\[#+\.+\] building the model  \d+ s  about \d+ s left"
+    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-dry_run"], tmp_path, environment,
+                slow_until=built, share=0.04)
+    assert re.search(built, text) and text.endswith("\r\x1b[K")
+
+
+def test_the_path_that_is_verified_has_a_bar(environment, tmp_path):
+    small_head(environment, tmp_path)
+    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-verify_path", "-accuracy", "1"],
+                tmp_path, environment)
+    assert re.search(r"\[#*\.+\] verifying the path: load \d", text)
 
 
 def test_estimates_have_a_bar_with_the_time_left(environment, tmp_path):
-    subprocess.run([programs() / "repose-phantom", "-skin_vertices", "4000", "-output", "head"],
-                   cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
-    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-sensitivity", "-verify_path",
-                 "-accuracy", "1"],
-                tmp_path, environment)
-    assert re.search(r"\[#*\.+\] verifying the path: load \d", text)
-    assert re.search(r"\[#+\.+\] estimating sensitivities  \d+ s  about \d+ s left", text)
+    small_head(environment, tmp_path)
+    estimated = r"\[#+\.+\] estimating sensitivities  \d+ s  about \d+ s left"
+    text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-sensitivity", "-accuracy", "1"],
+                tmp_path, environment, slow_until=estimated, share=0.25)
+    assert re.search(estimated, text)
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
