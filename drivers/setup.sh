@@ -70,4 +70,6 @@ mpi_environment() {
   export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
   # Ranks that wait let others go on: on a busy machine a message takes no time slice then.
   export OMPI_MCA_mpi_yield_when_idle=1
+  # UCX, below Open MPI, prints complaints on standard output, where repose-live answers.
+  export UCX_LOG_LEVEL=${UCX_LOG_LEVEL:-fatal}
 }

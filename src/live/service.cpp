@@ -91,9 +91,11 @@ bool Service::answer(const std::string& line, bool& quits) {
   }
   int sent = 1, ranks = 1;
   MPI_Comm_size(comm_, &ranks);
-  std::string bytes = reply.bytes();
-  if (ranks > 1 && bytes.back() != '\n') bytes += '\n';  // Open MPI 5 passes on whole lines
-  if (base::rank(comm_) == 0) sent = send_all(output_, bytes);
+  if (base::rank(comm_) == 0) {
+    std::string bytes = reply.bytes();
+    if (ranks > 1 && bytes.back() != '\n') bytes += '\n';  // Open MPI 5 passes on whole lines
+    sent = send_all(output_, bytes);
+  }
   MPI_Bcast(&sent, 1, MPI_INT, 0, comm_);
   return sent != 0;
 }
