@@ -77,6 +77,7 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
   job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
   base::on_root(comm, [&] {
     model::BuildReport report = geometry->report();
+    job.held = geometry->held();
     report.effective_modulus = job.local_model->effective_modulus;
     job.building = describe_build(report) +
                    report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));

@@ -57,7 +57,7 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
 
 /// The option that needs more than the parts of a model that ranks make themselves, or nothing.
 std::string needs_whole(const base::Options& options) {
-  for (const std::string name : {"adapt", "discretisation", "sensitivity", "verify_path"})
+  for (const std::string name : {"adapt", "discretisation", "sensitivity"})
     if (options.flag(name)) return "-" + name;
   if (options.has("restart")) return "-restart";
   return options.text("profile") == "preview" ? "-profile preview" : "";
@@ -126,7 +126,10 @@ class Run {
   std::string describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
                               const Writer& writer) const;
 
+  const discrete::Part& part() const { return job_.local_model ? job_.local_model->part : shared_; }
+
   Job& job_;
+  discrete::Part shared_;  // of a model that rank 0 built, once it is searched
   Strategy strategy_;
   std::string name_;
   base::Stages& stages_;
@@ -231,14 +234,11 @@ solve::Summary Run::search(Writer& writer) {
   settings.on_iterate = [&](double load, const auto& snapshot) {
     writer.on_iterate(load, snapshot);
   };
-  const bool needed = writer.makes_checkpoints() || writer.compares() || strategy_.verifies_path ||
-                      strategy_.sensitivity || !job_.held.empty();
-  solve::Summary summary =
-      job_.local_model
-          ? solve::find_repose(comm, job_.local_model->part, settings, start_, std::ref(writer))
-      : needed
-          ? solve::find_repose(comm, job_.model, settings, start_, std::ref(writer))
-          : solve::find_repose(comm, std::move(job_.model), settings, start_, std::ref(writer));
+  if (!job_.local_model) {
+    shared_ = discrete::distribute(comm, job_.model);
+    if (!writer.makes_checkpoints() && !writer.compares()) job_.model = {};
+  }
+  solve::Summary summary = solve::find_repose(comm, part(), settings, start_, std::ref(writer));
   if (summary.path.complete() && !writer.unsettled().empty()) {
     summary.path.last.converged = false;
     summary.last.reason += "; " + writer.unsettled();
@@ -261,7 +261,7 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
   if (!strategy_.verifies_path || !summary.path.complete()) return {};
   solve::Settings settings = strategy_.settings;
   settings.activity = "verifying the path: ";
-  PathCheck check = verify_path(comm, job_.model, settings, summary, writer.positions());
+  PathCheck check = verify_path(comm, part(), settings, summary, writer.slab());
   stages_.end("verify path");
   return check;
 }
@@ -353,7 +353,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
         describe_tangents(writer.point_fields()));
   if (path) print(describe_path(*path));
-  print(writer.reactions(job_.held) + describe_contact(job_.bodies, summary) +
+  print(writer.reactions(part(), job_.held) + describe_contact(job_.bodies, summary) +
         describe_pierced(job_.bodies, summary.pierced));
   print(describe_self_contact(skin, summary, writer));
   print(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));

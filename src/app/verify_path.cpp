@@ -4,30 +4,43 @@
 
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 
 namespace repose::app {
 
 namespace {
 
-/// On rank 0.
-void compare(const model::Model& model, const std::vector<Vec3>& one,
+/// Compares two positions, this rank's slabs. Collective.
+void compare(MPI_Comm comm, const discrete::Part& part, const std::vector<Vec3>& one,
              const std::vector<Vec3>& other, PathCheck& check) {
-  std::vector<double> apart;
-  for (size_t i = 0; i < one.size(); ++i) {
-    if (model.points.set[i] != model::PointSet::soft_tissue) continue;
-    apart.push_back((other[i] - one[i]).norm());
-    if (apart.back() < check.largest) continue;
-    check.largest = apart.back();
-    check.place = model.points.position[i];
+  const discrete::NaturalRows natural(comm, part);
+  const std::vector<Vec3> before = natural.owned(one), after = natural.owned(other);
+  struct {
+    double largest;
+    int rank;
+  } farthest{0, base::rank(comm)};
+  std::vector<double> mine;
+  for (size_t i = 0; i < before.size(); ++i) {
+    if (part.model.points.set[i] != model::PointSet::soft_tissue) continue;
+    mine.push_back((after[i] - before[i]).norm());
+    if (mine.back() < farthest.largest) continue;
+    farthest.largest = mine.back();
+    check.place = part.model.points.position[i];
   }
-  const auto at = apart.begin() + static_cast<std::ptrdiff_t>(0.95 * (apart.size() - 1));
+  MPI_Allreduce(MPI_IN_PLACE, &farthest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
+  check.largest = farthest.largest;
+  MPI_Bcast(check.place.data(), 3, MPI_DOUBLE, farthest.rank, comm);
+  std::vector<double> apart = discrete::gather(comm, mine.data(), mine.size());
+  if (apart.empty()) return;
+  const auto at =
+      apart.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(apart.size() - 1));
   std::nth_element(apart.begin(), at, apart.end());
   check.percentile_95 = *at;
 }
 
 }  // namespace
 
-PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings settings,
+PathCheck verify_path(MPI_Comm comm, const discrete::Part& part, solve::Settings settings,
                       const solve::Summary& first, const std::vector<Vec3>& position) {
   PathCheck check;
   check.steps = first.path.steps - 1;  // without that to the initial state
@@ -41,12 +54,9 @@ PathCheck verify_path(MPI_Comm comm, const model::Model& model, solve::Settings 
   settings.stages = nullptr;
   std::vector<Vec3> slab;
   check.again = solve::find_repose(
-      comm, model, settings, {},
+      comm, part, settings, {},
       [&](const model::StepNumbers&, const model::StepRows& rows) { slab = rows.position; });
-  const std::vector<Vec3> other = discrete::gather_points(comm, slab);
-  if (!check.again.path.complete()) return check;
-  base::on_root(comm, [&] { compare(model, position, other, check); });
-  MPI_Bcast(&check.largest, 1, MPI_DOUBLE, 0, comm);
+  if (check.again.path.complete()) compare(comm, part, position, slab, check);
   return check;
 }
 

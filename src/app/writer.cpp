@@ -40,7 +40,6 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
   begun_ = true;
   last_.numbers = numbers;
   last_.rows.position = rows.position;
-  last_.rows.pressure = rows.pressure;
   last_.rows.volume_ratio = rows.volume_ratio;
   last_.rows.point_fields = rows.point_fields;
   if (!makes_checkpoints() || !numbers.converged) return;
@@ -89,8 +88,9 @@ std::vector<double> Writer::contact_pressures() const {
   return {};
 }
 
-std::string Writer::reactions(const std::vector<std::vector<int64_t>>& held) const {
-  const auto forces = solve::reactions(comm_, model_, held, last_.numbers, last_.rows);
+std::string Writer::reactions(const discrete::Part& part,
+                              const std::vector<std::vector<int64_t>>& held) const {
+  const auto forces = solve::reactions(comm_, part, held, last_.numbers, last_.rows.position);
   return forces.empty() ? "" : describe_reactions(held, forces);
 }
 

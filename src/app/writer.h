@@ -49,6 +49,8 @@ class Writer {
     const double error = last_.numbers.discretization_error;
     return std::isnan(error) ? -1 : error;
   }
+  /// This rank's slab of the positions at the last step.
+  const std::vector<Vec3>& slab() const { return last_.rows.position; }
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
   /// Returns every `layers`-th point: in a model of layers, the skin.
@@ -59,7 +61,8 @@ class Writer {
   /// This rank's rows of what else is known of the points at the last step.
   const std::vector<model::PointField>& point_fields() const { return last_.rows.point_fields; }
   /// Describes the reaction forces on the instruments in the last step, on rank 0.
-  std::string reactions(const std::vector<std::vector<int64_t>>& held) const;
+  std::string reactions(const discrete::Part& part,
+                        const std::vector<std::vector<int64_t>>& held) const;
 
  private:
   struct Step {

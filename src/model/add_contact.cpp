@@ -38,35 +38,6 @@ void add(int64_t point, int32_t body, Binding binding, double area, ContactPairs
   pairs.area.push_back(area);
 }
 
-/// Free points against the bones that they may come to.
-void add_bone_contact(const scene::Scene& scene, const Attachment& attachment,
-                      const std::vector<double>& area, Model& model) {
-  for (size_t b = 0; b < model.bones.size(); ++b)
-    model.contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
-  const bool touching = scene.contact && scene.contact->bones;
-  std::vector<surface::TriangleTree> trees(model.bone_surfaces.begin(), model.bone_surfaces.end());
-  std::vector<double> travel;
-  const MotionRange range(scene, model.bone_surfaces);
-  for (size_t b = 0; b < model.bones.size(); ++b)
-    travel.push_back(range.travel(model.bone_surfaces[b], static_cast<int32_t>(b)));
-  const double farthest = travel.empty() ? 0 : *std::max_element(travel.begin(), travel.end());
-  const size_t layers = area.size() / std::max<size_t>(attachment.bone.size(), 1);
-  for (size_t p = 0; p < area.size(); ++p) {
-    if (model.points.set[p] != PointSet::soft_tissue) continue;
-    const size_t column = p / layers;
-    const int32_t slides_on = p % layers == layers - 1 ? attachment.slides_on[column] : -1;
-    for (int32_t b = 0; b < static_cast<int32_t>(trees.size()); ++b) {
-      const auto row = static_cast<int64_t>(p);
-      const double reach = travel[b] + farthest + margin;
-      if (b == slides_on)
-        add(row, b, Binding::slides, area[p], model.contact.pairs);
-      else if (touching && !attachment.free[column] &&
-               trees[b].any_within(model.points.position[p], reach * reach) >= 0)
-        add(row, b, Binding::touches, area[p], model.contact.pairs);
-    }
-  }
-}
-
 Body::Shape shape_of(const scene::Instrument& instrument) {
   return std::visit(
       [](const auto& shape) -> Body::Shape {
@@ -78,28 +49,57 @@ Body::Shape shape_of(const scene::Instrument& instrument) {
       instrument.shape);
 }
 
-/// Free points of the skin against an instrument: those that slide on it, or those around what it
-/// holds.
-void add_instrument_contact(const scene::Scene& scene, size_t number,
-                            const std::vector<double>& area, Model& model) {
-  const scene::Instrument& instrument = scene.instruments[number];
-  const auto body = static_cast<int32_t>(model.contact.bodies.size());
-  model.contact.bodies.push_back(
-      {fmt::format("instruments[{}]", number), -1, shape_of(instrument), instrument.push});
-  const PushedShape pushed(instrument);
-  bool met = !instrument.slide;
-  for (size_t p = 0; p < area.size(); ++p) {
-    if (model.points.layer[p] != 0 || model.points.set[p] != PointSet::soft_tissue) continue;
-    add(static_cast<int64_t>(p), body, Binding::touches, area[p], model.contact.pairs);
-    const auto part = pushed.along(model.points.position[p]);
-    met = met || (part && part->enter <= instrument.push.norm() && part->leave > 0);
+/// Adds the pairs of free points with the bodies that they may come to.
+class ContactAdder {
+ public:
+  ContactAdder(const scene::Scene& scene, const Attachment& attachment, Model& model)
+      : attachment_(attachment),
+        model_(model),
+        trees_(model.bone_surfaces.begin(), model.bone_surfaces.end()),
+        touching_(scene.contact && scene.contact->bones) {
+    const MotionRange range(scene, model.bone_surfaces);
+    for (size_t b = 0; b < model.bones.size(); ++b) {
+      model.contact.bodies.push_back({model.bones[b], static_cast<int32_t>(b)});
+      reach_.push_back(range.travel(model.bone_surfaces[b], static_cast<int32_t>(b)));
+    }
+    const double farthest = reach_.empty() ? 0 : *std::max_element(reach_.begin(), reach_.end());
+    for (double& reach : reach_) reach = reach + farthest + margin;
+    for (size_t i = 0; i < scene.instruments.size(); ++i) {
+      const scene::Instrument& instrument = scene.instruments[i];
+      if (instrument.slide || touching_)
+        model.contact.bodies.push_back(
+            {fmt::format("instruments[{}]", i), -1, shape_of(instrument), instrument.push});
+    }
   }
-  if (!met)
-    base::refuse(
-        "{}: instruments[{}]: it reaches no free point of the skin; move it or push it "
-        "farther",
-        scene.file.string(), number);
-}
+
+  void add_point(int64_t point, double area) {
+    const auto column = static_cast<size_t>(model_.points.column[point]);
+    const bool skin = model_.points.layer[point] == 0;
+    const auto bones = static_cast<int32_t>(trees_.size()),
+               bodies = static_cast<int32_t>(model_.contact.bodies.size());
+    for (int32_t b = 0; b < bones; ++b)
+      if (b == slides_on(point))
+        add(point, b, Binding::slides, area, model_.contact.pairs);
+      else if (touching_ && !attachment_.free[column] &&
+               trees_[b].any_within(model_.points.position[point], reach_[b] * reach_[b]) >= 0)
+        add(point, b, Binding::touches, area, model_.contact.pairs);
+    for (int32_t b = bones; skin && b < bodies; ++b)
+      add(point, b, Binding::touches, area, model_.contact.pairs);
+  }
+
+ private:
+  int32_t slides_on(int64_t point) const {
+    const auto layers =
+        static_cast<int64_t>(model_.points.position.size() / attachment_.slides_on.size());
+    return point % layers == layers - 1 ? attachment_.slides_on[point / layers] : -1;
+  }
+
+  const Attachment& attachment_;
+  Model& model_;
+  std::vector<surface::TriangleTree> trees_;
+  std::vector<double> reach_;  // [bones] mm
+  bool touching_;              // tissue and bones
+};
 
 /// mm, the 2nd percentile of the thickness of bone that is near the deep end of a column, along the
 /// way from there into the bone; `most` if that is larger.
@@ -134,23 +134,13 @@ double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout) {
   return std::clamp(thin_bone(layout, 2 * coarsest) / 2, finest, coarsest);
 }
 
-void add_bone_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                      Model& model) {
-  add_bone_contact(scene, attachment, layer_areas(mesh, model), model);
-}
-
-void add_contact(const scene::Scene& scene, const ColumnLayout& layout, Model& model) {
-  Contact& contact = model.contact;
-  const SkinMesh& mesh = layout.mesh;
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model) {
   const std::vector<double> area = layer_areas(mesh, model);
-  add_bone_contact(scene, layout.attachment, area, model);
-  for (size_t i = 0; i < scene.instruments.size(); ++i)
-    if (scene.instruments[i].slide || (scene.contact && scene.contact->bones))
-      add_instrument_contact(scene, i, area, model);
-  if (contact.pairs.point.empty()) contact.bodies.clear();
-  contact.spacing = grid_spacing(scene, layout);
-  const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
-  contact.stiffness = contact_stiffness(scene, column_sums(model, layers));
+  ContactAdder adder(scene, attachment, model);
+  for (size_t p = 0; p < area.size(); ++p)
+    if (model.points.set[p] == PointSet::soft_tissue)
+      adder.add_point(static_cast<int64_t>(p), area[p]);
 }
 
 void share_pairs(const std::vector<std::array<int64_t, 2>>& twins, Model& model) {

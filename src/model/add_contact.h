@@ -1,19 +1,15 @@
 #pragma once
+#include "attachment.h"
 #include "column_layout.h"
 #include "repose/model/model.h"
 
 namespace repose::model {
 
-/// Adds the contact of a model of make_layers: bones that the tissue may reach as they move, unless
-/// the scene's contact leaves them out; bones that it slides along; instruments on which the skin
-/// slides. The penalty's stiffness is the scene's, or 25 times the tissue's effective modulus over
-/// its median thickness. Throws InputError naming the scene and an instrument that reaches no free
-/// point of the skin.
-void add_contact(const scene::Scene& scene, const ColumnLayout& layout, Model& model);
-
-/// Adds the bones alone, and the points that may reach them; also for a part of a model.
-void add_bone_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
-                      Model& model);
+/// Adds the contact of a model of make_layers or of a part of it, point by point: bones that the
+/// tissue may reach as they move, unless the scene's contact leaves them out; bones that it slides
+/// along; instruments on which the skin slides or, where bones touch, that hold it.
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+                 Model& model);
 
 /// Returns the spacing of the grids of distances, mm: the scene's, or half the thickness of thin
 /// bone near the tissue, which a coarser grid would miss, but 0.5 mm at least and 1 mm at most.

@@ -5,18 +5,18 @@
 #include "layers.h"
 #include "loads.h"
 #include "point_sets.h"
+#include "repose/base/error.h"
+#include "repose/base/geometry.h"
 #include "repose/base/log.h"
 #include "repose/model/build.h"
 #include "repose/model/material.h"
+#include "repose/model/stiffness.h"
 
 namespace repose::model {
 
 std::string explain_central_build(const scene::Scene& scene) {
   if (!scene.tissue.material) return "its tissue is springs";
   if (!scene.incisions.empty()) return "it has incisions";
-  if (!scene.instruments.empty()) return "it has instruments";
-  if (!scene.forces.empty()) return "it has forces";
-  if (!scene.tissue.mass.empty()) return "its layers have masses";
   return "";
 }
 
@@ -24,37 +24,62 @@ struct ColumnGeometry::State {
   scene::Scene scene;
   std::vector<surface::Surface> bones;
   ColumnLayout layout;
+  ColumnLoads loads;
   int64_t layers;
+
+  bool is_held(int64_t column) const { return loads.instrument[column] >= 0; }
+  bool ends_in_bone(int64_t column) const {
+    return !layout.rim[column] && layout.attachment.bone[column] >= 0;
+  }
+  int64_t soft_points(int64_t column) const {
+    if (layout.rim[column]) return 0;
+    return layers - (is_held(column) ? 1 : 0) - (ends_in_bone(column) ? 1 : 0);
+  }
+  Counts count() const;
+  void require_free_cuts() const;
 };
 
-namespace {
-
-/// Counts the points and elements that the layers will have.
-Counts count(const ColumnLayout& layout, int64_t layers) {
+/// Counts the points that the layers will have.
+Counts ColumnGeometry::State::count() const {
   Counts counts;
-  for (size_t c = 0; c < layout.rim.size(); ++c) {
-    const int64_t bone = !layout.rim[c] && layout.attachment.bone[c] >= 0;
+  for (int64_t c = 0; c < static_cast<int64_t>(layout.rim.size()); ++c) {
     counts.boundary += layout.rim[c] ? layers : 0;
-    counts.bone += bone;
-    counts.soft += layout.rim[c] ? 0 : layers - bone;
+    counts.bone += ends_in_bone(c) ? 1 : 0;
+    counts.soft += soft_points(c);
   }
   return counts;
 }
 
-}  // namespace
+void ColumnGeometry::State::require_free_cuts() const {
+  for (size_t i = 0; i < layout.cuts.size(); ++i)
+    for (const int64_t column : layout.cuts[i].columns) {
+      if (!is_held(column)) continue;
+      const Vec3& at = layout.mesh.points[column];
+      base::refuse(
+          "{}: {}: an instrument holds the skin on the path near ({:.2f}, {:.2f}, "
+          "{:.2f}); move one of them",
+          scene.file.string(), scene.incisions[i].name, at.x(), at.y(), at.z());
+    }
+}
 
-ColumnGeometry::ColumnGeometry(const Anatomy& anatomy) {
+ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface& skin,
+                               const std::vector<surface::Surface>& bones) {
   static const PetscLogEvent event = base::log_event("RpBuild");
   const base::Logged logged(event);
-  const auto layers = static_cast<int64_t>(layer_depths(anatomy.scene.tissue).size());
-  state_ = std::make_unique<State>(
-      State{anatomy.scene, anatomy.bones,
-            lay_out_columns(anatomy.scene, anatomy.skin, anatomy.bones), layers});
+  const auto layers = static_cast<int64_t>(layer_depths(scene.tissue).size());
+  state_ =
+      std::make_unique<State>(State{scene, bones, lay_out_columns(scene, skin, bones), {}, layers});
   ColumnLayout& layout = state_->layout;
-  const Counts counts = count(layout, layers);
-  require_held(anatomy.scene, layout.mesh, layout.field, counts, layout.attachment);
-  prepend_messages(anatomy, layout.report);
+  state_->loads = column_loads(scene, layout.mesh, layout.columns, layout.rim);
+  state_->require_free_cuts();
+  const Counts counts = state_->count();
+  require_held(scene, layout.mesh, layout.field, counts, layout.attachment);
   report_columns(layout, counts.bone, layout.report);
+}
+
+ColumnGeometry::ColumnGeometry(const Anatomy& anatomy)
+    : ColumnGeometry(anatomy.scene, anatomy.skin, anatomy.bones) {
+  prepend_messages(anatomy, state_->layout.report);
 }
 
 ColumnGeometry::~ColumnGeometry() = default;
@@ -62,11 +87,16 @@ ColumnGeometry::ColumnGeometry(ColumnGeometry&&) noexcept = default;
 
 const SkinMesh& ColumnGeometry::skin() const { return state_->layout.mesh; }
 int64_t ColumnGeometry::layers() const { return state_->layers; }
-BuildReport ColumnGeometry::report() const { return state_->layout.report; }
+const BuildReport& ColumnGeometry::report() const { return state_->layout.report; }
+const std::vector<Cut>& ColumnGeometry::cuts() const { return state_->layout.cuts; }
+int64_t ColumnGeometry::soft_points(int64_t column) const { return state_->soft_points(column); }
 
-int64_t ColumnGeometry::soft_points(int64_t column) const {
-  if (state_->layout.rim[column]) return 0;
-  return state_->layers - (state_->layout.attachment.bone[column] >= 0 ? 1 : 0);
+std::vector<std::vector<int64_t>> ColumnGeometry::held() const {
+  std::vector<std::vector<int64_t>> rows(state_->scene.instruments.size());
+  const std::vector<int32_t>& instrument = state_->loads.instrument;
+  for (size_t c = 0; c < instrument.size(); ++c)
+    if (instrument[c] >= 0) rows[instrument[c]].push_back(static_cast<int64_t>(c) * layers());
+  return rows;
 }
 
 namespace {
@@ -111,6 +141,9 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
     piece.free.push_back(layout.attachment.free[c]);
     piece.rim.push_back(layout.rim[c]);
   }
+  const ColumnLoads& loads = state_->loads;
+  piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
+                 base::pick(loads.force, piece.column), loads.layer_area};
   for (const int64_t t : piece.triangle) {
     Triangle& corner = piece.corner.emplace_back();
     for (int k = 0; k < 3; ++k)
@@ -121,6 +154,8 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   return piece;
 }
 
+double ColumnGeometry::spacing() const { return grid_spacing(state_->scene, state_->layout); }
+
 Model ColumnGeometry::global_metadata() const {
   const ColumnLayout& layout = state_->layout;
   Model global_metadata;
@@ -129,30 +164,32 @@ Model ColumnGeometry::global_metadata() const {
         {t[0] * state_->layers, t[1] * state_->layers, t[2] * state_->layers});
   global_metadata.gravity = state_->scene.gravity.value_or(Vec3::Zero());
   add_bones(state_->scene, state_->bones, global_metadata);
-  global_metadata.contact.spacing = grid_spacing(state_->scene, layout);
+  global_metadata.contact.spacing = spacing();
   return global_metadata;
 }
 
 Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
                   const Piece& piece, std::vector<int64_t>& found) {
-  SkinMesh mesh;
-  mesh.points = piece.skin;
-  mesh.triangles = piece.corner;
+  const bool solid = scene.tissue.material.has_value();
+  const SkinMesh mesh = make_skin_mesh({"skin", piece.skin, piece.corner});
   Attachment attachment;
   attachment.bone = piece.bone;
   attachment.slides_on = piece.slides;
   attachment.free = piece.free;
   Model model = make_layers(mesh, piece.deep, layer_depths(scene.tissue), scene.tissue.depths_mm,
-                            Elements::solid);
-  found.assign(scene.tissue.material->regions.size(), 0);
+                            solid ? Elements::solid : Elements::springs);
+  found.assign(solid ? scene.tissue.material->regions.size() : 0, 0);
   model.gravity = scene.gravity.value_or(Vec3::Zero());
   add_bones(scene, bones, model);
   if (!piece.column.empty()) {
     set_points(piece.rim, attachment, scene.moves, model);
-    found = set_material(scene.tissue, scene.file.string(), model);
-    set_masses(scene.tissue, mesh, model);
+    if (solid)
+      found = set_material(scene.tissue, scene.file.string(), model);
+    else
+      set_stiffness(scene.tissue, mesh, model);
+    set_loads(scene.tissue, mesh, piece.loads, model);
   }
-  add_bone_contact(scene, mesh, attachment, model);
+  add_contact(scene, mesh, attachment, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
 }

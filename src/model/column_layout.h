@@ -22,7 +22,7 @@ struct ColumnLayout {
   BuildReport report;     ///< with the remarks so far
 };
 
-/// As build_model(), without the layers.
+/// As ColumnGeometry's constructor, but for the loads.
 ColumnLayout lay_out_columns(const scene::Scene& scene, const surface::Surface& skin,
                              const std::vector<surface::Surface>& bones);
 

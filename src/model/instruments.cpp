@@ -136,35 +136,40 @@ std::optional<Stretch> PushedShape::along(const Vec3& p) const {
 
 namespace {
 
-std::vector<int64_t> hold(const scene::Instrument& instrument, Points& points) {
+/// Refuses an instrument that reaches no free column; one to which the skin sticks holds those it
+/// reaches.
+void meet(const scene::Instrument& instrument, int32_t number, const std::vector<Vec3>& skin,
+          const std::vector<char>& rim, ColumnLoads& loads) {
   const PushedShape shape(instrument);
   const double push = instrument.push.norm();
-  std::vector<int64_t> held;
-  for (size_t i = 0; i < points.position.size(); ++i) {
-    if (points.layer[i] != 0 || points.set[i] != PointSet::soft_tissue) continue;
-    const auto part = shape.along(points.position[i]);
+  bool met = false;
+  for (size_t c = 0; c < skin.size() && !(met && instrument.slide); ++c) {
+    if (rim[c] || loads.instrument[c] >= 0) continue;
+    const auto part = shape.along(skin[c]);
     if (!part || part->enter > push || part->leave <= 0) continue;
-    points.set[i] = PointSet::held;
-    points.target[i] = points.position[i] + part->leave / push * instrument.push;
-    held.push_back(static_cast<int64_t>(i));
+    met = true;
+    if (instrument.slide) continue;
+    loads.instrument[c] = number;
+    loads.target[c] = skin[c] + part->leave / push * instrument.push;
   }
-  if (held.empty())
-    base::refuse("it reaches no free point of the skin; move it or push it farther");
-  return held;
+  if (!met) base::refuse("it reaches no free point of the skin; move it or push it farther");
 }
 
 }  // namespace
 
-std::vector<std::vector<int64_t>> hold_by_instruments(const scene::Scene& scene, Model& model) {
-  std::vector<std::vector<int64_t>> held;
-  for (const scene::Instrument& instrument : scene.instruments) {
-    try {
-      held.push_back(instrument.slide ? std::vector<int64_t>{} : hold(instrument, model.points));
-    } catch (const base::InputError& error) {
-      base::refuse("{}: instruments[{}]: {}", scene.file.string(), held.size(), error.what());
+ColumnLoads hold_by_instruments(const scene::Scene& scene, const std::vector<Vec3>& skin,
+                                const std::vector<char>& rim) {
+  ColumnLoads loads{std::vector<int32_t>(skin.size(), -1), skin, {}, {}};
+  for (const bool slide : {false, true})
+    for (size_t i = 0; i < scene.instruments.size(); ++i) {
+      if (scene.instruments[i].slide != slide) continue;
+      try {
+        meet(scene.instruments[i], static_cast<int32_t>(i), skin, rim, loads);
+      } catch (const base::InputError& error) {
+        base::refuse("{}: instruments[{}]: {}", scene.file.string(), i, error.what());
+      }
     }
-  }
-  return held;
+  return loads;
 }
 
 struct MeshDepth::Tree {

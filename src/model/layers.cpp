@@ -38,11 +38,9 @@ void add_points(const SkinMesh& mesh, const std::vector<Vec3>& deep,
   points.layer.reserve(rows);
   points.column.reserve(rows);
   for (size_t c = 0; c < deep.size(); ++c) {
-    const double thickness = (deep[c] - mesh.points[c]).norm();
-    const std::vector<double>& depths =
-        depths_mm.empty() ? even_depths : fractions_of(depths_mm, thickness, even_depths.size());
-    for (size_t a = 0; a < depths.size(); ++a) {
-      points.position.push_back((1 - depths[a]) * mesh.points[c] + depths[a] * deep[c]);
+    const std::vector<Vec3> column = column_points(mesh.points[c], deep[c], even_depths, depths_mm);
+    points.position.insert(points.position.end(), column.begin(), column.end());
+    for (size_t a = 0; a < column.size(); ++a) {
       points.layer.push_back(static_cast<int32_t>(a));
       points.column.push_back(static_cast<int64_t>(c));
     }
@@ -136,6 +134,16 @@ std::vector<double> layer_depths(const scene::Tissue& tissue) {
       base::refuse("tissue.depths: {} after {}; each must be greater than the one before it",
                    depths[a], depths[a - 1]);
   return depths;
+}
+
+std::vector<Vec3> column_points(const Vec3& skin, const Vec3& deep,
+                                const std::vector<double>& depths,
+                                const std::vector<double>& depths_mm) {
+  std::vector<Vec3> points;
+  const std::vector<double> fractions =
+      depths_mm.empty() ? depths : fractions_of(depths_mm, (deep - skin).norm(), depths.size());
+  for (const double f : fractions) points.push_back((1 - f) * skin + f * deep);
+  return points;
 }
 
 Model make_layers(const SkinMesh& mesh, const std::vector<Vec3>& deep,

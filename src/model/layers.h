@@ -12,6 +12,11 @@ namespace repose::model {
 /// fractions are not as many, do not run from 0 to 1, or do not increase.
 std::vector<double> layer_depths(const scene::Tissue& tissue);
 
+/// [layers] mm: a column from the skin to its deepest point, in layers as by make_layers().
+std::vector<Vec3> column_points(const Vec3& skin, const Vec3& deep,
+                                const std::vector<double>& depths,
+                                const std::vector<double>& depths_mm);
+
 /// Repeats the skin in layers (docs/theory/model.md "Points", "Springs"): n layers of V vertices, E
 /// edges and F triangles give nV points, nE + (n−1)(V + 2E) springs and (n−1)F prisms. Point =
 /// column · n + layer; springs by set ("layer 0" … , "connecting 0" …, "diagonal 0" …), in a set by

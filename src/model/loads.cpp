@@ -4,52 +4,46 @@
 #include <algorithm>
 #include <limits>
 
+#include "layers.h"
 #include "repose/base/error.h"
+#include "repose/model/instruments.h"
 
 namespace repose::model {
 namespace {
 
-void set_layer_masses(const std::vector<double>& mass, const SkinMesh& mesh, Model& model) {
-  const auto layers = static_cast<int64_t>(mass.size());
-  const std::vector<Vec3>& x = model.points.position;
-  std::vector<double> area(x.size(), 0), total(layers, 0);
-  for (const Triangle& t : mesh.triangles)
-    for (int64_t a = 0; a < layers; ++a) {
-      const int64_t i = t[0] * layers + a, j = t[1] * layers + a, k = t[2] * layers + a;
-      const double third = (x[j] - x[i]).cross(x[k] - x[i]).norm() / 6;
-      for (const int64_t point : {i, j, k}) area[point] += third;
-      total[a] += 3 * third;
-    }
-  for (size_t i = 0; i < x.size(); ++i) {
-    const int32_t a = model.points.layer[i];
-    model.points.mass[i] = mass[a] * area[i] / total[a];
-  }
+double third_of_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return (b - a).cross(c - a).norm() / 6;
 }
 
-}  // namespace
-
-void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model) {
-  if (tissue.density) {
-    for (size_t m = 0; m < model.prisms.points.size(); ++m)
-      for (const int64_t point : model.prisms.points[m])
-        model.points.mass[point] += *tissue.density * model.prisms.rest_volume[m] / 6;
-    return;
-  }
-  if (tissue.mass.empty()) return;
+/// [layers] mm².
+std::vector<double> layer_areas(const scene::Tissue& tissue, const SkinMesh& mesh,
+                                const std::vector<Vec3>& deep) {
   if (static_cast<int>(tissue.mass.size()) != tissue.layers)
     base::refuse("tissue.mass has {} values for {} layers; give one a layer (kg)",
                  tissue.mass.size(), tissue.layers);
-  set_layer_masses(tissue.mass, mesh, model);
+  const std::vector<double> depths = layer_depths(tissue);
+  std::vector<double> total(depths.size(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    std::array<std::vector<Vec3>, 3> at;
+    for (int k = 0; k < 3; ++k)
+      at[k] = column_points(mesh.points[t[k]], deep[t[k]], depths, tissue.depths_mm);
+    for (size_t a = 0; a < total.size(); ++a)
+      total[a] += 3 * third_of_area(at[0][a], at[1][a], at[2][a]);
+  }
+  return total;
 }
 
-void distribute_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model) {
-  const auto layers = static_cast<int64_t>(model.points.position.size() / mesh.points.size());
+/// [V] N, each force shared over the free columns within its radius in proportion to the skin area
+/// around them, so that the shares sum to it exactly (to rounding).
+std::vector<Vec3> distribute_forces(const scene::Scene& scene, const SkinMesh& mesh,
+                                    const std::vector<char>& free) {
+  std::vector<Vec3> at(mesh.points.size(), Vec3::Zero());
   for (size_t k = 0; k < scene.forces.size(); ++k) {
     const scene::Force& force = scene.forces[k];
     std::vector<int64_t> within;
     double area = 0, nearest = std::numeric_limits<double>::infinity();
     for (size_t v = 0; v < mesh.points.size(); ++v) {
-      if (model.points.set[v * layers] != PointSet::soft_tissue) continue;
+      if (!free[v]) continue;
       const double distance = (mesh.points[v] - force.at).norm();
       nearest = std::min(nearest, distance);
       if (distance > force.radius) continue;
@@ -61,9 +55,63 @@ void distribute_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& m
           "{}: forces[{}]: no free skin point within {} mm of ({}, {}, {}), the nearest is {:.2f} "
           "mm away; move `at` to the skin or make `radius` larger",
           scene.file.string(), k, force.radius, force.at.x(), force.at.y(), force.at.z(), nearest);
-    for (const int64_t v : within)
-      model.points.external_force[v * layers] += force.force * (mesh.vertex_area[v] / area);
+    for (const int64_t v : within) at[v] += force.force * (mesh.vertex_area[v] / area);
   }
+  return at;
+}
+
+void set_layer_masses(const std::vector<double>& mass, const std::vector<double>& total,
+                      const SkinMesh& mesh, Model& model) {
+  const auto layers = static_cast<int64_t>(mass.size());
+  const std::vector<Vec3>& x = model.points.position;
+  std::vector<double> area(x.size(), 0);
+  for (const Triangle& t : mesh.triangles)
+    for (int64_t a = 0; a < layers; ++a) {
+      const int64_t i = t[0] * layers + a, j = t[1] * layers + a, k = t[2] * layers + a;
+      const double third = third_of_area(x[i], x[j], x[k]);
+      for (const int64_t point : {i, j, k}) area[point] += third;
+    }
+  for (size_t i = 0; i < x.size(); ++i) {
+    const int32_t a = model.points.layer[i];
+    model.points.mass[i] = mass[a] * area[i] / total[a];
+  }
+}
+
+void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, const std::vector<double>& total,
+                Model& model) {
+  if (tissue.density) {
+    for (size_t m = 0; m < model.prisms.points.size(); ++m)
+      for (const int64_t point : model.prisms.points[m])
+        model.points.mass[point] += *tissue.density * model.prisms.rest_volume[m] / 6;
+    return;
+  }
+  if (!tissue.mass.empty()) set_layer_masses(tissue.mass, total, mesh, model);
+}
+
+}  // namespace
+
+ColumnLoads column_loads(const scene::Scene& scene, const SkinMesh& mesh, const Columns& columns,
+                         const std::vector<char>& rim) {
+  ColumnLoads loads = hold_by_instruments(scene, mesh.points, rim);
+  std::vector<char> free(rim.size());
+  for (size_t c = 0; c < rim.size(); ++c) free[c] = !rim[c] && loads.instrument[c] < 0;
+  loads.force = distribute_forces(scene, mesh, free);
+  if (!scene.tissue.mass.empty() && !scene.tissue.density)
+    loads.layer_area = layer_areas(scene.tissue, mesh, columns.deep);
+  return loads;
+}
+
+void set_loads(const scene::Tissue& tissue, const SkinMesh& mesh, const ColumnLoads& loads,
+               Model& model) {
+  Points& points = model.points;
+  const size_t columns = loads.instrument.size(), layers = points.position.size() / columns;
+  for (size_t c = 0; c < columns; ++c) {
+    points.external_force[c * layers] = loads.force[c];
+    if (loads.instrument[c] < 0) continue;
+    points.set[c * layers] = PointSet::held;
+    points.target[c * layers] = loads.target[c];
+  }
+  set_masses(tissue, mesh, loads.layer_area, model);
 }
 
 }  // namespace repose::model

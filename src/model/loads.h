@@ -1,22 +1,25 @@
 #pragma once
 #include <vector>
 
-#include "repose/model/model.h"
+#include "columns.h"
+#include "repose/model/build.h"
 #include "repose/model/skin_mesh.h"
 #include "repose/scene/scene.h"
 
-/// Loads on the points: masses and external forces.
+/// Loads on the points: masses, external forces and instruments.
 namespace repose::model {
 
-/// Masses (kg) of a model of make_layers: each layer's mass shared over its points in proportion to
-/// a third of the area of the layer's triangles around each; or with a density ρ, a sixth of ρ v_0
-/// of every prism for each of its points. Without either, none. Throws InputError where the number
-/// of masses is not that of the layers.
-void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model);
+/// Loads of all columns of a scene's tissue. `rim` [V] is 1 at columns that are held in whole.
+/// Throws InputError where an instrument reaches no free point of the skin, a force has none within
+/// its radius, or the number of masses is not that of the layers.
+ColumnLoads column_loads(const scene::Scene& scene, const SkinMesh& mesh, const Columns& columns,
+                         const std::vector<char>& rim);
 
-/// Adds each force (N) of the scene, shared over the soft-tissue points of layer 0 within its
-/// radius in proportion to the skin area around them, so that the shares sum to it exactly (to
-/// rounding). Throws InputError where there is none within, saying how far the nearest is.
-void distribute_forces(const scene::Scene& scene, const SkinMesh& mesh, Model& model);
+/// Gives a model of make_layers its loads: each layer's mass (kg) shared over its points in
+/// proportion to a third of the area of the layer's triangles around each, or with a density ρ a
+/// sixth of ρ v_0 of every prism for each of its points; the forces (N) on the points of the skin;
+/// and the points that instruments hold, with their targets. `mesh` has the model's triangles.
+void set_loads(const scene::Tissue& tissue, const SkinMesh& mesh, const ColumnLoads& loads,
+               Model& model);
 
 }  // namespace repose::model

@@ -1,9 +1,10 @@
 #include "repose/solve/reaction.h"
 
 #include <algorithm>
+#include <map>
 
 #include "repose/base/agreement.h"
-#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/mechanics/nodal_volumes.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
@@ -17,11 +18,9 @@ namespace {
 /// Sums forces on points by the group that they belong to.
 class Groups {
  public:
-  Groups(size_t points, const std::vector<std::vector<int64_t>>& groups)
-      : group_(points, -1), force_(groups.size(), Vec3::Zero()) {
-    for (size_t k = 0; k < groups.size(); ++k)
-      for (const int64_t point : groups[k]) group_[point] = static_cast<int64_t>(k);
-  }
+  /// `group` [local points] is −1 for none.
+  Groups(std::vector<int64_t> group, size_t groups)
+      : group_(std::move(group)), force_(groups, Vec3::Zero()) {}
 
   template <size_t K>
   bool touch(const std::array<int64_t, K>& points) const {
@@ -30,20 +29,47 @@ class Groups {
   void add(int64_t point, const Vec3& force) {
     if (group_[point] >= 0) force_[group_[point]] += force;
   }
-  const std::vector<Vec3>& forces() const { return force_; }
+  /// Adds what all ranks have. Collective.
+  std::vector<Vec3> sum(MPI_Comm comm) {
+    MPI_Allreduce(MPI_IN_PLACE, force_.data(), static_cast<int>(3 * force_.size()), MPI_DOUBLE,
+                  MPI_SUM, comm);
+    return std::move(force_);
+  }
 
  private:
-  std::vector<int64_t> group_;  // [N] or −1
-  std::vector<Vec3> force_;     // [groups]
+  std::vector<int64_t> group_;
+  std::vector<Vec3> force_;  // [groups]
 };
 
-void add_springs(const model::Model& model, const std::vector<double>& x, double weight,
+/// [local points] the group of each, −1 for none. `groups` are read on rank 0. Collective.
+std::vector<int64_t> group_of_points(MPI_Comm comm, const discrete::Part& part,
+                                     const std::vector<std::vector<int64_t>>& groups,
+                                     int64_t count) {
+  std::map<int64_t, int64_t> group_of;  // of rows in the whole model
+  for (int64_t k = 0; k < count; ++k) {
+    std::vector<int64_t> rows;
+    if (base::rank(comm) == 0) rows = groups[k];
+    auto size = static_cast<int>(rows.size());
+    MPI_Bcast(&size, 1, MPI_INT, 0, comm);
+    rows.resize(size);
+    MPI_Bcast(rows.data(), size, MPI_INT64_T, 0, comm);
+    for (const int64_t row : rows) group_of[row] = k;
+  }
+  std::vector<int64_t> group;
+  for (const int64_t row : part.point_row) {
+    const auto found = group_of.find(row);
+    group.push_back(found == group_of.end() ? -1 : found->second);
+  }
+  return group;
+}
+
+void add_springs(const discrete::Part& part, std::span<const Vec3> x, double weight,
                  Groups& groups) {
-  const model::Springs& s = model.springs;
-  for (size_t j = 0; j < s.points.size(); ++j) {
+  const model::Springs& s = part.model.springs;
+  for (int64_t j = 0; j < part.owned_springs; ++j) {
     if (!groups.touch(s.points[j])) continue;
     const auto [p, q] = s.points[j];
-    const Vec3 d = Vec3::Map(&x[3 * q]) - Vec3::Map(&x[3 * p]);
+    const Vec3 d = x[q] - x[p];
     if (d.norm() == 0) continue;
     const double tension = mechanics::with_exponent(s.exponent[j], [&]<int e>() {
       return mechanics::spring_tension<e>(d.norm() - s.rest_length[j], s.stiffness[j],
@@ -55,41 +81,36 @@ void add_springs(const model::Model& model, const std::vector<double>& x, double
   }
 }
 
-void add_edges(const model::Model& model, const std::vector<double>& x, Groups& groups) {
-  const model::Edges& edges = model.edges;
-  for (size_t j = 0; j < edges.points.size(); ++j) {
+void add_edges(const discrete::Part& part, std::span<const Vec3> x, Groups& groups) {
+  const model::Edges& edges = part.model.edges;
+  for (int64_t j = 0; j < part.owned_edges; ++j) {
     if (!groups.touch(edges.points[j])) continue;
     const auto [p, q] = edges.points[j];
-    const Vec3 force = edges.weight[j] * (Vec3::Map(&x[3 * q]) - Vec3::Map(&x[3 * p]));
+    const Vec3 force = edges.weight[j] * (x[q] - x[p]);
     groups.add(p, force);
     groups.add(q, -force);
   }
 }
 
-/// Φ_v'(v) of prism m.
-double slope(const model::StepNumbers& n, double change, double rest, double pressure) {
-  if (n.volume == VolumeTerm::paper) return 2 * (1 - n.lambda) * change;
-  if (n.volume == VolumeTerm::penalty) return n.bulk_modulus * change / rest;
-  return -pressure;
+/// Φ_v'(v) of a prism of springs.
+double slope(const model::StepNumbers& n, double change, double rest) {
+  return n.volume == VolumeTerm::paper ? 2 * (1 - n.lambda) * change
+                                       : n.bulk_modulus * change / rest;
 }
 
-void add_prisms(const model::Model& model, const std::vector<double>& x,
-                const std::vector<double>& pressure, const model::StepNumbers& n, Groups& groups) {
-  const model::Prisms& prisms = model.prisms;
+void add_prisms(const discrete::Part& part, std::span<const Vec3> x, const model::StepNumbers& n,
+                Groups& groups) {
+  const model::Prisms& prisms = part.model.prisms;
   std::vector<double> of_solid;
-  if (model::is_solid(model))
-    of_solid = mechanics::volume_slopes(
-        model, {reinterpret_cast<const Vec3*>(x.data()), model.points.position.size()});
-  for (size_t m = 0; m < prisms.points.size(); ++m) {
+  if (part.solid) of_solid = mechanics::volume_slopes(part.model, x);
+  for (int64_t m = 0; m < part.owned_prisms; ++m) {
     if (!groups.touch(prisms.points[m])) continue;
     mechanics::PrismTriples<double> corners;
-    for (int c = 0; c < 6; ++c)
-      corners[c] = mechanics::triple(Vec3::Map(&x[3 * prisms.points[m][c]]));
+    for (int c = 0; c < 6; ++c) corners[c] = mechanics::triple(x[prisms.points[m][c]]);
     const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
-    const double by = !of_solid.empty()
+    const double by = part.solid
                           ? of_solid[m]
-                          : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m],
-                                  pressure.empty() ? 0 : pressure[m]);
+                          : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m]);
     for (int c = 0; c < 6; ++c)
       groups.add(prisms.points[m][c], -by * mechanics::vec3(v.gradient[c]));
   }
@@ -97,24 +118,25 @@ void add_prisms(const model::Model& model, const std::vector<double>& x,
 
 }  // namespace
 
-std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
+std::vector<Vec3> reactions(MPI_Comm comm, const discrete::Part& part,
                             const std::vector<std::vector<int64_t>>& held,
-                            const model::StepNumbers& numbers, const model::StepRows& rows) {
+                            const model::StepNumbers& numbers, const std::vector<Vec3>& position) {
   auto requested = static_cast<int64_t>(held.size());
   MPI_Bcast(&requested, 1, MPI_INT64_T, 0, comm);
   if (requested == 0) return {};
-  const std::vector<double> x =
-      discrete::gather(comm, rows.position.empty() ? nullptr : rows.position.data()->data(),
-                       3 * rows.position.size());
-  const std::vector<double> pressure =
-      discrete::gather(comm, rows.pressure.data(), rows.pressure.size());
-  if (base::rank(comm) != 0) return {};
-  Groups groups(model.points.position.size(), held);
+  discrete::Positions positions(comm, part);
+  const base::VecHandle displacement = positions.make_vector();
+  discrete::NaturalRows(comm, part).set_unknowns(position, positions, displacement);
+  positions.set_load(numbers.load);
+  positions.update(displacement);
+  Groups groups(group_of_points(comm, part, held, requested), requested);
   const bool energy = numbers.functional == model::Functional::energy;
-  add_springs(model, x, energy && numbers.volume == VolumeTerm::paper ? numbers.lambda : 1, groups);
-  add_edges(model, x, groups);
-  if (energy && numbers.volume != VolumeTerm::none) add_prisms(model, x, pressure, numbers, groups);
-  return groups.forces();
+  add_springs(part, positions.local(),
+              energy && numbers.volume == VolumeTerm::paper ? numbers.lambda : 1, groups);
+  add_edges(part, positions.local(), groups);
+  if (energy && numbers.volume != VolumeTerm::none)
+    add_prisms(part, positions.local(), numbers, groups);
+  return groups.sum(comm);
 }
 
 }  // namespace repose::solve

@@ -433,11 +433,4 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
   return find_repose(comm, discrete::distribute(comm, model), settings, start, receive);
 }
 
-Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
-                    const Start& start, const Receiver& receive) {
-  const discrete::Part part = discrete::distribute(comm, model);
-  model = {};
-  return find_repose(comm, part, settings, start, receive);
-}
-
 }  // namespace repose::solve

@@ -1,5 +1,7 @@
 """The number of ranks changes neither the model nor the rest position."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -53,13 +55,26 @@ def test_same_face_of_a_turned_jaw(solved):
 
 
 @pytest.mark.parametrize("ranks", [2, 3, 5])
-@pytest.mark.parametrize("scene", ["head_solid.yaml", "head_le_fort.yaml"])
+@pytest.mark.parametrize("scene", ["head_solid.yaml", "head_le_fort.yaml", "head_instrument.yaml"])
 def test_ranks_make_the_parts_of_a_solid_that_one_rank_builds(solved, scene, ranks):
     one, many = solved(scene), solved(scene, ranks=ranks)
     model, other = model_of(one), model_of(many)
     assert model.keys() == other.keys()
     assert [name for name in model if model[name].tobytes() != other[name].tobytes()] == []
     assert apart(last(one), last(many)) < 0.1  # the accuracy
+
+
+def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run):
+    rows = []
+    for ranks in (1, 3):
+        result = run("repose-solve", PROJECT / "meshes/head_instrument.yaml", "-verify_path",
+                     ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert ("by 3 ranks, each its part" in result.stdout) == (ranks == 3)
+        assert "verified: in " in result.stdout
+        rows.append(next(row for row in result.stdout.splitlines() if "instrument 0 " in row))
+    forces = [[float(x) for x in re.findall(r"[-\d.e]+(?=[,)])", row)] for row in rows]
+    assert len(forces[0]) == 3 and forces[0] == pytest.approx(forces[1], abs=0.01)  # N
 
 
 def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
@@ -110,9 +125,8 @@ def test_what_only_rank_0_knows_is_refused_on_all_ranks(run, tmp_path, ranks):
 
 @pytest.mark.parametrize("options, why", [
     ("head_springs_advance.yaml", "its tissue is springs"),
-    ("head_instrument.yaml", "it has instruments"),
     ("head_incision.yaml", "it has incisions"),
-    ("head_solid.yaml -verify_path", "-verify_path")])
+    ("head_solid.yaml -sensitivity", "-sensitivity")])
 def test_why_one_rank_builds_the_model_whole_is_told(run, options, why):
     scene, *rest = options.split()
     result = run("repose-solve", PROJECT / "meshes" / scene, *rest, "-dry_run", ranks=2)

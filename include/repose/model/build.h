@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "repose/model/cut.h"
-#include "repose/model/instruments.h"
 #include "repose/model/model.h"
 #include "repose/model/skin_mesh.h"
 #include "repose/scene/scene.h"
@@ -33,8 +32,7 @@ struct BuiltModel {
   std::vector<Cut> cuts;  ///< the incisions, not made yet: cut_along after the prestress (cut.h)
 };
 
-/// Scene and surfaces to model: columns, layers, springs, prisms, sets, attachment. `bones` in the
-/// order of scene.bones. Serial. Throws InputError naming the place where no valid model exists.
+/// The model of all columns of a ColumnGeometry, whose arguments these are. Serial.
 BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones);
 
@@ -84,14 +82,24 @@ auto build_on_solvable_skin(Anatomy& anatomy, const Build& build) {
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
 
+/// Loads of columns of tissue.
+struct ColumnLoads {
+  std::vector<int32_t> instrument;  ///< [C] that holds its skin point, −1 for none
+  std::vector<Vec3> target;         ///< [C] mm, where a held skin point goes
+  std::vector<Vec3> force;          ///< [C] N, on its skin point
+  /// [layers] mm², of all columns of the tissue; empty where layers have no masses.
+  std::vector<double> layer_area;
+};
+
 /// Columns of tissue, ascending, and the triangles of skin between them.
 struct Piece {
-  std::vector<int64_t> column;    ///< [C] vertices of the whole skin
-  std::vector<Vec3> skin, deep;   ///< [C] mm, where a column begins and ends
-  std::vector<int32_t> bone;      ///< [C] that the deepest point moves with, −1 for none
-  std::vector<int32_t> slides;    ///< [C] bone that it slides along, −1 for none
-  std::vector<char> free;         ///< [C] 1: it does not even touch bones
-  std::vector<char> rim;          ///< [C] 1: held in whole
+  std::vector<int64_t> column;   ///< [C] vertices of the whole skin
+  std::vector<Vec3> skin, deep;  ///< [C] mm, where a column begins and ends
+  std::vector<int32_t> bone;     ///< [C] that the deepest point moves with, −1 for none
+  std::vector<int32_t> slides;   ///< [C] bone that it slides along, −1 for none
+  std::vector<char> free;        ///< [C] 1: it does not even touch bones
+  std::vector<char> rim;         ///< [C] 1: held in whole
+  ColumnLoads loads;
   std::vector<Triangle> corner;   ///< [F] rows of the piece
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
 };
@@ -100,7 +108,11 @@ struct Piece {
 /// Takes memory by the skin, where the model takes it by the skin times the layers.
 class ColumnGeometry {
  public:
-  /// Serial; as build_model(). For scenes of which nothing is beyond_columns().
+  /// `bones` in the order of scene.bones. Serial. Throws InputError naming the place where no valid
+  /// model exists.
+  ColumnGeometry(const scene::Scene& scene, const surface::Surface& skin,
+                 const std::vector<surface::Surface>& bones);
+  /// As above, with the anatomy's remarks and warnings in the report.
   explicit ColumnGeometry(const Anatomy& anatomy);
   ~ColumnGeometry();
   ColumnGeometry(ColumnGeometry&&) noexcept;
@@ -112,9 +124,15 @@ class ColumnGeometry {
   /// The given columns (ascending), those that share a triangle with them, and those that share one
   /// with these: all that values at elements of the given columns depend on.
   Piece piece(const std::vector<int64_t>& columns) const;
+  /// mm, of contact's grids of distances to meshes.
+  double spacing() const;
   /// The model without its points, prisms and edges: skin, bones, bodies, the grid of contact.
   Model global_metadata() const;
-  BuildReport report() const;
+  const BuildReport& report() const;
+  /// [instruments] rows of the points that each holds.
+  std::vector<std::vector<int64_t>> held() const;
+  /// The incisions, not made yet.
+  const std::vector<Cut>& cuts() const;
 
  private:
   struct State;
@@ -126,8 +144,9 @@ std::string explain_central_build(const scene::Scene& scene);
 
 /// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
 /// columns that the piece was made around, all there is; of others, what the piece has. Indices are
-/// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0. `found` [regions of
-/// the material] gets the prisms in each. Serial.
+/// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0, and bodies are
+/// there whether they are touched or not. `found` [regions of the material] gets the prisms in
+/// each. Serial.
 Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
                   const Piece& piece, std::vector<int64_t>& found);
 

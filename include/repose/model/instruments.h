@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "repose/model/model.h"
+#include "repose/model/build.h"
 #include "repose/scene/scene.h"
 
 /// Rigid bodies pushed into the skin.
@@ -50,11 +50,12 @@ class MeshDepth {
   std::unique_ptr<Tree> tree_;
 };
 
-/// Makes held points of the free skin points that an instrument to which the skin sticks sweeps
-/// over or ends on: their
-/// target is where the push takes them, on the surface of the instrument at the end of its push. A
-/// point goes with the first instrument of the scene that reaches it. Returns the rows of the
-/// points that each holds. Throws InputError naming the scene and an instrument that reaches none.
-std::vector<std::vector<int64_t>> hold_by_instruments(const scene::Scene& scene, Model& model);
+/// Finds the columns whose skin point an instrument to which the skin sticks sweeps over or ends
+/// on: their target is where the push takes them, on the surface of the instrument at the end of
+/// its push. A column goes with the first instrument of the scene that reaches it. `skin` [V] is
+/// where columns begin, mm; those of the `rim` [V] are not free. Throws InputError naming the scene
+/// and an instrument that reaches no free column.
+ColumnLoads hold_by_instruments(const scene::Scene& scene, const std::vector<Vec3>& skin,
+                                const std::vector<char>& rim);
 
 }  // namespace repose::model

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "repose/model/model.h"
+#include "repose/discrete/part.h"
 #include "repose/model/step.h"
 
 namespace repose::solve {
@@ -13,10 +13,10 @@ namespace repose::solve {
 ///     f = Σ_i [ Σ_springs at i (force of the spring on i) − Σ_prisms at i Φ_v'(v) ∂v/∂x_i ],
 /// over all springs and prisms, also those that move no soft-tissue point; with volume form paper
 /// both are weighted as in the objective, with the force functional it is the springs alone.
-/// `model` and `groups` are read on rank 0 only, which also has the result; `rows` are the
-/// slabs of the step `numbers`. Collective.
-std::vector<Vec3> reactions(MPI_Comm comm, const model::Model& model,
+/// `groups`, rows of the whole model, are read on rank 0 only; `position` is this rank's slab at
+/// the step `numbers`. Without groups there is no result, else all ranks have it. Collective.
+std::vector<Vec3> reactions(MPI_Comm comm, const discrete::Part& part,
                             const std::vector<std::vector<int64_t>>& groups,
-                            const model::StepNumbers& numbers, const model::StepRows& rows);
+                            const model::StepNumbers& numbers, const std::vector<Vec3>& position);
 
 }  // namespace repose::solve

@@ -166,8 +166,5 @@ Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& se
 /// Finds the rest position of a model that is already distributed.
 Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
                     const Start& start, const Receiver& receive);
-/// Takes ownership of the model, which is freed after distribution.
-Summary find_repose(MPI_Comm comm, model::Model&& model, const Settings& settings,
-                    const Start& start, const Receiver& receive);
 
 }  // namespace repose::solve

@@ -47,6 +47,18 @@ model::Anatomy rich(int squares) {
   return anatomy;
 }
 
+/// The same with forces, layers of given masses, and instruments of both kinds.
+model::Anatomy loaded(int squares) {
+  model::Anatomy anatomy = rich(squares);
+  scene::Scene& scene = anatomy.scene;
+  scene.tissue.density.reset();
+  scene.tissue.mass = {0.1, 0.2, 0.3, 0.4};
+  scene.forces = {{{20, 20, 0}, 60, {0.1, 0, 0}}, {{80, 80, 0}, 60, {0, 0, 0.2}}};
+  scene.instruments = {{scene::Sphere{{0, 100, 32}, 30}, {0, 0, -4}, true},
+                       {scene::Sphere{{100, 0, 32}, 30}, {0, 0, -4}}};
+  return anatomy;
+}
+
 discrete::LocalModel build_local(const model::Anatomy& anatomy) {
   std::optional<model::ColumnGeometry> geometry;
   base::on_root(comm, [&] { geometry.emplace(anatomy); });
@@ -115,7 +127,7 @@ int squares() {
 }
 
 TEST(Raise, parts_are_those_of_the_whole_model) {
-  for (const model::Anatomy& anatomy : {jaws(squares()), rich(squares())}) {
+  for (const model::Anatomy& anatomy : {jaws(squares()), rich(squares()), loaded(squares())}) {
     const model::BuiltModel built = model::build_model(anatomy);
     const Part part = discrete::distribute(comm, built.model);
     const discrete::LocalModel local_model = build_local(anatomy);
@@ -127,6 +139,7 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
     EXPECT_EQ(local_model.counts.soft, all.soft);
     EXPECT_EQ(local_model.counts.boundary, all.boundary);
     EXPECT_EQ(local_model.counts.bone, all.bone);
+    EXPECT_EQ(local_model.counts.held, all.held);
     EXPECT_EQ(local_model.counts.prisms, all.prisms);
     EXPECT_EQ(local_model.counts.edges, all.edges);
     if (base::rank(comm) > 0) continue;
@@ -250,14 +263,11 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
 TEST(Raise, what_needs_more_than_columns_is_said) {
   scene::Scene scene = jaws(4).scene;
   EXPECT_EQ(model::explain_central_build(scene), "");
-  scene.forces = {{Vec3::Zero(), 5, Vec3::UnitX()}};
-  EXPECT_EQ(model::explain_central_build(scene), "it has forces");
-  scene = jaws(4).scene;
   scene.tissue.material.reset();
   EXPECT_EQ(model::explain_central_build(scene), "its tissue is springs");
   scene = jaws(4).scene;
-  scene.tissue.mass = {1, 1, 1, 1};
-  EXPECT_EQ(model::explain_central_build(scene), "its layers have masses");
+  scene.incisions = {{}};
+  EXPECT_EQ(model::explain_central_build(scene), "it has incisions");
 }
 
 }  // namespace raise_test

@@ -72,24 +72,6 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   }
 }
 
-TEST(Sharing, AModelGivenAwayIsSolvedAndLetGoOf) {
-  model::Model m = patch();
-  for (size_t i = 0; i < m.points.target.size(); ++i)
-    if (m.points.set[i] == model::PointSet::bone) m.points.target[i].x() += 0.1;
-  solve::Settings settings;
-  settings.path.accuracy = 1e-6;
-  const testing::Rest kept = testing::find_rest(m, settings);
-  std::vector<Vec3> position;
-  solve::find_repose(MPI_COMM_WORLD, std::move(m), settings, {},
-                     [&](const model::StepNumbers&, const model::StepRows& slabs) {
-                       position = testing::gather(slabs.position);
-                     });
-  ASSERT_EQ(position.size(), kept.rows.position.size());
-  for (size_t i = 0; i < position.size(); ++i)
-    EXPECT_LT((position[i] - kept.rows.position[i]).norm(), 2 * settings.path.accuracy) << i;
-  EXPECT_TRUE(m.springs.points.empty());
-}
-
 TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
   constexpr PetscInt largest = 2147483647;
   EXPECT_NO_THROW(discrete::require_countable(715827882, largest));
