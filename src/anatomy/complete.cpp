@@ -1,6 +1,7 @@
 #include "repose/anatomy/complete.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "lip_crease.h"
@@ -95,6 +96,15 @@ void part_lips(const surface::Surface& skin, scene::Scene& scene,
       path.back().y(), path.back().z()));
 }
 
+/// Lowest and highest z of the vestibule: between B and the nasal spine on bone, and no farther
+/// than the lips reach, which end at B' and subnasale.
+std::array<double, 2> vestibule_height(const scene::AnatomyPlan& plan) {
+  const Vec3 *b_soft = find(plan, "b_soft"), *subnasale = find(plan, "subnasale");
+  const double low = find(plan, "b_point")->z(), high = find(plan, "nasal_spine")->z();
+  return {b_soft ? std::max(low, b_soft->z()) : low,
+          subnasale ? std::min(high, subnasale->z()) : high};
+}
+
 void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
   constexpr double beside = 12, before = 16, behind = 38;  // mm
   const scene::AnatomyPlan& plan = *scene.anatomy;
@@ -110,8 +120,9 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
     }
   const Vec3 &edge = *find(plan, "upper_incisor_edge"), &right = *find(plan, "mouth_right"),
              &left = *find(plan, "mouth_left");
-  const Vec3 low(right.x() - beside, edge.y() - before, find(plan, "b_point")->z()),
-      high(left.x() + beside, edge.y() + behind, find(plan, "nasal_spine")->z());
+  const auto [bottom, top] = vestibule_height(plan);
+  const Vec3 low(right.x() - beside, edge.y() - before, bottom),
+      high(left.x() + beside, edge.y() + behind, top);
   scene::Tissue& tissue = scene.tissue;
   tissue.attach_regions.insert(tissue.attach_regions.begin(),
                                scene::AttachRegion{scene::Box{(low + high) / 2, high - low},

@@ -14,14 +14,15 @@ constexpr std::array<std::array<const char*, 2>, 3> pairs{
      {"mouth_right", "mouth_left"}}};
 
 /// Landmarks that lie one below the other, on bone and on skin.
-constexpr std::array<std::array<const char*, 2>, 8> order{{{"nasion_bone", "nasal_spine"},
+constexpr std::array<std::array<const char*, 2>, 9> order{{{"nasion_bone", "nasal_spine"},
                                                            {"nasal_spine", "upper_incisor_edge"},
                                                            {"lower_incisor_edge", "b_point"},
                                                            {"b_point", "menton_bone"},
                                                            {"pronasale", "upper_lip"},
                                                            {"subnasale", "stomion"},
                                                            {"stomion", "lower_lip"},
-                                                           {"lower_lip", "pogonion_soft"}}};
+                                                           {"lower_lip", "b_soft"},
+                                                           {"b_soft", "pogonion_soft"}}};
 
 const Vec3* find(const Landmarks& landmarks, const char* name) {
   const auto found = landmarks.find(name);

@@ -77,13 +77,13 @@ def skin_of(shape, mesh, random):
     return points, triangles
 
 
-def make(folder, shape, base, random):
+def write_surfaces(folder, shape, base, random):
+    """Skin, skull and mandible of a shape, made of the head in the folder `base`."""
     points, triangles = skin_of(shape, meshio.read(base / "head_skin.ply"), random)
     meshio.Mesh(points, [("triangle", triangles.astype("int32"))]).write(folder / "skin.ply")
     for bone in ("skull", "mandible"):
         mesh = meshio.read(base / f"head_{bone}.ply")
         meshio.Mesh(shape.of(mesh.points), mesh.cells).write(folder / f"{bone}.ply")
-    (folder / "scene.yaml").write_text(SCENE)
 
 
 def follows(folder):
@@ -104,7 +104,8 @@ def rows(options, base):
         shape = Shape(random)
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
-            make(folder, shape, base, random)
+            write_surfaces(folder, shape, base, random)
+            (folder / "scene.yaml").write_text(SCENE)
             done = run([options.bin / "repose-solve", "scene.yaml"], folder, ends=None)
             message = done.text.split()
             number = (lambda word: message[message.index(word) - 1] if word in message else "0")

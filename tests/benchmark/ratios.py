@@ -1,15 +1,19 @@
 #!/usr/bin/env python3
-"""Ratios of soft to hard tissue of five operations on a real head, against published ones. Landmarks are
-those that repose-landmarks proposes, cuts are templates, moves are in the words of surgery.
+"""Ratios of soft to hard tissue of five operations on a real head, or on synthetic heads of random
+proportions, against published ones. Landmarks are those that repose-landmarks proposes, cuts are
+templates, moves are in the words of surgery.
 
     tests/benchmark/ratios.py [-bin build/bin] [-output docs/measurements/ratios.md] [-edge 4]
-                              [-head ../shared/data/head] [-ways "default,bonded lips"]
-                              [-operations "advance,set-back"] [-keep FOLDER]
+                              [-head ../shared/data/head] [-phantoms 12]
+                              [-ways "default,bonded lips"] [-operations "advance,set-back"]
+                              [-keep FOLDER]
 
-The folder of the head holds skin.ply, skull.ply and mandible.ply. Needs
+The folder of the head holds skin.ply, skull.ply and mandible.ply. With -phantoms synthetic heads take
+its place, solved in the first of the ways. Needs
 apt-get install --no-install-recommends python3-h5py python3-meshio python3-scipy
 """
 
+import argparse
 import json
 import pathlib
 import tempfile
@@ -18,6 +22,7 @@ import numpy as np
 
 from measure import run
 from page import option_parser, print_table
+from phantom_heads import Shape, write_surfaces
 from heads import BONES, DATA  # page knows where it is
 from tissue import last, model_of
 
@@ -51,6 +56,9 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
         "joined lips": (", lips: joined", "")}
+
+PHANTOM_HEAD = ("| operation, mm | landmark | published | median | lowest … highest | below, above |\n"
+                "|---|---|---|--:|--:|--:|")
 
 
 def landmarks_of(options, folder):
@@ -103,10 +111,14 @@ def cell(found, key):
     return number if low <= float(number) <= high else f"**{number}**"
 
 
+def operations_of(options):
+    return options.operations.split(",") if options.operations else list(OPERATIONS)
+
+
 def rows(options, folder):
     ways, outside, count = options.ways.split(","), dict.fromkeys(options.ways.split(","), 0), 0
     landmarks = landmarks_of(options, folder)
-    for operation in options.operations.split(",") if options.operations else OPERATIONS:
+    for operation in operations_of(options):
         found = {way: ratios_of(options, folder, operation, way, landmarks) for way in ways}
         for key, (published, _, _) in PUBLISHED.items():
             if key[0] != operation:
@@ -120,16 +132,48 @@ def rows(options, folder):
     yield (f"| **outside**, of {count} | | | " + " | ".join(str(outside[way]) for way in ways) + " |")
 
 
+def make_phantoms(options, folder):
+    """Folders of synthetic heads of random proportions, without beards."""
+    run([options.bin / "repose-phantom", "-skin_vertices", 20000, "-bone_edge", 2, "-output", "head"],
+        folder, ends=[0])
+    for seed in range(1, 1 + options.phantoms):
+        random = np.random.default_rng(seed)
+        shape = Shape(random)
+        shape.beard = 0
+        head = folder / f"phantom_{seed}"
+        head.mkdir(exist_ok=True)
+        write_surfaces(head, shape, folder, random)
+        yield head
+
+
+def phantom_rows(options, folder):
+    way, heads = options.ways.split(",")[0], []
+    for head in make_phantoms(options, folder):
+        own = argparse.Namespace(**{**vars(options), "head": head})
+        landmarks = landmarks_of(own, head)
+        heads.append({(operation, mark): ratio for operation in operations_of(options) for mark, ratio
+                      in ratios_of(own, head, operation, way, landmarks).items()})
+    for key, (published, low, high) in PUBLISHED.items():
+        found = np.round([head[key] for head in heads if key in head], 2)
+        if len(found):
+            yield (f"| {key[0]} {OPERATIONS[key[0]][4]} | {NAMES[key[1]]} | {published} | "
+                   f"{np.median(found):.2f} | {found.min():.2f} … {found.max():.2f} | "
+                   f"{np.sum(found < low)}, {np.sum(found > high)} of {len(found)} |")
+
+
 def main():
     options = option_parser(__doc__, edge=4.0, ways="default,bonded lips", head="", operations="",
-                            keep="").parse_args()
+                            keep="", phantoms=0).parse_args()
     options.head = pathlib.Path(options.head).resolve() if options.head else DATA
-    head = ("| operation, mm | landmark | published | " + " | ".join(options.ways.split(","))
-            + " |\n|---|---|---|" + "--:|" * len(options.ways.split(",")))
+    ways = options.ways.split(",")
     with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(options.keep or name)
+        folder = pathlib.Path(options.keep or name).resolve()
         folder.mkdir(exist_ok=True)
-        print_table(head, rows(options, folder), options.output)
+        if options.phantoms:
+            print_table(PHANTOM_HEAD, phantom_rows(options, folder), options.output, "phantoms")
+            return
+        print_table("| operation, mm | landmark | published | " + " | ".join(ways) + " |\n|---|---|---|"
+                    + "--:|" * len(ways), rows(options, folder), options.output)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from conftest import PROJECT, finish, programs
+from conftest import PROJECT, can_draw, finish, programs
 from tissue import last, model_of, prism_volumes
 
 
@@ -147,3 +147,23 @@ def test_the_cookbook_holds_its_recipes(environment, tmp_path):
     recipes = re.findall(r'"(-[^"]*)"', script.partition("RECIPES = [")[2].partition("]\n")[0])
     guide = (PROJECT / "docs/guide/solver.md").read_text()
     assert [row[0] for row in re.findall(r"^\| `(.+?)` " + count, guide, re.M)] == recipes
+
+
+@pytest.mark.long
+def test_ratios_of_synthetic_heads_and_their_pictures(environment, tmp_path):
+    for package in ("scipy", "meshio", "h5py", "vtkmodules"):
+        pytest.importorskip(package)
+    if not can_draw():
+        pytest.skip("VTK cannot draw here")
+    (tmp_path / "page.md").write_text("<!-- phantoms -->\n<!-- end of phantoms -->\n")
+    result = run_script("ratios.py", tmp_path, environment, "-phantoms", 1, "-edge", 6, "-ways",
+                        "default", "-operations", "impaction", "-keep", "kept", "-output", "page.md")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    row, = re.findall(r"^\| impaction 4 .*$", (tmp_path / "page.md").read_text(), re.M)
+    median, ends, outside = (cell.strip() for cell in row.split("|")[4:7])
+    assert ends == f"{median} … {median}" and 0.2 < float(median) < 0.7
+    assert outside in ("0, 0 of 1", "0, 1 of 1")
+    result = finish([sys.executable, PROJECT / "tests/benchmark/ratios_picture.py", "kept/phantom_1",
+                     "pictures"], tmp_path, environment, 60)
+    assert result.returncode == 0, result
+    assert (tmp_path / "pictures/impaction.png").stat().st_size > 50_000

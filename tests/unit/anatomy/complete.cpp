@@ -62,10 +62,23 @@ TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
   ASSERT_EQ(done.scene.tissue.attach_regions.size(), 2u);
   EXPECT_EQ(done.scene.tissue.attach_regions[0].attach, scene::Attach::contact);
   EXPECT_EQ(done.scene.tissue.attach_regions[1].attach, scene::Attach::slide);
-  const auto& box = std::get<scene::Box>(done.scene.tissue.attach_regions[0].where);
+}
+
+/// The first region of a scene, a box, lies between the heights of two of its landmarks.
+void expect_between(const Completed& done, const char* low, const char* high) {
+  const auto& box = std::get<scene::Box>(done.scene.tissue.attach_regions.at(0).where);
   const scene::Landmarks& marks = done.scene.anatomy->landmarks;
-  EXPECT_NEAR(box.center.z() + box.size.z() / 2, marks.at("nasal_spine").z(), 1e-9);
-  EXPECT_NEAR(box.center.z() - box.size.z() / 2, marks.at("b_point").z(), 1e-9);
+  EXPECT_NEAR(box.center.z() + box.size.z() / 2, marks.at(high).z(), 1e-9);
+  EXPECT_NEAR(box.center.z() - box.size.z() / 2, marks.at(low).z(), 1e-9);
+}
+
+TEST(CompleteScene, TheVestibuleEndsWithTheLips) {
+  const Completed done = complete_shipped();
+  const scene::Landmarks& marks = done.scene.anatomy->landmarks;
+  ASSERT_LT(marks.at("subnasale").z(), marks.at("nasal_spine").z());
+  ASSERT_GT(marks.at("b_soft").z(), marks.at("b_point").z());
+  expect_between(done, "b_soft", "subnasale");
+  expect_between(complete_shipped({"subnasale", "b_soft"}), "b_point", "nasal_spine");
 }
 
 TEST(CompleteScene, AMissingSulcusLeavesTheVestibuleOut) {

@@ -74,6 +74,10 @@ TEST(Anatomy, RefusesLandmarksOfNoHead) {
   Landmarks low = head();
   low["b_point"].z() = -10;
   has(refused(low), "lower_incisor_edge at z = -24.0 mm, not above b_point");
+  Landmarks swapped = head();
+  swapped["lower_lip"] = {0, -100, -42};
+  swapped["b_soft"] = {0, -95, -32};
+  has(refused(swapped), "lower_lip at z = -42.0 mm, not above b_soft");
 }
 
 TEST(OsteotomyTemplate, LeFortLiesAboveTheNasalFloor) {
