@@ -12,7 +12,6 @@
 #include <limits>
 #include <optional>
 
-#include "lip_gap.h"
 #include "movement.h"
 #include "phase.h"
 #include "plan_pieces.h"
@@ -325,11 +324,9 @@ std::string Run::describe_answer(const SolvedSkin& skin, const solve::Summary& s
   base::on_root(comm, [&] {
     std::vector<model::FacePlace> places;
     if (job_.anatomy) places = model::face_places(*job_.anatomy);
-    const std::vector<Vec3>&before = skin.initial_points(), after = skin.points_at(position);
-    text = describe_movement(places, before, after) + " ";
-    if (job_.anatomy) text += describe_lips(job_.anatomy->scene.landmarks, before, after);
-    text += describe_trust(summary, writer.discretization_error()) + "\n" +
-            describe_warnings(job_.warnings);
+    text = describe_movement(places, skin.initial_points(), skin.points_at(position)) + " " +
+           describe_trust(summary, writer.discretization_error()) + "\n" +
+           describe_warnings(job_.warnings);
   });
   return text;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace repose::mechanics {
 
@@ -145,6 +146,59 @@ bool BodyContact::changed_side(std::span<const Vec3> before, std::span<const Vec
     if (!now.isZero(0) && now.dot(direction_within(was_near, body, before[c])) < 0) return true;
   }
   return false;
+}
+
+namespace {
+
+/// Steps from a point to places where a body's other side may be nearest, mm.
+std::vector<Vec3> steps_around() {
+  std::vector<Vec3> steps;
+  for (int n = 0; n < 27; ++n) {
+    const Vec3 way(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    if (way.isZero(0)) continue;
+    for (const double radius : {1.0, 2.0}) steps.push_back(radius * way.normalized());
+  }
+  return steps;
+}
+
+/// A tangent plane of a body: its normal, in space, and the distance of a point from it, mm.
+struct Plane {
+  double distance;
+  Vec3 normal;
+};
+
+/// The nearest tangent plane of a body around a point inside it, at most 2 mm deep, whose normal is
+/// more than 60° from `normal`.
+std::optional<Plane> plane_round_edge(const RigidBody& body, const Vec3& beside, const Vec3& normal,
+                                      double offset) {
+  constexpr double deepest = 2, largest_cosine = 0.5;
+  static const std::vector<Vec3> steps = steps_around();
+  std::optional<Plane> nearest;
+  for (const Vec3& step : steps) {
+    const surface::Distance there = body.distance(beside + body.own_direction(step));
+    if (std::abs(there.value) > step.norm() || !(there.gradient.dot(normal) < largest_cosine))
+      continue;
+    const double distance = there.value - there.gradient.dot(step) - offset;
+    if (distance < 0 && distance > (nearest ? nearest->distance : -deepest))
+      nearest = {distance, there.gradient.normalized()};
+  }
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) const {
+  std::vector<LinearGap> found;
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    if (multiplier_[c] <= 0 || slides(c) || normal_[c].isZero(0)) continue;
+    const RigidBody& body = bodies_[pairs_.body[c]];
+    const Vec3 beside = body.beside(position[pairs_.point[c]]);
+    const auto plane = plane_round_edge(body, beside, normal_[c], pairs_.offset[c]);
+    if (!plane) continue;
+    const auto point = static_cast<int32_t>(pairs_.point[c]);
+    found.push_back({c, false, pairs_.area[c], plane->distance, {{point, plane->normal}}, {}});
+  }
+  return found;
 }
 
 void BodyContact::carry(std::span<const Vec3> position, std::span<const RigidBody> before,

@@ -81,6 +81,17 @@ void ContactQp::add_gaps() {
                                                    });
 }
 
+void ContactQp::replace(const LinearGap& by) {
+  const auto bodies = std::span(gaps_).first(touching_);
+  const auto gap = std::ranges::find(bodies, by.constraint, &LinearGap::constraint);
+  if (gap == bodies.end()) return;
+  *gap = by;
+  multiplier_[gap - bodies.begin()] = 0;
+  const int32_t point = by.gradient.front().first;
+  for (auto* blocks : {&curvature_, &convex_curvature_})
+    std::erase_if(*blocks, [&](const Objective::Block& b) { return b.p == point && b.q == point; });
+}
+
 void ContactQp::take_multipliers() {
   multiplier_.clear();
   for (size_t k = 0; k < gaps_.size(); ++k) {

@@ -24,6 +24,8 @@ class ContactQp {
   /// Linearizes where bodies and fixed points move on to `load`: each point stays beside the place
   /// of its body that it is beside. `travel` [local points] mm, of fixed points. Collective.
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
+  /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
+  void replace(const mechanics::LinearGap& by);
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
   /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Where negative
   /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a

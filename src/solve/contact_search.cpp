@@ -188,8 +188,8 @@ double ContactSearch::take_step(Vec displacement, double tissue, double& value) 
 }
 
 /// Steps of quadratic programs until one is shorter than half of `accuracy`.
-ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations) {
-  constexpr int max_steps = 12;
+ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations,
+                                         int max_steps) {
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   double value = objective_.evaluate(displacement, gradient_);
@@ -243,20 +243,19 @@ bool ContactSearch::gone_round(Vec displacement) {
   return found;
 }
 
-/// Finds the largest distance between two states of the skin, and its place. Collective.
-OtherRest ContactSearch::compare_skins(Vec displacement, Vec other) {
+/// Takes displacements of this rank's points as another rest position of a state of the skin: finds
+/// the largest distance and its place. Collective.
+OtherRest ContactSearch::compare_skins(Vec displacement, std::vector<Vec3> other) {
   discrete::Positions& positions = objective_.positions();
   const model::Points& points = positions.part().model.points;
   positions.update(displacement);
-  const std::vector<Vec3> skin(positions.local().begin(), positions.local().end());
-  positions.update(other);
   struct {
     double distance;
     int rank;
   } largest{0, base::rank(positions.comm())};
   OtherRest found;
   for (int64_t i = 0; i < positions.part().owned_points; ++i) {
-    const double apart = (positions.local()[i] - skin[i]).norm();
+    const double apart = (positions.local()[i] - points.position[i] - other[i]).norm();
     if (points.layer[i] != 0 || apart <= largest.distance) continue;
     largest.distance = apart;
     for (int a = 0; a < 3; ++a) found.place[a] = points.position[i][a];
@@ -264,6 +263,7 @@ OtherRest ContactSearch::compare_skins(Vec displacement, Vec other) {
   MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, positions.comm());
   MPI_Bcast(found.place, 3, MPI_DOUBLE, largest.rank, positions.comm());
   found.distance = largest.distance;
+  found.displacement = std::move(other);
   return found;
 }
 
@@ -296,7 +296,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
       presolve(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
   bool taken = false;
   if (!near.stopped && newton(start_, accuracy, iterations) == End::reached) {
-    OtherRest other = compare_skins(displacement, start_);
+    OtherRest other = compare_skins(displacement, displacements(start_));
     const bool is_less = energy(start_) < energy_here;
     const bool is_other = other.distance > 2 * accuracy;
     Outcome there;
@@ -305,7 +305,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     there.iterations += outcome.iterations + near.iterations + iterations;
     if (taken) outcome = there;
     if (is_other && taken == is_less) {
-      other.displacement = displacements(taken ? displacement : start_);
+      if (taken) other.displacement = displacements(displacement);
       outcome.other = std::move(other);
     }
   }
@@ -315,6 +315,86 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     set_pressures(here);
   objective_.evaluate(displacement, gradient_);
   evaluations_for_other_ += objective_.evaluations() - evaluated;
+}
+
+/// Searches from `displacement`, whose energy is `energy_here`, with one point beyond the other
+/// side of its body; ends in start_. Fails where that has no less energy. Collective; `side` is
+/// null on ranks that do not own the point.
+ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displacement,
+                                              double accuracy, double energy_here) {
+  // Of the work of the contact's force over the gap: after the program, which is not exact, and
+  // after a further step.
+  constexpr double promising = 0.4, still_promising = 0.1;
+  constexpr double rounding = 1e-6;  // of the energy
+  check(VecCopy(displacement, start_));
+  objective_.evaluate(start_, gradient_);
+  subtract_contact();
+  qp_.linearize(start_);
+  double work = 0;
+  if (side) {
+    const mechanics::LinearGap& gap = side->gap;
+    work = -gap.gap * gap.area * objective_.body_contact().multipliers()[gap.constraint];
+    qp_.replace(gap);
+  }
+  work = largest_of_ranks(objective_.positions().comm(), work);
+  if (!qp_.solve(start_, slope_, predicted_to, step_)) return End::failed;
+  check(VecAXPY(start_, 1.0, step_));
+  if (energy(start_) > energy_here + promising * work) return End::failed;
+  int64_t iterations = 0;
+  End end = newton(start_, accuracy, iterations, 1);
+  if (end == End::failed && energy(start_) <= energy_here + still_promising * work)
+    end = newton(start_, accuracy, iterations);
+  const bool less = energy(start_) < energy_here - rounding * std::abs(energy_here);
+  return end == End::reached && !less ? End::failed : end;
+}
+
+/// Lets points that press near an edge of a body go round it, one at a time, where that ends at
+/// less energy. The position that is left is the outcome's other one.
+void ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
+  constexpr int max_tried = 8;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  discrete::Positions& positions = objective_.positions();
+  const int64_t evaluated = objective_.evaluations();
+  double energy_here = energy(displacement);
+  const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
+  size_t next = 0;
+  for (int n = 0; n < max_tried; ++n) {
+    const ContactPressures here = pressures();
+    struct {
+      double softness;
+      int rank;
+    } first{next < sides.size() ? sides[next].softness : none, base::rank(positions.comm())};
+    MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, positions.comm());
+    if (first.softness == none) break;
+    const bool mine = first.rank == base::rank(positions.comm());
+    const End end =
+        change_side(mine ? &sides[next++] : nullptr, displacement, accuracy, energy_here);
+    Outcome there;
+    if (end == End::reached) there = finish(start_, accuracy);
+    if (there.converged) {
+      take_other(displacement, accuracy, there, outcome);
+      energy_here = energy(displacement);
+    } else {
+      set_pressures(here);
+    }
+    if (end == End::stopped) break;
+  }
+  objective_.evaluate(displacement, gradient_);
+  evaluations_for_other_ += objective_.evaluations() - evaluated;
+}
+
+/// Takes start_, which ended in `there`, in place of `displacement`. Of this and the other rest
+/// position so far, the one that is farther away is the outcome's other one.
+void ContactSearch::take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome) {
+  OtherRest other = compare_skins(start_, displacements(displacement));
+  if (outcome.other) {
+    OtherRest earlier = compare_skins(start_, std::move(outcome.other->displacement));
+    if (earlier.distance > other.distance) other = std::move(earlier);
+  }
+  there.iterations += outcome.iterations;
+  outcome = std::move(there);
+  if (other.distance > 2 * accuracy) outcome.other = std::move(other);
+  check(VecCopy(start_, displacement));
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
@@ -349,8 +429,10 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
-  if (outcome.converged && may_have_other && gone_round(displacement))
+  if (outcome.converged && may_have_other && gone_round(displacement)) {
     consider_other(displacement, accuracy, outcome);
+    change_sides(displacement, accuracy, outcome);
+  }
   return outcome;
 }
 

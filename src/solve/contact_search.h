@@ -1,5 +1,6 @@
 #pragma once
 #include "contact_qp.h"
+#include "contact_sides.h"
 #include "repose/solve/minimizer.h"
 
 namespace repose::solve {
@@ -12,6 +13,7 @@ namespace repose::solve {
 /// of a load are where the next begins. At load 1, where points have gone round an edge of a body,
 /// the sharp bodies are approached directly from the prediction, too: where this ends elsewhere,
 /// the rest position of less energy is taken, and the outcome states the distance of the other.
+/// Then single points are tried on the other side of the edge that they press near.
 class ContactSearch : public RestSearch {
  public:
   struct PresolveStage {
@@ -43,7 +45,7 @@ class ContactSearch : public RestSearch {
   void subtract_contact();
   Outcome presolve(Vec displacement, double accuracy, const PresolveStage& to);
   enum class End { reached, failed, stopped };
-  End newton(Vec displacement, double accuracy, int64_t& iterations);
+  End newton(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns the share of the step that was taken, 0 for none.
   double take_step(Vec displacement, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
@@ -51,7 +53,10 @@ class ContactSearch : public RestSearch {
   bool gone_round(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
-  OtherRest compare_skins(Vec displacement, Vec other);
+  End change_side(const OtherSide* side, Vec displacement, double accuracy, double energy_here);
+  void change_sides(Vec displacement, double accuracy, Outcome& outcome);
+  void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
+  OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
   std::vector<Vec3> displacements(Vec state);
 
   discrete::Objective& objective_;

@@ -90,6 +90,21 @@ def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, e
 
 
 @real_head
+@pytest.mark.long
+def test_points_at_an_edge_go_to_the_side_of_less_energy_on_any_ranks(folder, environment):
+    """On five ranks the search first ends with a point of the chin on the other side of an edge."""
+    run = runner(folder, environment)
+    fused = re.sub(r"mouth:.*\n  path:.*\n", "", (folder / "real_head_genioplasty.yaml").read_text())
+    (folder / "fused.yaml").write_text(fused)
+    faces = []
+    for ranks in (1, 5):
+        done = run("repose-solve", "fused.yaml", "-accuracy", 0.01, "-output", f"fused{ranks}", ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        faces.append(skin(folder / f"fused{ranks}.h5")[1])
+    assert np.linalg.norm(faces[1] - faces[0], axis=1).max() < 0.01
+
+
+@real_head
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
     file = solve("real_head_split")
     assert last(file)["inverted_prisms"] == 0

@@ -90,6 +90,10 @@ class BodyContact {
   /// True if a point that presses on a body was within 6 mm of it at `before`, which places()
   /// returned, on another side: the normals, in the body's axes, are more than 90° apart.
   bool changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const;
+  /// Gaps to first order of points that press on a body near an edge of it, from the body's side
+  /// round that edge: negative, at most 2 mm, from a plane more than 60° from the one pressed on.
+  /// At most one a constraint. At the latest update.
+  std::vector<LinearGap> other_sides(std::span<const Vec3> position) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
   template <class Visit>
   void for_each_curvature(std::span<const LinearGap> gaps, bool exact, Visit&& visit) const {

@@ -270,6 +270,44 @@ TEST(LinearGap, GoesWithABodyThatMoves) {
   }
 }
 
+/// A point that presses on the top of a box that has moved, so far from its edge, mm.
+struct AtEdge {
+  BodyContact loop;
+  std::vector<Vec3> position;
+};
+AtEdge pressing_on_box(double from_edge) {
+  RigidBody box(scene::Box{{0, 0, 0}, {10, 8, 6}}, -1, Vec3::Zero());
+  box.place(turn, shift);
+  model::ContactPairs pairs;
+  pairs.point = {0}, pairs.body = {0}, pairs.area = {2}, pairs.offset = {0};
+  pairs.binding = {model::Binding::touches};
+  AtEdge made{BodyContact(pairs, 0.7, {box}), {gone(Vec3(5 - from_edge, 0, 3.01))}};
+  made.loop.set_multipliers(std::vector{0.1});
+  made.loop.update_gaps(made.position);
+  return made;
+}
+
+TEST(BodyContact, FindsTheSideRoundTheEdgeThatAPointPressesNear) {
+  const AtEdge near = pressing_on_box(0.7);
+  const std::vector<LinearGap> sides = near.loop.other_sides(near.position);
+  ASSERT_EQ(sides.size(), 1U);
+  const auto& [point, normal] = sides[0].gradient.front();
+  EXPECT_EQ(point, 0);
+  EXPECT_LT(normal.dot(turn * Vec3::UnitZ()), 0.5);
+  double beyond = -1e9;  // of the box, along the normal from the point
+  for (const double x : {-5, 5})
+    for (const double y : {-4, 4})
+      for (const double z : {-3, 3})
+        beyond = std::max(beyond, normal.dot(gone(Vec3(x, y, z)) - near.position[0]));
+  EXPECT_NEAR(sides[0].gap, -beyond, 1e-12) << "a plane that touches the box";
+  EXPECT_GE(sides[0].gap, -0.7);
+  const AtEdge far = pressing_on_box(3.5);
+  EXPECT_TRUE(far.loop.other_sides(far.position).empty());
+  AtEdge free = pressing_on_box(0.7);
+  free.loop.set_multipliers(std::vector{0.0});
+  EXPECT_TRUE(free.loop.other_sides(free.position).empty());
+}
+
 TEST(SplineWeights, ReproduceStraightLinesAndGoOnStraight) {
   for (const int controls : {2, 3, 4, 7})
     for (double at = -1; at <= controls; at += 0.37) {
