@@ -74,7 +74,7 @@ bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   requested.volume = scene::VolumeTerm::penalty;
   requested.bulk_modulus = model::default_bulk_modulus(scene.tissue, requested, model);
   const solve::Settings settings = app::settings_of(requested, false);
-  results::ResultFile file(alone, name, model);
+  results::ResultFile file(alone, name, model, model::all_rows(model));
   const solve::Summary summary =
       solve::find_repose(alone, model, settings, {},
                          [&](const model::StepNumbers& numbers, const model::StepRows& rows) {

@@ -7,6 +7,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/mechanics/term.h"
 #include "repose/model/build.h"
 #include "repose/results/result_file.h"
@@ -37,9 +38,11 @@ base::Exit run(const base::Options& options) {
     skin.numbers.assign(model.skin.size(), options.number("pressure"));
     model.elements.push_back(std::move(skin));
   });
-  results::ResultFile file(MPI_COMM_WORLD, "own_energy", model);
+  const discrete::LocalModel local = discrete::distribute_model(MPI_COMM_WORLD, std::move(model));
+  results::ResultFile file(MPI_COMM_WORLD, "own_energy", local.global_metadata,
+                           discrete::NaturalRows::of_model(MPI_COMM_WORLD, local));
   const solve::Summary summary = solve::find_repose(
-      MPI_COMM_WORLD, model, settings, {},
+      MPI_COMM_WORLD, local.part, settings, {},
       [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
   file.commit();
   base::on_root(MPI_COMM_WORLD, [] {

@@ -14,12 +14,12 @@ namespace {
 constexpr double still = 0.1;  // mm, below which a skin point does not count as moving
 
 /// Mean distance of two positions of the skin points that move.
-double mean_difference(const model::Model& model, const std::vector<Vec3>& position,
+double mean_difference(const GridSequence& sequence, const std::vector<Vec3>& position,
                        const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double sum = 0, count = 0;
   for (size_t i = 0; i < a.size(); ++i) {
-    if (model.points.layer[i] > 0) continue;
-    if ((position[i] - model.points.position[i]).norm() < still) continue;
+    if (sequence.layer[i] > 0) continue;
+    if ((position[i] - sequence.initial[i]).norm() < still) continue;
     sum += (a[i] - b[i]).norm();
     ++count;
   }
@@ -79,23 +79,21 @@ std::string describe_convergence(const GridSequence& sequence, double requested,
                            : fmt::format(": MORE THAN THE {:g} mm REQUESTED: {}", requested, why));
 }
 
-Discretization discretization_of(const model::Model& fine, const std::vector<Vec3>& position,
-                                 const GridSequence& sequence) {
+Discretization discretization_of(const std::vector<Vec3>& position, const GridSequence& sequence) {
   Discretization found;
   found.at_point.assign(position.size(), 0.0);
   if (!sequence.before.empty()) {
-    const double last = mean_difference(fine, position, position, sequence.position);
-    const double before = mean_difference(fine, position, sequence.position, sequence.before);
+    const double last = mean_difference(sequence, position, position, sequence.position);
+    const double before = mean_difference(sequence, position, sequence.position, sequence.before);
     found.observed = last > 0 && before > last;
     if (found.observed) found.order = std::clamp(std::log2(before / last), 0.5, 2.0);
   }
   const double share = 1 / (std::exp2(found.order) - 1);
   std::vector<double> moving;
   for (size_t i = 0; i < position.size(); ++i) {
-    if (fine.points.layer[i] > 0) continue;
+    if (sequence.layer[i] > 0) continue;
     found.at_point[i] = share * (position[i] - sequence.position[i]).norm();
-    if ((position[i] - fine.points.position[i]).norm() >= still)
-      moving.push_back(found.at_point[i]);
+    if ((position[i] - sequence.initial[i]).norm() >= still) moving.push_back(found.at_point[i]);
   }
   if (moving.empty()) return found;
   std::sort(moving.begin(), moving.end());

@@ -17,26 +17,6 @@ constexpr double fade = 20;              // mm
 constexpr double ridge = 0.01;           // of the mean square extent of the neighbors
 constexpr double beyond_farthest = 1.1;  // where the weights end
 
-/// The skin of a model by itself.
-struct OwnSkin {
-  surface::Surface skin;
-  std::vector<Vec3> displacement;
-};
-
-OwnSkin skin_of(const model::Model& model, const std::vector<Vec3>& displacement) {
-  OwnSkin points{{"solved skin", {}, {}}, {}};
-  std::vector<int64_t> row(displacement.size(), -1);
-  for (size_t i = 0; i < displacement.size(); ++i) {
-    if (model.points.layer[i] != 0) continue;
-    row[i] = static_cast<int64_t>(points.displacement.size());
-    points.skin.points.push_back(model.points.position[i]);
-    points.displacement.push_back(displacement[i]);
-  }
-  for (const auto& [a, b, c] : model.skin)
-    points.skin.triangles.push_back({row[a], row[b], row[c]});
-  return points;
-}
-
 /// A copy whose triangles share the points that lie at one place, as the sides of cuts do.
 surface::Surface welded(const surface::Surface& skin) {
   std::map<std::array<double, 3>, int64_t> first;
@@ -153,12 +133,6 @@ surface::PointData displacement_of_given(const surface::Surface& given,
     for (const auto& [row, weight] : sum) moved += weight * displacement[row];
   }
   return data;
-}
-
-surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
-                                         const std::vector<Vec3>& displacement) {
-  const OwnSkin own = skin_of(model, displacement);
-  return displacement_of_given(given, own.skin, own.displacement);
 }
 
 }  // namespace repose::adapt

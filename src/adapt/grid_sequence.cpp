@@ -44,7 +44,10 @@ class SequenceSolver {
  public:
   SequenceSolver(MPI_Comm comm, const model::Anatomy& anatomy, const Model& fine,
                  const SequencePlan& requested)
-      : comm_(comm), anatomy_(anatomy), fine_(fine), requested_(requested) {}
+      : comm_(comm), anatomy_(anatomy), fine_(fine), requested_(requested) {
+    sequence_.initial = fine.points.position;
+    sequence_.layer = fine.points.layer;
+  }
 
   GridSequence run() {
     const base::ScopedOption method("-tao_type", "ntr");

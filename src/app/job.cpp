@@ -73,7 +73,6 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
   base::collective_try(comm, [&] {
     scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
   });
-  job.layers = scene.tissue.layers;
   job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
   base::on_root(comm, [&] {
     model::BuildReport report = geometry->report();
@@ -143,6 +142,12 @@ void share(MPI_Comm comm, Job& job) {
 }
 
 }  // namespace
+
+void distribute(MPI_Comm comm, Job& job) {
+  if (job.local_model) return;
+  job.local_model = discrete::distribute_model(comm, std::move(job.model));
+  job.model = std::move(job.local_model->global_metadata);
+}
 
 Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
              const Watch& watch, const scene::SceneChanges& changes) {

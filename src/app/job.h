@@ -15,9 +15,8 @@ namespace repose::app {
 
 /// A scene or a model, read and built: what is to be solved.
 struct Job {
-  model::Model model;  ///< on rank 0; global metadata of a fully distributed model
-  std::optional<discrete::LocalModel> local_model;  ///< on all ranks, of a fully distributed model
-  int64_t layers = 0;                               ///< of a fully distributed model, on all ranks
+  model::Model model;  ///< on rank 0; once the model is distributed, its global metadata
+  std::optional<discrete::LocalModel> local_model;  ///< on all ranks, once it is distributed
   scene::Solve requested;                           ///< the scene's, bulk modulus set; on all ranks
   std::optional<model::Anatomy> anatomy;            ///< of a scene, on rank 0
   std::optional<solve::ReferenceState>
@@ -42,5 +41,8 @@ struct Job {
 Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
              const std::function<void(double)>& watch = {},
              const scene::SceneChanges& changes = {});
+
+/// Distributes the model of a job, unless the ranks made their parts. Collective.
+void distribute(MPI_Comm comm, Job& job);
 
 }  // namespace repose::app

@@ -64,7 +64,6 @@ void require_plan(const std::filesystem::path& input, const Job& job) {
 struct PlanSession::State {
   MPI_Comm comm;
   Job job;
-  discrete::Part own;  // where the model was built on rank 0
   std::vector<Piece> pieces;
   std::vector<solve::PlanPiece> plan;
   std::vector<solve::Stratum> strata;
@@ -74,7 +73,7 @@ struct PlanSession::State {
   std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
   std::optional<solve::RestSolver> solver;  // once a solve is requested
 
-  discrete::Part& part() { return job.local_model ? job.local_model->part : own; }
+  discrete::Part& part() { return job.local_model->part; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
   std::vector<Vec3> weights(const std::vector<std::pair<int64_t, Vec3>>& functional);
@@ -197,7 +196,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
     base::broadcast(comm, name);
     s.pieces.push_back({name, piece.bone, piece.centroid, piece.placement});
   }
-  if (!s.job.local_model) s.own = discrete::distribute(comm, s.job.model);
+  distribute(comm, s.job);
 }
 
 PlanSession::~PlanSession() = default;
@@ -207,7 +206,6 @@ const scene::Plan& PlanSession::box() const { return state_->box; }
 double PlanSession::accuracy() const { return state_->settings.path.accuracy; }
 const model::Model& PlanSession::model() const { return state_->job.model; }
 const std::string& PlanSession::building() const { return state_->job.building; }
-int64_t PlanSession::layers() const { return state_->job.local_model ? state_->job.layers : 0; }
 
 const surface::Surface* PlanSession::given_skin() const {
   const auto& anatomy = state_->job.anatomy;
@@ -256,12 +254,8 @@ void PlanSession::write(const std::filesystem::path& name) {
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
   std::optional<results::NameLock> lock;
   base::on_root(s.comm, [&] { lock.emplace(name); });
-  results::ResultFile file =
-      s.job.local_model
-          ? results::ResultFile(s.comm, name, s.job.model,
-                                discrete::NaturalRows::of_model(s.comm, *s.job.local_model),
-                                results::Kind::result)
-          : results::ResultFile(s.comm, name, s.job.model, results::Kind::result);
+  results::ResultFile file(s.comm, name, s.job.model,
+                           discrete::NaturalRows::of_model(s.comm, *s.job.local_model));
   file.append(s.last->first, s.last->second);
   file.commit();
 }

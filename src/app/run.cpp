@@ -20,7 +20,7 @@
 #include "repose/adapt/given_skin.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
-#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/results/given_skin.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
@@ -118,18 +118,14 @@ class Run {
   solve::Summary search(Writer& writer);
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
-  std::vector<Vec3> positions(const Writer& writer) const;
-  std::string write_given_skin(const std::vector<Vec3>& position) const;
-  std::string describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
-                                    const Writer& writer) const;
+  std::string write_given_skin(const SolvedSkin& skin, const std::vector<Vec3>& now) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
-  std::string describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
-                              const Writer& writer) const;
+  std::string describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
+                              const solve::Summary& summary, const Writer& writer) const;
 
-  const discrete::Part& part() const { return job_.local_model ? job_.local_model->part : shared_; }
+  const discrete::Part& part() const { return job_.local_model->part; }
 
   Job& job_;
-  discrete::Part shared_;  // of a model that rank 0 built, once it is searched
   Strategy strategy_;
   std::string name_;
   base::Stages& stages_;
@@ -152,12 +148,15 @@ bool Run::is_done(const model::StepNumbers& end) const {
          !strategy_.sensitivity && !strategy_.tangents.requested() && !strategy_.tears;
 }
 
-/// Makes a finished result that of this run's name, unless it is. On rank 0.
+/// Makes a finished result that of this run's name, unless it is. Collective.
 void Run::copy_result(const std::filesystem::path& file) const {
   std::ifstream one(file, std::ios::binary), other(name_ + ".h5", std::ios::binary);
   using Bytes = std::istreambuf_iterator<char>;
-  if (other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes())) return;
-  results::ResultFile copy(MPI_COMM_SELF, name_, job_.model);
+  bool same = other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes());
+  MPI_Bcast(&same, 1, MPI_C_BOOL, 0, comm);
+  if (same) return;
+  results::ResultFile copy(comm, name_, job_.model,
+                           discrete::NaturalRows::of_model(comm, *job_.local_model));
   copy.keep(file, results::step_count(file));
   copy.commit();
 }
@@ -174,11 +173,13 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
     done = true;
     folded = from.end->inverted_prisms > 0 && !folds_allowed;
     print(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
-    copy_result(file);
   });
   for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (!done) return {};
-  print(write_given_skin(discrete::gather_points(comm, start_.position)));
+  distribute(comm, job_);
+  copy_result(file);
+  const SolvedSkin skin(comm, job_);
+  print(write_given_skin(skin, skin.points_at(start_.position)));
   return folded ? base::Exit::not_converged : base::Exit::done;
 }
 
@@ -226,18 +227,13 @@ Coarser Run::solve_coarser() {
   return coarser;
 }
 
-/// Finds the rest position of the job's model, which rank 0 frees where only the search needs
-/// it: of a large model it is a fifth of the memory.
+/// Finds the rest position of the job's model.
 solve::Summary Run::search(Writer& writer) {
   solve::Settings settings = strategy_.settings;
   settings.derivatives = strategy_.tangents;
   settings.on_iterate = [&](double load, const auto& snapshot) {
     writer.on_iterate(load, snapshot);
   };
-  if (!job_.local_model) {
-    shared_ = discrete::distribute(comm, job_.model);
-    if (!writer.makes_checkpoints() && !writer.compares()) job_.model = {};
-  }
   solve::Summary summary = solve::find_repose(comm, part(), settings, start_, std::ref(writer));
   if (summary.path.complete() && !writer.unsettled().empty()) {
     summary.path.last.converged = false;
@@ -266,42 +262,22 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
   return check;
 }
 
-/// Positions of the points at the last step, or of the skin alone where no rank holds the whole
-/// model; on rank 0. Collective.
-std::vector<Vec3> Run::positions(const Writer& writer) const {
-  return job_.local_model ? writer.skin_positions(job_.layers) : writer.positions();
-}
-
 /// Writes the displacement of the given skin, in the place of which another was solved, to
-/// NAME_given_skin.vtp and into the result. Collective; `position` as positions() returns it.
-std::string Run::write_given_skin(const std::vector<Vec3>& position) const {
+/// NAME_given_skin.vtp and into the result. `now` are the points of the solved skin. Collective.
+std::string Run::write_given_skin(const SolvedSkin& skin, const std::vector<Vec3>& now) const {
   if (!job_.remeshed) return "";
   const std::string file = name_ + "_given_skin.vtp";
-  const auto write = [&](const auto& solved, const std::vector<Vec3>& initial) {
-    std::vector<Vec3> displacement(position.size());
-    for (size_t i = 0; i < position.size(); ++i) displacement[i] = position[i] - initial[i];
+  base::on_root(comm, [&] {
+    std::vector<Vec3> displacement(now.size());
+    for (size_t i = 0; i < now.size(); ++i) displacement[i] = now[i] - skin.initial().points[i];
     const surface::Surface& given = *job_.anatomy->given_skin;
-    const surface::PointData data = adapt::displacement_of_given(given, solved, displacement);
+    const surface::PointData data =
+        adapt::displacement_of_given(given, skin.initial(), displacement);
     surface::write_surface(file, given, data);
     results::add_given_skin(name_ + ".h5", {given.points, given.triangles, data.vectors[0].values,
                                             data.fields[0].values});
-  };
-  base::on_root(comm, [&] {
-    if (job_.local_model) return write(job_.anatomy->skin, job_.anatomy->skin.points);
-    const model::Model model = results::read_model(name_ + ".h5");
-    write(model, model.points.position);
   });
   return report_row("given skin", file + ", and in the result: its vertices, with displacement");
-}
-
-/// Skin that ends inside other skin at load 1. Collective.
-std::string Run::describe_self_contact(const SolvedSkin& skin, const solve::Summary& summary,
-                                       const Writer& writer) const {
-  if (!summary.path.complete()) return "";
-  const std::vector<Vec3> position = positions(writer);
-  std::string text;
-  base::on_root(comm, [&] { text = skin.describe_self_contact(position); });
-  return text;
 }
 
 /// Describes the change of the result under varied assumptions. Collective.
@@ -315,47 +291,48 @@ std::string Run::describe_sensitivity(const solve::Summary& summary, const Write
   return describe_sensitivities(found);
 }
 
-/// First lines of the end-of-run summary: movement of the face, its accuracy, and warnings.
-/// Collective.
-std::string Run::describe_answer(const SolvedSkin& skin, const solve::Summary& summary,
-                                 const Writer& writer) const {
-  const std::vector<Vec3> position = positions(writer);
-  std::string text;
-  base::on_root(comm, [&] {
-    std::vector<model::FacePlace> places;
-    if (job_.anatomy) places = model::face_places(*job_.anatomy);
-    text = describe_movement(places, skin.initial_points(), skin.points_at(position)) + " " +
-           describe_trust(summary, writer.discretization_error()) + "\n" +
-           describe_warnings(job_.warnings);
-  });
-  return text;
+/// First lines of the end-of-run summary: movement of the face, its accuracy, and warnings. `now`
+/// are the points of the skin. On rank 0.
+std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
+                                 const solve::Summary& summary, const Writer& writer) const {
+  std::vector<model::FacePlace> places;
+  if (job_.anatomy) places = model::face_places(*job_.anatomy);
+  return describe_movement(places, skin.initial().points, now) + " " +
+         describe_trust(summary, writer.discretization_error()) + "\n" +
+         describe_warnings(job_.warnings);
 }
 
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  Writer writer(comm, name_, job_.model, job_.local_model ? &*job_.local_model : nullptr, coarser,
-                checkpoint_interval, unsettled(tearing));
+  distribute(comm, job_);
+  Writer writer(comm, name_, job_, coarser, checkpoint_interval, unsettled(tearing));
   if (kept_ > 0) writer.keep(earlier_, kept_);
   const Saving saving(interrupt_, writer, name_);
-  const SolvedSkin skin(job_);
+  const SolvedSkin skin(comm, job_);
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
   const std::string folds = folded ? describe_folds(summary.last, writer) : "";
-  const std::string given = write_given_skin(positions(writer));
+  const std::vector<Vec3> now = skin.points_at(writer.slab());
+  const std::string given = write_given_skin(skin, now);
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
-  print(describe_answer(skin, summary, writer));
+  std::string answer, self_contact;
+  base::on_root(comm, [&] {
+    answer = describe_answer(skin, now, summary, writer);
+    if (summary.path.complete()) self_contact = skin.describe_self_contact(now);
+  });
+  print(answer);
   print(folds + describe_failure(summary, job_.reference_state.has_value()));
   print(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
         describe_tangents(writer.point_fields()));
   if (path) print(describe_path(*path));
-  print(writer.reactions(part(), job_.held) + describe_contact(job_.bodies, summary) +
+  print(writer.reactions() + describe_contact(job_.bodies, summary) +
         describe_pierced(job_.bodies, summary.pierced));
-  print(describe_self_contact(skin, summary, writer));
+  print(self_contact);
   print(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
   print(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());

@@ -6,39 +6,37 @@
 #include <set>
 
 #include "report.h"
-#include "repose/base/geometry.h"
+#include "repose/discrete/gather.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/surface/intersections.h"
 
 namespace repose::app {
 
-SolvedSkin::SolvedSkin(const Job& job) {
-  if (job.local_model) {
-    if (job.anatomy) initial_ = job.anatomy->skin;
-    for (size_t i = 0; i < initial_.points.size(); ++i) row_.push_back(static_cast<int64_t>(i));
-    on_a_side_.resize(row_.size(), 0);
-    return;
-  }
-  for (const Triangle& t : job.model.skin) row_.insert(row_.end(), t.begin(), t.end());
+SolvedSkin::SolvedSkin(MPI_Comm comm, const Job& job) : comm_(comm) {
+  const model::Model& model = job.model;
+  for (const Triangle& t : model.skin) row_.insert(row_.end(), t.begin(), t.end());
   std::sort(row_.begin(), row_.end());
   row_.erase(std::unique(row_.begin(), row_.end()), row_.end());
   const auto number = [&](int64_t row) {
     return std::lower_bound(row_.begin(), row_.end(), row) - row_.begin();
   };
-  for (const int64_t row : row_) initial_.points.push_back(job.model.points.position[row]);
-  for (const Triangle& t : job.model.skin)
+  for (const Triangle& t : model.skin)
     initial_.triangles.push_back({number(t[0]), number(t[1]), number(t[2])});
-  const std::set<int64_t> sides(job.model.contact.cut_faces.point.begin(),
-                                job.model.contact.cut_faces.point.end());
+  const std::vector<int64_t>& beside = model.contact.cut_faces.point;
+  const std::set<int64_t> sides(beside.begin(), beside.end());
   for (const int64_t row : row_) on_a_side_.push_back(sides.contains(row));
+  const discrete::Part& part = job.local_model->part;
+  initial_.points =
+      points_at(discrete::NaturalRows(comm, part).natural(part.model.points.position));
 }
 
-std::vector<Vec3> SolvedSkin::points_at(const std::vector<Vec3>& position) const {
-  return base::pick(position, row_);
+std::vector<Vec3> SolvedSkin::points_at(const std::vector<Vec3>& slab) const {
+  return discrete::gather_points(comm_, slab, row_);
 }
 
-std::string SolvedSkin::describe_self_contact(const std::vector<Vec3>& position) const {
+std::string SolvedSkin::describe_self_contact(const std::vector<Vec3>& points) const {
   surface::Surface now = initial_;
-  now.points = points_at(position);
+  now.points = points;
   const auto beside_cut = [&](int64_t triangle) {
     return std::ranges::any_of(now.triangles[triangle],
                                [&](int64_t point) { return on_a_side_[point] != 0; });

@@ -10,18 +10,20 @@ namespace repose::app {
 /// other skin is reported: nothing keeps it apart.
 class SolvedSkin {
  public:
-  explicit SolvedSkin(const Job& job);
+  /// Of a job that is distributed. Collective.
+  SolvedSkin(MPI_Comm comm, const Job& job);
 
   /// Row of the closing table on triangles that pass through others and did not at the start, empty
-  /// without any. `position`: of all points of the model, or of the skin alone if the model is
-  /// distributed. Pairs beside the same cut are left out if contact keeps its sides apart.
-  std::string describe_self_contact(const std::vector<Vec3>& position) const;
+  /// without any. `points` are those of points_at(). Pairs beside the same cut are left out if
+  /// contact keeps its sides apart. On rank 0.
+  std::string describe_self_contact(const std::vector<Vec3>& points) const;
 
-  /// Where its points were, and where they are.
-  const std::vector<Vec3>& initial_points() const { return initial_.points; }
-  std::vector<Vec3> points_at(const std::vector<Vec3>& position) const;
+  const surface::Surface& initial() const { return initial_; }
+  /// Its points, on rank 0, of this rank's slab of positions. Collective.
+  std::vector<Vec3> points_at(const std::vector<Vec3>& slab) const;
 
  private:
+  MPI_Comm comm_;
   surface::Surface initial_;
   std::vector<int64_t> row_;     // [points] of the model
   std::vector<char> on_a_side_;  // [points] it is on a side of a cut that contact keeps apart

@@ -9,23 +9,19 @@
 
 namespace repose::app {
 
-Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-               const discrete::LocalModel* local_model, const Coarser& coarser, double interval,
-               std::string unsettled)
+Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const Job& job,
+               const Coarser& coarser, double interval, std::string unsettled)
     : comm_(comm),
       name_(name),
-      model_(model),
-      local_model_(local_model),
+      job_(job),
       coarser_(coarser),
       unsettled_(std::move(unsettled)),
       file_(open("", results::Kind::result)),
       interval_(interval) {}
 
 results::ResultFile Writer::open(const std::string& ending, results::Kind kind) const {
-  const std::filesystem::path file = name_.string() + ending;
-  if (!local_model_) return results::ResultFile(comm_, file, model_, kind);
-  return results::ResultFile(comm_, file, model_,
-                             discrete::NaturalRows::of_model(comm_, *local_model_), kind);
+  return results::ResultFile(comm_, name_.string() + ending, job_.model,
+                             discrete::NaturalRows::of_model(comm_, *job_.local_model), kind);
 }
 
 void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
@@ -66,16 +62,6 @@ std::vector<Vec3> Writer::positions() const {
   return discrete::gather_points(comm_, last_.rows.position);
 }
 
-std::vector<Vec3> Writer::skin_positions(int64_t layers) const {
-  auto rows = static_cast<int64_t>(last_.rows.position.size()), total = rows;
-  MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_INT64_T, MPI_SUM, comm_);
-  const int64_t begin = base::slab(total, base::rank(comm_), base::size(comm_)).begin;
-  std::vector<Vec3> skin;
-  for (int64_t i = (layers - begin % layers) % layers; i < rows; i += layers)
-    skin.push_back(last_.rows.position[i]);
-  return discrete::gather_points(comm_, skin);
-}
-
 std::vector<double> Writer::volume_ratios() const {
   const std::vector<double>& ratio = last_.rows.volume_ratio;
   return discrete::gather(comm_, ratio.data(), ratio.size());
@@ -88,10 +74,10 @@ std::vector<double> Writer::contact_pressures() const {
   return {};
 }
 
-std::string Writer::reactions(const discrete::Part& part,
-                              const std::vector<std::vector<int64_t>>& held) const {
-  const auto forces = solve::reactions(comm_, part, held, last_.numbers, last_.rows.position);
-  return forces.empty() ? "" : describe_reactions(held, forces);
+std::string Writer::reactions() const {
+  const auto forces = solve::reactions(comm_, job_.local_model->part, job_.held, last_.numbers,
+                                       last_.rows.position);
+  return forces.empty() ? "" : describe_reactions(job_.held, forces);
 }
 
 void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
@@ -100,7 +86,7 @@ void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
   const std::vector<Vec3> position = discrete::gather_points(comm_, rows.position);
   std::vector<Vec3> at_point(position.size());
   base::on_root(comm_, [&] {
-    const auto found = adapt::discretization_of(model_, position, *coarser_.compared);
+    const auto found = adapt::discretization_of(position, *coarser_.compared);
     numbers.discretization_error = found.largest;
     comparison_ = adapt::describe_discretization(found);
     for (size_t i = 0; i < at_point.size(); ++i) at_point[i].x() = found.at_point[i];

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "job.h"
 #include "repose/adapt/grid_sequence.h"
 #include "repose/results/result_file.h"
 #include "repose/solve/repose.h"
@@ -22,12 +23,10 @@ struct Coarser {
 /// members that write or gather are collective.
 class Writer {
  public:
-  /// `local_model`: the local model of a fully distributed model, or none; `model` is its global
-  /// metadata then. `interval` in s between checkpoints, 0 for none; `unsettled`: why not even a
-  /// rest position at load 1 is the end, or empty.
-  Writer(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-         const discrete::LocalModel* local_model, const Coarser& coarser, double interval,
-         std::string unsettled);
+  /// `job` is distributed. `interval` in s between checkpoints, 0 for none; `unsettled`: why not
+  /// even a rest position at load 1 is the end, or empty.
+  Writer(MPI_Comm comm, const std::filesystem::path& name, const Job& job, const Coarser& coarser,
+         double interval, std::string unsettled);
 
   void operator()(model::StepNumbers numbers, model::StepRows rows);
   /// At an iteration of a search.
@@ -40,7 +39,6 @@ class Writer {
   bool save() { return file_.save(); }
 
   bool makes_checkpoints() const { return interval_ > 0; }
-  bool compares() const { return coarser_.compared.has_value(); }
   const std::string& unsettled() const { return unsettled_; }
   /// Returns the estimated discretization error of the skin, on rank 0.
   const std::string& comparison() const { return comparison_; }
@@ -53,16 +51,13 @@ class Writer {
   const std::vector<Vec3>& slab() const { return last_.rows.position; }
   /// [N] and [prisms] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
-  /// Returns every `layers`-th point: in a model of layers, the skin.
-  std::vector<Vec3> skin_positions(int64_t layers) const;
   std::vector<double> volume_ratios() const;
   /// [N] N/mm², or nothing where tissue touches nothing; likewise.
   std::vector<double> contact_pressures() const;
   /// This rank's rows of what else is known of the points at the last step.
   const std::vector<model::PointField>& point_fields() const { return last_.rows.point_fields; }
   /// Describes the reaction forces on the instruments in the last step, on rank 0.
-  std::string reactions(const discrete::Part& part,
-                        const std::vector<std::vector<int64_t>>& held) const;
+  std::string reactions() const;
 
  private:
   struct Step {
@@ -76,8 +71,7 @@ class Writer {
 
   MPI_Comm comm_;
   std::filesystem::path name_;
-  const model::Model& model_;
-  const discrete::LocalModel* local_model_;
+  const Job& job_;
   const Coarser& coarser_;
   std::string comparison_, unsettled_;
   results::ResultFile file_;

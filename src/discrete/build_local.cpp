@@ -7,6 +7,7 @@
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
 #include "repose/discrete/message.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/discrete/part.h"
 
 namespace repose::discrete {
@@ -132,7 +133,7 @@ void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& lo
   for (const int64_t point : model.contact.pairs.point)
     column.push_back(model.points.column[point]);
   ColumnRows rows = rows_by_column(comm, rank_columns.columns, column);
-  local_model.pair_row = std::move(rows.row);
+  local_model.part.pair_row = std::move(rows.row);
   local_model.contact_pairs = rows.total;
 }
 
@@ -176,7 +177,8 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, model);
   number_rows(rank_columns, edges.row, part);
   number_pairs(comm, rank_columns, local_model);
-  local_model.outward = pick(model::outward_normals(model), points);
+  local_model.outward =
+      NaturalRows(comm, part).natural(pick(model::outward_normals(model), points));
   local_model.counts = count_all(comm, part, edges.total);
   local_model.global_metadata.contact.bodies = model.contact.bodies;
   local_model.global_metadata.contact.stiffness = model.contact.stiffness;

@@ -95,6 +95,7 @@ void pick_points(const Distribution& distribution, Part& part) {
   model::Points& mine = part.model.points;
   mine.position = pick(all.position, part.point_row);
   mine.set = pick(distribution.set, part.point_row);
+  part.original_set = pick(all.set, std::span(part.point_row).first(part.owned_points));
   mine.target = pick(all.target, part.point_row);
   mine.layer = pick(all.layer, part.point_row);
   mine.column = pick(all.column, part.point_row);
@@ -116,7 +117,8 @@ std::vector<surface::Surface> body_meshes(const Model& model) {
 }
 
 /// The constraints of the points that a rank owns.
-model::Contact pick_contact(const Distribution& distribution, LocalNumbers& local, int rank) {
+model::Contact pick_contact(const Distribution& distribution, LocalNumbers& local, int rank,
+                            std::vector<int64_t>& pair_row) {
   const model::Contact& all = distribution.model.contact;
   const auto mine = [&](const std::vector<int64_t>& points) {
     std::vector<int64_t> rows;
@@ -129,7 +131,7 @@ model::Contact pick_contact(const Distribution& distribution, LocalNumbers& loca
     for (int64_t& point : points) point = local.of(point);
   };
   model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
-  const std::vector<int64_t> rows = mine(all.pairs.point);
+  const std::vector<int64_t>& rows = pair_row = mine(all.pairs.point);
   part.pairs = {pick(all.pairs.point, rows), pick(all.pairs.body, rows),
                 pick(all.pairs.binding, rows), pick(all.pairs.area, rows),
                 pick(distribution.contact_offset, rows)};
@@ -196,7 +198,7 @@ Part make_part(const Distribution& distribution, const OwnedRange& owned, LocalN
   pick_solid(distribution, local, rank, part);
   for (const model::TermElements& elements : model.elements)
     part.model.elements.push_back(pick_elements(distribution, elements, local, rank));
-  part.model.contact = pick_contact(distribution, local, rank);
+  part.model.contact = pick_contact(distribution, local, rank, part.pair_row);
   part.contact = !model.contact.empty();
   part.bodies = distribution.bodies;
   if (!distribution.bodies.empty()) part.body_meshes = body_meshes(model);

@@ -133,33 +133,47 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   const NaturalRows natural(comm, part);
   model::ModelRows rows;
   rows.counts = local_model.counts;
+  rows.solid = part.solid;
   rows.contact_pairs = local_model.contact_pairs;
   const auto to_slab = [&](const Rows& of, const auto& values) {
     return natural.to_slab_each(of, values);
   };
   const Rows& points = natural.points_;
   const model::Points& p = part.model.points;
-  rows.points = {to_slab(points, p.position), to_slab(points, p.set),
+  rows.points = {to_slab(points, p.position), to_slab(points, part.original_set),
                  to_slab(points, p.target),   to_slab(points, p.layer),
                  to_slab(points, p.column),   to_slab(points, p.bone),
                  to_slab(points, p.mass),     to_slab(points, p.external_force)};
-  rows.outward = to_slab(points, local_model.outward);
+  rows.outward = local_model.outward;
+  const Rows& springs = natural.springs_;
+  const model::Springs& s = part.model.springs;
+  rows.springs = {to_slab(springs, in_rows(s.points, part.owned_springs, part.point_row)),
+                  to_slab(springs, s.set),
+                  to_slab(springs, s.rest_length),
+                  to_slab(springs, s.stiffness),
+                  to_slab(springs, s.exponent),
+                  to_slab(springs, s.reference)};
   const Rows& prisms = natural.prisms_;
   const model::Prisms& m = part.model.prisms;
   int averaged = !m.nodal_modulus.empty();
   MPI_Allreduce(MPI_IN_PLACE, &averaged, 1, MPI_INT, MPI_MAX, comm);
   rows.prisms = {to_slab(prisms, in_rows(m.points, part.owned_prisms, part.point_row)),
                  to_slab(prisms, m.rest_volume),
-                 to_slab(prisms, m.shear_modulus),
-                 to_slab(prisms, m.modulus),
-                 to_slab(prisms, m.target_volume),
+                 {},
+                 {},
+                 {},
                  {}};
+  if (part.solid) {
+    rows.prisms.shear_modulus = to_slab(prisms, m.shear_modulus);
+    rows.prisms.modulus = to_slab(prisms, m.modulus);
+    rows.prisms.target_volume = to_slab(prisms, m.target_volume);
+  }
   if (averaged != 0) rows.prisms.nodal_modulus = to_slab(prisms, m.nodal_modulus);
   const Rows edges{part.edge_row, local_model.counts.edges, 1};
   const model::Edges& e = part.model.edges;
   rows.edges = {to_slab(edges, in_rows(e.points, part.owned_edges, part.point_row)),
                 to_slab(edges, e.weight)};
-  const Rows touching{local_model.pair_row, local_model.contact_pairs, 1};
+  const Rows touching{part.pair_row, local_model.contact_pairs, 1};
   const model::ContactPairs& t = part.model.contact.pairs;
   rows.pairs = {to_slab(touching, base::pick(part.point_row, t.point)), to_slab(touching, t.body),
                 to_slab(touching, t.binding), to_slab(touching, t.area)};

@@ -114,7 +114,8 @@ void pass(Archive& archive, Part& part) {
   pass_bodies(archive, part.bodies);
   pass_meshes(archive, part.body_meshes);
   archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
-          part.point_row, part.spring_row, part.prism_row, part.edge_row, part.unknown);
+          part.point_row, part.spring_row, part.prism_row, part.edge_row, part.pair_row,
+          part.original_set, part.unknown);
   archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
           part.total_prisms, part.total_unknowns);
 }
@@ -168,6 +169,41 @@ Part distribute(MPI_Comm comm, const Model& model) {
     base::collective_try(comm, [&] { send_part(comm, r, part); });
   }
   return part;
+}
+
+namespace {
+
+/// Removes contact's pairs of points that are not free to move.
+void remove_fixed_pairs(Model& model) {
+  model::ContactPairs& pairs = model.contact.pairs;
+  std::vector<int64_t> free;
+  for (size_t c = 0; c < pairs.point.size(); ++c)
+    if (model.points.set[pairs.point[c]] == PointSet::soft_tissue)
+      free.push_back(static_cast<int64_t>(c));
+  pairs = {pick(pairs.point, free), pick(pairs.body, free), pick(pairs.binding, free),
+           pick(pairs.area, free)};
+}
+
+}  // namespace
+
+LocalModel distribute_model(MPI_Comm comm, Model&& model) {
+  LocalModel local_model;
+  base::on_root(comm, [&] {
+    remove_fixed_pairs(model);
+    local_model.counts = model::count(model);
+    local_model.contact_pairs = static_cast<int64_t>(model.contact.pairs.point.size());
+  });
+  MPI_Bcast(&local_model.counts, sizeof local_model.counts, MPI_BYTE, 0, comm);
+  MPI_Bcast(&local_model.contact_pairs, 1, MPI_INT64_T, 0, comm);
+  local_model.part = distribute(comm, model);
+  local_model.outward = base::scatter(comm, model::outward_normals(model));
+  model.points = {};
+  model.springs = {};
+  model.prisms = {};
+  model.edges = {};
+  model.contact.pairs = {};
+  local_model.global_metadata = std::move(model);
+  return local_model;
 }
 
 }  // namespace repose::discrete

@@ -366,6 +366,12 @@ Counts count(const Model& model) {
   return c;
 }
 
+ModelRows all_rows(const Model& model) {
+  return {count(model), is_solid(model),     static_cast<int64_t>(model.contact.pairs.point.size()),
+          model.points, model.springs,       model.prisms,
+          model.edges,  model.contact.pairs, outward_normals(model)};
+}
+
 void validate(const Model& model, const std::string& file) {
   const ArrayCheck check(file);
   check_arrays(model, check);

@@ -1,6 +1,7 @@
 #include "model_write.h"
 
-#include <optional>
+#include <map>
+#include <sstream>
 #include <type_traits>
 
 #include "writer.h"
@@ -43,26 +44,15 @@ auto numbers(const std::vector<Value>& values) {
     return values.data();
 }
 
-/// The arrays of a group. `all`: they are slabs of so many rows, to be written later.
+/// Creates the arrays of a group, of which rank 0 has the first of so many rows.
 template <class Group>
-void write_arrays(hid_t group, const Group& of, std::optional<int64_t> all) {
-  model::for_each_array(of, [&]<class Value>(const char* name, const std::vector<Value>& values) {
-    std::vector<hsize_t> shape = {all ? static_cast<hsize_t>(*all) : values.size()};
-    if (width < Value >> 0) shape.push_back(width<Value>);
-    write_array(group, name, shape, all ? nullptr : numbers(values));
-  });
-}
-
-void write_springs(hid_t model, const model::Springs& springs) {
-  if (springs.points.empty()) return;
-  const base::Hdf5Group group = base::create_hdf5_group(model, "spring");
-  const hsize_t s = springs.points.size();
-  write_array(group, "points", {s, 2}, flat(springs.points));
-  write_array(group, "set", {s}, springs.set.data());
-  write_array(group, "rest_length", {s}, springs.rest_length.data());
-  write_array(group, "stiffness", {s}, springs.stiffness.data());
-  write_array(group, "exponent", {s}, springs.exponent.data());
-  write_array(group, "reference", {s}, springs.reference.data());
+void create_arrays(hid_t group, const Group& first, int64_t rows) {
+  model::for_each_array(first,
+                        [&]<class Value>(const char* name, const std::vector<Value>& values) {
+                          std::vector<hsize_t> shape = {static_cast<hsize_t>(rows)};
+                          if (width < Value >> 0) shape.push_back(width<Value>);
+                          write_array(group, name, shape, decltype(numbers(values)){nullptr});
+                        });
 }
 
 void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
@@ -108,16 +98,13 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
   write_array(group, "body_shape", {count, model::shape_numbers}, shape.data());
 }
 
-void write_contact(hid_t model, const model::Contact& contact, const model::ModelRows* slabs) {
-  if (slabs ? slabs->contact_pairs == 0 : contact.empty()) return;
+void write_contact(hid_t model, const model::Contact& contact, const model::ModelRows& slabs) {
+  if (slabs.contact_pairs == 0 && contact.cut_faces.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "contact");
   write_attribute(group, "stiffness", contact.stiffness);
   write_attribute(group, "grid", contact.spacing);
   write_bodies(group, contact.bodies);
-  if (slabs)
-    write_arrays(group, slabs->pairs, slabs->contact_pairs);
-  else
-    write_arrays(group, contact.pairs, {});
+  create_arrays(group, slabs.pairs, slabs.contact_pairs);
   const model::CutFaces& cut_faces = contact.cut_faces;
   if (cut_faces.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
@@ -163,25 +150,21 @@ void write_merged(hid_t model, const MergedBones& bones) {
 }  // namespace
 
 void write_model(const base::Hdf5File& file, const model::Model& model,
-                 const model::ModelRows* slabs, const MergedBones& bones) {
+                 const model::ModelRows& slabs, const MergedBones& bones) {
   const base::Hdf5Group root(H5Gopen2(file, "/", H5P_DEFAULT));
   write_attribute(root, "format", std::string("tissue-model"));
   write_attribute(root, "version", int64_t{1});
   const base::Hdf5Group group = base::create_hdf5_group(file, "model");
   const Vec3& g = model.gravity;
   write_attribute(group, "gravity", std::vector<double>{g.x(), g.y(), g.z()});
-  const auto write = [&](const char* name, const auto& whole, const auto* slab, int64_t rows) {
-    const base::Hdf5Group own = base::create_hdf5_group(group, name);
-    if (slab)
-      write_arrays(own, *slab, rows);
-    else
-      write_arrays(own, whole, {});
+  const auto create = [&](const char* name, const auto& first, int64_t rows) {
+    create_arrays(base::create_hdf5_group(group, name), first, rows);
   };
-  const model::Counts all = slabs ? slabs->counts : model::count(model);
-  write("point", model.points, slabs ? &slabs->points : nullptr, all.points);
-  write_springs(group, model.springs);
-  write("prism", model.prisms, slabs ? &slabs->prisms : nullptr, all.prisms);
-  if (all.edges > 0) write("edge", model.edges, slabs ? &slabs->edges : nullptr, all.edges);
+  const model::Counts& all = slabs.counts;
+  create("point", slabs.points, all.points);
+  if (all.springs > 0) create("spring", slabs.springs, all.springs);
+  create("prism", slabs.prisms, all.prisms);
+  if (all.edges > 0) create("edge", slabs.edges, all.edges);
   write_elements(group, model.elements);
   write_contact(group, model.contact, slabs);
   write_skin(group, model.skin);
@@ -194,29 +177,28 @@ void write_model(const base::Hdf5File& file, const model::Model& model,
 
 namespace {
 
-/// Memory types of what arrays hold.
-template <class Value>
-hid_t memory_type() {
-  if constexpr (width < Value >> 0)
-    return memory_type<std::decay_t<decltype(std::declval<Value>()[0])>>();
-  else if constexpr (std::is_same_v<Value, double>)
-    return H5T_NATIVE_DOUBLE;
-  else if constexpr (std::is_same_v<Value, int64_t>)
-    return H5T_NATIVE_INT64;
-  else if constexpr (std::is_same_v<Value, int32_t>)
-    return H5T_NATIVE_INT32;
-  else
-    return H5T_NATIVE_INT8;
-}
-
+/// Rank 0 knows which arrays there are: other slabs may be empty.
 template <class Group>
 void fill(MPI_Comm comm, hid_t group, const Group& slab, int64_t rows, const OnDisk& on_disk) {
   const base::Slab mine = base::slab(rows, base::rank(comm), base::size(comm));
-  model::for_each_array(slab, [&]<class Value>(const char* name, const std::vector<Value>& values) {
-    base::Hdf5Dataset dataset;
-    on_disk([&] { dataset = base::Hdf5Dataset(H5Dopen2(group, name, H5P_DEFAULT)); });
-    on_disk([&] { write_rows(comm, dataset, mine, numbers(values), memory_type<Value>()); });
+  std::map<std::string, const void*> values;
+  std::string names;
+  model::for_each_array(slab, [&](const char* name, const auto& array) {
+    values[name] = numbers(array);
+    names += std::string(name) + '\n';
   });
+  base::broadcast(comm, names);
+  std::istringstream list(names);
+  for (std::string name; std::getline(list, name);) {
+    base::Hdf5Dataset dataset;
+    base::Hdf5Type type;
+    on_disk([&] {
+      dataset = base::Hdf5Dataset(H5Dopen2(group, name.c_str(), H5P_DEFAULT));
+      const base::Hdf5Type stored(H5Dget_type(dataset));
+      type = base::Hdf5Type(H5Tget_native_type(stored, H5T_DIR_ASCEND));
+    });
+    on_disk([&] { write_rows(comm, dataset, mine, values[name], type); });
+  }
 }
 
 }  // namespace
@@ -224,26 +206,27 @@ void fill(MPI_Comm comm, hid_t group, const Group& slab, int64_t rows, const OnD
 void fill_model(MPI_Comm comm, hid_t file, const model::ModelRows& slabs, const OnDisk& on_disk) {
   const model::Counts& all = slabs.counts;
   const auto write = [&](const char* name, const auto& slab, int64_t rows) {
+    if (rows == 0) return;
     base::Hdf5Group group;
     on_disk([&] { group = base::Hdf5Group(H5Gopen2(file, name, H5P_DEFAULT)); });
     fill(comm, group, slab, rows, on_disk);
   };
   write("/model/point", slabs.points, all.points);
+  write("/model/spring", slabs.springs, all.springs);
   write("/model/prism", slabs.prisms, all.prisms);
-  if (all.edges > 0) write("/model/edge", slabs.edges, all.edges);
-  if (slabs.contact_pairs > 0) write("/model/contact", slabs.pairs, slabs.contact_pairs);
+  write("/model/edge", slabs.edges, all.edges);
+  write("/model/contact", slabs.pairs, slabs.contact_pairs);
 }
 
-int64_t model_bytes(const model::Model& model, const model::ModelRows* slabs,
+int64_t model_bytes(const model::Model& model, const model::ModelRows& slabs,
                     const MergedBones& bones) {
   const int64_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
-  const model::Counts all = slabs ? slabs->counts : model::count(model);
-  const size_t pairs = slabs ? slabs->contact_pairs : model.contact.pairs.point.size();
+  const model::Counts& all = slabs.counts;
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
   size_t elements = 0;
   for (const model::TermElements& of : model.elements)
     elements += 8 * (of.points.size() + of.numbers.size());
-  const size_t bytes = descriptions + elements + pairs * 21 +
+  const size_t bytes = descriptions + elements + slabs.contact_pairs * 21 +
                        model.contact.cut_faces.point.size() * 50 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes) + all.points * point + all.springs * spring +

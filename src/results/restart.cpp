@@ -104,11 +104,7 @@ Numbers numbers_of(const model::Model& m) {
   model::for_each_array(m.edges, numbers);
   numbers("bone_transform", m.bone_transform);
   if (!m.contact.empty()) add_contact(m.contact, numbers);
-  numbers("points", m.springs.points);
-  numbers("rest_length", m.springs.rest_length);
-  numbers("stiffness", m.springs.stiffness);
-  numbers("exponent", m.springs.exponent);
-  numbers("reference", m.springs.reference);
+  model::for_each_array(m.springs, numbers);
   for (const model::TermElements& elements : m.elements) {
     numbers("points", elements.points);
     numbers("numbers", elements.numbers);

@@ -154,7 +154,7 @@ struct ResultFile::State {
            48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
   }
   void name_bones(const model::Model& model);
-  void create(const model::Model& model, const model::ModelRows* slabs, Kind kind);
+  void create(const model::Model& model, const model::ModelRows& slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
   void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
@@ -191,7 +191,7 @@ void ResultFile::State::name_bones(const model::Model& model) {
   }
 }
 
-void ResultFile::State::create(const model::Model& model, const model::ModelRows* slabs,
+void ResultFile::State::create(const model::Model& model, const model::ModelRows& slabs,
                                Kind kind) {
   unfinished.emplace(with_ending(name, ".h5"));
   part = unfinished->part();
@@ -208,16 +208,15 @@ void ResultFile::State::create(const model::Model& model, const model::ModelRows
     base::create_hdf5_group(whole, "step");
     whole.close();
   });
-  const model::Counts of = slabs ? slabs->counts : model::count(model);
-  const bool solid = slabs || model::is_solid(model);
+  const model::Counts& of = slabs.counts;
   counts = {of.points,
             of.springs,
             of.prisms,
             static_cast<int64_t>(model.skin.size()),
             static_cast<int64_t>(bones.points.size()),
             static_cast<int64_t>(bones.triangles.size()),
-            solid,
-            solid};
+            slabs.solid,
+            slabs.solid};
 }
 
 void ResultFile::State::require_rows(const model::StepRows& rows) const {
@@ -496,37 +495,23 @@ void ResultFile::State::copy_steps(const std::filesystem::path& earlier, int64_t
   });
 }
 
-void ResultFile::open(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-                      const model::ModelRows* slabs, Kind kind) {
-  State& s = *state_;
-  s.comm = comm;
-  // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
-  s.name = std::filesystem::absolute(name);
-  base::on_root(comm, [&] { s.create(model, slabs, kind); });
-  base::broadcast(comm, s.part);
-  MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
-  s.savable = kind == Kind::result;
-  s.is_whole = true;
-}
-
-ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-                       Kind kind)
-    : state_(std::make_unique<State>()) {
-  open(comm, name, model, nullptr, kind);
-  state_->initial = base::scatter(comm, model.points.position);
-  state_->outward = base::scatter(comm, model::outward_normals(model));
-}
-
 ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name,
                        const model::Model& global_metadata, const model::ModelRows& slabs,
                        Kind kind)
     : state_(std::make_unique<State>()) {
-  open(comm, name, global_metadata, &slabs, kind);
-  state_->on_disk([&] { state_->file = base::open_hdf5(state_->part, comm); });
-  fill_model(comm, state_->file, slabs, [this](const auto& work) { state_->on_disk(work); });
-  state_->close_part();
-  state_->initial = slabs.points.position;
-  state_->outward = slabs.outward;
+  State& s = *state_;
+  s.comm = comm;
+  // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
+  s.name = std::filesystem::absolute(name);
+  base::on_root(comm, [&] { s.create(global_metadata, slabs, kind); });
+  base::broadcast(comm, s.part);
+  MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
+  s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
+  fill_model(comm, s.file, slabs, [&s](const auto& work) { s.on_disk(work); });
+  s.close_part();
+  s.initial = slabs.points.position;
+  s.outward = slabs.outward;
+  s.savable = kind == Kind::result;
 }
 
 ResultFile::~ResultFile() = default;

@@ -51,7 +51,9 @@ void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
   model::Model model;
   if (base::rank(comm) == 0) model = model::build_model(jaw_advance(), skin, bones).model;
   clock.end("build");
-  results::ResultFile file(comm, name, model);
+  const discrete::LocalModel local = discrete::distribute_model(comm, std::move(model));
+  results::ResultFile file(comm, name, local.global_metadata,
+                           discrete::NaturalRows::of_model(comm, local));
   file.commit();
   clock.end("write");
 }
@@ -85,13 +87,14 @@ void measure(int64_t skin_vertices, const std::string& name) {
   if (base::rank(comm) == 0)
     std::printf("counts %ld %ld\n", static_cast<long>(counts.points),
                 static_cast<long>(counts.springs));
-  results::ResultFile file(comm, name, model);
-  clock.end("open");
-  const discrete::Part part = discrete::distribute(comm, model);
-  model = {};
+  const discrete::LocalModel local = discrete::distribute_model(comm, std::move(model));
+  const discrete::Part& part = local.part;
   discrete::Positions positions(comm, part);
   const discrete::NaturalRows natural(comm, part);
   clock.end("distribute");
+  results::ResultFile file(comm, name, local.global_metadata,
+                           discrete::NaturalRows::of_model(comm, local));
+  clock.end("open");
   const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty, 0.5};
   discrete::Objective objective(positions, weights);
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();

@@ -39,10 +39,8 @@ struct Discretization {
 
 /// Richardson's extrapolation (1911): where differences between resolutions fall with the order p,
 /// |u_h − u_2h| / (2^p − 1) is left. p is observed where `sequence` has two resolutions, and is
-/// kept within 1/2 and 2. `position` [N] is the rest position of `fine`, the scene's own model. On
-/// rank 0.
-Discretization discretization_of(const model::Model& fine, const std::vector<Vec3>& position,
-                                 const GridSequence& sequence);
+/// kept within 1/2 and 2. `position` [N] is the rest position of the scene's own model. On rank 0.
+Discretization discretization_of(const std::vector<Vec3>& position, const GridSequence& sequence);
 
 /// One row for a person.
 std::string describe_discretization(const Discretization& found);

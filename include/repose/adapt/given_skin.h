@@ -3,7 +3,6 @@
 #include <utility>
 #include <vector>
 
-#include "repose/model/model.h"
 #include "repose/surface/write.h"
 
 namespace repose::adapt {
@@ -24,11 +23,9 @@ GivenSkinMap map_to_given(const surface::Surface& given, const surface::Surface&
 /// than they do (ears, inner walls) that at their border.
 /// Beyond the rim of the solved skin it fades to nothing over 20 mm. The fields are `displacement`
 /// (mm) and `solved`, the share of it that is left (1 over the solved skin). `displacement` is that
-/// of the points of the solved `skin`, or of all of a model. Serial.
+/// of the points of the solved `skin`. Serial.
 surface::PointData displacement_of_given(const surface::Surface& given,
                                          const surface::Surface& skin,
-                                         const std::vector<Vec3>& displacement);
-surface::PointData displacement_of_given(const surface::Surface& given, const model::Model& model,
                                          const std::vector<Vec3>& displacement);
 
 }  // namespace repose::adapt

@@ -28,6 +28,8 @@ struct Level {
 /// Results of a sequence of coarser models.
 struct GridSequence {
   std::vector<Level> levels;        ///< coarsest first, those that came to rest
+  std::vector<Vec3> initial;        ///< [N] on rank 0: the scene's points, …
+  std::vector<int32_t> layer;       ///< … and their layers
   std::vector<Vec3> position;       ///< [N] on rank 0: the last one's answer at the scene's points
   std::vector<Vec3> before;         ///< likewise of the level before it, or empty
   model::BuiltModel last;           ///< the last one's model, on rank 0

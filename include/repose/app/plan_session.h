@@ -54,14 +54,13 @@ class PlanSession {
 
   const std::vector<Piece>& pieces() const;
   const scene::Plan& box() const;
-  double accuracy() const;            ///< mm, the scene's
-  const model::Model& model() const;  ///< at most its skin and bones where ranks build their parts
+  double accuracy() const;                     ///< mm, the scene's
+  const model::Model& model() const;           ///< its skin, its bones and names, on rank 0
   const surface::Surface* given_skin() const;  ///< in whose place another is solved, or null
   bool has_cuts() const;                       ///< incisions or parted lips
   std::vector<Vec3> initial() const;           ///< [N] mm
   int64_t points() const;                      ///< N, on all ranks
-  int64_t layers() const;               ///< points of a column where all have as many, else 0
-  const std::string& building() const;  ///< report of the build
+  const std::string& building() const;         ///< report of the build
 
   /// Throws InputError where the plan is outside the box.
   Answer solve(const Request& request);

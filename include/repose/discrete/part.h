@@ -31,9 +31,12 @@ struct Part {
   std::vector<int64_t> spring_row;  ///< [owned_springs]
   std::vector<int64_t> prism_row;   ///< [owned_prisms]
   std::vector<int64_t> edge_row;    ///< [owned_edges]
-  std::vector<int64_t> unknown;     ///< [local points] block number of its unknowns, −1 if fixed
-  int64_t first_unknown = 0;        ///< block number of this rank's first unknown point
-  int64_t owned_unknowns = 0;       ///< unknown points owned here
+  std::vector<int64_t> pair_row;    ///< [pairs of the contact]
+  /// [owned points] as in the whole model, where bones that do not move rigidly have bone points.
+  std::vector<model::PointSet> original_set;
+  std::vector<int64_t> unknown;  ///< [local points] block number of its unknowns, −1 if fixed
+  int64_t first_unknown = 0;     ///< block number of this rank's first unknown point
+  int64_t owned_unknowns = 0;    ///< unknown points owned here
   int64_t total_points = 0, total_springs = 0, total_prisms = 0, total_unknowns = 0;
 };
 
@@ -41,17 +44,20 @@ struct Part {
 /// (PT-Scotch through MatPartitioning). Collective.
 Part distribute(MPI_Comm comm, const model::Model& model);
 
-/// Part built by its own rank, and global numbers of the model.
+/// A rank's part of a model, and global numbers of it.
 struct LocalModel {
   Part part;
-  model::Model
-      global_metadata;   ///< ColumnGeometry::global_metadata() and its contact's bodies, on rank 0
-  model::Counts counts;  ///< of the whole model, on all ranks
-  int64_t contact_pairs = 0;      ///< rows of contact of the whole model
-  std::vector<int64_t> pair_row;  ///< [touches of the part] in the whole model
-  std::vector<Vec3> outward;      ///< [owned points] outward_normals()
-  double effective_modulus = 0;   ///< N/mm², on rank 0
+  /// The model without points, springs, prisms, edges and contact's pairs, on rank 0.
+  model::Model global_metadata;
+  model::Counts counts;          ///< of the whole model, on all ranks
+  int64_t contact_pairs = 0;     ///< rows of contact of the whole model
+  std::vector<Vec3> outward;     ///< [this rank's slab of points] outward_normals()
+  double effective_modulus = 0;  ///< N/mm², on rank 0, of a model that build_local() made
 };
+
+/// Distributes a model (read on rank 0 only) as distribute() does, and frees it. Contact's pairs of
+/// points that are not free to move are left out: they have no effect. Collective.
+LocalModel distribute_model(MPI_Comm comm, model::Model&& model);
 
 /// Builds the parts of a fully distributed model, equal to distribute() of the scene's model: rank
 /// 0, which alone has the `geometry`, gives every rank the columns that it owns and those around

@@ -104,8 +104,8 @@ struct Counts {
 };
 Counts count(const Model& model);
 
-/// Calls visit(name, array) for each array of points, of prisms, of edges or of what touches, with
-/// its name and in its order in a file; of prisms only those that they have.
+/// Calls visit(name, array) for each array of points, of springs, of prisms, of edges or of what
+/// touches, with its name and in its order in a file; of prisms only those that they have.
 template <class Group, class Visit>
 void for_each_array(Group& of, Visit&& visit) {
   if constexpr (requires { of.target; }) {
@@ -117,6 +117,13 @@ void for_each_array(Group& of, Visit&& visit) {
     visit("bone", of.bone);
     visit("mass", of.mass);
     visit("external_force", of.external_force);
+  } else if constexpr (requires { of.rest_length; }) {
+    visit("points", of.points);
+    visit("set", of.set);
+    visit("rest_length", of.rest_length);
+    visit("stiffness", of.stiffness);
+    visit("exponent", of.exponent);
+    visit("reference", of.reference);
   } else if constexpr (requires { of.rest_volume; }) {
     visit("points", of.points);
     visit("rest_volume", of.rest_volume);
@@ -136,16 +143,21 @@ void for_each_array(Group& of, Visit&& visit) {
   }
 }
 
-/// Slabs (base::slab) of the arrays of a fully distributed model on this rank, in natural order.
+/// Slabs (base::slab) of the arrays of a distributed model on this rank, in natural order.
 struct ModelRows {
   Counts counts;              ///< of the whole
+  bool solid = false;         ///< the whole is one
   int64_t contact_pairs = 0;  ///< rows of contact of the whole model
   Points points;
+  Springs springs;
   Prisms prisms;
   Edges edges;
   ContactPairs pairs;         ///< without offsets
   std::vector<Vec3> outward;  ///< outward_normals()
 };
+
+/// All rows of a model, the slabs of a single rank.
+ModelRows all_rows(const Model& model);
 
 /// Refuses a model that is not one: index out of range, value not finite, negative stiffness, mass
 /// or rest length, s_ref ≤ 0, unknown exponent or set, arrays of different length, a volume that is

@@ -24,12 +24,8 @@ inline constexpr std::string_view stopped_at_rest = "stopped before it was done,
 /// are contiguous (chunks with parallel gzip took twelve times as long for 28 % less space).
 class ResultFile {
  public:
-  /// Opens the part of NAME.h5 (`name` is a path without the ending) and writes /model (`model` is
-  /// read on rank 0 only, and copied as far as it is needed later).
-  ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-             Kind kind = Kind::result);
-  /// Creates the file of a fully distributed model: `frame`, on rank 0, has what is neither point
-  /// nor element; no rank's slabs are empty.
+  /// Opens the part of NAME.h5 (`name` is a path without the ending) and writes /model:
+  /// `global_metadata`, on rank 0, has what is in no slab.
   ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& global_metadata,
              const model::ModelRows& slabs, Kind kind = Kind::result);
   ~ResultFile();
@@ -61,8 +57,6 @@ class ResultFile {
 
  private:
   struct State;
-  void open(MPI_Comm comm, const std::filesystem::path& name, const model::Model& model,
-            const model::ModelRows* slabs, Kind kind);
   std::unique_ptr<State> state_;
 };
 

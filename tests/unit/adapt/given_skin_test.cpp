@@ -12,22 +12,20 @@ namespace given_skin_test {
 TEST(GivenSkin, follows_an_affine_motion_and_fades_beyond_the_rim) {
   const test::PatchSize size{
       .columns_x = 13, .columns_y = 9, .layers = 3, .spacing = 4, .thickness = 3};
-  model::Model model = test::layered_patch(size);
-  for (const auto& [a, b, c] : test::patch_skin(size).triangles)
-    model.skin.push_back({a * 3, b * 3, c * 3});
+  surface::Surface skin{"skin", {}, test::patch_skin(size).triangles};
+  for (int64_t c = 0; c < size.columns_x * size.columns_y; ++c)
+    skin.points.push_back({4.0 * static_cast<double>(c % size.columns_x),
+                           4.0 * static_cast<double>(c / size.columns_x), 0});
   const auto motion = [](const Vec3& x) -> Vec3 {
     return {1 + 0.1 * x.y(), 0.2 * x.x() - 3, 0.05 * x.x() + 2};
   };
   std::vector<Vec3> displacement;
-  for (size_t i = 0; i < model.points.position.size(); ++i) {
-    const bool skin = model.points.layer[i] == 0;  // what is beneath has no part
-    displacement.push_back(skin ? motion(model.points.position[i]) : Vec3(99, 99, 99));
-  }
+  for (const Vec3& point : skin.points) displacement.push_back(motion(point));
   const surface::Surface given{
       "given",
       {{20, 16, 0}, {21.3, 14.9, 0.4}, {30, 7, -1}, {58, 16, 0}, {70, 16, 0}},
       {{0, 1, 2}, {2, 3, 4}}};
-  const surface::PointData data = displacement_of_given(given, model, displacement);
+  const surface::PointData data = displacement_of_given(given, skin, displacement);
   ASSERT_EQ(data.vectors.size(), 1u);
   const std::vector<Vec3>& carried = data.vectors[0].values;
   ASSERT_EQ(carried.size(), given.points.size());

@@ -17,7 +17,7 @@ struct StepState {
 Restart restart_of(const std::vector<StepState>& steps) {
   const Folder folder;
   const model::Model m = small_model();
-  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, Kind::checkpoint);
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m), Kind::checkpoint);
   for (const StepState& step : steps) {
     model::StepNumbers numbers = small_numbers(step.load);
     numbers.converged = step.converged;
@@ -62,7 +62,7 @@ TEST(Restart, IsFromTheStartWhereNothingWasReached) {
 Restart restart_of_result(const Folder& folder, const std::vector<double>& loads,
                           const model::Model& m) {
   const model::Model stored = small_model();
-  ResultFile file(MPI_COMM_SELF, folder.path("a"), stored);
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), stored, model::all_rows(stored));
   for (const double load : loads) {
     model::StepNumbers numbers = small_numbers(load);
     numbers.converged = true;
@@ -109,7 +109,7 @@ TEST(Restart, OfAModelThatDiffersKeepsNothing) {
 TEST(Restart, IsFromTheRestPositionAtWhichASignalEndedTheRun) {
   const Folder folder;
   const model::Model m = small_model();
-  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
   for (const double load : {0.0, 0.5}) {
     model::StepNumbers numbers = small_numbers(load);
     numbers.converged = true;

@@ -112,7 +112,8 @@ TEST(RoundTrip, ModelWithoutAnythingOptional) {
 
 TEST(RoundTrip, AModelHasNoStep) {
   const Folder folder;
-  ResultFile(MPI_COMM_SELF, folder.path("a"), small_model()).commit();
+  ResultFile(MPI_COMM_SELF, folder.path("a"), small_model(), model::all_rows(small_model()))
+      .commit();
   EXPECT_EQ(step_count(folder.path("a.h5")), 0);
 }
 

@@ -33,9 +33,9 @@ TEST(WholeOrAbsent, NothingIsLeftWithoutCommit) {
   const Folder folder;
   const model::Model m = small_model();
   {
-    ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+    ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
     file.append(small_numbers(0), small_rows(m, 0));
-    ResultFile other(MPI_COMM_SELF, folder.path("a"), m);
+    ResultFile other(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
     EXPECT_EQ(folder.content(), parts("a.h5", 2)) << "each has its own";
   }
   EXPECT_EQ(folder.content(), "");
@@ -55,7 +55,7 @@ TEST(WholeOrAbsent, WhatIsSavedOnTheWayIsAResultAndTheRunGoesOn) {
   using Steps = std::vector<std::pair<double, bool>>;
   const Folder folder;
   const model::Model m = small_model();
-  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
   EXPECT_FALSE(file.save()) << "there is no step";
   const auto at = [](double load, bool converged) {
     model::StepNumbers numbers = small_numbers(load);
@@ -83,7 +83,7 @@ TEST(WholeOrAbsent, KeptStepsAreThoseOfTheEarlierResult) {
   const model::Model m = small_model();
   write_small_result(folder.path("a"), m);
   const int64_t count = step_count(folder.path("a.h5"));
-  ResultFile file(MPI_COMM_SELF, folder.path("b"), m);
+  ResultFile file(MPI_COMM_SELF, folder.path("b"), m, model::all_rows(m));
   file.keep(folder.path("a.h5"), count);
   file.commit();
   EXPECT_EQ(text_of(folder.path("a_tissue.xdmf")).size(),
@@ -97,7 +97,9 @@ TEST(WholeOrAbsent, AnEarlierResultStaysUntilCommit) {
   const Folder folder;
   write_small_result(folder.path("a"), small_model());
   const std::string before = text_of(folder.path("a.h5"));
-  { ResultFile file(MPI_COMM_SELF, folder.path("a"), small_model()); }
+  {
+    ResultFile file(MPI_COMM_SELF, folder.path("a"), small_model(), model::all_rows(small_model()));
+  }
   EXPECT_EQ(text_of(folder.path("a.h5")), before);
 }
 
@@ -133,7 +135,9 @@ TEST(WholeOrAbsent, MarkupInTheNameIsEscaped) {
 }
 
 std::string refusal_to_write(const std::filesystem::path& name) {
-  return refusal([&] { ResultFile(MPI_COMM_SELF, name, small_model()).commit(); });
+  return refusal([&] {
+    ResultFile(MPI_COMM_SELF, name, small_model(), model::all_rows(small_model())).commit();
+  });
 }
 
 TEST(WholeOrAbsent, AMissingFolderIsRefused) {
@@ -172,7 +176,7 @@ TEST(WholeOrAbsent, ADiskThatIsTooSmallIsRefusedBeforeWriting) {
 TEST(WholeOrAbsent, RowsThatAreNotTheSlabAreAnInternalError) {
   const Folder folder;
   const model::Model m = small_model();
-  ResultFile file(MPI_COMM_SELF, folder.path("a"), m);
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
   model::StepRows rows = small_rows(m, 0);
   rows.tension.pop_back();
   EXPECT_THROW(file.append(small_numbers(0), rows), base::InternalError);

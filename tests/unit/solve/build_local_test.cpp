@@ -5,6 +5,8 @@
 #include "repose/base/error.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/objective.h"
+#include "repose/results/model_file.h"
+#include "repose/results/result_file.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "rest.h"
@@ -186,6 +188,37 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
   EXPECT_EQ(rows.pairs.area, slab(whole.contact.pairs.area));
   EXPECT_EQ(rows.outward, slab(model::outward_normals(whole)));
   EXPECT_EQ(rows.contact_pairs, static_cast<int64_t>(whole.contact.pairs.point.size()));
+}
+
+/// With few columns, some ranks have no row of prisms, or none at all.
+TEST(Raise, a_distributed_model_is_written_as_it_was) {
+  model::Anatomy springs = jaws(1);
+  springs.scene.tissue.material.reset();
+  const std::filesystem::path name = std::filesystem::temp_directory_path() / "distributed_rows";
+  for (const model::Anatomy& anatomy : {springs, jaws(1), loaded(12)}) {
+    const model::Model whole = model::build_model(anatomy).model;
+    const discrete::LocalModel local = discrete::distribute_model(comm, model::Model(whole));
+    EXPECT_TRUE(local.global_metadata.points.position.empty());
+    results::ResultFile(comm, name, local.global_metadata,
+                        discrete::NaturalRows::of_model(comm, local))
+        .commit();
+    base::on_root(comm, [&] {
+      const model::Model stored = results::read_model(name.string() + ".h5");
+      expect_same(stored, whole);
+      EXPECT_EQ(stored.points.mass, whole.points.mass);
+      EXPECT_EQ(stored.springs.points, whole.springs.points);
+      EXPECT_EQ(stored.springs.set, whole.springs.set);
+      EXPECT_EQ(stored.springs.rest_length, whole.springs.rest_length);
+      EXPECT_EQ(stored.springs.stiffness, whole.springs.stiffness);
+      EXPECT_EQ(stored.springs.exponent, whole.springs.exponent);
+      EXPECT_EQ(stored.springs.reference, whole.springs.reference);
+      EXPECT_EQ(stored.spring_sets, whole.spring_sets);
+      EXPECT_EQ(stored.skin, whole.skin);
+      for (const char* ending :
+           {".h5", "_tissue.xdmf", "_skin.xdmf", "_springs.xdmf", "_bones.xdmf"})
+        std::filesystem::remove(name.string() + ending);
+    });
+  }
 }
 
 /// The jaws turn together about each corner.
