@@ -13,13 +13,6 @@ constexpr double worth_saying = 0.3;  // mm, of a component beside the largest o
 constexpr double unmoved = 0.1;       // mm
 constexpr double same_place = 25;     // mm
 
-size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
-  size_t nearest = 0;
-  for (size_t i = 1; i < points.size(); ++i)
-    if ((points[i] - place).squaredNorm() < (points[nearest] - place).squaredNorm()) nearest = i;
-  return nearest;
-}
-
 /// "7.4 mm forward, 0.3 down", the largest component first and with its unit.
 std::string describe_shift(const Vec3& by) {
   struct Component {
@@ -55,6 +48,13 @@ std::string place_of(const Vec3& at, double moved, const std::vector<model::Face
 }
 
 }  // namespace
+
+size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
+  size_t nearest = 0;
+  for (size_t i = 1; i < points.size(); ++i)
+    if ((points[i] - place).squaredNorm() < (points[nearest] - place).squaredNorm()) nearest = i;
+  return nearest;
+}
 
 std::string describe_movement(const std::vector<model::FacePlace>& places,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {

@@ -7,6 +7,9 @@
 
 namespace repose::app {
 
+/// Row of the point nearest to a place; 0 without points.
+size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points);
+
 /// Returns how the face moved, in one line for a person: places of the face in LPS directions, the
 /// largest movement and where it is. `initial` and `moved` [points] of the skin, mm.
 std::string describe_movement(const std::vector<model::FacePlace>& places,

@@ -12,6 +12,7 @@
 #include <limits>
 #include <optional>
 
+#include "lip_gap.h"
 #include "movement.h"
 #include "phase.h"
 #include "plan_pieces.h"
@@ -297,8 +298,10 @@ std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>
                                  const solve::Summary& summary, const Writer& writer) const {
   std::vector<model::FacePlace> places;
   if (job_.anatomy) places = model::face_places(*job_.anatomy);
-  return describe_movement(places, skin.initial().points, now) + " " +
-         describe_trust(summary, writer.discretization_error()) + "\n" +
+  const std::vector<Vec3>& before = skin.initial().points;
+  std::string text = describe_movement(places, before, now) + " ";
+  if (job_.anatomy) text += describe_lips(job_.anatomy->scene.landmarks, before, now);
+  return text + describe_trust(summary, writer.discretization_error()) + "\n" +
          describe_warnings(job_.warnings);
 }
 

@@ -458,7 +458,12 @@ std::vector<Key> anatomy_keys() {
                    "are not attached to it; tissue.attach_regions override it.",
        .choices = {"on", "off"}},
       {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
-       Range::between(0, 10)}};
+       Range::between(0, 10)},
+      {"anatomy.septum", number, "",
+       "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal spine "
+       "to "
+       "pronasale to nasion; tissue.material.regions override it.",
+       "N/mm²", Range::between(1e-9, 1e9)}};
 }
 
 std::vector<Key> osteotomy_keys() {

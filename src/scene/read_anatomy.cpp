@@ -1,5 +1,7 @@
 #include "read_anatomy.h"
 
+#include <fmt/format.h>
+
 #include <array>
 
 #include "repose/scene/landmarks.h"
@@ -75,6 +77,28 @@ AnatomyPlan read_anatomy(const Value& value) {
   if (const auto vestibule = map.find("vestibule")) plan.vestibule = vestibule->choice() == 0;
   if (const auto gap = map.find("gap")) plan.gap = gap->number();
   return plan;
+}
+
+void read_septum(const Value& anatomy, Scene& scene) {
+  constexpr double reach = 5;  // mm on either side of an edge
+  const auto septum = Map(anatomy).find("septum");
+  if (!septum) return;
+  if (!scene.tissue.material)
+    septum->refuse("needs a solid; give tissue.material in place of tissue.springs or remove it");
+  CurveRegion edges{{}, reach};
+  for (const char* name : {"nasal_spine", "pronasale", "nasion_bone"}) {
+    const Vec3* place = find(scene.anatomy->landmarks, name);
+    if (!place)
+      septum->refuse("needs the landmark {}, which {} lacks", name, scene.anatomy->file.string());
+    edges.path.push_back(*place);
+  }
+  Material& material = *scene.tissue.material;
+  material.regions.insert(material.regions.begin(),
+                          {edges, {septum->number(), material.deep.poisson}});
+  scene.remarks.push_back(fmt::format(
+      "septum by landmarks: {:g} N/mm² within {:g} mm of the lines from the nasal spine to "
+      "pronasale to nasion (material region 0)",
+      septum->number(), reach));
 }
 
 }  // namespace repose::scene

@@ -9,4 +9,9 @@ namespace repose::scene {
 /// from above to below that no head has.
 AnatomyPlan read_anatomy(const Value& value);
 
+/// Reads anatomy.septum, if there, into the first region of the scene's material: the septum's free
+/// edges between the landmarks of `scene.anatomy`. Adds a remark. Throws InputError for springs and
+/// where one of these landmarks is missing.
+void read_septum(const Value& anatomy, Scene& scene);
+
 }  // namespace repose::scene

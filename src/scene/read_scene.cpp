@@ -380,7 +380,10 @@ Scene read_scene(const std::filesystem::path& file, const SceneChanges& changes)
   if (map.find("moves") || map.find("osteotomies")) require_bones(scene);
   scene.tissue = read_tissue(map.at("tissue"));
   read_surroundings(scene, map);
-  if (const auto anatomy = map.find("anatomy")) scene.anatomy = read_anatomy(*anatomy);
+  if (const auto anatomy = map.find("anatomy")) {
+    scene.anatomy = read_anatomy(*anatomy);
+    read_septum(*anatomy, scene);
+  }
   if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
   if (scene.anatomy) scene.landmarks = scene.anatomy->landmarks;

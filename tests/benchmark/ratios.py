@@ -55,7 +55,8 @@ PUBLISHED = {
 WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
-        "joined lips": (", lips: joined", "")}
+        "joined lips": (", lips: joined", ""), "septum 0.2": (", septum: 0.2", ""),
+        "septum 1": (", septum: 1", "")}
 
 PHANTOM_HEAD = ("| operation, mm | landmark | published | median | lowest … highest | below, above |\n"
                 "|---|---|---|--:|--:|--:|")

@@ -1,6 +1,7 @@
 """Scenes by landmarks from outside: proposed landmarks place cuts, part lips and move jaws of heads."""
 
 import json
+import re
 
 import h5py
 import meshio
@@ -56,6 +57,15 @@ def test_templates_cut_any_head(run, tmp_path, head, template):
         assert np.linalg.norm(piece[:, None] - condyles, axis=2).min() > 5
 
 
+def lip_gap(initial, rest, head):
+    """mm along z between the two skin points that were one vertex nearest to stomion."""
+    places, vertex, count = np.unique(initial, axis=0, return_inverse=True, return_counts=True)
+    twice = np.flatnonzero(count == 2)
+    nearest = twice[np.linalg.norm(places[twice] - head["stomion"], axis=1).argmin()]
+    one, other = rest[vertex.ravel() == nearest]
+    return abs(one[2] - other[2])
+
+
 @REAL
 @pytest.mark.parametrize("head", ["real_head"], indirect=True)
 def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
@@ -74,6 +84,8 @@ def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
         return way[np.argsort(off)[:3]].mean()
 
     assert ratio("pogonion_soft") > 0.9
+    stated, = re.findall(r"Lips (\d\.\d) mm apart at stomion, together before\.", result.stdout)
+    assert abs(float(stated) - lip_gap(model["point/position"][skin], rest[skin], head)) < 0.06
     assert ratio("lower_lip") < 0.93 and ratio("upper_lip") < 0.3
     assert run("repose-check", "face.h5").returncode == 0
 

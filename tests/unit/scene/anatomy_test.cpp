@@ -23,7 +23,8 @@ Landmarks head() {
           {"mouth_left", {25, -90, -24}}};
 }
 
-Scene read(const Landmarks& landmarks, const std::string& more) {
+Scene read(const Landmarks& landmarks, const std::string& more, const std::string& anatomy = "",
+           const std::string& tissue = "layers: 4") {
   static const Folder folder;
   folder.write("head.mrk.json", markups_text(landmarks));
   return read_scene(folder.write("scene.yaml",
@@ -31,9 +32,9 @@ Scene read(const Landmarks& landmarks, const std::string& more) {
                                  "bones:\n"
                                  "  - {name: skull, file: skull.ply}\n"
                                  "  - {name: mandible, file: mandible.ply}\n"
-                                 "tissue: {layers: 4}\n"
-                                 "anatomy: {landmarks: head.mrk.json}\n" +
-                                     more));
+                                 "tissue: {" +
+                                     tissue + "}\nanatomy: {landmarks: head.mrk.json" + anatomy +
+                                     "}\n" + more));
 }
 
 const std::string le_fort = "osteotomies: [{bone: skull, piece: maxilla, template: le_fort_1}]\n";
@@ -78,6 +79,34 @@ TEST(Anatomy, RefusesLandmarksOfNoHead) {
   swapped["lower_lip"] = {0, -100, -42};
   swapped["b_soft"] = {0, -95, -32};
   has(refused(swapped), "lower_lip at z = -42.0 mm, not above b_soft");
+}
+
+TEST(Septum, StiffensTheNoseBelowTheScenesOwnRegions) {
+  Landmarks marks = head();
+  EXPECT_NE(refusal([&] {
+              read(marks, "", ", septum: 1");
+            }).find("anatomy.septum needs the landmark pronasale, which"),
+            std::string::npos);
+  marks["pronasale"] = {0, -112, 15};
+  const Scene scene = read(marks, "", ", septum: 0.8",
+                           "layers: 4, material: {poisson: 0.4, regions: [{sphere: {center: [0, 0, "
+                           "0], radius: 1}, young: 2}]}");
+  const std::vector<MaterialRegion>& regions = scene.tissue.material->regions;
+  ASSERT_EQ(regions.size(), 2u);
+  const auto& edges = std::get<CurveRegion>(std::get<Region>(regions[0].where));
+  ASSERT_EQ(edges.path.size(), 3u);
+  expect_near(edges.path[0], marks["nasal_spine"]);
+  expect_near(edges.path[1], marks["pronasale"]);
+  expect_near(edges.path[2], marks["nasion_bone"]);
+  EXPECT_EQ(regions[0].elasticity.young, 0.8);
+  EXPECT_EQ(regions[0].elasticity.poisson, 0.4);
+  EXPECT_TRUE(read(marks, "").tissue.material->regions.empty());
+  EXPECT_NE(refusal([&] {
+              read(marks, "", ", septum: 1",
+                   "layers: 4, springs: {default: {stiffness: 1.0, law: "
+                   "quartic, reference: 1.0}}");
+            }).find("anatomy.septum needs a solid"),
+            std::string::npos);
 }
 
 TEST(OsteotomyTemplate, LeFortLiesAboveTheNasalFloor) {
