@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace repose::app {
 namespace {
 
@@ -11,11 +13,15 @@ const std::vector<Vec3> skin = {{0, -90, 10}, {0, -90, -10}, {1, -90, 0}, {1, -9
 const scene::Landmarks marks = {
     {"upper_lip", {0, -90, 10}}, {"lower_lip", {0, -90, -10}}, {"stomion", {0, -90, 0}}};
 
+/// The sentence for lips that move so, with either one's point at stomion first.
 std::string after(const Vec3& upper, const Vec3& lower) {
-  std::vector<Vec3> moved = skin;
-  for (const size_t i : {0, 2}) moved[i] += upper;
-  for (const size_t i : {1, 3}) moved[i] += lower;
-  return describe_lips(marks, skin, moved);
+  const std::vector<Vec3> upper_first = {skin[0] + upper, skin[1] + lower, skin[2] + upper,
+                                         skin[3] + lower};
+  std::vector<Vec3> lower_first = upper_first;
+  std::swap(lower_first[2], lower_first[3]);
+  const std::string text = describe_lips(marks, skin, upper_first);
+  EXPECT_EQ(describe_lips(marks, skin, lower_first), text);
+  return text;
 }
 
 TEST(LipGap, IsMeasuredAlongZ) {
