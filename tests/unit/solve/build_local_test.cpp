@@ -194,7 +194,8 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
 TEST(Raise, a_distributed_model_is_written_as_it_was) {
   model::Anatomy springs = jaws(1);
   springs.scene.tissue.material.reset();
-  const std::filesystem::path name = std::filesystem::temp_directory_path() / "distributed_rows";
+  const std::filesystem::path name = std::filesystem::temp_directory_path() /
+                                     fmt::format("distributed_rows_on_{}", base::size(comm));
   for (const model::Anatomy& anatomy : {springs, jaws(1), loaded(12)}) {
     const model::Model whole = model::build_model(anatomy).model;
     const discrete::LocalModel local = discrete::distribute_model(comm, model::Model(whole));
