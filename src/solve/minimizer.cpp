@@ -85,6 +85,12 @@ struct Minimizer::Callbacks {
     return guarded(me, [&](Minimizer& self) { *value = self.function_.evaluate(x, gradient); });
   }
 
+  /// TAO's own way to the value alone leaves its vector behind where an evaluation fails.
+  static PetscErrorCode value(Tao, Vec x, PetscReal* value, void* me) {
+    return guarded(
+        me, [&](Minimizer& self) { *value = self.function_.evaluate(x, self.estimate_gradient_); });
+  }
+
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
     return guarded(me, [&](Minimizer& self) {
       self.solver_.prepare(x);
@@ -145,6 +151,7 @@ void Minimizer::make_tao() {
   require_supported_types();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
+  check(TaoSetObjective(tao_, Callbacks::value, this));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
   check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner_matrix(),
                       Callbacks::hessian, this));
