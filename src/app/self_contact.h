@@ -10,7 +10,7 @@ namespace repose::app {
 /// other skin is reported: nothing keeps it apart.
 class SolvedSkin {
  public:
-  /// Of a job that is distributed. Collective.
+  /// Takes the skin of a job whose model is distributed. Collective.
   SolvedSkin(MPI_Comm comm, const Job& job);
 
   /// Row of the closing table on triangles that pass through others and did not at the start, empty

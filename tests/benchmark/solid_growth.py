@@ -26,36 +26,29 @@ import numpy as np
 from measure import run, synthetic
 from page import option_parser, print_table
 
-SCENE = """skin: head_skin.ply
+CONTACT = {"off": "contact: {bones: off, cuts: off}", "on": ""}
+SURFACES = """skin: head_skin.ply
 bones:
   - {name: skull, file: head_skull.ply}
   - {name: mandible, file: head_mandible.ply}
 tissue:
   layers: 4
   edge: given
-  material: {young: 0.015, poisson: POISSON, dilatation: DILATATION}
+"""
+SCENE = SURFACES + """  material: {young: 0.015, poisson: POISSON, dilatation: DILATATION}
 moves:
   - {bone: mandible, rotate: {axis: [1, 0, 0], center: [0, 0, 0], angle: 8}}
   - {bone: mandible, translate: [0, -6, 0]}
 CONTACT
 solve: {accuracy: 0.01}
 """
-STANDING = """skin: head_skin.ply
-bones:
-  - {name: skull, file: head_skull.ply}
-  - {name: mandible, file: head_mandible.ply}
-tissue:
-  layers: 4
-  edge: given
-  turgor: 0.02
+STANDING = SURFACES + """  turgor: 0.02
   density: 1.0e-6
   material: {young: 0.015, poisson: POISSON, dilatation: nodal, skin: {thickness: 1.5, young: 0.08}}
 gravity: [0, 0, -9.81]
 moves:
   - {bone: mandible, translate: [0, -6, 0]}
-contact: {bones: off, cuts: off}
-"""
-CONTACT = {"off": "contact: {bones: off, cuts: off}", "on": ""}
+""" + CONTACT["off"] + "\n"
 HEAD = ("| unknowns | ν | method | evaluations | Hessians | search, s | µs/unknown | memory, MiB | "
         "inverted prisms | from the first, mm |\n|--:|--:|---" + "|--:" * 7 + "|")
 

@@ -104,8 +104,8 @@ struct Counts {
 };
 Counts count(const Model& model);
 
-/// Calls visit(name, array) for each array of points, of springs, of prisms, of edges or of what
-/// touches, with its name and in its order in a file; of prisms only those that they have.
+/// Calls visit(name, array) for each array of a group (points, springs, prisms, edges, contact
+/// pairs), with its name and in its order in a file; of prisms only those that they have.
 template <class Group, class Visit>
 void for_each_array(Group& of, Visit&& visit) {
   if constexpr (requires { of.target; }) {
