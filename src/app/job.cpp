@@ -1,5 +1,8 @@
 #include "job.h"
 
+#include <algorithm>
+#include <functional>
+
 #include "report.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
@@ -108,14 +111,21 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
   if (distributed) build_local(comm, input, changes, job);
 }
 
+/// Parts the lips, or makes all other cuts. On rank 0.
+void cut_tissue(bool lips, Job& job) {
+  for (const model::Cut& cut : job.cuts) {
+    if (cut.lips != lips) continue;
+    const size_t doubled = model::cut_along(cut, job.model).size();
+    job.building += describe_cut(cut, static_cast<int64_t>(doubled));
+  }
+}
+
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
 /// 0.
 void make_incisions(Job& job) {
-  for (const model::Cut& cut : job.cuts) {
-    const size_t doubled = model::cut_along(cut, job.model).size();
-    job.building += describe_cut(cut, static_cast<int64_t>(doubled));
+  cut_tissue(false, job);
+  if (std::ranges::any_of(job.cuts, std::not_fn(&model::Cut::lips)))
     job.initial_equilibrium = false;
-  }
 }
 
 void bring_into_equilibrium(MPI_Comm comm, Job& job) {
@@ -153,6 +163,7 @@ Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::strin
              const Watch& watch, const scene::SceneChanges& changes) {
   Job job;
   read(comm, input, whole, watch, changes, job);
+  base::on_root(comm, [&] { cut_tissue(true, job); });
   bring_into_equilibrium(comm, job);
   base::on_root(comm, [&] {
     make_incisions(job);

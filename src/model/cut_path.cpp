@@ -189,7 +189,10 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
   std::set<std::array<int64_t, 2>> edges;
   for (size_t i = 0; i < incisions.size(); ++i) {
     PathCutter cutter(fmt::format("{}: {}", scene_file, incisions[i].name), skin, taken, edges);
-    cuts.push_back({cutter.cut(incisions[i].path), incisions[i].layers});
+    const scene::Incision& incision = incisions[i];
+    cuts.push_back({.columns = cutter.cut(incision.path),
+                    .layers = incision.layers,
+                    .lips = incision.name == "mouth"});
   }
   return cuts;
 }

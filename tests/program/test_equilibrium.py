@@ -10,6 +10,7 @@ from conftest import PROJECT
 from tissue import last, model_of, steps
 
 LYING, UPRIGHT, BOWED = [0, 9.80665, 0], [0, 0, -9.80665], [0, -9.80665, 0]  # N/kg, in LPS axes
+LIPS = "{path: [[-20, -92, -35], [0, -98, -35], [20, -92, -35]], layers: 2}"
 LOOSE = ("stiffness: 1.0, law: quartic, reference: 1.0", "modulus: 0.01, law: quartic")
 
 
@@ -31,6 +32,12 @@ def posture(tmp_path_factory):
     return write
 
 
+def as_solid(text, preset):
+    """A scene of posture(…) with a solid in place of its springs."""
+    text = re.sub(r"  springs:.*?\n(?=\S)", f"  material: {{preset: {preset}}}\n", text, flags=re.S)
+    return text[:text.index("solve:")] + text[text.index("gravity:"):]
+
+
 def skin_motion(file):
     skin = model_of(file)["point/layer"] == 0
     return last(file)["point/displacement"][skin]
@@ -43,6 +50,25 @@ def test_nothing_moves_under_the_gravity_of_the_recording(solved, posture, ranks
     assert all(step["smallest_eigenvalue"] > 0 for step in steps(file))
     pull = np.linalg.norm(last(file)["point/residual_force"], axis=1)
     assert pull.max() < 1e-12 * np.abs(last(file)["spring/tension"]).max()
+
+
+@pytest.mark.parametrize("tissue", ["springs", "solid"])
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_lips_stay_closed_where_an_incision_opens(solved, posture, ranks, tissue):
+    """Lips are parted before the equilibrium; a cut along the same path is made after it."""
+    text = posture(LYING, turgor=0.05, name="lips").read_text()
+    if tissue == "solid":
+        text = as_solid(text, "skin_on_fat")
+    moved = []
+    for cut in (f"mouth: {LIPS.replace(', layers: 2', '')}\n", f"incisions: [{LIPS}]\n"):
+        scene = posture(LYING, turgor=0.05, name=f"{cut[:5]}_{tissue}_{ranks}")
+        scene.write_text(text + cut)
+        file = solved(scene, "-accuracy", 0.01, ranks=ranks)
+        model = model_of(file)
+        layers, columns = (model[f"point/{key}"].max() + 1 for key in ("layer", "column"))
+        assert len(model["point/layer"]) > layers * columns, "nothing was cut"
+        moved.append(np.abs(last(file)["point/displacement"]).max())
+    assert moved[0] < 1e-9 and moved[1] > 0.1, moved
 
 
 def test_another_posture_moves_the_face_with_gravity(solved, posture):
@@ -63,11 +89,10 @@ def test_rest_lengths_do_not_depend_on_the_posture_after(solved, posture):
 @pytest.mark.parametrize("tissue", ["springs", "material"])
 def test_tissue_that_slides_on_bone_begins_in_equilibrium(solved, posture, tissue):
     scene = posture(LYING, turgor=0.01 if tissue == "springs" else 0, name=f"sliding_{tissue}")
-    text = scene.read_text() + "teeth:\n  - {sphere: {center: [0, -90, -30], radius: 40}}\n"
+    text = scene.read_text()
     if tissue == "material":
-        text = re.sub(r"  springs:.*?\n(?=\S)", "  material: {preset: face}\n", text, flags=re.S)
-        text = text[:text.index("solve:")] + text[text.index("gravity:"):]
-    scene.write_text(text)
+        text = as_solid(text, "face")
+    scene.write_text(text + "teeth:\n  - {sphere: {center: [0, -90, -30], radius: 40}}\n")
     file = solved(scene)
     model, step = model_of(file), last(file)
     assert (model["contact/binding"] == 1).any()

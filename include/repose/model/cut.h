@@ -14,6 +14,7 @@ struct Cut {
                                  ///< and last
   int layers;                    ///< point layers that it parts, from the skin down
   bool meets = false;            ///< its sides touch and do not pass each other
+  bool lips = false;             ///< parts lips, which the initial equilibrium finds parted
 };
 
 /// Makes the paths of incisions edges of the skin: triangles and edges that a path crosses are
