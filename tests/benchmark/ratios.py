@@ -18,6 +18,7 @@ import json
 import pathlib
 import tempfile
 
+import meshio
 import numpy as np
 
 from measure import run
@@ -133,10 +134,29 @@ def rows(options, folder):
     yield (f"| **outside**, of {count} | | | " + " | ".join(str(outside[way]) for way in ways) + " |")
 
 
+def ramp(values, start, end):
+    """0 at `start`, 1 at `end`, with a slope of 0 at both."""
+    share = np.clip((values - start) / (end - start), 0, 1)
+    return share * share * (3 - 2 * share)
+
+
+def correct_profile(file):
+    """Raises the nose of the shipped head's skin by 6 mm and draws its lips back by 3.5 mm, so that
+    the tip of the nose is as high above the nasal spine as on the real head, and the lips as thick."""
+    skin = meshio.read(file)
+    x, y, z = np.transpose(skin.points)
+    front = ramp(-y, 60, 80)
+    nose = front * ramp(z, -14, -5) * ramp(z, 50, 14) * ramp(abs(x), 32, 16)
+    lips = front * ramp(z, -46, -32) * ramp(z, 4, -6) * ramp(abs(x), 40, 16)
+    skin.points = skin.points + np.column_stack([0 * x, 3.5 * lips, 6 * nose])
+    skin.write(file)
+
+
 def make_phantoms(options, folder):
-    """Folders of synthetic heads of random proportions, without beards."""
+    """Folders of synthetic heads of random proportions, without beards, their profile corrected."""
     run([options.bin / "repose-phantom", "-skin_vertices", 20000, "-bone_edge", 2, "-output", "head"],
         folder, ends=[0])
+    correct_profile(folder / "head_skin.ply")
     for seed in range(1, 1 + options.phantoms):
         random = np.random.default_rng(seed)
         shape = Shape(random)

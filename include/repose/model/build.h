@@ -29,7 +29,7 @@ struct BuiltModel {
   Model model;
   BuildReport report;
   std::vector<std::vector<int64_t>> held;  ///< [instruments] rows of the points that each holds
-  std::vector<Cut> cuts;  ///< the incisions, not made yet: cut_along after the prestress (cut.h)
+  std::vector<Cut> cuts;  ///< not made yet (cut.h): lips before the prestress, others after
 };
 
 /// The model of all columns of a ColumnGeometry, whose arguments these are. Serial.
