@@ -133,6 +133,19 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
       low.x(), high.x(), low.y(), high.y(), low.z(), high.z()));
 }
 
+/// Without the landmarks that tell the lips and the teeth apart lips do not adhere.
+void settle_adhesion(scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
+  if (!plan.vestibule || plan.adhesion == 0) return;
+  for (const char* name :
+       {"stomion", "mouth_right", "mouth_left", "upper_incisor_edge", "lower_incisor_edge"}) {
+    if (find(plan, name)) continue;
+    remarks.push_back(fmt::format("{}: landmark {} is missing, so lips do not adhere to teeth",
+                                  plan.file.string(), name));
+    plan.adhesion = 0;
+    return;
+  }
+}
+
 void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
   constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
   const Vec3 *spine = find(plan, "nasal_spine"), *upper = find(plan, "upper_incisor_edge"),
@@ -157,6 +170,7 @@ void complete(const surface::Surface& skin, const std::vector<surface::Surface>&
   remark_teeth(*scene.anatomy, remarks);
   part_lips(skin, scene, remarks);
   add_vestibule(scene, remarks);
+  settle_adhesion(*scene.anatomy, remarks);
 }
 
 }  // namespace repose::anatomy

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "adhesion.h"
 #include "repose/base/error.h"
 
 namespace repose::mechanics {
@@ -11,7 +12,11 @@ namespace repose::mechanics {
 namespace {
 
 std::map<std::string, std::unique_ptr<const Term>>& known_terms() {
-  static std::map<std::string, std::unique_ptr<const Term>> terms;
+  static std::map<std::string, std::unique_ptr<const Term>> terms = [] {
+    std::map<std::string, std::unique_ptr<const Term>> built_in;
+    built_in["adhesion"] = std::make_unique<DifferentiatedTerm<Adhesion>>();
+    return built_in;
+  }();
   return terms;
 }
 

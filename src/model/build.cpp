@@ -2,6 +2,7 @@
 
 #include <numeric>
 
+#include "add_adhesion.h"
 #include "column_layout.h"
 #include "repose/anatomy/complete.h"
 #include "repose/base/log.h"
@@ -26,6 +27,8 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   built.held = geometry.held();
   built.cuts = geometry.cuts();
   built.report = geometry.report();
+  if (adheres(scene))
+    add_adhesion(*scene.anatomy, bones, built.cuts, built.model, built.report.remarks);
   built.report.effective_modulus = effective_modulus(sums);
   return built;
 }

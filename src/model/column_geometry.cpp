@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "add_adhesion.h"
 #include "add_contact.h"
 #include "column_layout.h"
 #include "layers.h"
@@ -17,6 +18,7 @@ namespace repose::model {
 std::string explain_central_build(const scene::Scene& scene) {
   if (!scene.tissue.material) return "its tissue is springs";
   if (!scene.incisions.empty()) return "it has incisions";
+  if (adheres(scene)) return "its lips adhere to the teeth";
   return "";
 }
 

@@ -76,6 +76,7 @@ AnatomyPlan read_anatomy(const Value& value) {
   if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;
   if (const auto vestibule = map.find("vestibule")) plan.vestibule = vestibule->choice() == 0;
   if (const auto gap = map.find("gap")) plan.gap = gap->number();
+  if (const auto adhesion = map.find("adhesion")) plan.adhesion = adhesion->number();
   return plan;
 }
 

@@ -54,7 +54,7 @@ PUBLISHED = {
     ("impaction", "upper_lip"): ("0.2–0.5 [6]", 0.2, 0.5)}
 # Way → anatomy and tissue.
 WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
-        "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
+        "no adhesion": (", adhesion: 0", ""), "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
         "joined lips": (", lips: joined", ""), "septum 0.2": (", septum: 0.2", ""),
         "septum 1": (", septum: 1", "")}

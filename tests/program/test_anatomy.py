@@ -70,7 +70,8 @@ def lip_gap(initial, rest, head):
 @pytest.mark.parametrize("head", ["real_head"], indirect=True)
 def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
     write_scene(tmp_path, "osteotomies: [{bone: mandible, piece: jaw, template: sagittal_split, "
-                          "kerf: 0.5}]\nmoves: [{bone: jaw, clinical: {set_back: 5}}]\n")
+                          "kerf: 0.5}]\nmoves: [{bone: jaw, clinical: {set_back: 5}}]\n",
+                anatomy="landmarks: head.mrk.json, adhesion: 0")
     result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
     assert (result.returncode, result.stderr) == (0, ""), result
     assert "lips are parted along their crease by landmarks" in result.stdout
@@ -88,6 +89,30 @@ def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
     assert abs(float(stated) - lip_gap(model["point/position"][skin], rest[skin], head)) < 0.06
     assert ratio("lower_lip") < 0.93 and ratio("upper_lip") < 0.3
     assert run("repose-check", "face.h5").returncode == 0
+
+
+@REAL
+@pytest.mark.parametrize("head", ["real_head"], indirect=True)
+def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
+    """It follows them farther, by as much on three ranks, and the upper lip stays."""
+    lips = {}
+    for name, adhesion, ranks in (("off", 0, 1), ("on", 5e-4, 1), ("shared", 5e-4, 3)):
+        write_scene(tmp_path, "osteotomies: [{bone: mandible, piece: jaw, template: sagittal_split, "
+                              "kerf: 0.5}]\nmoves: [{bone: jaw, clinical: {set_back: 5}}]\n",
+                    anatomy=f"landmarks: head.mrk.json, adhesion: {adhesion}")
+        result = run("repose-solve", "scene.yaml", "-output", name, "-skip_other_rest", ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert ("points of the lips adhere to teeth" in result.stdout) == (adhesion > 0)
+        assert run("repose-check", f"{name}.h5").returncode == 0
+        model, step = model_of(tmp_path / f"{name}.h5"), last(tmp_path / f"{name}.h5")
+        skin = np.flatnonzero(model["point/layer"] == 0)
+        for mark in ("lower_lip", "upper_lip"):
+            off = np.linalg.norm(model["point/position"][skin] - head[mark], axis=1)
+            way = step["point/displacement"][skin[np.argsort(off)[:3]], 1].mean()
+            lips[name, mark] = way / 5
+    assert lips["on", "lower_lip"] > lips["off", "lower_lip"] + 0.05
+    assert abs(lips["on", "upper_lip"] - lips["off", "upper_lip"]) < 0.05
+    assert abs(lips["on", "lower_lip"] - lips["shared", "lower_lip"]) < 0.005
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)

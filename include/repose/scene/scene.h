@@ -274,9 +274,10 @@ struct Collision {
 struct AnatomyPlan {
   std::filesystem::path file;  ///< absolute, of the landmarks
   Landmarks landmarks;
-  bool part_lips = true;  ///< where the scene has no mouth of its own
-  bool vestibule = true;  ///< tissue in front of teeth touches them and is not attached
-  double gap = 1;         ///< mm, of the vestibule, between mucosa and teeth
+  bool part_lips = true;   ///< where the scene has no mouth of its own
+  bool vestibule = true;   ///< tissue in front of teeth touches them and is not attached
+  double gap = 1;          ///< mm, of the vestibule, between mucosa and teeth
+  double adhesion = 5e-4;  ///< N/mm², largest tension between lips and the teeth of their jaw
 };
 
 struct Scene {
