@@ -156,7 +156,7 @@ def test_ratios_of_synthetic_heads_and_their_pictures(environment, tmp_path):
     if not can_draw():
         pytest.skip("VTK cannot draw here")
     (tmp_path / "page.md").write_text("<!-- phantoms -->\n<!-- end of phantoms -->\n")
-    result = run_script("ratios.py", tmp_path, environment, "-phantoms", 1, "-edge", 6, "-ways",
+    result = run_script("ratios.py", tmp_path, environment, "-phantoms", 1, "-edge", 4, "-ways",
                         "default", "-operations", "impaction", "-keep", "kept", "-output", "page.md")
     assert (result.returncode, result.stderr) == (0, ""), result
     row, = re.findall(r"^\| impaction 4 .*$", (tmp_path / "page.md").read_text(), re.M)
