@@ -124,14 +124,19 @@ void CutFaceContact::add_place(int64_t point, double area, const Eigen::Vector2d
 
 void CutFaceContact::link(const Net& own, const Net& other) {
   constexpr int reach = 4;  // columns, by which sides slide along each other
-  for (const Net* a : {&own, &other})
-    for (const Net* b : {&own, &other})
-      for (int c = 0; c < own.columns * own.rows; ++c)
-        for (int d = std::max(0, c / own.rows - reach) * own.rows;
-             d < std::min(own.columns, c / own.rows + reach + 1) * own.rows; ++d)
-          for (const auto& [p, of_p] : a->controls[c])
-            for (const auto& [q, of_q] : b->controls[d])
-              if (p < q) links_.push_back({p, q});
+  std::vector<std::vector<int32_t>> points(own.columns);
+  for (int c = 0; c < own.columns; ++c) {
+    for (const Net* net : {&own, &other})
+      for (int row = 0; row < own.rows; ++row)
+        for (const auto& [p, share] : net->controls[c * own.rows + row]) points[c].push_back(p);
+    std::ranges::sort(points[c]);
+    points[c].erase(std::ranges::unique(points[c]).begin(), points[c].end());
+  }
+  for (int c = 0; c < own.columns; ++c)
+    for (int d = std::max(0, c - reach); d < std::min(own.columns, c + reach + 1); ++d)
+      for (const int32_t p : points[c])
+        for (const int32_t q : points[d])
+          if (p < q) links_.push_back({p, q});
 }
 
 namespace {

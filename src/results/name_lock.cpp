@@ -64,7 +64,8 @@ void write_holder(int descriptor) {
 /// Returns whether what follows the name is that of a run's unfinished file, not of another run's.
 bool is_ending(const std::string& rest) {
   static const std::regex endings(
-      "(_checkpoint)?(\\.h5|_(tissue|springs|skin|bones)\\.xdmf)\\.[0-9]+\\.part");
+      "(_checkpoint)?(\\.h5|_(tissue|springs|skin|bones|blocks)\\.xdmf|_given_skin\\.vtp)"
+      "\\.[0-9]+\\.part");
   return std::regex_match(rest, endings);
 }
 

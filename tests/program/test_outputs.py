@@ -60,3 +60,15 @@ def test_names_that_are_none_are_refused(run, inputs, tmp_path, name):
     assert result.returncode == 1 and result.stderr.count("\n") == 1
     assert "is no name of files" in result.stderr
     assert {file for file in tmp_path.rglob("*") if file.is_file()} == set(inputs)
+
+
+def test_a_run_removes_what_a_killed_one_left_of_each_file(run, inputs, tmp_path):
+    """A killed run may leave a part of any file that it writes."""
+    solve = ["scene.yaml", "-output", "face", "-checkpoint_interval", "1e9"]
+    assert run("repose-solve", *solve).returncode == 0
+    written = {file.name for file in tmp_path.iterdir() if file.name.startswith("face")}
+    assert {"face.h5", "face_skin.xdmf", "face_blocks.xdmf"} <= written, written
+    for name in written:
+        (tmp_path / f"{name}.1.part").touch()
+    assert run("repose-solve", *solve).returncode == 0
+    assert not list(tmp_path.glob("*.part"))
