@@ -84,7 +84,6 @@ void choose_shift_and_invert(EPS eps, Mat matrix) {
   check(STSetType(st, STSINVERT));
   check(STGetKSP(st, &krylov));
   choose_factors(krylov);
-  check(EPSSetFromOptions(eps));
 }
 
 void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
@@ -98,7 +97,6 @@ void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
   check(STGetKSP(st, &krylov));
   check(KSPSetType(krylov, KSPPREONLY));
   check(KSPSetPC(krylov, solver.preconditioner()));
-  check(EPSSetFromOptions(eps));
 }
 
 EpsHandle symmetric_problem(Mat matrix, double tolerance, int maximum) {
@@ -128,6 +126,15 @@ void scale_mode(Vec mode) {
   check(VecScale(mode, (maximum >= -minimum ? 1 : -1) / discrete::largest_block(mode)));
 }
 
+double first_mode(EPS eps, Vec mode) {
+  const double value = first_eigenvalue(eps);
+  check(VecSet(mode, 0));
+  if (std::isnan(value)) return value;
+  check(EPSGetEigenvector(eps, 0, mode, nullptr));
+  scale_mode(mode);
+  return value;
+}
+
 }  // namespace
 
 double largest_eigenvalue(Mat hessian) {
@@ -149,11 +156,23 @@ double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec 
     choose_shift_and_invert(eps, exact);
   else
     choose_preconditioned(eps, solver);
-  const double value = first_eigenvalue(eps);
-  check(VecSet(mode, 0));
-  if (std::isnan(value)) return value;
-  check(EPSGetEigenvector(eps, 0, mode, nullptr));
-  scale_mode(mode);
+  check(EPSSetFromOptions(eps));
+  return first_mode(eps, mode);
+}
+
+double rough_smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode) {
+  constexpr double tolerance = 0.1;  // of the eigenvalue
+  constexpr int maximum = 200;       // iterations
+  solver.prepare(displacement);
+  const Mat action = solver.hessian().action();
+  double value = 0;
+  {
+    const EpsHandle eps = symmetric_problem(action, tolerance, maximum);
+    choose_preconditioned(eps, solver);
+    value = first_mode(eps, mode);
+  }
+  // SLEPc takes them away from the preconditioner that it was lent.
+  check(PCSetOperators(solver.preconditioner(), action, solver.preconditioner_matrix()));
   return value;
 }
 

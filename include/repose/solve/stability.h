@@ -29,4 +29,8 @@ double largest_eigenvalue(Mat hessian);
 double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
                            int64_t direct_limit = linear::TangentSolver::factors_limit);
 
+/// The same to a tenth, by LOBPCG on products with the Hessian: enough to leave a saddle along
+/// `mode`. No options apply. Collective.
+double rough_smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode);
+
 }  // namespace repose::solve

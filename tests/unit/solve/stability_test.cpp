@@ -84,6 +84,22 @@ TEST_P(Solver, CompressedChainBucklesByItsStiffestWave) {
   EXPECT_NEAR(energy.smallest_at_start(GetParam()), expected, 1e-6 * std::abs(expected));
 }
 
+TEST(RoughEigenvalue, IsThatOfAStringAndLeavesTheSolverUsable) {
+  constexpr int links = 24;
+  constexpr double length = 4, k = 1.5;
+  for (const double stretch : {0.5, -0.5}) {
+    Energy energy(MPI_COMM_WORLD, chain(links, length, stretch, k));
+    const base::VecHandle start = energy.positions.make_vector();
+    energy.mode = energy.positions.make_vector();
+    const double wave = std::cos(M_PI / links);
+    const double expected = k * stretch / length * (stretch > 0 ? 2 - 2 * wave : 2 + 2 * wave);
+    const double found = solve::rough_smallest_eigenvalue(energy.solver, start, energy.mode);
+    EXPECT_NEAR(found, expected, 0.1 * std::abs(expected));
+    EXPECT_NEAR(discrete::largest_block(energy.mode), 1, 1e-12);
+    EXPECT_GT(energy.solver.preconditioned_step(energy.mode), 0);
+  }
+}
+
 /// A weight on a spring, at rest below its support or on top of it: m g / r across, of either sign.
 class Pendulum : public ::testing::TestWithParam<std::tuple<bool, int64_t>> {};
 
