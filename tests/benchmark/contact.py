@@ -113,6 +113,17 @@ def implicit(points, triangles):
     return distance.EvaluateFunction
 
 
+def encloses(points, triangles, place):
+    """Whether the solid angles of a closed surface add up to a whole turn: VTK's sign, from the nearest
+    triangle's normal, is wrong beside slivers."""
+    a, b, c = np.moveaxis(points[triangles] - place, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    angle = np.arctan2(volume, la * lb * lc + np.einsum("ij,ij->i", a, b) * lc
+                       + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb)
+    return abs(angle.sum()) > np.pi
+
+
 def inside_bone(file):
     """How many free points are deeper in a bone than at the start, and by how much, mm."""
     with h5py.File(file) as result:
@@ -123,13 +134,13 @@ def inside_bone(file):
     before, now = model["point/position"][free], step["point/position"][free]
     deeper = np.zeros(len(now))
     for bone, move in enumerate(moves):
-        distance = implicit(surfaces["points"], surfaces["triangles"][surfaces["bone"] == bone])
+        triangles = surfaces["triangles"][surfaces["bone"] == bone]
+        distance = implicit(surfaces["points"], triangles)
         beside = (now - move[:3, 3]) @ move[:3, :3]
-        low, high = (f(surfaces["points"][surfaces["triangles"][surfaces["bone"] == bone]]
-                       .reshape(-1, 3), axis=0) for f in (np.min, np.max))
+        low, high = (f(surfaces["points"][triangles].reshape(-1, 3), axis=0) for f in (np.min, np.max))
         for row in np.flatnonzero(((beside > low) & (beside < high)).all(axis=1)):
             depth = -distance(beside[row])
-            if depth > 0.1:
+            if depth > 0.1 and encloses(surfaces["points"], triangles, beside[row]):
                 deeper[row] = max(deeper[row], depth - max(0, -distance(before[row])))
     return np.count_nonzero(deeper > 0.1), deeper.max()
 
