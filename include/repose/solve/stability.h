@@ -29,8 +29,10 @@ double largest_eigenvalue(Mat hessian);
 double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
                            int64_t direct_limit = linear::TangentSolver::factors_limit);
 
-/// The same to a tenth, by LOBPCG on products with the Hessian: enough to leave a saddle along
-/// `mode`. No options apply. Collective.
+/// The smallest eigenvalue of the exact Hessian, N/mm, to a relative error of 0.1, by LOBPCG with
+/// products of the Hessian and the preconditioner of `solver`; not a number if that did not
+/// converge. `mode` receives the eigenvector, scaled as above. `-eps_…` options do not apply.
+/// Collective.
 double rough_smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode);
 
 }  // namespace repose::solve
