@@ -100,9 +100,6 @@ void TangentSolver::make_krylov() {
 struct KeptPreconditioner {
   std::shared_ptr<ColumnMultigrid> columns;
   std::shared_ptr<const ColumnMultigrid::Numbers> numbers;
-  double compliance;  // mm/N; −1: not known
-  double compliance_load;
-  bool convex;
   LagPolicy lag;
 };
 
@@ -112,7 +109,7 @@ void TangentSolver::reset() {
   krylov_ = {};
   make_krylov();
   renewals_ = 0;
-  made_at_ = made_at_state_ = measured_at_ = bounded_at_ = compliance_at_ = -1;
+  made_at_ = made_at_state_ = measured_at_ = bounded_at_ = loaded_at_ = -1;
   convex_ = true;
   negative_curvature_ = finished_ = false;
 }
@@ -120,11 +117,9 @@ void TangentSolver::reset() {
 std::shared_ptr<const KeptPreconditioner> TangentSolver::make_kept(Vec displacement) {
   reset();
   renew(displacement);
-  largest_compliance(displacement);
   if (!columns_) return nullptr;
-  const double compliance = compliance_at_ < 0 ? -1 : compliance_;
-  return std::make_shared<KeptPreconditioner>(KeptPreconditioner{
-      columns_, columns_->numbers(), compliance, compliance_load_, convex_, lag_});
+  return std::make_shared<KeptPreconditioner>(
+      KeptPreconditioner{columns_, columns_->numbers(), lag_});
 }
 
 void TangentSolver::restore(const KeptPreconditioner& kept) {
@@ -133,10 +128,6 @@ void TangentSolver::restore(const KeptPreconditioner& kept) {
   columns_->set_numbers(*kept.numbers);
   lag_ = kept.lag;
   renewals_ = 1;
-  compliance_ = kept.compliance;
-  compliance_load_ = kept.compliance_load;
-  compliance_at_ = compliance_ < 0 ? -1 : renewals_;
-  convex_ = kept.convex;
 }
 
 void TangentSolver::choose_preconditioner() {
@@ -314,11 +305,10 @@ double TangentSolver::newton_distance(Vec displacement, Vec gradient) {
 }
 
 /// Upper estimate of a point's compliance, mm/N, by a load of random signs. Soft points move most,
-/// and take most of its energy, so that a rough solution suffices. States that share a
-/// preconditioner at one load have similar compliance.
+/// and take most of its energy, so that a rough solution suffices.
 double TangentSolver::largest_compliance(Vec displacement) {
-  const double load_now = positions_.load();
-  if (compliance_at_ == renewals_ && compliance_load_ == load_now) return compliance_;
+  hessian_.assemble(displacement);
+  if (loaded_at_ == hessian_.assemblies()) return compliance_;
   base::VecHandle load = positions_.make_vector();
   PetscInt begin = 0, end = 0;
   PetscScalar* values = nullptr;
@@ -334,8 +324,7 @@ double TangentSolver::largest_compliance(Vec displacement) {
     if (known || !convex_) break;
   }
   compliance_ = known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
-  compliance_at_ = known ? renewals_ : -1;
-  compliance_load_ = load_now;
+  loaded_at_ = hessian_.assemblies();
   return compliance_;
 }
 

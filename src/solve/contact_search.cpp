@@ -217,9 +217,10 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
 }
 
 /// Moves along the direction of least curvature, where that is negative, to the side of less
-/// energy. Returns false where neither side has less, at 0.3 mm or nearer. Collective.
+/// energy, as far as doubled steps lower it. Returns false where neither side has less, at 0.3 mm
+/// or nearer. Collective.
 bool ContactSearch::leave_saddle(Vec displacement) {
-  constexpr double way = 0.3, least = 1e-3;  // mm
+  constexpr double way = 0.3, least = 1e-3, farthest = 10;  // mm
   tangent_.forget_contact();
   const double here = objective_.evaluate(displacement, gradient_);
   if (!(rough_smallest_eigenvalue(solver_, displacement, step_) < 0)) return false;
@@ -230,8 +231,16 @@ bool ContactSearch::leave_saddle(Vec displacement) {
   };
   for (double share = way; share > least; share /= 3) {
     const double forth = try_side(share), back = try_side(-share);
-    if (!(std::min(forth, back) < here)) continue;
-    check(VecAXPY(displacement, forth < back ? share : -share, step_));
+    double lowest = std::min(forth, back);
+    if (!(lowest < here)) continue;
+    double best = forth < back ? share : -share;
+    for (double next = 2 * best; std::abs(next) < farthest; next *= 2) {
+      const double value = try_side(next);
+      if (!(value < lowest)) break;
+      lowest = value;
+      best = next;
+    }
+    check(VecAXPY(displacement, best, step_));
     return true;
   }
   return false;
@@ -421,7 +430,7 @@ void ContactSearch::take_other(Vec displacement, double accuracy, Outcome there,
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
-  constexpr int max_rounds = 8, stiffest = 16;
+  constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
   Outcome outcome;
   if (!predicted_) {
     outcome = finish(displacement, accuracy);
@@ -435,8 +444,11 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   int64_t iterations = 0;
   double finer = accuracy;
   const PresolveStage to_fine{false, accuracy, accuracy, to_exact.finer};
-  for (int round = 0; round < max_rounds; ++round) {
-    const auto stages = round == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
+  int left = 0;  // saddles
+  const auto leaves = [&] { return left < max_left && leave_saddle(displacement) && ++left > 0; };
+  for (int round = 0; round < max_rounds;) {
+    const auto stages =
+        round + left == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
     for (const PresolveStage& to : stages) {
       const Outcome near = presolve(displacement, accuracy, to);
       iterations += near.iterations;
@@ -444,12 +456,13 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     }
     const End end = newton(displacement, finer, iterations);
     if (end == End::stopped) return stopped(displacement, outcome);
-    const bool may_leave = end == End::failed && qp_.reduced() && round + 1 < max_rounds;
-    if (may_leave && leave_saddle(displacement)) continue;
+    if (end == End::failed && qp_.reduced() && leaves()) continue;
     outcome = finish(displacement, accuracy);
     if (outcome.converged) break;
+    if (!outcome.stable && leaves()) continue;
     if (end == End::reached) finer /= 4;
     stiffen(std::min(2 * times_, stiffest));
+    ++round;
   }
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)

@@ -186,6 +186,28 @@ double over_hertz(int columns, int layers) {
 
 TEST(Contact, ABallPressedIntoALayerMeetsHertzsForce) { EXPECT_NEAR(over_hertz(25, 16), 1, 0.05); }
 
+// Euler's column: straight it is balanced, and only the curvature there tells that it is not at
+// rest.
+TEST(Contact, ASlenderColumnThatAPlatePressesBuckles) {
+  constexpr int layers = 12;
+  const auto aside = [&](double pressed) {
+    model::Model m = solid_block(2, 2, layers, poisson, 0, [&](int, int, int a) {
+      return a + 1 == layers ? PointSet::boundary : PointSet::soft_tissue;
+    });
+    const Vec3 z = Vec3::UnitZ();
+    bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -pressed}), Binding::touches, face_areas(m, z, 0));
+    const Rest rest = testing::find_rest(m, settings(0.001));
+    EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+    double farthest = 0;
+    for (size_t i = 0; i < m.points.position.size(); ++i)
+      farthest =
+          std::max(farthest, (rest.rows.position[i] - m.points.position[i]).head<2>().norm());
+    return farthest;
+  };
+  EXPECT_NEAR(aside(0.3), 0.8426, 0.002);
+  EXPECT_NEAR(aside(2), 14.96, 0.01);
+}
+
 /// A block of 30 × 40 × 9 mm whose ends and bottom are held, cut along its middle but for its ends.
 model::Model cut_block(bool cut) {
   model::Model m = solid_block(7, 9, 4, poisson, 0, [](int, int j, int a) {
