@@ -113,11 +113,9 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
 
 /// Parts the lips, or makes all other cuts. On rank 0.
 void cut_tissue(bool lips, Job& job) {
-  for (const model::Cut& cut : job.cuts) {
-    if (cut.lips != lips) continue;
-    const size_t doubled = model::cut_along(cut, job.model).size();
-    job.building += describe_cut(cut, static_cast<int64_t>(doubled));
-  }
+  const std::vector<int64_t> doubled = model::make_cuts(job.cuts, lips, job.model);
+  for (size_t i = 0; i < doubled.size(); ++i)
+    if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank

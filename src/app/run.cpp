@@ -27,6 +27,7 @@
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
+#include "repose/results/run_files.h"
 #include "repose/solve/supported.h"
 #include "repose/surface/write.h"
 #include "self_contact.h"
@@ -267,7 +268,7 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
 /// NAME_given_skin.vtp and into the result. `now` are the points of the solved skin. Collective.
 std::string Run::write_given_skin(const SolvedSkin& skin, const std::vector<Vec3>& now) const {
   if (!job_.remeshed) return "";
-  const std::string file = name_ + "_given_skin.vtp";
+  const std::string file = name_ + results::given_skin_ending;
   base::on_root(comm, [&] {
     std::vector<Vec3> displacement(now.size());
     for (size_t i = 0; i < now.size(); ++i) displacement[i] = now[i] - skin.initial().points[i];

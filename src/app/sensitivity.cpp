@@ -35,13 +35,9 @@ model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) 
   model::BuiltModel built;
   base::on_root(comm,
                 [&] { built = model::build_model(scene, job.anatomy->skin, job.anatomy->bones); });
-  const auto cut_tissue = [&](bool lips) {
-    for (const model::Cut& cut : built.cuts)
-      if (cut.lips == lips) model::cut_along(cut, built.model);
-  };
-  base::on_root(comm, [&] { cut_tissue(true); });
+  base::on_root(comm, [&] { model::make_cuts(built.cuts, true, built.model); });
   if (job.reference_state) solve::prestress(comm, built.model, *job.reference_state);
-  base::on_root(comm, [&] { cut_tissue(false); });
+  base::on_root(comm, [&] { model::make_cuts(built.cuts, false, built.model); });
   return std::move(built.model);
 }
 

@@ -5,6 +5,7 @@
 #include "repose/base/agreement.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/results/run_files.h"
 #include "repose/solve/reaction.h"
 
 namespace repose::app {
@@ -104,7 +105,7 @@ bool Writer::due() const {
 /// The last rest position reached and, of a search at load 1, the state it is at: with both a run
 /// can go on from there or, should that lead astray, along the path.
 void Writer::write_checkpoint(const solve::StateSnapshot& snapshot) {
-  results::ResultFile file = open("_checkpoint", results::Kind::checkpoint);
+  results::ResultFile file = open(results::checkpoint_suffix, results::Kind::checkpoint);
   file.append(reached_->numbers, reached_->rows);
   if (snapshot && reached_->numbers.load < 1)
     snapshot([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });

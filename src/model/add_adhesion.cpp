@@ -45,14 +45,16 @@ double lip_line(const scene::Landmarks& landmarks, double x) {
   return middle.z() + share * (corner.z() - middle.z());
 }
 
+const char* incisor_edge(bool upper) { return upper ? "upper_incisor_edge" : "lower_incisor_edge"; }
+
 /// Elements of one jaw.
 class JawAdhesion {
  public:
-  JawAdhesion(const scene::AnatomyPlan& plan, bool upper, const surface::Surface& bone,
+  JawAdhesion(const scene::AnatomyPlan& plan, bool upper, const surface::TriangleTree& bone,
               const Frame& frame)
       : plan_(plan),
         upper_(upper),
-        edge_(plan.landmarks.at(upper ? "upper_incisor_edge" : "lower_incisor_edge")),
+        edge_(plan.landmarks.at(incisor_edge(upper))),
         tree_(bone),
         frame_(frame) {}
 
@@ -80,15 +82,14 @@ class JawAdhesion {
   const scene::AnatomyPlan& plan_;
   bool upper_;
   Vec3 edge_;
-  surface::TriangleTree tree_;
+  const surface::TriangleTree& tree_;
   Frame frame_;
 };
 
 /// The bone nearest to a place.
-int32_t bone_at(const Vec3& place, const std::vector<surface::Surface>& bones) {
+int32_t bone_at(const Vec3& place, const std::vector<surface::TriangleTree>& bones) {
   std::vector<double> squared;
-  for (const surface::Surface& bone : bones)
-    squared.push_back(surface::TriangleTree(bone).nearest(place).squared);
+  for (const surface::TriangleTree& bone : bones) squared.push_back(bone.nearest(place).squared);
   return static_cast<int32_t>(std::ranges::min_element(squared) - squared.begin());
 }
 
@@ -101,12 +102,12 @@ void add_adhesion(const scene::AnatomyPlan& plan, const std::vector<surface::Sur
   std::set<int64_t> parted;
   for (const Cut& cut : cuts) parted.insert(cut.columns.begin(), cut.columns.end());
   const ContactPairs& pairs = model.contact.pairs;
+  const std::vector<surface::TriangleTree> trees(bones.begin(), bones.end());
   for (const bool upper : {true, false}) {
-    const int32_t bone =
-        bone_at(plan.landmarks.at(upper ? "upper_incisor_edge" : "lower_incisor_edge"), bones);
+    const int32_t bone = bone_at(plan.landmarks.at(incisor_edge(upper)), trees);
     const auto frame = frame_of(model, bone);
     if (!frame) continue;
-    const JawAdhesion jaw(plan, upper, bones[bone], *frame);
+    const JawAdhesion jaw(plan, upper, trees[bone], *frame);
     for (size_t c = 0; c < pairs.point.size(); ++c) {
       const int64_t column = model.points.column[pairs.point[c]];
       if (pairs.body[c] == bone && pairs.binding[c] == Binding::touches &&

@@ -15,6 +15,7 @@
 
 #include "repose/base/error.h"
 #include "repose/base/whole_file.h"
+#include "repose/results/run_files.h"
 
 namespace repose::results {
 
@@ -63,10 +64,10 @@ void write_holder(int descriptor) {
 
 /// Returns whether what follows the name is that of a run's unfinished file, not of another run's.
 bool is_ending(const std::string& rest) {
-  static const std::regex endings(
-      "(_checkpoint)?(\\.h5|_(tissue|springs|skin|bones|blocks)\\.xdmf|_given_skin\\.vtp)"
-      "\\.[0-9]+\\.part");
-  return std::regex_match(rest, endings);
+  static const std::regex unfinished("\\.[0-9]+\\.part");
+  return std::ranges::any_of(run_file_endings(), [&](const std::string& ending) {
+    return rest.starts_with(ending) && std::regex_match(rest.substr(ending.size()), unfinished);
+  });
 }
 
 }  // namespace

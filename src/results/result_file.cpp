@@ -13,6 +13,7 @@
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/results/model_file.h"
+#include "repose/results/run_files.h"
 #include "unfinished_file.h"
 #include "views.h"
 #include "vtkhdf.h"
@@ -348,7 +349,7 @@ std::vector<std::unique_ptr<UnfinishedFile>> ResultFile::State::describe() const
   std::vector<std::unique_ptr<UnfinishedFile>> documents;
   const std::string h5 = name.filename().string() + ".h5";
   const auto describe_as = [&](const std::string& view, bool requested, const auto& shown) {
-    const std::filesystem::path document = with_ending(name, "_" + view + ".xdmf");
+    const std::filesystem::path document = with_ending(name, view_ending(view));
     if (!requested) {
       std::error_code ignored;
       std::filesystem::remove(document, ignored);
@@ -360,7 +361,7 @@ std::vector<std::unique_ptr<UnfinishedFile>> ResultFile::State::describe() const
   const std::vector<XdmfBlock> all = views_of_steps();
   for (const XdmfBlock& block : all) describe_as(block.name, block.cells > 0, block);
   const std::vector<XdmfBlock> named = named_blocks(all, named_bones);
-  describe_as("blocks", named.size() > 1, named);
+  describe_as(named_view, named.size() > 1, named);
   return documents;
 }
 

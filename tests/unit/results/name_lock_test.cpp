@@ -27,7 +27,8 @@ TEST(NameLock, WhatAKilledRunLeftGoesAndNothingElse) {
   const Folder folder;
   for (const std::string left :
        {"a.lock", "a.h5.77.part", "a_checkpoint.h5.77.part", "a_skin.xdmf.78.part",
-        "a_checkpoint_skin.xdmf.9.part", "a_blocks.xdmf.8.part", "a_given_skin.vtp.8.part"})
+        "a_checkpoint_skin.xdmf.9.part", "a_tissue.xdmf.1.part", "a_springs.xdmf.1.part",
+        "a_bones.xdmf.1.part", "a_blocks.xdmf.8.part", "a_given_skin.vtp.8.part"})
     make(folder.path(left));
   const std::string others = "a.h5 a.h5.x.part a_2.h5.77.part a_2_skin.xdmf.77.part ba.h5.77.part";
   std::istringstream names(others);
