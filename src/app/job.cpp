@@ -38,16 +38,6 @@ Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
   }
 }
 
-/// Why rank 0 builds the model whole, or nothing where every rank makes its part.
-std::string explain_undistributed(MPI_Comm comm, const model::Anatomy& anatomy,
-                                  const std::string& reason) {
-  constexpr size_t worth_a_part = 8;  // columns a rank
-  if (!reason.empty()) return reason;
-  if (anatomy.skin.points.size() < worth_a_part * static_cast<size_t>(base::size(comm)))
-    return "its skin has few vertices";
-  return model::explain_central_build(anatomy.scene);
-}
-
 /// Takes over what a scene states before its model is built. On rank 0.
 void read_scene(const scene::Scene& scene, Job& job) {
   job.anatomy = model::load_anatomy(scene);
@@ -81,8 +71,10 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
     model::BuildReport report = geometry->report();
     job.held = geometry->held();
     report.effective_modulus = job.local_model->effective_modulus;
-    job.building = describe_build(report) +
-                   report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
+    job.building = describe_build(report);
+    if (base::size(comm) > 1)
+      job.building +=
+          report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
     job.warnings = std::move(report.warnings);
     job.model = std::move(job.local_model->global_metadata);
   });
@@ -101,8 +93,9 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
     }
     read_scene(scene::read_scene(input, changes), job);
     if (watch) watch(share_of_surfaces);
-    const std::string why = explain_undistributed(comm, *job.anatomy, whole);
-    distributed = shared && why.empty();
+    const std::string why =
+        whole.empty() ? model::explain_central_build(job.anatomy->scene) : whole;
+    distributed = why.empty();
     if (distributed) return;
     build(input, job);
     if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
