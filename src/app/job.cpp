@@ -69,6 +69,9 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
   job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
   base::on_root(comm, [&] {
     model::BuildReport report = geometry->report();
+    const std::string adhesion =
+        model::remark_on_adhesion(job.anatomy->scene, job.local_model->global_metadata);
+    if (!adhesion.empty()) report.remarks.push_back(adhesion);
     job.held = geometry->held();
     report.effective_modulus = job.local_model->effective_modulus;
     job.building = describe_build(report);

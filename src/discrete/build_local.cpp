@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <map>
 
 #include "by_column.h"
 #include "distribution.h"
@@ -31,6 +32,17 @@ model::Model build_piece(MPI_Comm comm, const scene::Scene& scene,
                 comm);
   base::on_root(comm, [&] { model::require_regions(found, scene.file.string()); });
   return model;
+}
+
+/// Removes terms that have no element on any rank. Collective.
+void remove_empty_terms(MPI_Comm comm, model::Model& model) {
+  std::vector<int64_t> elements;  // as many on all ranks
+  for (const model::TermElements& of : model.elements)
+    elements.push_back(static_cast<int64_t>(of.size()));
+  MPI_Allreduce(MPI_IN_PLACE, elements.data(), static_cast<int>(elements.size()), MPI_INT64_T,
+                MPI_MAX, comm);
+  for (size_t k = elements.size(); k-- > 0;)
+    if (elements[k] == 0) model.elements.erase(model.elements.begin() + static_cast<int64_t>(k));
 }
 
 /// Rows of the piece's columns that a rank owns.
@@ -137,6 +149,38 @@ void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& lo
   local_model.contact_pairs = rows.total;
 }
 
+void append(const model::TermElements& elements, size_t e, model::TermElements& to) {
+  const auto points = elements.points_of(e);
+  const auto numbers = elements.numbers_of(e);
+  to.points.insert(to.points.end(), points.begin(), points.end());
+  to.numbers.insert(to.numbers.end(), numbers.begin(), numbers.end());
+}
+
+/// The elements of all parts by their first points, of which each has one at most. On rank 0;
+/// collective.
+std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part) {
+  std::vector<model::TermElements> all = part.model.elements;
+  for (model::TermElements& elements : all) {
+    for (int64_t& point : elements.points) point = part.point_row[point];
+    if (base::rank(comm) > 0) {
+      Sender(comm, 0)(elements.points, elements.numbers);
+      continue;
+    }
+    model::TermElements theirs = elements;
+    for (int other = 1; other < base::size(comm); ++other) {
+      Receiver(comm, other)(theirs.points, theirs.numbers);
+      for (size_t e = 0; e < theirs.size(); ++e) append(theirs, e, elements);
+    }
+    const model::TermElements unsorted = std::move(elements);
+    elements = {unsorted.term, unsorted.points_each, unsorted.numbers_each, {}, {}};
+    std::map<int64_t, size_t> by_point;
+    for (size_t e = 0; e < unsorted.size(); ++e) by_point[unsorted.points_of(e)[0]] = e;
+    for (const auto& [point, e] : by_point) append(unsorted, e, elements);
+  }
+  if (base::rank(comm) > 0) all.clear();
+  return all;
+}
+
 model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
   int64_t of[4] = {};
   for (int64_t i = 0; i < part.owned_points; ++i) ++of[static_cast<int>(part.model.points.set[i])];
@@ -163,6 +207,7 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   model::Model model = build_piece(comm, scene, bones, rank_columns);
   const std::vector<int64_t> own = own_columns(rank_columns, rank);
   set_mean_moduli(comm, scene, rank_columns, own, model, local_model);
+  remove_empty_terms(comm, model);
   Distribution distribution{model, {}, {}, {}, {}, {}, {}, {}};
   distribute_motion(distribution);
   distribute_contact(comm, model, distribution);
@@ -180,6 +225,7 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   local_model.outward =
       NaturalRows(comm, part).natural(pick(model::outward_normals(model), points));
   local_model.counts = count_all(comm, part, edges.total);
+  local_model.global_metadata.elements = gather_elements(comm, part);
   local_model.global_metadata.contact.bodies = model.contact.bodies;
   local_model.global_metadata.contact.stiffness = model.contact.stiffness;
   return local_model;

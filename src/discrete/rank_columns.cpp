@@ -19,8 +19,8 @@ using base::pick;
 template <class Archive>
 void pass(Archive& archive, RankColumns& d) {
   model::Piece& p = d.piece;
-  archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.corner, p.triangle,
-          p.loads.instrument, p.loads.target, p.loads.force, p.loads.layer_area);
+  archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
+          p.triangle, p.loads.instrument, p.loads.target, p.loads.force, p.loads.layer_area);
   archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.total_unknowns,
           d.first_unknown, d.unknowns, d.spacing, d.moves);
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "column_layout.h"
 #include "repose/model/build.h"
 
 namespace repose::model {
@@ -10,10 +11,14 @@ inline bool adheres(const scene::Scene& scene) {
   return scene.anatomy && scene.anatomy->vestibule && scene.anatomy->adhesion > 0;
 }
 
-/// Adds the adhesion of the lips to the crowns of the front teeth of their own jaw: one
-/// element of mechanics::Adhesion for each deepest point that touches a jaw and lies at its teeth.
-/// A remark counts them. `cuts` are those of the lips among others, whose columns belong to both.
+/// Returns the jaws that lips adhere to, which have three columns that end in them far from one
+/// line, in rows of the whole skin.
+std::vector<AdheringJaw> adhering_jaws(const scene::AnatomyPlan& plan, const ColumnLayout& layout);
+
+/// Adds the adhesion of the lips to the crowns of the front teeth of their own jaw to the model of
+/// a piece: one element of mechanics::Adhesion for each deepest point that touches a jaw and lies
+/// at its teeth, ascending. Columns on the path of a cut, which belong to both lips, have none.
 void add_adhesion(const scene::AnatomyPlan& plan, const std::vector<surface::Surface>& bones,
-                  const std::vector<Cut>& cuts, Model& model, std::vector<std::string>& remarks);
+                  const Piece& piece, Model& model);
 
 }  // namespace repose::model

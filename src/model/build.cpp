@@ -2,7 +2,6 @@
 
 #include <numeric>
 
-#include "add_adhesion.h"
 #include "column_layout.h"
 #include "repose/anatomy/complete.h"
 #include "repose/base/log.h"
@@ -27,8 +26,9 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   built.held = geometry.held();
   built.cuts = geometry.cuts();
   built.report = geometry.report();
-  if (adheres(scene))
-    add_adhesion(*scene.anatomy, bones, built.cuts, built.model, built.report.remarks);
+  std::erase_if(built.model.elements, [](const auto& elements) { return elements.size() == 0; });
+  const std::string adhesion = remark_on_adhesion(scene, built.model);
+  if (!adhesion.empty()) built.report.remarks.push_back(adhesion);
   built.report.effective_modulus = effective_modulus(sums);
   return built;
 }

@@ -18,7 +18,6 @@ namespace repose::model {
 std::string explain_central_build(const scene::Scene& scene) {
   if (!scene.tissue.material) return "its tissue is springs";
   if (!scene.incisions.empty()) return "it has incisions";
-  if (adheres(scene)) return "its lips adhere to the teeth";
   return "";
 }
 
@@ -27,6 +26,8 @@ struct ColumnGeometry::State {
   std::vector<surface::Surface> bones;
   ColumnLayout layout;
   ColumnLoads loads;
+  std::vector<AdheringJaw> jaws;
+  std::vector<char> parted;  // [columns]
   int64_t layers;
 
   bool is_held(int64_t column) const { return loads.instrument[column] >= 0; }
@@ -69,14 +70,18 @@ ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface
   static const PetscLogEvent event = base::log_event("RpBuild");
   const base::Logged logged(event);
   const auto layers = static_cast<int64_t>(layer_depths(scene.tissue).size());
-  state_ =
-      std::make_unique<State>(State{scene, bones, lay_out_columns(scene, skin, bones), {}, layers});
+  state_ = std::make_unique<State>(
+      State{scene, bones, lay_out_columns(scene, skin, bones), {}, {}, {}, layers});
   ColumnLayout& layout = state_->layout;
   state_->loads = column_loads(scene, layout.mesh, layout.columns, layout.rim);
   state_->require_free_cuts();
   const Counts counts = state_->count();
   require_held(scene, layout.mesh, layout.field, counts, layout.attachment);
   report_columns(layout, counts.bone, layout.report);
+  if (adheres(scene)) state_->jaws = adhering_jaws(*scene.anatomy, layout);
+  state_->parted.assign(layout.rim.size(), 0);
+  for (const Cut& cut : layout.cuts)
+    for (const int64_t column : cut.columns) state_->parted[column] = 1;
 }
 
 ColumnGeometry::ColumnGeometry(const Anatomy& anatomy)
@@ -132,8 +137,11 @@ std::vector<int64_t> columns_of(const SkinMesh& mesh, const std::vector<int64_t>
 Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   const ColumnLayout& layout = state_->layout;
   Piece piece;
+  std::vector<int64_t> centers = columns;
+  for (const AdheringJaw& jaw : state_->jaws)
+    centers.insert(centers.end(), jaw.frame.begin(), jaw.frame.end());
   piece.triangle =
-      triangles_at(layout.mesh, columns_of(layout.mesh, triangles_at(layout.mesh, columns)));
+      triangles_at(layout.mesh, columns_of(layout.mesh, triangles_at(layout.mesh, centers)));
   piece.column = columns_of(layout.mesh, piece.triangle);
   for (const int64_t c : piece.column) {
     piece.skin.push_back(layout.mesh.points[c]);
@@ -142,17 +150,18 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
     piece.slides.push_back(layout.attachment.slides_on[c]);
     piece.free.push_back(layout.attachment.free[c]);
     piece.rim.push_back(layout.rim[c]);
+    piece.parted.push_back(state_->parted[c]);
   }
   const ColumnLoads& loads = state_->loads;
   piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
                  base::pick(loads.force, piece.column), loads.layer_area};
-  for (const int64_t t : piece.triangle) {
-    Triangle& corner = piece.corner.emplace_back();
-    for (int k = 0; k < 3; ++k)
-      corner[k] =
-          std::lower_bound(piece.column.begin(), piece.column.end(), layout.mesh.triangles[t][k]) -
-          piece.column.begin();
-  }
+  const auto rows_of = [&](std::array<int64_t, 3> columns) {
+    for (int64_t& c : columns) c = std::ranges::lower_bound(piece.column, c) - piece.column.begin();
+    return columns;
+  };
+  for (const int64_t t : piece.triangle) piece.corner.push_back(rows_of(layout.mesh.triangles[t]));
+  for (const AdheringJaw& jaw : state_->jaws)
+    piece.jaws.push_back({jaw.upper, jaw.bone, rows_of(jaw.frame)});
   return piece;
 }
 
@@ -192,6 +201,7 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
     set_loads(scene.tissue, mesh, piece.loads, model);
   }
   add_contact(scene, mesh, attachment, model);
+  if (!piece.jaws.empty()) add_adhesion(*scene.anatomy, bones, piece, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
 }

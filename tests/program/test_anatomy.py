@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
-from tissue import last, model_of
+from tissue import apart, last, model_of
 
 MESHES = PROJECT / "meshes"
 DATA = PROJECT.parent / "shared/data/head"
@@ -113,6 +113,24 @@ def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
     assert lips["on", "lower_lip"] > lips["off", "lower_lip"] + 0.05
     assert abs(lips["on", "upper_lip"] - lips["off", "upper_lip"]) < 0.05
     assert abs(lips["on", "lower_lip"] - lips["shared", "lower_lip"]) < 0.005
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_ranks_make_the_parts_of_lips_that_adhere(run, tmp_path, head):
+    """The mouth of this head is open: no cut parts its lips."""
+    write_scene(tmp_path, "moves: [{bone: mandible, clinical: {set_back: 3}}]\n")
+    models, rests = [], []
+    for ranks in (1, 2, 3, 5):
+        result = run("repose-solve", "scene.yaml", "-output", f"on{ranks}", ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert (f"by {ranks} ranks, each its part" in result.stdout) == (ranks > 1)
+        models.append(model_of(tmp_path / f"on{ranks}.h5"))
+        rests.append(last(tmp_path / f"on{ranks}.h5"))
+    assert len(models[0]["element/0/points"]) > 0
+    for model, rest in zip(models, rests):
+        assert model.keys() == models[0].keys()
+        assert [name for name in model if model[name].tobytes() != models[0][name].tobytes()] == []
+        assert apart(rest, rests[0]) < 0.1  # the accuracy
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)

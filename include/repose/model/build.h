@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -91,6 +92,13 @@ struct ColumnLoads {
   std::vector<double> layer_area;
 };
 
+/// A jaw with teeth that a lip adheres to.
+struct AdheringJaw {
+  bool upper;
+  int32_t bone;
+  std::array<int64_t, 3> frame;  ///< columns, whose deepest points tell where the bone is
+};
+
 /// Columns of tissue, ascending, and the triangles of skin between them.
 struct Piece {
   std::vector<int64_t> column;   ///< [C] vertices of the whole skin
@@ -99,7 +107,9 @@ struct Piece {
   std::vector<int32_t> slides;   ///< [C] bone that it slides along, −1 for none
   std::vector<char> free;        ///< [C] 1: it does not even touch bones
   std::vector<char> rim;         ///< [C] 1: held in whole
+  std::vector<char> parted;      ///< [C] 1: on the path of an incision
   ColumnLoads loads;
+  std::vector<AdheringJaw> jaws;  ///< frames in rows of the piece
   std::vector<Triangle> corner;   ///< [F] rows of the piece
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
 };
@@ -122,7 +132,8 @@ class ColumnGeometry {
   /// Points of a column that are free to move.
   int64_t soft_points(int64_t column) const;
   /// The given columns (ascending), those that share a triangle with them, and those that share one
-  /// with these: all that values at elements of the given columns depend on.
+  /// with these: all that values at elements of the given columns depend on. Of a scene with
+  /// adhering lips, the frames of jaws are among the given columns.
   Piece piece(const std::vector<int64_t>& columns) const;
   /// mm, of contact's grids of distances to meshes.
   double spacing() const;
@@ -142,11 +153,15 @@ class ColumnGeometry {
 /// Returns the reason why a scene's model cannot be built column by column, or an empty text.
 std::string explain_central_build(const scene::Scene& scene);
 
+/// Returns a remark that counts the points of a scene's model that adhere to teeth; empty of a
+/// scene without adhesion.
+std::string remark_on_adhesion(const scene::Scene& scene, const Model& model);
+
 /// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
 /// columns that the piece was made around, all there is; of others, what the piece has. Indices are
-/// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0, and bodies are
-/// there whether they are touched or not. `found` [regions of the material] gets the prisms in
-/// each. Serial.
+/// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0, and bodies
+/// and terms are there whether they are touched or have elements or not. `found` [regions of the
+/// material] gets the prisms in each. Serial.
 Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
                   const Piece& piece, std::vector<int64_t>& found);
 

@@ -61,13 +61,39 @@ model::Anatomy loaded(int squares) {
   return anatomy;
 }
 
+/// The jaws with teeth beyond y = 60, to which lips adhere.
+model::Anatomy adhering(int squares) {
+  model::Anatomy anatomy = jaws(squares);
+  anatomy.scene.tissue.release = 0;
+  scene::AnatomyPlan& plan = anatomy.scene.anatomy.emplace();
+  plan.landmarks = {{"upper_incisor_edge", {20, 100, -10}},
+                    {"lower_incisor_edge", {80, 100, -10}},
+                    {"stomion", {51, 100, 0}},
+                    {"mouth_right", {0, 100, -5}},
+                    {"mouth_left", {100, 100, 5}}};
+  anatomy.scene.tissue.attach_regions = {
+      scene::AttachRegion{scene::Box{{50, 90, -10}, {200, 60, 60}}, scene::Attach::contact, 1}};
+  return anatomy;
+}
+
 discrete::LocalModel build_local(const model::Anatomy& anatomy) {
   std::optional<model::ColumnGeometry> geometry;
   base::on_root(comm, [&] { geometry.emplace(anatomy); });
   return discrete::build_local(comm, geometry ? &*geometry : nullptr, anatomy.scene);
 }
 
+void expect_same(const std::vector<model::TermElements>& one,
+                 const std::vector<model::TermElements>& other) {
+  ASSERT_EQ(one.size(), other.size());
+  for (size_t k = 0; k < one.size(); ++k) {
+    EXPECT_EQ(one[k].term, other[k].term);
+    EXPECT_EQ(one[k].points, other[k].points);
+    EXPECT_EQ(one[k].numbers, other[k].numbers);
+  }
+}
+
 void expect_same(const model::Model& one, const model::Model& other) {
+  expect_same(one.elements, other.elements);
   EXPECT_EQ(one.gravity, other.gravity);
   EXPECT_EQ(one.points.position, other.points.position);
   EXPECT_EQ(one.points.set, other.points.set);
@@ -129,7 +155,8 @@ int squares() {
 }
 
 TEST(Raise, parts_are_those_of_the_whole_model) {
-  for (const model::Anatomy& anatomy : {jaws(squares()), rich(squares()), loaded(squares())}) {
+  for (const model::Anatomy& anatomy :
+       {jaws(squares()), rich(squares()), loaded(squares()), adhering(squares())}) {
     const model::BuiltModel built = model::build_model(anatomy);
     const Part part = discrete::distribute(comm, built.model);
     const discrete::LocalModel local_model = build_local(anatomy);
@@ -145,6 +172,8 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
     EXPECT_EQ(local_model.counts.prisms, all.prisms);
     EXPECT_EQ(local_model.counts.edges, all.edges);
     if (base::rank(comm) > 0) continue;
+    EXPECT_EQ(built.model.elements.size(), anatomy.scene.anatomy ? 1 : 0);
+    expect_same(local_model.global_metadata.elements, built.model.elements);
     EXPECT_EQ(local_model.global_metadata.skin, built.model.skin);
     EXPECT_EQ(local_model.global_metadata.bones, built.model.bones);
     EXPECT_EQ(local_model.global_metadata.contact.bodies.size(), built.model.contact.bodies.size());
