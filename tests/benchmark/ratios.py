@@ -16,11 +16,13 @@ apt-get install --no-install-recommends python3-h5py python3-meshio python3-scip
 import argparse
 import json
 import pathlib
+import sys
 import tempfile
 
 import meshio
 import numpy as np
 
+from lip_tone import add_tone
 from measure import run
 from page import option_parser, print_table
 from phantom_heads import Shape, write_surfaces
@@ -57,7 +59,12 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "no adhesion": (", adhesion: 0", ""), "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
         "joined lips": (", lips: joined", ""), "septum 0.2": (", septum: 0.2", ""),
-        "septum 1": (", septum: 1", "")}
+        "septum 1": (", septum: 1", ""),
+        "lower gap 2": (", gap: 2", ", attach_regions: [{box: UPPER, attach: contact, gap: 1}]")}
+# Way → tone of the ring muscle, N/mm², and the way without it.
+TONES = {"tone 3": (0.003, "default"), "tone 3 lower gap 2": (0.003, "lower gap 2"),
+         "tone 6 lower gap 2": (0.006, "lower gap 2")}
+LIMIT = 60  # s, of a search
 
 PHANTOM_HEAD = ("| operation, mm | landmark | published | median | lowest … highest | below, above |\n"
                 "|---|---|---|--:|--:|--:|")
@@ -74,9 +81,20 @@ def landmarks_of(options, folder):
     return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
 
 
-def scene_of(options, operation, way):
+def upper_vestibule(landmarks):
+    """The part of the vestibule in front of the upper teeth, from stomion on, as a box of a scene."""
+    right, left, edge = (landmarks[name] for name in
+                         ("mouth_right", "mouth_left", "upper_incisor_edge"))
+    low = np.array([right[0] - 12, edge[1] - 16, landmarks["stomion"][2]])
+    top = min(landmarks["nasal_spine"][2], landmarks["subnasale"][2])
+    high = np.array([left[0] + 12, edge[1] + 38, top])
+    return f"{{center: {((low + high) / 2).tolist()}, size: {(high - low).tolist()}}}"
+
+
+def scene_of(options, operation, way, landmarks):
     bone, template, move, _, _ = OPERATIONS[operation]
     anatomy, tissue = WAYS[way]
+    tissue = tissue.replace("UPPER", upper_vestibule(landmarks))
     bones = ", ".join(f"{{name: {name}, file: {options.head / name}.ply}}" for name in BONES)
     kerf = ", kerf: 4.5" if operation == "impaction" else ", kerf: 0.5"
     return (f"skin: {options.head / 'skin.ply'}\nbones: [{bones}]\n"
@@ -89,12 +107,20 @@ def scene_of(options, operation, way):
 def ratios_of(options, folder, operation, way, landmarks):
     """Landmark → way of the skin over that of the bone; empty where the scene is refused."""
     _, _, _, direction, length = OPERATIONS[operation]
+    stress, scene_way = TONES.get(way, (0, way))
     name = f"{operation}_{way}".replace(" ", "_")
-    (folder / f"{name}.yaml").write_text(scene_of(options, operation, way))
-    done = run([options.bin / "repose-solve", f"{name}.yaml", "-skip_other_rest"], folder, ends=None)
+    (folder / f"{name}.yaml").write_text(scene_of(options, operation, scene_way, landmarks))
+    source = f"{name}.yaml"
+    if stress:
+        run([options.bin / "repose-solve", source, "-time_limit", 0.01, "-output", "recorded"], folder)
+        source = f"{name}_model.h5"
+        pressure = add_tone(folder / "recorded.h5", folder / source, landmarks, stress)
+        print(f"{operation}, {way}: {1e6 * pressure:.0f} Pa on the lower lip", file=sys.stderr)
+    done = run([options.bin / "repose-solve", source, "-skip_other_rest", "-time_limit", LIMIT,
+                "-output", name], folder, ends=None)
     (folder / f"{name}.log").write_text(done.text + done.error)
-    if done.status not in (0, 2):
-        print(done.error)
+    if done.status != 0:
+        print(operation, way, done.error, file=sys.stderr)
         return {}
     model, rest = model_of(folder / f"{name}.h5"), last(folder / f"{name}.h5")["point/position"]
     skin = np.flatnonzero(model["point/layer"] == 0)
