@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "leave_saddle.h"
 #include "repose/base/agreement.h"
-#include "repose/solve/stability.h"
 
 namespace repose::solve {
 
@@ -216,36 +216,6 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
   return End::failed;
 }
 
-/// Moves along the direction of least curvature, where that is negative, to the side of less
-/// energy, as far as doubled steps lower it. Returns false where neither side has less, at 0.3 mm
-/// or nearer. Collective.
-bool ContactSearch::leave_saddle(Vec displacement) {
-  constexpr double way = 0.3, least = 1e-3, farthest = 10;  // mm
-  tangent_.forget_contact();
-  const double here = objective_.evaluate(displacement, gradient_);
-  if (!(rough_smallest_eigenvalue(solver_, displacement, step_) < 0)) return false;
-  const auto try_side = [&](double share) {
-    check(VecCopy(displacement, trial_));
-    check(VecAXPY(trial_, share, step_));
-    return objective_.evaluate(trial_, gradient_);
-  };
-  for (double share = way; share > least; share /= 3) {
-    const double forth = try_side(share), back = try_side(-share);
-    double lowest = std::min(forth, back);
-    if (!(lowest < here)) continue;
-    double best = forth < back ? share : -share;
-    for (double next = 2 * best; std::abs(next) < farthest; next *= 2) {
-      const double value = try_side(next);
-      if (!(value < lowest)) break;
-      lowest = value;
-      best = next;
-    }
-    check(VecAXPY(displacement, best, step_));
-    return true;
-  }
-  return false;
-}
-
 /// Ends the search where a strict estimate says that it is over.
 Outcome ContactSearch::finish(Vec displacement, double accuracy) {
   tangent_.forget_contact();
@@ -445,7 +415,10 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   double finer = accuracy;
   const PresolveStage to_fine{false, accuracy, accuracy, to_exact.finer};
   int left = 0;  // saddles
-  const auto leaves = [&] { return left < max_left && leave_saddle(displacement) && ++left > 0; };
+  const auto leaves = [&] {
+    tangent_.forget_contact();
+    return left < max_left && leave_saddle(objective_, solver_, displacement) && ++left > 0;
+  };
   for (int round = 0; round < max_rounds;) {
     const auto stages =
         round + left == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};

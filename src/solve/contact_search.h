@@ -48,7 +48,6 @@ class ContactSearch : public RestSearch {
   End newton(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns the share of the step that was taken, 0 for none.
   double take_step(Vec displacement, double tissue, double& value);
-  bool leave_saddle(Vec displacement);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   bool gone_round(Vec displacement);

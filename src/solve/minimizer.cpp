@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "initial_hessian.h"
+#include "leave_saddle.h"
 #include "progress_test.h"
 #include "repose/base/error.h"
 #include "repose/base/petsc.h"
@@ -423,6 +424,21 @@ Outcome Minimizer::finish(Vec displacement, double accuracy, double taken) {
 }
 
 Outcome Minimizer::run(Vec displacement, double accuracy) {
+  constexpr int max_left = 20;  // saddles
+  Outcome outcome = search_and_finish(displacement, accuracy);
+  const auto leaves = [&] {
+    return &estimate_.function == &function_ && !outcome.stable && !outcome.stopped &&
+           leave_saddle(function_, solver_, displacement);
+  };
+  for (int n = 0; n < max_left && leaves(); ++n) {
+    const int64_t iterations = outcome.iterations;
+    outcome = search_and_finish(displacement, accuracy);
+    outcome.iterations += iterations;
+  }
+  return outcome;
+}
+
+Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   accuracy_ = accuracy;
   thrown_ = nullptr;
   stopped_ = false;

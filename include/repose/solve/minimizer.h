@@ -49,7 +49,7 @@ class Minimizer : public RestSearch {
   Outcome finish(Vec displacement, double accuracy, double taken = 0);
 
   /// With accuracy 0 the distance is not estimated during the search: TAO goes on as long as it
-  /// can.
+  /// can. A saddle is left along the mode of least curvature, and searched from again.
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
@@ -57,6 +57,7 @@ class Minimizer : public RestSearch {
   void make_tao();
   void set_forcing();
   void search(Vec displacement, bool near = false);
+  Outcome search_and_finish(Vec displacement, double accuracy);
   /// Returns whether the search that ended after `iterations` begins again where it ended.
   bool should_restart(int64_t iterations);
   /// `last`: the search is over, so the estimate is reported.

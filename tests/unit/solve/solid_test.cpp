@@ -117,6 +117,27 @@ TEST(Solid, NoMinimumIsInfinitelyFarAway) {
   EXPECT_TRUE(std::isinf(rest.summary.last.displacement_error)) << rest.summary.last.reason;
 }
 
+// Straight, it is balanced at any load.
+TEST(Solid, ASlenderColumnBetweenHeldEndsBuckles) {
+  constexpr int layers = 12;
+  const auto aside = [&](double pressed) {
+    model::Model m = solid_block(2, 2, layers, 0.45, 0, [&](int, int, int a) {
+      return a == 0 || a + 1 == layers ? PointSet::held : PointSet::soft_tissue;
+    });
+    testing::aim(m,
+                 [&](const Vec3& x) -> Vec3 { return x - Vec3(0, 0, x.z() == 0 ? pressed : 0); });
+    const Rest rest = testing::find_rest(m, settings(0.001));
+    EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+    double farthest = 0;
+    for (size_t i = 0; i < m.points.position.size(); ++i)
+      farthest =
+          std::max(farthest, (rest.rows.position[i] - m.points.position[i]).head<2>().norm());
+    return farthest;
+  };
+  EXPECT_LT(aside(1), 0.1);
+  EXPECT_NEAR(aside(2), 3.442, 0.005);
+}
+
 TEST(Solid, TakesFewEvaluations) {
   const Rest rest = testing::find_rest(twisted_block(0.45), settings(0.01));
   EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
