@@ -290,9 +290,8 @@ void ColumnMultigrid::cycle(size_t l) {
   }
   const ColumnLevel& matrix = *level.matrix;
   matrix.forward(level.b, level.x);
-  matrix.update_ghosts(level.x);
   if (l < coarsening_.size()) {
-    matrix.residual_of_forward(level.x, level.r);
+    matrix.residual_of_forward(level.b, level.x, level.r);
     Level& coarse = levels_[l + 1];
     coarsening_[l]->restrict_to(level.r, coarse.b);
     cycle(l + 1);

@@ -46,6 +46,10 @@ struct BlockPattern {
 /// Gauss–Seidel on it column by column: the points of a column, each coupled to those above and
 /// below it, are solved for at once. Rows and columns of blocks have local numbers: this rank's
 /// points, column by column from the top, then ghosts. Vectors are [own points + ghosts].
+///
+/// Sweeps are those of one matrix, whatever the number of ranks: first the columns at borders
+/// between ranks, neighboring ranks in turn, then all others at once (Adams 2001, "A distributed
+/// memory unstructured Gauss–Seidel algorithm for multigrid smoothers").
 class ColumnLevel {
  public:
   /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
@@ -81,19 +85,20 @@ class ColumnLevel {
   /// The values of the matrix and its factors, without the pattern.
   struct Numbers {
     std::vector<Eigen::Matrix3f> block;  ///< [blocks + 1]
-    std::vector<float> damping;          ///< [own] added to the diagonal of the columns' blocks
+    std::vector<float> lift;             ///< [own] added to the diagonal of the columns' blocks
     std::vector<float> inverse;          ///< [9 own + 1] factors of the columns' blocks
   };
   const Numbers& numbers() const { return numbers_; }
   void set_numbers(const Numbers& numbers) { numbers_ = numbers; }  ///< of the same pattern
 
-  /// x = (L + D)⁻¹ b: a sweep down the numbers from x = 0. D: the columns' blocks, and what keeps
-  /// sweeps convergent although ranks sweep at once: half of the norms of the blocks of ghosts on
-  /// the diagonal (Baker, Falgout, Kolev & Yang 2011). Own points.
+  /// x = (L + D)⁻¹ b: a sweep in order from x = 0, D being the columns' blocks. Own points and
+  /// ghosts. Collective.
   void forward(std::span<const Lanes> b, std::span<Lanes> x) const;
-  /// r = b − A x for the x of forward(), whose ghosts are up to date.
-  void residual_of_forward(std::span<const Lanes> x, std::span<Lanes> r) const;
-  /// A sweep up the numbers on A x = b, ghosts fixed.
+  /// r = b − A x for the x of forward(). Not collective.
+  void residual_of_forward(std::span<const Lanes> b, std::span<const Lanes> x,
+                           std::span<Lanes> r) const;
+  /// A sweep in reverse order on A x = b, from an x whose ghosts are up to date, which are not
+  /// afterwards. Collective.
   void backward(std::span<const Lanes> b, std::span<Lanes> x) const;
   /// Brings the ghosts of x up to date. Collective.
   void update_ghosts(std::span<Lanes> x) const { share(x.data(), x.data() + own(), lanes_); }
@@ -102,21 +107,27 @@ class ColumnLevel {
 
  private:
   using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
-  void damp(int32_t point);
   void factor_column(size_t column);
   /// Σ of the blocks [k, end) of a row with x.
   Lanes row_product(int64_t k, int64_t end, std::span<const Lanes> x) const;
   void solve_column(int64_t column, std::span<Lanes> x) const;
+  /// b − A x of an own row, but for the blocks of its own column.
+  Lanes residual_around(int32_t i, std::span<const Lanes> b, std::span<const Lanes> x) const;
+  void backward_column(size_t column, std::span<const Lanes> b, std::span<Lanes> x) const;
   void find_columns();
   void connect(MPI_Comm comm);
+  void find_border();
 
   std::vector<Place> place_;
   std::vector<int64_t> ghost_;
   int64_t first_ = 0, total_ = 0;
   BlockPattern pattern_;
-  std::vector<int32_t> chain_;          // [columns + 1] first points
-  std::vector<int32_t> left_, within_;  // [own] blocks left of the column's, and of it
-  std::vector<int32_t> diagonal_;       // [own] blocks left of the diagonal
+  std::vector<int32_t> chain_;            // [columns + 1] first points
+  std::vector<int32_t> left_, within_;    // [own] blocks left of the column's, and of it
+  std::vector<int32_t> diagonal_;         // [own] blocks left of the diagonal
+  std::vector<size_t> border_;            // columns coupled to ghosts, the last first
+  std::vector<char> is_border_, beside_;  // [columns] of the border, or coupled to a column of it
+  int turn_ = 0, turns_ = 1;              // of this rank among its neighbors, and of all
   Numbers numbers_;
   StarForest forest_;
   FloatsType lanes_{4};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
 #include <random>
 
@@ -96,7 +97,7 @@ TEST_F(SweepsOfALevel, ForwardSolvesWithTheLowerPart) {
 TEST_F(SweepsOfALevel, ResidualIsWhatForwardLeaves) {
   std::vector<Lanes> x(Level::points), r = x;
   s_.level.forward(lanes(some_), x);
-  s_.level.residual_of_forward(x, r);
+  s_.level.residual_of_forward(lanes(some_), x, r);
   EXPECT_LT((some_ - s_.matrix * vector(x) - vector(r)).norm(), 1e-5 * some_.norm());
 }
 
@@ -112,6 +113,49 @@ TEST_F(SweepsOfALevel, BackwardIsForwardTransposed) {
   s_.level.forward(lanes(some_), down);
   s_.level.backward(lanes(other), up);
   EXPECT_NEAR(other.dot(vector(down)), some_.dot(vector(up)), 1e-5);
+}
+
+/// Two columns of one point on each rank, all coupled as strongly as a column to itself, nearly:
+/// where ranks swept at once, each would take away the whole residual.
+TEST(ColumnLevel, NeighboringRanksSweepInTurn) {
+  constexpr int32_t own = 2;
+  constexpr float weak = 0.01f;
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  MPI_Comm_size(PETSC_COMM_WORLD, &ranks);
+  const int32_t all = own * ranks;
+  std::vector<int64_t> ghost;
+  for (int32_t g = 0; g < all; ++g)
+    if (g / own != rank) ghost.push_back(g);
+  linear::BlockPattern pattern;
+  for (int32_t i = 0; i < own; ++i) {
+    for (int32_t j = 0; j < all; ++j) pattern.column.push_back(j);
+    pattern.begin.push_back(static_cast<int64_t>(pattern.column.size()));
+  }
+  linear::ColumnLevel level(PETSC_COMM_WORLD, {{0, 0}, {1, 0}}, ghost, pattern);
+  linear::UpperSums sums(level);
+  for (int32_t i = 0; i < own; ++i)
+    for (int32_t j = i; j < all; ++j)
+      sums.add(i, j, (i == j ? 1 + weak : 1.0f) * Eigen::Matrix3f::Identity());
+  level.fill(sums);
+  level.factor();
+  const std::vector<Lanes> none(all);
+  std::vector<Lanes> x(all, Lanes{1, 1, 1});
+  level.backward(none, x);
+  std::array<double, 2> sum{};
+  for (int32_t i = 0; i < own; ++i) sum = {sum[0] + x[i][0], sum[1] + x[i][0] * x[i][0]};
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), 2, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);
+  const double energy = sum[0] * sum[0] + weak * sum[1];
+  EXPECT_LT(energy, 0.1 * all * all);
+
+  const std::vector<Lanes> b(all, Lanes{1, 2, 3});
+  std::vector<Lanes> r(all);
+  level.forward(b, x);
+  level.residual_of_forward(b, x, r);
+  Lanes product{};
+  for (const Lanes& value : x) product += value;
+  for (int32_t i = 0; i < own; ++i)
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(r[i][d], b[i][d] - product[d] - weak * x[i][d], 1e-4);
 }
 
 TEST(ColumnLevel, WhatIsNoNumberCouplesNothing) {
