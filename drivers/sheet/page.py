@@ -185,12 +185,13 @@ def described(plans, appearance):
 
 
 def frame(plans):
-    """Corners of the box that the view fills: the head to its vertex, but of a tall scan not what lies
-    below the computed part, nor what stands above a head."""
+    """Corners of the box that the view fills: skin and bones to the vertex, but of a tall scan not what
+    lies below the computed part, nor what stands above a head."""
     solved = [plan.result.solved for plan in plans]
     states = np.concatenate([solved[0].before, *(skin.after for skin in solved)])
     low, high = states.min(0), states.max(0)
-    points = np.concatenate([states, plans[0].result.skin.before])
+    bones = [bone["before"] for bone in plans[0].result.bones]
+    points = np.concatenate([states, plans[0].result.skin.before, *bones])
     points = points[(points[:, 2] > low[2] - 5) & (points[:, 2] < high[2] + 150)]
     return points.min(0) - (0, 0, 2), points.max(0) + (0, 0, 2)
 

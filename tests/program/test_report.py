@@ -211,7 +211,7 @@ def test_the_view_works_in_a_browser(report, opened, tmp_path):
       const chin = viewer.surfaces[0].positions[0].length;
       const at = (x, y) => ({clientX: box.left + x * box.width, clientY: box.top + y * box.height});
       viewer.show({mode: "single", states: [1]});
-      const hit = viewer.pick(at(0.5, 0.75));
+      const hit = viewer.pick(at(0.6, 0.75));
       const after = viewer.surfaces[0].positions[1], before = viewer.surfaces[0].positions[0];
       const moved = hit.at(after, 3).map((v, k) => v - hit.at(before, 3)[k]);
       document.getElementById("measure").click();
