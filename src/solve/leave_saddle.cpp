@@ -13,14 +13,13 @@ using base::check;
 bool leave_saddle(discrete::Function& function, linear::TangentSolver& solver, Vec displacement) {
   constexpr double way = 0.3, least = 1e-3, farthest = 10;  // mm
   const base::VecHandle mode = function.positions().make_vector(),
-                        trial = function.positions().make_vector(),
-                        gradient = function.positions().make_vector();
+                        trial = function.positions().make_vector();
   const auto value_at = [&](double moved) {
     check(VecCopy(displacement, trial));
     check(VecAXPY(trial, moved, mode));
-    return function.evaluate(trial, gradient);
+    return function.evaluate(trial, nullptr);
   };
-  const double here = function.evaluate(displacement, gradient);
+  const double here = function.evaluate(displacement, nullptr);
   if (!(rough_smallest_eigenvalue(solver, displacement, mode) < 0)) return false;
   for (double share = way; share > least; share /= 3) {
     const double forth = value_at(share), back = value_at(-share);

@@ -198,11 +198,7 @@ TEST(Contact, ASlenderColumnThatAPlatePressesBuckles) {
     bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -pressed}), Binding::touches, face_areas(m, z, 0));
     const Rest rest = testing::find_rest(m, settings(0.001));
     EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
-    double farthest = 0;
-    for (size_t i = 0; i < m.points.position.size(); ++i)
-      farthest =
-          std::max(farthest, (rest.rows.position[i] - m.points.position[i]).head<2>().norm());
-    return farthest;
+    return testing::farthest_aside(m, rest);
   };
   EXPECT_NEAR(aside(0.3), 0.8426, 0.002);
   EXPECT_NEAR(aside(2), 14.96, 0.01);

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <vector>
 
 #include "repose/base/agreement.h"
@@ -35,6 +36,15 @@ struct Rest {
   model::StepRows rows;
   solve::Summary summary;
 };
+
+/// mm, the farthest that a point moved across z.
+inline double farthest_aside(const model::Model& model, const Rest& rest) {
+  double farthest = 0;
+  for (size_t i = 0; i < model.points.position.size(); ++i)
+    farthest =
+        std::max(farthest, (rest.rows.position[i] - model.points.position[i]).head<2>().norm());
+  return farthest;
+}
 
 inline Rest find_rest(const model::Model& model, const solve::Settings& settings) {
   Rest rest;

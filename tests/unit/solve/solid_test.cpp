@@ -128,11 +128,7 @@ TEST(Solid, ASlenderColumnBetweenHeldEndsBuckles) {
                  [&](const Vec3& x) -> Vec3 { return x - Vec3(0, 0, x.z() == 0 ? pressed : 0); });
     const Rest rest = testing::find_rest(m, settings(0.001));
     EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
-    double farthest = 0;
-    for (size_t i = 0; i < m.points.position.size(); ++i)
-      farthest =
-          std::max(farthest, (rest.rows.position[i] - m.points.position[i]).head<2>().norm());
-    return farthest;
+    return testing::farthest_aside(m, rest);
   };
   EXPECT_LT(aside(1), 0.1);
   EXPECT_NEAR(aside(2), 3.442, 0.005);
