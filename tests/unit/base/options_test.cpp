@@ -2,11 +2,8 @@
 
 #include <gtest/gtest.h>
 #include <petscsys.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
-
+#include "../../folder.h"
 #include "repose/base/error.h"
 #include "repose/base/petsc.h"
 
@@ -193,13 +190,11 @@ TEST(Options, RefusesInOneLine) {
 
 /// PETSc with a database as an -options_file would leave it; one life of PETSc for the whole test.
 TEST(Options, ReadsPetscsDatabase) {
-  const auto file =
-      std::filesystem::temp_directory_path() / fmt::format("options_{}.txt", getpid());
-  std::ofstream(file)
-      << "-accuracy 0.25\n-load_steps 7\n-dry_run\n-ksp_rtol 1e-3\n-functionl force\n";
+  const test::Folder folder;
+  const auto file = folder.write(
+      "options.txt", "-accuracy 0.25\n-load_steps 7\n-dry_run\n-ksp_rtol 1e-3\n-functionl force\n");
   Line line({"head.yaml", "-load_steps", "9", "-pc_typo", "x", "-options_file", file.string()});
   const Session session(line->petsc_argc(), line->petsc_argv(), nullptr);
-  std::filesystem::remove(file);
   EXPECT_NE(
       line.refusal().find("unknown option '-functionl'; the nearest known one is -functional"),
       std::string::npos)

@@ -1,13 +1,12 @@
 #include "repose/tools/phantom/phantom.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
 
+#include "../../folder.h"
 #include "../surface/shapes.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
@@ -220,18 +219,16 @@ TEST(Phantom, shipped_default_head_loads) {
 }
 
 TEST(Phantom, is_written_whole) {
-  const auto folder =
-      std::filesystem::temp_directory_path() / ("repose_phantom_" + std::to_string(::getpid()));
-  std::filesystem::create_directory(folder);
-  const auto files = write_phantom(folder / "a head", paper_head());
+  const test::Folder folder;
+  const auto files = write_phantom(folder.path("a head"), paper_head());
   EXPECT_EQ(files.size(), 7u);
   for (const auto& file : files) EXPECT_GT(std::filesystem::file_size(file), 100u) << file;
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 7);
-  EXPECT_EQ(read_surface(folder / "a head_skin.ply").points, paper_head().skin.points);
-  std::filesystem::remove_all(folder);
-  EXPECT_NE(
-      refusal([&] { write_phantom(folder / "head", paper_head()); }).find("cannot be written"),
-      std::string::npos);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path("")), {}), 7);
+  EXPECT_EQ(read_surface(folder.path("a head_skin.ply")).points, paper_head().skin.points);
+  EXPECT_NE(refusal([&] {
+              write_phantom(folder.path("none/head"), paper_head());
+            }).find("cannot be written"),
+            std::string::npos);
 }
 
 TEST(Solid, distances_of_simple_parts_are_exact) {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
+#include "../../folder.h"
 #include "patches.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
@@ -64,7 +64,8 @@ TEST(PushedShape, an_oblique_capsule_ends_at_its_radius) {
 }
 
 TEST(PushedShape, a_mesh_is_met_as_the_shape_it_is) {
-  const auto file = std::filesystem::temp_directory_path() / "instrument_mesh_test.ply";
+  const test::Folder folder;
+  const auto file = folder.path("mesh.ply");
   surface::write_ply(file, patches::box({-4, -4, 18}, {4, 4, 22}));
   const Instrument mesh{scene::ClosedMesh{file}, {0, 0, -10}};
   const Instrument box{scene::Box{{0, 0, 20}, {8, 8, 4}}, {0, 0, -10}};
@@ -72,7 +73,6 @@ TEST(PushedShape, a_mesh_is_met_as_the_shape_it_is) {
     EXPECT_NEAR(along(mesh, p)->leave, along(box, p)->leave, 1e-9);
   EXPECT_FALSE(along(mesh, {5, 0, 11}));
   EXPECT_FALSE(along(mesh, {0, 0, 7})) << "ahead of it";
-  std::filesystem::remove(file);
 }
 
 scene::Scene pressed(const Instrument& instrument) {

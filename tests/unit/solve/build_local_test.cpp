@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../../folder.h"
 #include "../model/patches.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
@@ -223,8 +224,9 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
 TEST(Raise, a_distributed_model_is_written_as_it_was) {
   model::Anatomy springs = jaws(1);
   springs.scene.tissue.material.reset();
-  const std::filesystem::path name = std::filesystem::temp_directory_path() /
-                                     fmt::format("distributed_rows_on_{}", base::size(comm));
+  const test::Folder folder;
+  std::string name = folder.path("rows");
+  base::broadcast(comm, name);
   for (const model::Anatomy& anatomy : {springs, jaws(1), loaded(12)}) {
     const model::Model whole = model::build_model(anatomy).model;
     const discrete::LocalModel local = discrete::distribute_model(comm, model::Model(whole));
@@ -233,7 +235,7 @@ TEST(Raise, a_distributed_model_is_written_as_it_was) {
                         discrete::NaturalRows::of_model(comm, local))
         .commit();
     base::on_root(comm, [&] {
-      const model::Model stored = results::read_model(name.string() + ".h5");
+      const model::Model stored = results::read_model(name + ".h5");
       expect_same(stored, whole);
       EXPECT_EQ(stored.points.mass, whole.points.mass);
       EXPECT_EQ(stored.springs.points, whole.springs.points);
@@ -244,9 +246,6 @@ TEST(Raise, a_distributed_model_is_written_as_it_was) {
       EXPECT_EQ(stored.springs.reference, whole.springs.reference);
       EXPECT_EQ(stored.spring_sets, whole.spring_sets);
       EXPECT_EQ(stored.skin, whole.skin);
-      for (const char* ending :
-           {".h5", "_tissue.xdmf", "_skin.xdmf", "_springs.xdmf", "_bones.xdmf"})
-        std::filesystem::remove(name.string() + ending);
     });
   }
 }
