@@ -12,6 +12,8 @@
 namespace repose::anatomy {
 namespace {
 
+using scene::find;
+
 constexpr double off_surface = 15;  // mm, farther than a landmark is ever placed beside its surface
 
 /// Refuses landmarks far from the surface that they are said to be on.
@@ -38,17 +40,14 @@ void require_same_head(const scene::AnatomyPlan& plan, const surface::Surface& s
   }
 }
 
-const Vec3* find(const scene::AnatomyPlan& plan, const char* name) {
-  const auto found = plan.landmarks.find(name);
-  return found == plan.landmarks.end() ? nullptr : &found->second;
-}
-
 /// The frame of the condyles, or that of the scan.
 HeadFrame frame_of(const scene::AnatomyPlan& plan) {
   HeadFrame frame;
-  const Vec3 *right = find(plan, "condyle_right_center"), *left = find(plan, "condyle_left_center");
-  const Vec3 *mouth_right = find(plan, "mouth_right"), *mouth_left = find(plan, "mouth_left");
-  const Vec3* edge = find(plan, "upper_incisor_edge");
+  const Vec3 *right = find(plan.landmarks, "condyle_right_center"),
+             *left = find(plan.landmarks, "condyle_left_center");
+  const Vec3 *mouth_right = find(plan.landmarks, "mouth_right"),
+             *mouth_left = find(plan.landmarks, "mouth_left");
+  const Vec3* edge = find(plan.landmarks, "upper_incisor_edge");
   if (mouth_right && mouth_left)
     frame.origin = (*mouth_right + *mouth_left) / 2;
   else if (edge)
@@ -72,8 +71,8 @@ void part_lips(const surface::Surface& skin, scene::Scene& scene,
   const scene::AnatomyPlan& plan = *scene.anatomy;
   if (!plan.part_lips || has_mouth(scene)) return;
   const HeadFrame frame = frame_of(plan);
-  const Vec3* edge = find(plan, "upper_incisor_edge");
-  const Vec3* stomion = find(plan, "stomion");
+  const Vec3* edge = find(plan.landmarks, "upper_incisor_edge");
+  const Vec3* stomion = find(plan.landmarks, "stomion");
   const Vec3* height = stomion ? stomion : edge;
   if (height && open_mouth(FrontMap(skin, frame), frame.to_frame(*height).z())) {
     remarks.push_back(
@@ -99,8 +98,10 @@ void part_lips(const surface::Surface& skin, scene::Scene& scene,
 /// Lowest and highest z of the vestibule: between B and the nasal spine on bone, and no farther
 /// than the lips reach, which end at B' and subnasale.
 std::array<double, 2> vestibule_height(const scene::AnatomyPlan& plan) {
-  const Vec3 *b_soft = find(plan, "b_soft"), *subnasale = find(plan, "subnasale");
-  const double low = find(plan, "b_point")->z(), high = find(plan, "nasal_spine")->z();
+  const Vec3 *b_soft = find(plan.landmarks, "b_soft"),
+             *subnasale = find(plan.landmarks, "subnasale");
+  const double low = find(plan.landmarks, "b_point")->z(),
+               high = find(plan.landmarks, "nasal_spine")->z();
   return {b_soft ? std::max(low, b_soft->z()) : low,
           subnasale ? std::min(high, subnasale->z()) : high};
 }
@@ -112,25 +113,33 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
   const char* needed[] = {"b_point", "nasal_spine", "upper_incisor_edge", "mouth_right",
                           "mouth_left"};
   for (const char* name : needed)
-    if (!find(plan, name)) {
+    if (!find(plan.landmarks, name)) {
       remarks.push_back(fmt::format(
           "{}: landmark {} is missing, so the lips hold to teeth as to bone: no vestibule",
           plan.file.string(), name));
       return;
     }
-  const Vec3 &edge = *find(plan, "upper_incisor_edge"), &right = *find(plan, "mouth_right"),
-             &left = *find(plan, "mouth_left");
+  const Vec3 &edge = *find(plan.landmarks, "upper_incisor_edge"),
+             &right = *find(plan.landmarks, "mouth_right"),
+             &left = *find(plan.landmarks, "mouth_left");
   const auto [bottom, top] = vestibule_height(plan);
   const Vec3 low(right.x() - beside, edge.y() - before, bottom),
       high(left.x() + beside, edge.y() + behind, top);
-  scene::Tissue& tissue = scene.tissue;
-  tissue.attach_regions.insert(tissue.attach_regions.begin(),
-                               scene::AttachRegion{scene::Box{(low + high) / 2, high - low},
-                                                   scene::Attach::contact, plan.gap});
-  remarks.push_back(fmt::format(
-      "vestibule by landmarks: x {:.0f} … {:.0f}, y {:.0f} … {:.0f}, z {:.0f} … {:.0f} mm (attach "
-      "region 0)",
-      low.x(), high.x(), low.y(), high.y(), low.z(), high.z()));
+  const Vec3* stomion = find(plan.landmarks, "stomion");
+  const double lower_gap = stomion ? scene::gap_of_lower_teeth(plan) : plan.gap;
+  std::vector<scene::AttachRegion>& regions = scene.tissue.attach_regions;
+  const auto put = [&](size_t number, const Vec3& to, double gap) {
+    const scene::Box box{(low + to) / 2, to - low};
+    regions.insert(regions.begin() + static_cast<std::ptrdiff_t>(number),
+                   scene::AttachRegion{box, scene::Attach::contact, gap});
+  };
+  put(0, high, plan.gap);
+  if (lower_gap != plan.gap) put(1, {high.x(), high.y(), stomion->z()}, lower_gap);
+  remarks.push_back(
+      fmt::format("vestibule by landmarks: x {:.0f} … {:.0f}, y {:.0f} … {:.0f}, z {:.0f} … {:.0f} "
+                  "mm, {:.2g} mm "
+                  "in front of upper and {:.2g} mm of lower teeth (first attach regions)",
+                  low.x(), high.x(), low.y(), high.y(), low.z(), high.z(), plan.gap, lower_gap));
 }
 
 /// Without the landmarks that tell the lips and the teeth apart lips do not adhere.
@@ -138,7 +147,7 @@ void settle_adhesion(scene::AnatomyPlan& plan, std::vector<std::string>& remarks
   if (!plan.vestibule || plan.adhesion == 0) return;
   for (const char* name :
        {"stomion", "mouth_right", "mouth_left", "upper_incisor_edge", "lower_incisor_edge"}) {
-    if (find(plan, name)) continue;
+    if (find(plan.landmarks, name)) continue;
     remarks.push_back(fmt::format("{}: landmark {} is missing, so lips do not adhere to teeth",
                                   plan.file.string(), name));
     plan.adhesion = 0;
@@ -146,10 +155,25 @@ void settle_adhesion(scene::AnatomyPlan& plan, std::vector<std::string>& remarks
   }
 }
 
+void remark_tone(const scene::Scene& scene, std::vector<std::string>& remarks) {
+  const scene::AnatomyPlan& plan = *scene.anatomy;
+  if (!scene.tissue.material || plan.tone == 0) return;
+  for (const char* name : {"stomion", "mouth_right", "mouth_left", "subnasale", "b_soft"}) {
+    if (find(plan.landmarks, name)) continue;
+    remarks.push_back(fmt::format("{}: landmark {} is missing, so the ring muscle has no tone",
+                                  plan.file.string(), name));
+    return;
+  }
+  remarks.push_back(fmt::format(
+      "ring muscle by landmarks: a tone of up to {:g} N/mm² between subnasale and B′", plan.tone));
+}
+
 void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
   constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
-  const Vec3 *spine = find(plan, "nasal_spine"), *upper = find(plan, "upper_incisor_edge"),
-             *lower = find(plan, "lower_incisor_edge"), *menton = find(plan, "menton_bone");
+  const Vec3 *spine = find(plan.landmarks, "nasal_spine"),
+             *upper = find(plan.landmarks, "upper_incisor_edge"),
+             *lower = find(plan.landmarks, "lower_incisor_edge"),
+             *menton = find(plan.landmarks, "menton_bone");
   const auto remark = [&](const char* jaw, double height, double minimum) {
     if (height < minimum)
       remarks.push_back(fmt::format(
@@ -171,6 +195,7 @@ void complete(const surface::Surface& skin, const std::vector<surface::Surface>&
   part_lips(skin, scene, remarks);
   add_vestibule(scene, remarks);
   settle_adhesion(*scene.anatomy, remarks);
+  remark_tone(scene, remarks);
 }
 
 }  // namespace repose::anatomy

@@ -8,6 +8,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/model/cut.h"
+#include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
 #include "repose/results/model_file.h"
 #include "repose/surface/read.h"
@@ -133,6 +134,20 @@ void bring_into_equilibrium(MPI_Comm comm, Job& job) {
                       : solve::prestress(comm, job.model, reference_state));
 }
 
+/// After the initial equilibrium, which would balance the tone again. Collective.
+void give_tone(MPI_Comm comm, Job& job) {
+  model::RingMuscle muscle;
+  if (job.anatomy) muscle = model::ring_muscle(job.anatomy->scene);
+  MPI_Bcast(&muscle, sizeof muscle, MPI_BYTE, 0, comm);
+  if (muscle.tone == 0) return;
+  if (job.local_model) {
+    discrete::Part& part = job.local_model->part;
+    model::add_tone(muscle, part.point_row, part.owned_points, part.model);
+    return;
+  }
+  base::on_root(comm, [&] { model::add_tone(muscle, job.model); });
+}
+
 /// Broadcasts rank 0's flags and counts to all ranks.
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
@@ -159,8 +174,9 @@ Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::strin
   read(comm, input, whole, watch, changes, job);
   base::on_root(comm, [&] { cut_tissue(true, job); });
   bring_into_equilibrium(comm, job);
+  base::on_root(comm, [&] { make_incisions(job); });
+  give_tone(comm, job);
   base::on_root(comm, [&] {
-    make_incisions(job);
     if (job.requested.bulk_modulus) return;
     const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
     job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, job.model);

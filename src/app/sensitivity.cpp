@@ -9,6 +9,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/model/cut.h"
+#include "repose/model/material.h"
 #include "repose/solve/prestress.h"
 
 namespace repose::app {
@@ -37,7 +38,10 @@ model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) 
                 [&] { built = model::build_model(scene, job.anatomy->skin, job.anatomy->bones); });
   base::on_root(comm, [&] { model::make_cuts(built.cuts, true, built.model); });
   if (job.reference_state) solve::prestress(comm, built.model, *job.reference_state);
-  base::on_root(comm, [&] { model::make_cuts(built.cuts, false, built.model); });
+  base::on_root(comm, [&] {
+    model::make_cuts(built.cuts, false, built.model);
+    model::add_tone(model::ring_muscle(scene), built.model);
+  });
   return std::move(built.model);
 }
 

@@ -63,7 +63,7 @@ class JawAdhesion {
     const auto& x = model.points.position;
     if ((skin.z() > lip_line(plan_.landmarks, skin.x())) != jaw_.upper) return;
     if (std::abs(x[point].z() - edge_.z()) > crown) return;
-    const double farthest = plan_.gap + rough;
+    const double farthest = (jaw_.upper ? plan_.gap : scene::gap_of_lower_teeth(plan_)) + rough;
     const auto tooth = tree_.nearest(x[point], farthest * farthest);
     if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();

@@ -37,12 +37,6 @@ Mat3 map_gradient(const std::array<Vec3, 6>& corners, const Gradients& local) {
   return map;
 }
 
-std::array<Vec3, 6> corners_of(const Model& model, size_t prism) {
-  std::array<Vec3, 6> corners;
-  for (int c = 0; c < 6; ++c) corners[c] = model.points.position[model.prisms.points[prism][c]];
-  return corners;
-}
-
 Vec3 middle_of(const std::array<Vec3, 6>& corners) {
   return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
 }
@@ -181,6 +175,12 @@ Moduli moduli(const scene::Elasticity& e) {
   return {shear, e.young * e.poisson / ((1 + e.poisson) * (1 - 2 * e.poisson)) + shear};
 }
 
+std::array<Vec3, 6> corners_of(const Model& model, size_t prism) {
+  std::array<Vec3, 6> corners;
+  for (int c = 0; c < 6; ++c) corners[c] = model.points.position[model.prisms.points[prism][c]];
+  return corners;
+}
+
 std::vector<double> strata_shares(const std::vector<double>& thickness,
                                   const std::array<double, 2>& depth) {
   std::vector<double> shares;
@@ -203,7 +203,8 @@ std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>&
   return depth;
 }
 
-std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners) {
+std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners,
+                                                   const Mat3& A) {
   constexpr double in_triangle[3][2] = {{1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3}};
   const double half = 0.5 / std::sqrt(3.0);
   std::array<double, 15> weights{};
@@ -213,10 +214,10 @@ std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& co
       const Mat3 map = map_gradient(corners, local);
       const double determinant = map.determinant();
       if (!(determinant > 0)) return {};
-      const Gradients gradients = map.inverse().transpose() * local;
+      const Gradients gradients = map.inverse().transpose() * local, weighted = A * gradients;
       for (size_t k = 0; k < prism_pairs.size(); ++k)
         weights[k] -= determinant / 12 *
-                      gradients.col(prism_pairs[k][0]).dot(gradients.col(prism_pairs[k][1]));
+                      gradients.col(prism_pairs[k][0]).dot(weighted.col(prism_pairs[k][1]));
     }
   return weights;
 }

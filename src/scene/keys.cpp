@@ -459,9 +459,18 @@ std::vector<Key> anatomy_keys() {
        .choices = {"on", "off"}},
       {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
        Range::between(0, 10)},
+      {"anatomy.lower_gap", number, "",
+       "The gap in front of the lower teeth; unset, half of the overjet, at least gap and at most "
+       "4 mm.",
+       "mm", Range::between(0, 10)},
       {"anatomy.adhesion", number, "0.0005",
        "Largest tension with which lips adhere to the teeth of their own jaw: reached 2 mm farther "
        "from them than at the start, gone at 6 mm.",
+       "N/mm²", Range::between(0, 1)},
+      {"anatomy.tone", number, "0.004",
+       "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
+       "between "
+       "the lips, balanced as the head is recorded.",
        "N/mm²", Range::between(0, 1)},
       {"anatomy.septum", number, "",
        "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal spine "

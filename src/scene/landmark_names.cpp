@@ -97,6 +97,11 @@ std::string standard_name(const std::string& spelling) {
   return "";
 }
 
+const Vec3* find(const Landmarks& landmarks, const char* name) {
+  const auto found = landmarks.find(name);
+  return found == landmarks.end() ? nullptr : &found->second;
+}
+
 Landmarks with_standard_names(const Landmarks& landmarks, const std::string& file) {
   constexpr double same = 1e-3;  // mm
   Landmarks renamed;

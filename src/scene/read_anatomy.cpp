@@ -26,11 +26,6 @@ constexpr std::array<std::array<const char*, 2>, 9> order{{{"nasion_bone", "nasa
                                                            {"lower_lip", "b_soft"},
                                                            {"b_soft", "pogonion_soft"}}};
 
-const Vec3* find(const Landmarks& landmarks, const char* name) {
-  const auto found = landmarks.find(name);
-  return found == landmarks.end() ? nullptr : &found->second;
-}
-
 void check_front(const Value& file, const Landmarks& landmarks) {
   const Vec3* condyle = find(landmarks, "condyle_right_center");
   for (const char* name : {"lower_incisor_edge", "upper_incisor_edge", "pronasale", "stomion"})
@@ -76,8 +71,19 @@ AnatomyPlan read_anatomy(const Value& value) {
   if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;
   if (const auto vestibule = map.find("vestibule")) plan.vestibule = vestibule->choice() == 0;
   if (const auto gap = map.find("gap")) plan.gap = gap->number();
+  if (const auto gap = map.find("lower_gap")) plan.lower_gap = gap->number();
   if (const auto adhesion = map.find("adhesion")) plan.adhesion = adhesion->number();
+  if (const auto tone = map.find("tone")) plan.tone = tone->number();
   return plan;
+}
+
+double gap_of_lower_teeth(const AnatomyPlan& plan) {
+  constexpr double largest = 4;  // mm
+  if (plan.lower_gap) return *plan.lower_gap;
+  const Vec3 *upper = find(plan.landmarks, "upper_incisor_edge"),
+             *lower = find(plan.landmarks, "lower_incisor_edge");
+  if (!upper || !lower) return plan.gap;
+  return std::max(plan.gap, std::min((lower->y() - upper->y()) / 2, largest));
 }
 
 void read_septum(const Value& anatomy, Scene& scene) {

@@ -5,11 +5,11 @@ templates, moves are in the words of surgery.
 
     tests/benchmark/ratios.py [-bin build/bin] [-output docs/measurements/ratios.md] [-edge 4]
                               [-head ../shared/data/head] [-phantoms 12]
-                              [-ways "default,bonded lips"] [-operations "advance,set-back"]
-                              [-keep FOLDER]
+                              [-ways "default;bonded lips"] [-operations "advance,set-back"]
+                              [-first 1] [-keep FOLDER]
 
-The folder of the head holds skin.ply, skull.ply and mandible.ply. With -phantoms synthetic heads take
-its place, solved in the first of the ways. Needs
+The folder of the head holds skin.ply, skull.ply and mandible.ply. With -phantoms so many synthetic
+heads take its place, numbered from -first, solved in the first of the ways. Needs
 apt-get install --no-install-recommends python3-h5py python3-meshio python3-scipy
 """
 
@@ -22,7 +22,6 @@ import tempfile
 import meshio
 import numpy as np
 
-from lip_tone import add_tone
 from measure import run
 from page import option_parser, print_table
 from phantom_heads import Shape, write_surfaces
@@ -59,11 +58,11 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "no adhesion": (", adhesion: 0", ""), "gap 2": (", gap: 2", ""), "release 5": ("", ", release: 5"),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
         "joined lips": (", lips: joined", ""), "septum 0.2": (", septum: 0.2", ""),
-        "septum 1": (", septum: 1", ""),
-        "lower gap 2": (", gap: 2", ", attach_regions: [{box: UPPER, attach: contact, gap: 1}]")}
-# Way → tone of the ring muscle, N/mm², and the way without it.
-TONES = {"tone 3": (0.003, "default"), "tone 3 lower gap 2": (0.003, "lower gap 2"),
-         "tone 6 lower gap 2": (0.006, "lower gap 2")}
+        "septum 1": (", septum: 1", ""), "no tone": (", tone: 0", ""),
+        "tone 3": (", tone: 0.003", ""), "tone 5": (", tone: 0.005", ""), "tone 6": (", tone: 0.006", ""),
+        "lower gap 1": (", lower_gap: 1", ""), "lower gap 2": (", lower_gap: 2", ""),
+        "lower gap 4": (", lower_gap: 4", ""),
+        "no tone, lower gap 1": (", tone: 0, lower_gap: 1", "")}
 LIMIT = 60  # s, of a search
 
 PHANTOM_HEAD = ("| operation, mm | landmark | published | median | lowest … highest | below, above |\n"
@@ -81,20 +80,9 @@ def landmarks_of(options, folder):
     return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
 
 
-def upper_vestibule(landmarks):
-    """The part of the vestibule in front of the upper teeth, from stomion on, as a box of a scene."""
-    right, left, edge = (landmarks[name] for name in
-                         ("mouth_right", "mouth_left", "upper_incisor_edge"))
-    low = np.array([right[0] - 12, edge[1] - 16, landmarks["stomion"][2]])
-    top = min(landmarks["nasal_spine"][2], landmarks["subnasale"][2])
-    high = np.array([left[0] + 12, edge[1] + 38, top])
-    return f"{{center: {((low + high) / 2).tolist()}, size: {(high - low).tolist()}}}"
-
-
-def scene_of(options, operation, way, landmarks):
+def scene_of(options, operation, way):
     bone, template, move, _, _ = OPERATIONS[operation]
     anatomy, tissue = WAYS[way]
-    tissue = tissue.replace("UPPER", upper_vestibule(landmarks))
     bones = ", ".join(f"{{name: {name}, file: {options.head / name}.ply}}" for name in BONES)
     kerf = ", kerf: 4.5" if operation == "impaction" else ", kerf: 0.5"
     return (f"skin: {options.head / 'skin.ply'}\nbones: [{bones}]\n"
@@ -104,25 +92,32 @@ def scene_of(options, operation, way, landmarks):
             f"moves: [{{bone: part, clinical: {{{move}}}}}]\n")
 
 
+def lip_pressure(model, landmarks):
+    """Force with which the tone draws the middle half of the lower lip back, over its area seen from
+    the front, N/mm². The scene has no other external forces."""
+    right, left, stomion, low = (landmarks[name] for name in
+                                 ("mouth_right", "mouth_left", "stomion", "b_soft"))
+    x, y, z = np.transpose(model["point/position"])
+    front = np.abs(x - (left[0] + right[0]) / 2) < (left[0] - right[0]) / 4
+    front &= (z < stomion[2]) & (z > low[2]) & (y < stomion[1] + 40)
+    balance = model["point/external_force"][front, 1].sum()
+    return -balance / ((left[0] - right[0]) / 2 * (stomion[2] - low[2]))
+
+
 def ratios_of(options, folder, operation, way, landmarks):
     """Landmark → way of the skin over that of the bone; empty where the scene is refused."""
     _, _, _, direction, length = OPERATIONS[operation]
-    stress, scene_way = TONES.get(way, (0, way))
-    name = f"{operation}_{way}".replace(" ", "_")
-    (folder / f"{name}.yaml").write_text(scene_of(options, operation, scene_way, landmarks))
-    source = f"{name}.yaml"
-    if stress:
-        run([options.bin / "repose-solve", source, "-time_limit", 0.01, "-output", "recorded"], folder)
-        source = f"{name}_model.h5"
-        pressure = add_tone(folder / "recorded.h5", folder / source, landmarks, stress)
-        print(f"{operation}, {way}: {1e6 * pressure:.0f} Pa on the lower lip", file=sys.stderr)
-    done = run([options.bin / "repose-solve", source, "-skip_other_rest", "-time_limit", LIMIT,
+    name = f"{operation}_{way}".replace(" ", "_").replace(",", "")
+    (folder / f"{name}.yaml").write_text(scene_of(options, operation, way))
+    done = run([options.bin / "repose-solve", f"{name}.yaml", "-skip_other_rest", "-time_limit", LIMIT,
                 "-output", name], folder, ends=None)
     (folder / f"{name}.log").write_text(done.text + done.error)
     if done.status != 0:
         print(operation, way, done.error, file=sys.stderr)
         return {}
     model, rest = model_of(folder / f"{name}.h5"), last(folder / f"{name}.h5")["point/position"]
+    print(f"{operation}, {way}: the tone draws the lower lip back with "
+          f"{1e6 * lip_pressure(model, landmarks):.0f} Pa", file=sys.stderr)
     skin = np.flatnonzero(model["point/layer"] == 0)
     initial = model["point/position"][skin]
     ratio = (rest[skin] - initial) @ direction / length
@@ -139,12 +134,16 @@ def cell(found, key):
     return number if low <= float(number) <= high else f"**{number}**"
 
 
+def ways_of(options):
+    return options.ways.split(";")
+
+
 def operations_of(options):
     return options.operations.split(",") if options.operations else list(OPERATIONS)
 
 
 def rows(options, folder):
-    ways, outside, count = options.ways.split(","), dict.fromkeys(options.ways.split(","), 0), 0
+    ways, outside, count = ways_of(options), dict.fromkeys(ways_of(options), 0), 0
     landmarks = landmarks_of(options, folder)
     for operation in operations_of(options):
         found = {way: ratios_of(options, folder, operation, way, landmarks) for way in ways}
@@ -183,7 +182,7 @@ def make_phantoms(options, folder):
     run([options.bin / "repose-phantom", "-skin_vertices", 20000, "-bone_edge", 2, "-output", "head"],
         folder, ends=[0])
     correct_profile(folder / "head_skin.ply")
-    for seed in range(1, 1 + options.phantoms):
+    for seed in range(options.first, options.first + options.phantoms):
         random = np.random.default_rng(seed)
         shape = Shape(random)
         shape.beard = 0
@@ -194,7 +193,7 @@ def make_phantoms(options, folder):
 
 
 def phantom_rows(options, folder):
-    way, heads = options.ways.split(",")[0], []
+    way, heads = ways_of(options)[0], []
     for head in make_phantoms(options, folder):
         own = argparse.Namespace(**{**vars(options), "head": head})
         landmarks = landmarks_of(own, head)
@@ -209,10 +208,10 @@ def phantom_rows(options, folder):
 
 
 def main():
-    options = option_parser(__doc__, edge=4.0, ways="default,bonded lips", head="", operations="",
-                            keep="", phantoms=0).parse_args()
+    options = option_parser(__doc__, edge=4.0, ways="default;bonded lips", head="", operations="",
+                            keep="", phantoms=0, first=1).parse_args()
     options.head = pathlib.Path(options.head).resolve() if options.head else DATA
-    ways = options.ways.split(",")
+    ways = ways_of(options)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(options.keep or name).resolve()
         folder.mkdir(exist_ok=True)

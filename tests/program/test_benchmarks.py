@@ -12,7 +12,6 @@ from conftest import PROJECT, can_draw, finish, programs
 from tissue import last, model_of, prism_volumes
 
 sys.path.append(str(PROJECT / "tests/benchmark"))
-import lip_tone  # noqa: E402
 
 METHODS = "default,default_end,stiffness,stiffness_step,lmvm,polak_ribiere,liblbfgs,L-BFGS-B"
 
@@ -151,31 +150,6 @@ def test_the_cookbook_holds_its_recipes(environment, tmp_path):
     assert [row[0] for row in re.findall(r"^\| `(.+?)` " + count, guide, re.M)] == recipes
 
 
-def test_a_tone_resists_stretch_along_its_fibers_alone():
-    corners = np.array([[0, 0, 0], [2, 0.1, 0], [0.2, 1.5, 0.1], [0.1, 0, 1], [2, 0, 1.2], [0, 1.6, 0.9]])
-    along, across = np.array([0.6, 0.8, 0]), np.array([-0.8, 0.6, 0])
-    weights, = lip_tone.pair_weights(corners[None], along[None])
-    volume = prism_volumes(corners, np.arange(6)[None])[0]
-    for gradient, expected in ((np.eye(3), 1), (1.5 * np.eye(3), 2.25), (np.outer(across, along), 1),
-                               (np.outer(along, across), 0)):
-        placed = corners @ gradient.T
-        squared = [((placed[i] - placed[j]) ** 2).sum() for i, j in lip_tone.PAIRS]
-        assert weights @ squared == pytest.approx(expected * volume, abs=1e-12)
-
-
-def test_a_tone_runs_round_the_mouth():
-    landmarks = {"mouth_right": (-25, 0, 0), "mouth_left": (25, 0, 0), "stomion": (0, -10, 0),
-                 "subnasale": (0, -10, 20), "b_soft": (0, -8, -15)}
-    wedge = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 1, 0], [1, 1, 0], [0, 1, 1]])
-    corners = wedge + 1.0 * np.array([[0, -10, 5], [0, -10, -5], [32, 0, 0], [0, -10, 25]])[:, None]
-    along, share = lip_tone.fibers(corners, {name: np.array(at, float) for name, at in landmarks.items()})
-    assert share[3] == 0 and all(0 < share[:3]) and share[1] < share[0]
-    assert np.abs(along[:2]) == pytest.approx(np.tile([1, 0, 0], (2, 1)))
-    assert np.abs(along[2, 2]) > 0.9
-    assert np.linalg.norm(along, axis=1) == pytest.approx(np.ones(4))
-
-
-@pytest.mark.long
 def test_ratios_of_synthetic_heads_and_their_pictures(environment, tmp_path):
     for package in ("scipy", "meshio", "h5py", "vtkmodules"):
         pytest.importorskip(package)

@@ -26,6 +26,9 @@ std::vector<double> strata_shares(const std::vector<double>& thickness,
 std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism,
                                const std::vector<int64_t>& skin);
 
+/// Initial positions of a prism's points, mm.
+std::array<Vec3, 6> corners_of(const Model& model, size_t prism);
+
 /// The pairs of a prism's six points, in the order of their weights.
 inline constexpr std::array<std::array<int, 2>, 15> prism_pairs = {{{0, 1},
                                                                     {0, 2},
@@ -43,9 +46,11 @@ inline constexpr std::array<std::array<int, 2>, 15> prism_pairs = {{{0, 1},
                                                                     {0, 5},
                                                                     {2, 3}}};
 
-/// −∫ ∇N_i · ∇N_j dV (mm) over a prism for the pairs of its points, N the wedge's shape functions,
-/// by 3 × 2 Gauss points. Empty where the map of the wedge is not invertible at one of them.
-std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners);
+/// −∫ ∇N_i · A ∇N_j dV (mm) over a prism for the pairs of its points, N the wedge's shape
+/// functions, A symmetric, by 3 × 2 Gauss points. Empty where the map of the wedge is not
+/// invertible at one of them.
+std::optional<std::array<double, 15>> pair_weights(const std::array<Vec3, 6>& corners,
+                                                   const Mat3& A = Mat3::Identity());
 
 /// A prism's deformation gradient in the middle, from its corners before and now.
 Mat3 deformation_gradient(const std::array<Vec3, 6>& before, const std::array<Vec3, 6>& now);
@@ -65,5 +70,26 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
 /// The edges again from the prisms and their shear moduli, sorted by their points. InputError as
 /// above. Serial, O(prisms).
 void assemble_edges(const std::string& file, Model& model);
+
+/// The ring muscle of the mouth (orbicularis oris), by landmarks.
+struct RingMuscle {
+  double tone = 0;  ///< N/mm², stress along the fibers at the line between the lips; 0: no muscle
+  Vec3 right = Vec3::Zero(), left = right,
+       stomion = right;        ///< corners and middle of that line, mm
+  double top = 0, bottom = 0;  ///< z, mm, where the tone is 0
+};
+
+/// The ring muscle of a scene: of no tone where the scene has no anatomy, no solid, or lacks one of
+/// the landmarks stomion, mouth_right, mouth_left, subnasale and b_soft.
+RingMuscle ring_muscle(const scene::Scene& scene);
+
+/// Gives the ring muscle its tone, balanced as the tissue is: adds ½ ∫ τ |F f − f|² dV, τ = σ (1 −
+/// ρ²), to the edges and, what is linear in the displacements, to the external forces of soft
+/// tissue. Serial.
+void add_tone(const RingMuscle& muscle, Model& model);
+/// Does so for a part of a model, whose points have the given rows [points] in the whole, so that
+/// sums are taken in the same order; forces on its first `owned` points alone.
+void add_tone(const RingMuscle& muscle, const std::vector<int64_t>& row, int64_t owned,
+              Model& model);
 
 }  // namespace repose::model

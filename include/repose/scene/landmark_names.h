@@ -10,6 +10,9 @@ namespace repose::scene {
 
 using Landmarks = std::map<std::string, Vec3>;  ///< standard name → position, mm, LPS
 
+/// The position of a landmark, or null.
+const Vec3* find(const Landmarks& landmarks, const char* name);
+
 /// One landmark that has a standard name.
 struct LandmarkName {
   std::string name;                  ///< as files of this project have it

@@ -274,11 +274,17 @@ struct Collision {
 struct AnatomyPlan {
   std::filesystem::path file;  ///< absolute, of the landmarks
   Landmarks landmarks;
-  bool part_lips = true;   ///< where the scene has no mouth of its own
-  bool vestibule = true;   ///< tissue in front of teeth touches them and is not attached
-  double gap = 1;          ///< mm, of the vestibule, between mucosa and teeth
+  bool part_lips = true;            ///< where the scene has no mouth of its own
+  bool vestibule = true;            ///< tissue in front of teeth touches them and is not attached
+  double gap = 1;                   ///< mm, of the vestibule, between mucosa and teeth
+  std::optional<double> lower_gap;  ///< mm, below stomion; unset: by the overjet
   double adhesion = 5e-4;  ///< N/mm², largest tension between lips and the teeth of their jaw
+  double tone = 0.004;     ///< N/mm², of the ring muscle at the line between the lips
 };
+
+/// The gap in front of the lower teeth, mm: `lower_gap`, or half of the overjet, at least `gap` and
+/// at most 4 mm. The lower lip lies on the upper incisors, and a wedge is left to its sulcus.
+double gap_of_lower_teeth(const AnatomyPlan& plan);
 
 struct Scene {
   std::filesystem::path file;

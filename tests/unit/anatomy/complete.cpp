@@ -33,6 +33,7 @@ Completed complete_head(const std::string& skin_file, const std::string& skull_f
   for (const std::string& name : without) plan.landmarks.erase(name);
   for (auto& [name, place] : plan.landmarks) place += shift;
   done.scene.anatomy = plan;
+  done.scene.tissue.material = scene::Material{};
   done.scene.tissue.attach_regions.push_back(
       {scene::SphereRegion{Vec3::Zero(), 1}, scene::Attach::slide, 0});
   complete(skin, {skull, mandible}, done.scene, done.remarks);
@@ -59,9 +60,23 @@ TEST(CompleteScene, AnOpenMouthIsNotParted) {
 
 TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
   const Completed done = complete_shipped();
-  ASSERT_EQ(done.scene.tissue.attach_regions.size(), 2u);
+  ASSERT_EQ(done.scene.tissue.attach_regions.size(), 3u);
   EXPECT_EQ(done.scene.tissue.attach_regions[0].attach, scene::Attach::contact);
-  EXPECT_EQ(done.scene.tissue.attach_regions[1].attach, scene::Attach::slide);
+  EXPECT_EQ(done.scene.tissue.attach_regions[1].attach, scene::Attach::contact);
+  EXPECT_EQ(done.scene.tissue.attach_regions[2].attach, scene::Attach::slide);
+}
+
+TEST(CompleteScene, LowerTeethHaveAGapOfTheirOwnBelowStomion) {
+  const Completed done = complete_shipped();
+  const scene::AttachRegion &whole = done.scene.tissue.attach_regions.at(0),
+                            &lower = done.scene.tissue.attach_regions.at(1);
+  const auto &outer = std::get<scene::Box>(whole.where), &inner = std::get<scene::Box>(lower.where);
+  const double stomion = done.scene.anatomy->landmarks.at("stomion").z();
+  EXPECT_NEAR(inner.center.z() + inner.size.z() / 2, stomion, 1e-9);
+  EXPECT_NEAR(inner.center.z() - inner.size.z() / 2, outer.center.z() - outer.size.z() / 2, 1e-9);
+  EXPECT_EQ(whole.gap, 1);
+  EXPECT_EQ(lower.gap, scene::gap_of_lower_teeth(*done.scene.anatomy));
+  EXPECT_GT(lower.gap, whole.gap);
 }
 
 /// The first region of a scene, a box, lies between the heights of two of its landmarks.
@@ -85,6 +100,12 @@ TEST(CompleteScene, AMissingSulcusLeavesTheVestibuleOut) {
   const Completed done = complete_shipped({"b_point"});
   EXPECT_EQ(done.scene.tissue.attach_regions.size(), 1u);
   EXPECT_TRUE(says(done, "landmark b_point is missing"));
+}
+
+TEST(CompleteScene, TheToneIsStatedOrWhyThereIsNone) {
+  EXPECT_TRUE(says(complete_shipped(), "ring muscle by landmarks: a tone of up to 0.004 N/mm²"));
+  const Completed without = complete_shipped({"b_soft"});
+  EXPECT_TRUE(says(without, "landmark b_soft is missing, so the ring muscle has no tone"));
 }
 
 TEST(CompleteScene, LandmarksOfAnotherHeadAreRefused) {

@@ -49,6 +49,22 @@ void expect_near(const Vec3& a, const Vec3& b) {
   EXPECT_LT((a - b).norm(), 1e-9) << a.transpose() << " against " << b.transpose();
 }
 
+TEST(Anatomy, TheGapOfLowerTeethIsHalfTheOverjetOrWhatTheSceneSays) {
+  const auto gap = [](const Landmarks& landmarks, const std::string& anatomy = "") {
+    return gap_of_lower_teeth(*read(landmarks, "", anatomy).anatomy);
+  };
+  Landmarks edge_to_edge = head(), far = head(), toothless = head();
+  edge_to_edge["lower_incisor_edge"].y() = -90;
+  far["lower_incisor_edge"].y() = -75;
+  toothless.erase("lower_incisor_edge");
+  EXPECT_DOUBLE_EQ(gap(head()), 2.5);
+  EXPECT_EQ(gap(head(), ", gap: 3"), 3);
+  EXPECT_EQ(gap(edge_to_edge), 1);
+  EXPECT_EQ(gap(far), 4);
+  EXPECT_EQ(gap(far, ", lower_gap: 0.5"), 0.5);
+  EXPECT_EQ(gap(toothless), 1);
+}
+
 TEST(Anatomy, LandmarksHaveStandardNamesAndServeMoves) {
   Landmarks spelled = head();
   spelled.erase("b_point");
