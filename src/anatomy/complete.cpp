@@ -63,7 +63,7 @@ HeadFrame frame_of(const scene::AnatomyPlan& plan) {
 
 bool has_mouth(const scene::Scene& scene) {
   return std::any_of(scene.incisions.begin(), scene.incisions.end(),
-                     [](const scene::Incision& cut) { return cut.name == "mouth"; });
+                     [](const scene::Incision& cut) { return cut.parts_lips(); });
 }
 
 void part_lips(const surface::Surface& skin, scene::Scene& scene,

@@ -74,11 +74,16 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
         model::remark_on_adhesion(job.anatomy->scene, job.local_model->global_metadata);
     if (!adhesion.empty()) report.remarks.push_back(adhesion);
     job.held = geometry->held();
+    job.cuts = geometry->cuts();
     report.effective_modulus = job.local_model->effective_modulus;
     job.building = describe_build(report);
     if (base::size(comm) > 1)
       job.building +=
           report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
+    std::vector<int64_t> doubled(job.cuts.size(), 0);
+    for (const model::DoubledColumn& at : geometry->doubled()) doubled[at.cut] += at.points;
+    for (size_t i = 0; i < job.cuts.size(); ++i)
+      job.building += describe_cut(job.cuts[i], doubled[i]);
     job.warnings = std::move(report.warnings);
     job.model = std::move(job.local_model->global_metadata);
   });
@@ -98,7 +103,8 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
     read_scene(scene::read_scene(input, changes), job);
     if (watch) watch(share_of_surfaces);
     const std::string why =
-        whole.empty() ? model::explain_central_build(job.anatomy->scene) : whole;
+        whole.empty() ? model::explain_central_build(job.anatomy->scene, job.initial_equilibrium)
+                      : whole;
     distributed = why.empty();
     if (distributed) return;
     build(input, job);
@@ -110,6 +116,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& 
 
 /// Parts the lips, or makes all other cuts. On rank 0.
 void cut_tissue(bool lips, Job& job) {
+  if (job.local_model) return;  // it is cut already
   const std::vector<int64_t> doubled = model::make_cuts(job.cuts, lips, job.model);
   for (size_t i = 0; i < doubled.size(); ++i)
     if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);

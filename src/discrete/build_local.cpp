@@ -81,39 +81,79 @@ void distribute_contact(MPI_Comm comm, model::Model& model, Distribution& distri
   distribution.contact_offset = mechanics::contact_offsets(model, distribution.bodies);
 }
 
+/// Points of a piece's model whose cuts are made.
+struct PiecePoints {
+  std::vector<int64_t> column;  // [N] row of the piece's columns
+  std::vector<int64_t> place;   // [N] among the points of its column: layers, then doubles
+  std::vector<int64_t> row;     // [N] in the whole model
+  void add(int64_t piece_column, int64_t place_in_column, int64_t whole_row) {
+    column.push_back(piece_column);
+    place.push_back(place_in_column);
+    row.push_back(whole_row);
+  }
+};
+
+PiecePoints points_of(const RankColumns& rank_columns) {
+  const std::vector<int64_t>& column = rank_columns.piece.column;
+  const int64_t layers = rank_columns.layers;
+  PiecePoints points;
+  for (size_t c = 0; c < column.size(); ++c)
+    for (int64_t a = 0; a < layers; ++a)
+      points.add(static_cast<int64_t>(c), a, column[c] * layers + a);
+  for (const model::DoubledColumn& at : rank_columns.doubled) {
+    const auto found = std::ranges::lower_bound(column, at.column);
+    if (found == column.end() || *found != at.column) continue;
+    for (int64_t a = 0; a < at.points; ++a)
+      points.add(found - column.begin(), layers + a, at.first_row + a);
+  }
+  return points;
+}
+
+/// The column of a row of the whole model in a list sorted by rows: doubles make columns of their
+/// own after all others.
+int64_t list_column(const RankColumns& rank_columns, int64_t row) {
+  if (row < rank_columns.columns * rank_columns.layers) return row / rank_columns.layers;
+  const auto after =
+      std::ranges::upper_bound(rank_columns.doubled, row, {}, &model::DoubledColumn::first_row);
+  return rank_columns.columns + (after - rank_columns.doubled.begin()) - 1;
+}
+
+int64_t list_columns(const RankColumns& rank_columns) {
+  return rank_columns.columns + static_cast<int64_t>(rank_columns.doubled.size());
+}
+
 /// By the columns of a piece what a plan says of its points.
-void number_points(const RankColumns& rank_columns, Distribution& distribution) {
-  for (size_t c = 0; c < rank_columns.owner.size(); ++c) {
-    int64_t unknown = rank_columns.unknown[c];
-    for (int64_t a = 0; a < rank_columns.layers; ++a) {
-      distribution.owner.push_back(rank_columns.owner[c]);
-      distribution.place.push_back(rank_columns.place[c] + a);
-      const bool soft = distribution.set[distribution.unknown.size()] == PointSet::soft_tissue;
-      distribution.unknown.push_back(soft ? unknown++ : -1);
-    }
+void number_points(const RankColumns& rank_columns, const PiecePoints& points,
+                   Distribution& distribution) {
+  std::vector<int64_t> unknown = rank_columns.unknown;
+  for (size_t i = 0; i < points.column.size(); ++i) {
+    const int64_t c = points.column[i];
+    distribution.owner.push_back(rank_columns.owner[c]);
+    distribution.place.push_back(rank_columns.place[c] + points.place[i]);
+    const bool soft = distribution.set[i] == PointSet::soft_tissue;
+    distribution.unknown.push_back(soft ? unknown[c]++ : -1);
   }
   distribution.total_points = rank_columns.columns * rank_columns.layers;
+  for (const model::DoubledColumn& at : rank_columns.doubled)
+    distribution.total_points += at.points;
   distribution.total_unknowns = rank_columns.total_unknowns;
 }
 
 /// Rows of the piece's points that a rank owns, by their places.
-std::vector<int64_t> own_points(const RankColumns& rank_columns, std::vector<int64_t> own) {
-  std::sort(own.begin(), own.end(),
-            [&](int64_t a, int64_t b) { return rank_columns.place[a] < rank_columns.place[b]; });
+std::vector<int64_t> own_points(const Distribution& distribution, int rank) {
   std::vector<int64_t> rows;
-  for (const int64_t c : own)
-    for (int64_t a = 0; a < rank_columns.layers; ++a) rows.push_back(c * rank_columns.layers + a);
+  for (size_t i = 0; i < distribution.owner.size(); ++i)
+    if (distribution.owner[i] == rank) rows.push_back(static_cast<int64_t>(i));
+  std::ranges::sort(rows, {}, [&](int64_t row) { return distribution.place[row]; });
   return rows;
 }
 
 /// The whole model's rows in place of the piece's. `edge_row` [edges of the
 /// piece].
-void number_rows(const RankColumns& rank_columns, const std::vector<int64_t>& edge_row,
-                 Part& part) {
+void number_rows(const RankColumns& rank_columns, const PiecePoints& points,
+                 const std::vector<int64_t>& edge_row, Part& part) {
   const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
-  for (int64_t& row : part.point_row)
-    row = rank_columns.piece.column[row / rank_columns.layers] * rank_columns.layers +
-          row % rank_columns.layers;
+  part.point_row = pick(points.row, part.point_row);
   for (int64_t& row : part.prism_row)
     row = row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
   for (int64_t& row : part.edge_row) row = edge_row[row];
@@ -124,15 +164,15 @@ void number_rows(const RankColumns& rank_columns, const std::vector<int64_t>& ed
 /// Rows of the piece's edges in the whole model, −1 of those of others.
 /// Collective.
 ColumnRows rows_of_edges(MPI_Comm comm, int rank, const RankColumns& rank_columns,
-                         const model::Model& model) {
+                         const PiecePoints& points, const model::Model& model) {
   std::vector<int64_t> mine, column;
   for (size_t e = 0; e < model.edges.points.size(); ++e) {
-    const int64_t c = model.edges.points[e][0] / rank_columns.layers;
-    if (rank_columns.owner[c] != rank) continue;
+    const int64_t first = model.edges.points[e][0];
+    if (rank_columns.owner[points.column[first]] != rank) continue;
     mine.push_back(static_cast<int64_t>(e));
-    column.push_back(rank_columns.piece.column[c]);
+    column.push_back(list_column(rank_columns, points.row[first]));
   }
-  const ColumnRows rows = rows_by_column(comm, rank_columns.columns, column);
+  const ColumnRows rows = rows_by_column(comm, list_columns(rank_columns), column);
   ColumnRows all{std::vector<int64_t>(model.edges.points.size(), -1), rows.total};
   for (size_t k = 0; k < mine.size(); ++k) all.row[mine[k]] = rows.row[k];
   return all;
@@ -140,13 +180,27 @@ ColumnRows rows_of_edges(MPI_Comm comm, int rank, const RankColumns& rank_column
 
 /// Rows of contact in the whole model. Collective.
 void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& local_model) {
-  const model::Model& model = local_model.part.model;
   std::vector<int64_t> column;
-  for (const int64_t point : model.contact.pairs.point)
-    column.push_back(model.points.column[point]);
-  ColumnRows rows = rows_by_column(comm, rank_columns.columns, column);
+  for (const int64_t point : local_model.part.model.contact.pairs.point)
+    column.push_back(list_column(rank_columns, local_model.part.point_row[point]));
+  ColumnRows rows = rows_by_column(comm, list_columns(rank_columns), column);
   local_model.part.pair_row = std::move(rows.row);
   local_model.contact_pairs = rows.total;
+}
+
+/// The sides of cuts in rows of the whole model, on rank 0, from the rank that has them. Returns on
+/// all ranks whether one does. Collective.
+bool gather_cut_faces(MPI_Comm comm, const Part& part, model::CutFaces& whole) {
+  model::CutFaces faces = part.model.contact.cut_faces;
+  for (int64_t& point : faces.point) point = part.point_row[point];
+  int has = faces.empty() ? -1 : base::rank(comm);
+  MPI_Allreduce(MPI_IN_PLACE, &has, 1, MPI_INT, MPI_MAX, comm);
+  if (has > 0 && has == base::rank(comm))
+    Sender(comm, 0)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
+  if (has > 0 && base::rank(comm) == 0)
+    Receiver(comm, has)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
+  if (base::rank(comm) == 0) whole = std::move(faces);
+  return has >= 0;
 }
 
 void append(const model::TermElements& elements, size_t e, model::TermElements& to) {
@@ -208,24 +262,30 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   const std::vector<int64_t> own = own_columns(rank_columns, rank);
   set_mean_moduli(comm, scene, rank_columns, own, model, local_model);
   remove_empty_terms(comm, model);
+  base::collective_try(comm, [&] {
+    for (const model::Cut& cut : rank_columns.cuts) model::cut_along(cut, model);
+  });
   Distribution distribution{model, {}, {}, {}, {}, {}, {}, {}};
   distribute_motion(distribution);
   distribute_contact(comm, model, distribution);
-  number_points(rank_columns, distribution);
-  const std::vector<int64_t> points = own_points(rank_columns, own);
+  const PiecePoints piece_points = points_of(rank_columns);
+  number_points(rank_columns, piece_points, distribution);
+  const std::vector<int64_t> points = own_points(distribution, rank);
   LocalNumbers local(static_cast<int64_t>(distribution.owner.size()));
   Part& part = local_model.part;
   part = make_part(distribution, {rank, points, rank_columns.first_unknown, rank_columns.unknowns},
                    local);
   part.solid = true;
-  part.contact = !model.contact.bodies.empty();
-  const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, model);
-  number_rows(rank_columns, edges.row, part);
+  const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, piece_points, model);
+  number_rows(rank_columns, piece_points, edges.row, part);
   number_pairs(comm, rank_columns, local_model);
   local_model.outward =
       NaturalRows(comm, part).natural(pick(model::outward_normals(model), points));
   local_model.counts = count_all(comm, part, edges.total);
   local_model.global_metadata.elements = gather_elements(comm, part);
+  model::Contact& contact = local_model.global_metadata.contact;
+  const bool cuts_meet = gather_cut_faces(comm, part, contact.cut_faces);
+  part.contact = cuts_meet || !model.contact.bodies.empty();
   local_model.global_metadata.contact.bodies = model.contact.bodies;
   local_model.global_metadata.contact.stiffness = model.contact.stiffness;
   return local_model;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "countable.h"
 #include "partition.h"
@@ -22,7 +23,12 @@ void pass(Archive& archive, RankColumns& d) {
   archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
           p.triangle, p.loads.instrument, p.loads.target, p.loads.force, p.loads.layer_area);
   archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.total_unknowns,
-          d.first_unknown, d.unknowns, d.spacing, d.moves);
+          d.first_unknown, d.unknowns, d.spacing, d.moves, d.doubled);
+  auto count = static_cast<int64_t>(d.cuts.size());
+  archive(count);
+  d.cuts.resize(count);
+  for (model::Cut& cut : d.cuts)
+    archive(cut.columns, cut.layers, cut.meets, cut.lips, cut.around, cut.edge);
 }
 
 template <class Archive>
@@ -47,6 +53,21 @@ ColumnGraph graph_of(const model::ColumnGeometry& geometry) {
   return graph;
 }
 
+/// The columns along cuts whose sides may meet, and those beside them, go to one rank.
+void keep_cuts_whole(const std::vector<model::Cut>& cuts, std::vector<int>& owner) {
+  const auto first = std::ranges::find_if(cuts, &model::Cut::meets);
+  if (first == cuts.end()) return;
+  const int rank = owner[first->columns.front()];
+  for (const model::Cut& cut : cuts) {
+    if (!cut.meets) continue;
+    for (const int64_t column : cut.columns) owner[column] = rank;
+    const std::set<int64_t> inner(cut.columns.begin() + 1, cut.columns.end() - 1);
+    for (const Triangle& t : cut.around)
+      if (std::ranges::any_of(t, [&](int64_t column) { return inner.contains(column); }))
+        for (const int64_t column : t) owner[column] = rank;
+  }
+}
+
 /// Distributes columns from rank 0.
 class Distributor {
  public:
@@ -62,9 +83,12 @@ class Distributor {
     });
     place_.resize(columns);
     unknown_.resize(columns);
+    std::vector<int64_t> doubled(columns, 0);
+    for (const model::DoubledColumn& at : geometry.doubled()) doubled[at.column] = at.points;
     for (int64_t k = 0; k < columns; ++k) {
       const int64_t c = order[k];
-      place_[c] = k * geometry.layers();
+      place_[c] = points_;
+      points_ += geometry.layers() + doubled[c];
       unknown_[c] = unknowns_;
       unknowns_ += geometry.soft_points(c);
       first_unknown_[owner[c] + 1] += geometry.soft_points(c);
@@ -87,6 +111,10 @@ class Distributor {
     rank_columns.unknowns = first_unknown_[rank + 1] - first_unknown_[rank];
     rank_columns.spacing = spacing;
     rank_columns.moves = scene_.moves;
+    rank_columns.doubled = geometry_.doubled();
+    rank_columns.cuts = geometry_.cuts();
+    for (model::Cut& cut : rank_columns.cuts)
+      cut.meets = cut.meets && owner_[cut.columns.front()] == rank;
     return rank_columns;
   }
 
@@ -97,7 +125,7 @@ class Distributor {
   std::vector<std::vector<int64_t>> own_;  // [ranks] columns
   std::vector<int64_t> place_, unknown_;   // [columns] as in RankColumns
   std::vector<int64_t> first_unknown_;     // [ranks + 1]
-  int64_t unknowns_ = 0;
+  int64_t points_ = 0, unknowns_ = 0;
 };
 
 }  // namespace
@@ -108,14 +136,19 @@ RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geome
   const int ranks = base::size(comm), rank = base::rank(comm);
   ColumnGraph graph;
   base::on_root(comm, [&] {
-    require_countable(static_cast<int64_t>(geometry->skin().points.size()) * geometry->layers());
+    int64_t points = static_cast<int64_t>(geometry->skin().points.size()) * geometry->layers();
+    for (const model::DoubledColumn& at : geometry->doubled()) points += at.points;
+    require_countable(points);
     graph = graph_of(*geometry);
     global_metadata = geometry->global_metadata();
     bones = global_metadata.bone_surfaces;
   });
-  const std::vector<int> owner = partition(comm, graph);
+  std::vector<int> owner = partition(comm, graph);
   std::optional<Distributor> distributor;  // on rank 0
-  base::on_root(comm, [&] { distributor.emplace(*geometry, scene, graph, owner, ranks); });
+  base::on_root(comm, [&] {
+    keep_cuts_whole(geometry->cuts(), owner);
+    distributor.emplace(*geometry, scene, graph, owner, ranks);
+  });
   RankColumns rank_columns;
   for (int r = ranks - 1; r >= 0; --r) {
     base::on_root(

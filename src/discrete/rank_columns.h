@@ -16,8 +16,11 @@ struct RankColumns {
   std::vector<int64_t> unknown;                    ///< [C] block number of its first unknown
   int64_t layers = 0, columns = 0, triangles = 0;  ///< of the whole
   int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;
-  double spacing = 0;                     ///< mm, of contact's grids
-  std::vector<scene::RigidMotion> moves;  ///< [bones]
+  /// Cuts of the whole; those meet whose sides this rank holds.
+  std::vector<model::Cut> cuts;
+  std::vector<model::DoubledColumn> doubled;  ///< of the whole
+  double spacing = 0;                         ///< mm, of contact's grids
+  std::vector<scene::RigidMotion> moves;      ///< [bones]
 };
 
 /// Distributes the `geometry`, which rank 0 alone reads: to every rank its piece, and the bones; to

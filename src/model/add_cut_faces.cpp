@@ -67,15 +67,12 @@ class CutFaceBuilder {
     std::set<int64_t> in_cut;
     for (const int64_t column : cut_.columns)
       for (const bool left : {false, true}) in_cut.insert(side_of(node(column, 0), left));
-    double sum = 0;
     for (const Triangle& t : model_.skin)
       for (int k = 0; k < 3; ++k) {
         const int64_t p = t[k], q = t[(k + 1) % 3];
-        sum += (position(p) - position(q)).norm() / (3 * static_cast<double>(model_.skin.size()));
         if (in_cut.contains(p) && !in_cut.contains(q)) beside_[p].insert(q);
         if (in_cut.contains(q) && !in_cut.contains(p)) beside_[q].insert(p);
       }
-    edge_ = sum;
   }
 
   /// Layers −1 and −2, and as many beyond the deepest, lie round the edge, on the skin or inside.
@@ -88,7 +85,8 @@ class CutFaceBuilder {
     Vec3 length = Vec3::Zero();
     for (const auto& [point, weight] : direction) length += weight * position(point);
     for (const auto& [point, weight] : direction)
-      shares.emplace_back(point, std::abs(layer - inner) * step * edge_ / length.norm() * weight);
+      shares.emplace_back(point,
+                          std::abs(layer - inner) * step * cut_.edge / length.norm() * weight);
     return shares;
   }
   /// The way from an edge's points to those beside them, as a mean over the columns nearby.
@@ -97,7 +95,7 @@ class CutFaceBuilder {
     Shares direction;
     double sum = 0;
     for (size_t k = 0; k < along_.size(); ++k) {
-      const double weight = 1 - std::abs(along_[k] - along_[i]) / (reach * edge_);
+      const double weight = 1 - std::abs(along_[k] - along_[i]) / (reach * cut_.edge);
       const int64_t row = node(cut_.columns[k], 0);
       const auto beside = beside_.find(side_of(row, left));
       if (weight <= 0 || !twin_of_.contains(row) || beside == beside_.end()) continue;
@@ -164,7 +162,6 @@ class CutFaceBuilder {
   const Model& model_;
   int deepest_ = 0;
   bool through_ = false;
-  double edge_ = 1;            // mm, the skin's mean
   std::vector<double> along_;  // mm, of the path's columns
   std::map<int64_t, int64_t> twin_of_;
   std::map<std::array<int64_t, 2>, int64_t> row_of_;  // column, layer

@@ -3,6 +3,7 @@
 #include "add_adhesion.h"
 #include "add_contact.h"
 #include "column_layout.h"
+#include "cut_sides.h"
 #include "layers.h"
 #include "loads.h"
 #include "point_sets.h"
@@ -15,9 +16,10 @@
 
 namespace repose::model {
 
-std::string explain_central_build(const scene::Scene& scene) {
+std::string explain_central_build(const scene::Scene& scene, bool prestressed) {
   if (!scene.tissue.material) return "its tissue is springs";
-  if (!scene.incisions.empty()) return "it has incisions";
+  if (prestressed && !std::ranges::all_of(scene.incisions, &scene::Incision::parts_lips))
+    return "it has incisions that its tension opens";
   return "";
 }
 
@@ -29,6 +31,8 @@ struct ColumnGeometry::State {
   std::vector<AdheringJaw> jaws;
   std::vector<char> parted;  // [columns]
   int64_t layers;
+  std::vector<DoubledColumn> doubled = {};
+  std::vector<int64_t> doubled_points = {};  // [columns]
 
   bool is_held(int64_t column) const { return loads.instrument[column] >= 0; }
   bool ends_in_bone(int64_t column) const {
@@ -40,6 +44,7 @@ struct ColumnGeometry::State {
   }
   Counts count() const;
   void require_free_cuts() const;
+  void prepare_cuts();
 };
 
 /// Counts the points that the layers will have.
@@ -65,6 +70,26 @@ void ColumnGeometry::State::require_free_cuts() const {
     }
 }
 
+void ColumnGeometry::State::prepare_cuts() {
+  const auto columns = static_cast<int64_t>(layout.rim.size());
+  std::ranges::stable_partition(layout.cuts, &Cut::lips);
+  parted.assign(columns, 0);
+  doubled_points.assign(columns, 0);
+  int64_t first_row = columns * layers;
+  for (Cut& cut : layout.cuts) {
+    add_skin_around(layout.mesh.points, layout.mesh.triangles, cut);
+    for (const int64_t column : cut.columns) parted[column] = 1;
+    std::vector<int64_t> inner(cut.columns.begin() + 1, cut.columns.end() - 1);
+    std::ranges::sort(inner);
+    for (const int64_t column : inner) {
+      const int64_t points = std::min<int64_t>(cut.layers, soft_points(column));
+      doubled.push_back({column, &cut - layout.cuts.data(), points, first_row});
+      doubled_points[column] = points;
+      first_row += points;
+    }
+  }
+}
+
 ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface& skin,
                                const std::vector<surface::Surface>& bones) {
   static const PetscLogEvent event = base::log_event("RpBuild");
@@ -79,9 +104,7 @@ ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface
   require_held(scene, layout.mesh, layout.field, counts, layout.attachment);
   report_columns(layout, counts.bone, layout.report);
   if (adheres(scene)) state_->jaws = adhering_jaws(*scene.anatomy, layout);
-  state_->parted.assign(layout.rim.size(), 0);
-  for (const Cut& cut : layout.cuts)
-    for (const int64_t column : cut.columns) state_->parted[column] = 1;
+  state_->prepare_cuts();
 }
 
 ColumnGeometry::ColumnGeometry(const Anatomy& anatomy)
@@ -96,7 +119,10 @@ const SkinMesh& ColumnGeometry::skin() const { return state_->layout.mesh; }
 int64_t ColumnGeometry::layers() const { return state_->layers; }
 const BuildReport& ColumnGeometry::report() const { return state_->layout.report; }
 const std::vector<Cut>& ColumnGeometry::cuts() const { return state_->layout.cuts; }
-int64_t ColumnGeometry::soft_points(int64_t column) const { return state_->soft_points(column); }
+const std::vector<DoubledColumn>& ColumnGeometry::doubled() const { return state_->doubled; }
+int64_t ColumnGeometry::soft_points(int64_t column) const {
+  return state_->soft_points(column) + state_->doubled_points[column];
+}
 
 std::vector<std::vector<int64_t>> ColumnGeometry::held() const {
   std::vector<std::vector<int64_t>> rows(state_->scene.instruments.size());
@@ -167,12 +193,30 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
 
 double ColumnGeometry::spacing() const { return grid_spacing(state_->scene, state_->layout); }
 
+namespace {
+
+/// The corners left of cuts become the doubles.
+void part_skin(const SkinMesh& mesh, const std::vector<Cut>& cuts,
+               const std::vector<DoubledColumn>& doubled, std::vector<Triangle>& skin) {
+  std::vector<CutSides> sides;
+  for (const Cut& cut : cuts) sides.emplace_back(cut.columns, cut.around);
+  for (const DoubledColumn& at : doubled)
+    for (const int64_t t : mesh.triangles_of[at.column]) {
+      const Triangle& corners = mesh.triangles[t];
+      if (at.points == 0 || !sides[at.cut].left_triangle(at.column, corners)) continue;
+      skin[t][std::ranges::find(corners, at.column) - corners.begin()] = at.first_row;
+    }
+}
+
+}  // namespace
+
 Model ColumnGeometry::global_metadata() const {
   const ColumnLayout& layout = state_->layout;
   Model global_metadata;
   for (const Triangle& t : layout.mesh.triangles)
     global_metadata.skin.push_back(
         {t[0] * state_->layers, t[1] * state_->layers, t[2] * state_->layers});
+  part_skin(layout.mesh, layout.cuts, state_->doubled, global_metadata.skin);
   global_metadata.gravity = state_->scene.gravity.value_or(Vec3::Zero());
   add_bones(state_->scene, state_->bones, global_metadata);
   global_metadata.contact.spacing = spacing();

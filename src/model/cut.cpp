@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "add_contact.h"
 #include "cut_sides.h"
@@ -10,20 +11,13 @@
 namespace repose::model {
 namespace {
 
-std::vector<Triangle> column_triangles(const Model& model) {
-  std::vector<Triangle> triangles = model.skin;
-  for (Triangle& t : triangles)
-    for (int64_t& v : t) v = model.points.column[v];
-  return triangles;
-}
-
 /// Parts a model along one cut.
 class CutSplitter {
  public:
   CutSplitter(const Cut& cut, Model& model)
       : model_(model),
         cut_(cut),
-        sides_(cut.columns, column_triangles(model)),
+        sides_(cut.columns, cut.around),
         doubles_(model.points.position.size(), -1) {}
 
   std::vector<std::array<int64_t, 2>> run() {
@@ -152,11 +146,13 @@ class CutSplitter {
     return beyond;
   }
 
+  /// An edge at the border of a piece may have prisms on one side only, whose share is all.
   void add_to_edge(int64_t p, int64_t q, double weight) {
     Edges& edges = model_.edges;
     const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
     const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
-    edges.weight[edge - edges.points.begin()] += weight;
+    if (edge != edges.points.end() && *edge == ends)
+      edges.weight[edge - edges.points.begin()] += weight;
   }
 
   /// The edges of the parted prisms, with what else they carried.
@@ -201,6 +197,18 @@ class CutSplitter {
 };
 
 }  // namespace
+
+void add_skin_around(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                     Cut& cut) {
+  const std::set<int64_t> columns(cut.columns.begin(), cut.columns.end());
+  for (const Triangle& t : triangles) {
+    if (std::ranges::any_of(t, [&](int64_t v) { return columns.contains(v); }))
+      cut.around.push_back(t);
+    for (int k = 0; k < 3; ++k)
+      cut.edge += (points[t[k]] - points[t[(k + 1) % 3]]).norm() /
+                  (3 * static_cast<double>(triangles.size()));
+  }
+}
 
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model) {
   std::vector<std::array<int64_t, 2>> pairs = CutSplitter(cut, model).run();

@@ -192,7 +192,7 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
     const scene::Incision& incision = incisions[i];
     cuts.push_back({.columns = cutter.cut(incision.path),
                     .layers = incision.layers,
-                    .lips = incision.name == "mouth"});
+                    .lips = incision.parts_lips()});
   }
   return cuts;
 }

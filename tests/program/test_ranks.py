@@ -109,6 +109,29 @@ def test_a_remeshed_skin_with_parted_lips_ends_on_any_ranks(run, tmp_path, ranks
     result = run("repose-solve", "lips.yaml", ranks=ranks)
     assert (result.returncode, result.stderr) == (0, ""), result
     assert "incision               along" in result.stdout
+    assert (f"by {ranks} ranks, each its part" in result.stdout) == (ranks > 1)
+
+
+CHEEK = "incisions:\n  - {path: [[-45, -67, -31], [-45, -75, -14], [-45, -81, 1]], layers: 2}\n"
+
+
+def test_ranks_make_the_parts_of_a_solid_with_cuts(run, tmp_path):
+    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_") + LIPS + CHEEK
+    (tmp_path / "cuts.yaml").write_text(text)
+    models, rests = [], []
+    for ranks in (1, 2, 3, 5):
+        result = run("repose-solve", "cuts.yaml", "-output", f"on{ranks}", ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert result.stdout.count("incision               along") == 2
+        assert (f"by {ranks} ranks, each its part" in result.stdout) == (ranks > 1)
+        models.append(model_of(tmp_path / f"on{ranks}.h5"))
+        rests.append(last(tmp_path / f"on{ranks}.h5"))
+    assert len(models[0]["contact/wall/net"]) == 2
+    for model, rest in zip(models, rests):
+        assert model.keys() == models[0].keys()
+        assert [name for name in model if model[name].tobytes() != models[0][name].tobytes()] == []
+        assert apart(rest, rests[0]) < 0.1  # the accuracy
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -125,7 +148,7 @@ def test_what_only_rank_0_knows_is_refused_on_all_ranks(run, tmp_path, ranks):
 
 @pytest.mark.parametrize("options, why", [
     ("head_springs_advance.yaml", "its tissue is springs"),
-    ("head_incision.yaml", "it has incisions"),
+    ("head_incision.yaml", "it has incisions that its tension opens"),
     ("head_solid.yaml -sensitivity", "-sensitivity")])
 def test_why_one_rank_builds_the_model_whole_is_told(run, options, why):
     scene, *rest = options.split()

@@ -114,6 +114,15 @@ struct Piece {
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
 };
 
+/// Points of a column that a cut doubles, from the skin down. The doubles are the last points of a
+/// model whose cuts are made (cut_along).
+struct DoubledColumn {
+  int64_t column;     ///< vertex of the skin
+  int64_t cut;        ///< row of ColumnGeometry::cuts()
+  int64_t points;     ///< that are doubled
+  int64_t first_row;  ///< of the doubles in the whole model
+};
+
 /// Geometry of the columns of tissue: all of a model but its layers.
 /// Takes memory by the skin, where the model takes it by the skin times the layers.
 class ColumnGeometry {
@@ -129,7 +138,7 @@ class ColumnGeometry {
 
   const SkinMesh& skin() const;
   int64_t layers() const;
-  /// Points of a column that are free to move.
+  /// Points of a column that are free to move, with their doubles.
   int64_t soft_points(int64_t column) const;
   /// The given columns (ascending), those that share a triangle with them, and those that share one
   /// with these: all that values at elements of the given columns depend on. Of a scene with
@@ -137,13 +146,16 @@ class ColumnGeometry {
   Piece piece(const std::vector<int64_t>& columns) const;
   /// mm, of contact's grids of distances to meshes.
   double spacing() const;
-  /// The model without its points, prisms and edges: skin, bones, bodies, the grid of contact.
+  /// The model, with its cuts made, without its points, prisms and edges: skin, bones, bodies, the
+  /// grid of contact.
   Model global_metadata() const;
   const BuildReport& report() const;
   /// [instruments] rows of the points that each holds.
   std::vector<std::vector<int64_t>> held() const;
-  /// The incisions, not made yet.
+  /// The incisions, not made yet, in the order in which they are: those of lips first.
   const std::vector<Cut>& cuts() const;
+  /// The columns that they double, in the order of the doubles.
+  const std::vector<DoubledColumn>& doubled() const;
 
  private:
   struct State;
@@ -151,7 +163,8 @@ class ColumnGeometry {
 };
 
 /// Returns the reason why a scene's model cannot be built column by column, or an empty text.
-std::string explain_central_build(const scene::Scene& scene);
+/// `prestressed` means that an initial equilibrium precedes the incisions.
+std::string explain_central_build(const scene::Scene& scene, bool prestressed);
 
 /// Returns a remark that counts the points of a scene's model that adhere to teeth; empty of a
 /// scene without adhesion.

@@ -15,7 +15,14 @@ struct Cut {
   int layers;                    ///< point layers that it parts, from the skin down
   bool meets = false;            ///< its sides touch and do not pass each other
   bool lips = false;             ///< parts lips, which the initial equilibrium finds parted
+  std::vector<Triangle> around = {};  ///< [T] skin vertices of the skin's triangles at the columns
+  double edge = 0;                    ///< mm, mean length of the sides of the skin's triangles
 };
+
+/// Gives a cut the skin around it, `around` and `edge`. `points` [V] mm and `triangles` are the
+/// whole skin's.
+void add_skin_around(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
+                     Cut& cut);
 
 /// Makes the paths of incisions edges of the skin: triangles and edges that a path crosses are
 /// split where it runs, and the vertices that come of it added at the end. A path nearer to a
@@ -36,7 +43,9 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
 /// are made again from its prisms, and what tension they carried besides is shared like that.
 /// Positions and rest lengths stay as they are: where the tissue was in equilibrium, the tension
 /// that crossed the cut now opens it. Returns the rows of the doubled points, the double second.
-/// Throws InternalError where the columns are no path of edges.
+/// The model may be one of build_local(), of a piece: values at elements of the columns that the
+/// piece was made around are those of the whole model, and `cut.meets` requires that the piece was
+/// made around the whole path. Throws InternalError where the columns are no path of edges.
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model);
 
 /// Makes the cuts of the lips, or all others, in their order (cut_along). Returns of each of `cuts`

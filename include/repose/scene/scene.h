@@ -242,6 +242,7 @@ struct Incision {
   std::vector<Vec3> path;  ///< mm, at least two points on or near the skin
   int layers;              ///< point layers that it parts, from the skin down, ≥ 1
   std::string name = {};   ///< where the scene tells of it
+  bool parts_lips() const { return name == "mouth"; }
 };
 
 struct Solve {

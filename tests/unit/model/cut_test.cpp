@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -205,6 +206,55 @@ TEST_F(CutAlong, leaves_points_on_bone_joined) {
     EXPECT_EQ(built_.model.points.set[twin], PointSet::soft_tissue);
   const auto inner = static_cast<int64_t>(built_.cuts[0].columns.size()) - 2;
   EXPECT_EQ(static_cast<int64_t>(pairs_.size()), 2 * inner);
+}
+
+/// [whole model's points] weights of its edges, where `point_row` [points] are rows of it.
+std::map<std::array<int64_t, 2>, double> weights_by_row(const Edges& edges,
+                                                        const std::vector<int64_t>& point_row) {
+  std::map<std::array<int64_t, 2>, double> weights;
+  for (size_t j = 0; j < edges.points.size(); ++j) {
+    const int64_t p = point_row[edges.points[j][0]], q = point_row[edges.points[j][1]];
+    weights[{std::min(p, q), std::max(p, q)}] = edges.weight[j];
+  }
+  return weights;
+}
+
+/// The path turns back, so that it lies at the border of some pieces and in their middle, too.
+TEST(CutPiece, edges_at_its_own_columns_are_those_of_the_whole) {
+  scene::Scene scene =
+      cut_scene(4, {{{{20, 30, 0}, {20, 60, 0}, {50, 60, 0}, {50, 10, 0}, {80, 10, 0}}, 3}});
+  scene.tissue.material =
+      scene::Material{.deep = {0.015, 0.45}, .strata = {{1.5, {0.1, 0.4}}}, .regions = {}};
+  scene.tissue.turgor = 0.05;
+  const surface::Surface skin = patches::square(10, 100);
+  BuiltModel built = build_model(scene, skin, {kBone});
+  cut_along(built.cuts[0], built.model);
+  std::vector<int64_t> same(built.model.points.position.size());
+  std::iota(same.begin(), same.end(), 0);
+  const auto whole = weights_by_row(built.model.edges, same);
+  const ColumnGeometry geometry(scene, skin, {kBone});
+  for (size_t center = 0; center < geometry.skin().points.size(); ++center) {
+    std::vector<int64_t> own, found, rows;
+    for (size_t c = 0; c < geometry.skin().points.size(); ++c)
+      if ((geometry.skin().points[c] - geometry.skin().points[center]).norm() < 25)
+        own.push_back(static_cast<int64_t>(c));
+    const Piece piece = geometry.piece(own);
+    Model model = build_local(scene, {kBone}, piece, found);
+    cut_along(geometry.cuts()[0], model);
+    for (const int64_t c : piece.column)
+      for (int a = 0; a < 4; ++a) rows.push_back(4 * c + a);
+    for (const DoubledColumn& at : geometry.doubled())
+      for (int a = 0; a < at.points && std::ranges::binary_search(piece.column, at.column); ++a)
+        rows.push_back(at.first_row + a);
+    ASSERT_EQ(rows.size(), model.points.position.size());
+    const auto local = weights_by_row(model.edges, rows);
+    for (const auto& [ends, weight] : whole)
+      if (std::ranges::binary_search(own, built.model.points.column[ends[0]]) ||
+          std::ranges::binary_search(own, built.model.points.column[ends[1]])) {
+        ASSERT_TRUE(local.contains(ends));
+        EXPECT_EQ(local.at(ends), weight);
+      }
+  }
 }
 
 class CutSolid : public CutAlong {

@@ -77,6 +77,26 @@ model::Anatomy adhering(int squares) {
   return anatomy;
 }
 
+/// The same with parted lips and, where there are squares enough, an incision.
+model::Anatomy cut(model::Anatomy anatomy, bool sides_touch) {
+  scene::Scene& scene = anatomy.scene;
+  scene.contact->cuts = sides_touch;
+  if (anatomy.skin.points.size() >= 36) {
+    scene.incisions = {{{{20, 40, 0}, {80, 40, 0}}, 2, "incisions[0]"},
+                       {{{20, 60, 0}, {80, 60, 0}}, 4, "mouth"}};
+  } else {
+    scene.incisions = {{{{10, 45, 0}, {90, 55, 0}}, 4, "mouth"}};
+  }
+  return anatomy;
+}
+
+/// The whole model with all its cuts made, those of lips first.
+model::Model cut_whole(const model::Anatomy& anatomy) {
+  model::BuiltModel built = model::build_model(anatomy);
+  for (const bool lips : {true, false}) model::make_cuts(built.cuts, lips, built.model);
+  return built.model;
+}
+
 discrete::LocalModel build_local(const model::Anatomy& anatomy) {
   std::optional<model::ColumnGeometry> geometry;
   base::on_root(comm, [&] { geometry.emplace(anatomy); });
@@ -93,6 +113,14 @@ void expect_same(const std::vector<model::TermElements>& one,
   }
 }
 
+void expect_same(const model::CutFaces& one, const model::CutFaces& other) {
+  EXPECT_EQ(one.size, other.size);
+  EXPECT_EQ(one.begin, other.begin);
+  EXPECT_EQ(one.point, other.point);
+  EXPECT_EQ(one.weight, other.weight);
+  EXPECT_EQ(one.area, other.area);
+}
+
 void expect_same(const model::Model& one, const model::Model& other) {
   expect_same(one.elements, other.elements);
   EXPECT_EQ(one.gravity, other.gravity);
@@ -102,7 +130,6 @@ void expect_same(const model::Model& one, const model::Model& other) {
   EXPECT_EQ(one.points.layer, other.points.layer);
   EXPECT_EQ(one.points.column, other.points.column);
   EXPECT_EQ(one.points.bone, other.points.bone);
-  EXPECT_EQ(one.points.external_force, other.points.external_force);
   EXPECT_EQ(one.prisms.points, other.prisms.points);
   EXPECT_EQ(one.prisms.rest_volume, other.prisms.rest_volume);
   EXPECT_EQ(one.prisms.shear_modulus, other.prisms.shear_modulus);
@@ -118,6 +145,7 @@ void expect_same(const model::Model& one, const model::Model& other) {
   EXPECT_EQ(one.contact.pairs.binding, other.contact.pairs.binding);
   EXPECT_EQ(one.contact.pairs.area, other.contact.pairs.area);
   EXPECT_EQ(one.contact.pairs.offset, other.contact.pairs.offset);
+  expect_same(one.contact.cut_faces, other.contact.cut_faces);
   EXPECT_EQ(one.bone_transform, other.bone_transform);
 }
 
@@ -144,9 +172,11 @@ void expect_same(const Part& one, const Part& other) {
       EXPECT_EQ(one.bodies[k].distance(at).value, other.bodies[k].distance(at).value);
 }
 
-void expect_same_masses(const Part& one, const Part& other) {
-  for (int64_t i = 0; i < one.owned_points; ++i)
+void expect_same_loads(const Part& one, const Part& other) {
+  for (int64_t i = 0; i < one.owned_points; ++i) {
     EXPECT_EQ(one.model.points.mass[i], other.model.points.mass[i]) << i;
+    EXPECT_EQ(one.model.points.external_force[i], other.model.points.external_force[i]) << i;
+  }
 }
 
 /// So many squares that columns are dealt out in order: PT-Scotch deals otherwise each time.
@@ -162,7 +192,7 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
     const Part part = discrete::distribute(comm, built.model);
     const discrete::LocalModel local_model = build_local(anatomy);
     expect_same(local_model.part, part);
-    expect_same_masses(local_model.part, part);
+    expect_same_loads(local_model.part, part);
     EXPECT_TRUE(part.contact);
     const model::Counts all = model::count(built.model);
     EXPECT_EQ(local_model.counts.points, all.points);
@@ -182,6 +212,23 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
   }
 }
 
+TEST(Raise, parts_of_a_cut_model_are_those_of_the_whole) {
+  for (const bool sides_touch : {false, true})
+    for (const auto& uncut : {jaws(squares()), rich(squares()), loaded(squares())}) {
+      const model::Anatomy anatomy = cut(uncut, sides_touch);
+      const model::Model whole = cut_whole(anatomy);
+      const discrete::LocalModel local_model = build_local(anatomy);
+      const Part part = discrete::distribute(comm, whole);
+      ASSERT_GT(part.total_points, 4 * static_cast<int64_t>(uncut.skin.points.size()));
+      expect_same(local_model.part, part);
+      expect_same_loads(local_model.part, part);
+      if (base::rank(comm) > 0) continue;
+      EXPECT_EQ(local_model.global_metadata.skin, whole.skin);
+      EXPECT_EQ(whole.contact.cut_faces.empty(), !sides_touch);
+      expect_same(local_model.global_metadata.contact.cut_faces, whole.contact.cut_faces);
+    }
+}
+
 TEST(Raise, a_rank_without_columns_has_an_empty_part) {
   const model::Anatomy anatomy = jaws(1);  // four columns
   const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
@@ -196,10 +243,14 @@ std::vector<Value> slab(const std::vector<Value>& whole) {
   return {whole.begin() + mine.begin, whole.begin() + mine.end};
 }
 
-TEST(Raise, its_rows_are_those_of_the_whole_model) {
-  const model::Anatomy anatomy = rich(24);
-  const model::Model whole = model::build_model(anatomy).model;
-  const model::ModelRows rows = discrete::NaturalRows::of_model(comm, build_local(anatomy));
+void expect_its_rows(const model::Anatomy& anatomy) {
+  const model::Model whole = cut_whole(anatomy);
+  const discrete::LocalModel local_model = build_local(anatomy);
+  if (base::rank(comm) == 0) {
+    EXPECT_EQ(local_model.global_metadata.skin, whole.skin);
+    expect_same(local_model.global_metadata.contact.cut_faces, whole.contact.cut_faces);
+  }
+  const model::ModelRows rows = discrete::NaturalRows::of_model(comm, local_model);
   EXPECT_EQ(rows.points.position, slab(whole.points.position));
   EXPECT_EQ(rows.points.set, slab(whole.points.set));
   EXPECT_EQ(rows.points.target, slab(whole.points.target));
@@ -218,6 +269,12 @@ TEST(Raise, its_rows_are_those_of_the_whole_model) {
   EXPECT_EQ(rows.pairs.area, slab(whole.contact.pairs.area));
   EXPECT_EQ(rows.outward, slab(model::outward_normals(whole)));
   EXPECT_EQ(rows.contact_pairs, static_cast<int64_t>(whole.contact.pairs.point.size()));
+}
+
+TEST(Raise, its_rows_are_those_of_the_whole_model) { expect_its_rows(rich(24)); }
+
+TEST(Raise, its_rows_are_those_of_the_whole_model_with_cuts) {
+  for (const bool sides_touch : {false, true}) expect_its_rows(cut(loaded(24), sides_touch));
 }
 
 /// With few columns, some ranks have no row of prisms, or none at all.
@@ -324,12 +381,15 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
 
 TEST(Raise, what_needs_more_than_columns_is_said) {
   scene::Scene scene = jaws(4).scene;
-  EXPECT_EQ(model::explain_central_build(scene), "");
+  EXPECT_EQ(model::explain_central_build(scene, true), "");
   scene.tissue.material.reset();
-  EXPECT_EQ(model::explain_central_build(scene), "its tissue is springs");
+  EXPECT_EQ(model::explain_central_build(scene, false), "its tissue is springs");
   scene = jaws(4).scene;
-  scene.incisions = {{}};
-  EXPECT_EQ(model::explain_central_build(scene), "it has incisions");
+  scene.incisions = {{{}, 4, "mouth"}};
+  EXPECT_EQ(model::explain_central_build(scene, true), "");
+  scene.incisions.push_back({{}, 4, "incisions[0]"});
+  EXPECT_EQ(model::explain_central_build(scene, false), "");
+  EXPECT_EQ(model::explain_central_build(scene, true), "it has incisions that its tension opens");
 }
 
 }  // namespace raise_test

@@ -216,6 +216,13 @@ model::Model cut_block(bool cut) {
   m.contact.stiffness = 0.05;
   model::Cut path{{}, 4, true};
   for (int i = 0; i < 7; ++i) path.columns.push_back(4 * 7 + i);
+  std::vector<Vec3> skin(7 * 9);
+  for (size_t p = 0; p < m.points.layer.size(); ++p)
+    if (m.points.layer[p] == 0) skin[m.points.column[p]] = m.points.position[p];
+  std::vector<Triangle> triangles = m.skin;
+  for (Triangle& t : triangles)
+    for (int64_t& corner : t) corner = m.points.column[corner];
+  model::add_skin_around(skin, triangles, path);
   model::cut_along(path, m);
   return m;
 }
