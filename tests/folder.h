@@ -46,7 +46,8 @@ class Folder {
   std::filesystem::path path_;
 };
 
-/// What a call refuses with, "accepted" if it does not; any other exception passes.
+/// Returns the message of a call's refusal, "accepted" if it does not refuse; any other exception
+/// passes.
 template <class Call>
 std::string refusal(const Call& call) {
   try {

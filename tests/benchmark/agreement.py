@@ -43,7 +43,7 @@ def solve(scene, chosen, folder, ranks, options):
 
 
 def name_of(scene, folder):
-    """Of a shipped scene, or of a copy without its contact."""
+    """Name of a shipped scene, or of a copy without its contact."""
     shipped, off, _ = scene.partition(":off")
     if not off:
         return shipped

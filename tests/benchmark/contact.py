@@ -114,7 +114,7 @@ def implicit(points, triangles):
 
 
 def encloses(points, triangles, place):
-    """Whether the solid angles of a closed surface add up to a whole turn: VTK's sign, from the nearest
+    """Returns whether the solid angles of a closed surface add up to a whole turn: VTK's sign, from the nearest
     triangle's normal, is wrong beside slivers."""
     a, b, c = np.moveaxis(points[triangles] - place, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
@@ -125,7 +125,7 @@ def encloses(points, triangles, place):
 
 
 def inside_bone(file):
-    """How many free points are deeper in a bone than at the start, and by how much, mm."""
+    """Number of free points that are deeper in a bone than at the start, and the difference, mm."""
     with h5py.File(file) as result:
         surfaces = {k: v[:] for k, v in result["model/bone_surfaces"].items()}
         moves = result["model/bone_transform"][:]

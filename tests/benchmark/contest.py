@@ -71,7 +71,7 @@ LONG = 20  # s: what takes longer is not repeated
 
 
 def cross(a, b):
-    """Of [3, M] arrays."""
+    """Cross products of [3, M] arrays."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
                      a[0] * b[1] - a[1] * b[0]])
 
@@ -295,7 +295,7 @@ class Contest:
 
 
 def ending(entry):
-    """What came of it, in words."""
+    """Describes the outcome in words."""
     away = f"{entry['distance']:.2g} mm"
     if entry["end"] == "reached":
         return away
@@ -338,7 +338,7 @@ def table(contest):
 
 
 def verdict(contest, own, rival, what, times):
-    """How many times fewer, and whether that is the goal."""
+    """Reduction factor, and whether it reaches the goal."""
     entry, own = contest.entries.get((rival, 0)), contest.entries.get((own, 0))
     if not entry or not own:
         return "not measured"
@@ -352,7 +352,7 @@ def verdict(contest, own, rival, what, times):
 
 
 def verdicts(contests, own, name):
-    """How much faster one of Repose's methods is than the others."""
+    """Speedup of one of Repose's methods over the others."""
     names = {"polak_ribiere": "the paper's algorithm", "liblbfgs": "liblbfgs on the same kernel",
              "L-BFGS-B": "SciPy L-BFGS-B"}
     text = f"| {name} is faster than | " + " | ".join(contests) + " |\n"
@@ -371,7 +371,7 @@ def spread(values):
 
 
 def conclusion(contests):
-    """What the figures say of the goals, in a few sentences."""
+    """Compares the figures with the goals, in a few sentences."""
     over = {what: [c.entries["polak_ribiere", 0][what] / c.entries["default", 0][what]
                    for c in contests.values() if ("polak_ribiere", 0) in c.entries]
             for what in ("evaluations", "seconds")}

@@ -187,7 +187,7 @@ class Newton:
         return np.linalg.norm(self.step.array.reshape(-1, 3), axis=1).max()
 
     def advance(self, tolerance, most=30):
-        """Whether the rest position was found; it is the displacement then."""
+        """Searches the rest position from the displacement; returns whether it was found."""
         self.solve()
         self.u.axpy(-1, self.step)
         for _ in range(most):

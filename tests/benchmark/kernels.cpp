@@ -81,7 +81,7 @@ Workload& workload(int64_t columns) {
   return made.try_emplace(columns, columns).first->second;
 }
 
-/// What is measured: how many elements, what they read and write, and the work.
+/// A kernel to measure: its elements, what they read and write, and the work.
 struct Kernel {
   const char* name;
   int64_t (*elements)(const Workload&);

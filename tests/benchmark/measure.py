@@ -23,7 +23,7 @@ class Run:
 
     @property
     def evaluations(self):
-        """Of value and gradient, and of the Hessian, on the scene's own mesh."""
+        """Evaluations of value and gradient, and of the Hessian, on the scene's own mesh."""
         words = self.message["evaluations"].split()
         return int(words[0]), int(words[5])
 

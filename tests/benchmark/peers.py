@@ -276,7 +276,7 @@ class Comparison:
         return [energy.time(title, how)]
 
     def contest(self, method, *options):
-        """What benchmark_contest says of a method, by its names."""
+        """Figures that benchmark_contest prints of a method, by their names."""
         exact = self.folder / "exact.h5"
         if not exact.exists():
             self.repose_solve(1e-9, "exact")

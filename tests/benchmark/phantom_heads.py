@@ -87,7 +87,7 @@ def write_surfaces(folder, shape, base, random):
 
 
 def follows(folder):
-    """How far the foremost skin of the chin goes over the way of the bone below it."""
+    """Ratio of the movement of the foremost skin of the chin to that of the bone below it."""
     model, rest = model_of(folder / "scene.h5"), last(folder / "scene.h5")["point/position"]
     initial, layer = model["point/position"], model["point/layer"]
     deep = np.flatnonzero(layer == layer.max())

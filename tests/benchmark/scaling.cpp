@@ -26,7 +26,7 @@ constexpr int layers = 4;
 constexpr double bone_edge = 2;  // mm, of all heads: only the skin gets finer
 const std::vector<int64_t> skin_sizes = {477, 2500, 25000, 250000};
 
-/// What one head costs: CPU seconds on one core, bytes on the heap.
+/// Cost of one head: CPU seconds on one core, bytes on the heap.
 struct Cost {
   int64_t points, springs, prisms;
   double build, evaluation, preconditioner, action;

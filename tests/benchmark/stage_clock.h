@@ -7,7 +7,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
 
-/// What stages of a program cost, by the ranks of MPI_COMM_WORLD.
+/// Cost of the stages of a program, over the ranks of MPI_COMM_WORLD.
 namespace repose::benchmark {
 
 /// Most bytes that were resident since the last restart() (Linux).

@@ -61,7 +61,7 @@ def rows_of(points):
 
 
 class Energy:
-    """What a step of a result minimized. `soft` are the unknown points, `free` their unknowns."""
+    """Objective that a step minimizes. `soft` are the unknown points, `free` their unknowns."""
 
     def __init__(self, model, step):
         self.model, self.start = model, model["point/position"]

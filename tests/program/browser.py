@@ -44,7 +44,7 @@ def scripted(page, script):
 
 
 def evaluate(page, script, **options):
-    """What an asynchronous JavaScript function, given as its body, returns on the page, as JSON."""
+    """Returns the JSON result of an asynchronous JavaScript function, given as its body."""
     with scripted(page, f"""
   const told = document.createElement("pre");
   told.id = "found";

@@ -55,7 +55,7 @@ def vtk_version():
 
 
 def can_draw():
-    """Whether render.py can: without a display from VTK 9.4 on, else on a screen in memory."""
+    """Returns whether render.py can draw: without a display from VTK 9.4 on, else in memory."""
     older = vtk_version() > (0, 0) or shutil.which("pvbatch")
     return vtk_version() >= (9, 4) or bool(older and shutil.which("xvfb-run"))
 

@@ -143,7 +143,7 @@ class Solid:
         return by_prism + self.share.T @ self.pressure(v), v, slopes
 
     def pressure(self, v):
-        """Of averaged volumes at each point, N/mm²."""
+        """Pressure of the averaged volumes at each point, N/mm²."""
         return self.stiffness * (self.share @ (v - self.volume))
 
     def value_and_gradient(self, x):

@@ -60,7 +60,7 @@ def parameters(text):
 
 
 def declares(text, line):
-    """Whether the statement at `line` has typed parameters, not arguments."""
+    """Returns whether the statement at `line` has typed parameters, not arguments."""
     head = " ".join(text.splitlines()[line - 1:line + 6]).split("{")[0].split(";")[0]
     return bool(re.search(r"\w[&*>]* \w+[,)=]", head))
 

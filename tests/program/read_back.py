@@ -79,7 +79,7 @@ def joined(one, other):
 
 
 def whole(h5, step):
-    """What NAME.h5 shows as a VTKHDF file."""
+    """Returns the grid of a step that NAME.h5 shows as a VTKHDF file."""
     return joined(held_by(h5, step, "tissue"), held_by(h5, step, "bones"))
 
 
@@ -87,7 +87,7 @@ def whole(h5, step):
 
 
 def grid_of(grids):
-    """What VTK has read, its parts as one."""
+    """Merges the grids that VTK has read."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     points, corners, before = [], [], 0
     for grid in grids:
@@ -173,7 +173,7 @@ def compare(shown, held, where):
 
 
 def compare_grids(read, held, view, where):
-    """How many arrays agree. Tissue and springs show all that is theirs, other views may not."""
+    """Counts the arrays that agree. Tissue and springs show all their arrays, other views may not."""
     for what, shown, stored in zip(("points", "corners"), read, held):
         compare(shown, stored, f"{where}, {what}")
     for shown, stored in zip(read[2:], held[2:]):
@@ -187,7 +187,7 @@ def compare_grids(read, held, view, where):
 
 
 def read_back(file, view, reader):
-    """How many load steps and arrays of a view agree with the file."""
+    """Counts the load steps and arrays of a view that agree with the file."""
     name, _, read, xdmf = reader
     arrays = 0
     with h5py.File(file) as h5:

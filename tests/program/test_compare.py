@@ -125,7 +125,7 @@ SKIN, MARKS = PROJECT / "meshes/head_skin.ply", PROJECT / "meshes/head.mrk.json"
 
 
 def turned(points):
-    """What a patient lay differently by."""
+    """Moves points as a patient who lies differently."""
     a = np.radians(6)
     turn = [[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]
     return points @ np.array(turn).T + [4, -7, 9]

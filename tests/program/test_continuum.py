@@ -35,7 +35,7 @@ def surface(x):
 
 
 def area_force(solid, x, face):
-    """What holds the points of a face, N."""
+    """Reaction of the points of a face, N."""
     return solid.value_and_gradient(x)[1][face].sum(0)
 
 
@@ -54,7 +54,7 @@ def test_rigid_motions_cost_nothing():
 
 
 def averaged(model):
-    """The same with volumes averaged around points."""
+    """Returns the model with volumes averaged around points."""
     return model | {"prism/nodal_modulus": 0.9 * model["prism/modulus"]}
 
 

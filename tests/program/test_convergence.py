@@ -12,7 +12,7 @@ INNER, OUTER, INFLATED = 20.0, 30.0, 24.0  # mm, radii; the inner one goes to th
 
 
 def prisms_of(triangles, layers):
-    """Of columns of `layers` points from the top down; triangles counter-clockwise from above."""
+    """Prisms of columns of `layers` points from the top down; triangles counter-clockwise from above."""
     swapped = triangles[:, [0, 2, 1]]
     return np.concatenate([np.hstack([swapped * layers + a, swapped * layers + a + 1])
                            for a in range(layers - 1)])
@@ -64,7 +64,7 @@ def icosphere(rounds):
 
 
 def outer_radius():
-    """Of the inflated shell: r(R) with d(R² ∂W/∂r')/dR = R² ∂W/∂r, no stress outside."""
+    """Outer radius of the inflated shell: r(R) with d(R² ∂W/∂r')/dR = R² ∂W/∂r, no stress outside."""
     mu, kappa = moduli(YOUNG, POISSON)
 
     def slopes(radius, y):

@@ -76,7 +76,7 @@ def tissue(result, arrays):
 
 
 def touching(result, contact, arrays, numbers):
-    """The same of contact and of what it is part of."""
+    """Values of contact and of the totals that it is part of."""
     x, load = arrays["point/position"], numbers["load"]
     near = max(FIELD_ERROR_MM, numbers["displacement_error"])
     gap, deepest, acting = contact.measure(x, load, near)

@@ -254,7 +254,7 @@ def pages():
 
 
 def anchors(text):
-    """What a page's headings are called behind a #, as on GitHub."""
+    """Returns the anchors of a page's headings, as on GitHub."""
     heads = [re.sub(r"[^\w\- ]", "", head.lower()) for head in re.findall(r"^#+ (.*)", text, re.M)]
     return {head.strip().replace(" ", "-") for head in heads}
 

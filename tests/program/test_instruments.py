@@ -46,7 +46,7 @@ def test_skin_lies_on_the_ball_and_pushes_back(run, folder):
 
 
 def slope(tissue, x, held):
-    """Of the objective when all held points move as one."""
+    """Derivative of the objective when all held points move as one."""
     result = np.zeros(3)
     for axis in range(3):
         for sign in (-1, 1):

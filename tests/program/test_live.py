@@ -156,7 +156,7 @@ def test_faces_are_meshes_of_pyvista(session):
 
 
 def talk(environment, lines, ranks=1):
-    """What repose-live writes for these lines, and its status."""
+    """Returns the answers of repose-live to these lines, and its status."""
     command = [str(programs() / "repose-live"), str(SCENE)]
     if ranks > 1:
         command = ["mpirun", "-n", str(ranks), *command]

@@ -173,7 +173,7 @@ def starts_and_stops(scene, count):
 
 
 def leftovers():
-    """What Open MPI and PETSc leave in this test's temporary folder."""
+    """Names in this test's temporary folder, where Open MPI and PETSc leave files."""
     return set(os.listdir(os.environ["TMPDIR"]))
 
 

@@ -38,7 +38,7 @@ def test_loads_rise_to_one(solved):
 
 
 def verified(run, scene, *options, ranks=1):
-    """What -verify_path says of a scene, and the exit status."""
+    """Returns the output of -verify_path on a scene, and the exit status."""
     message = run("repose-solve", PROJECT / "meshes" / scene, "-verify_path", *options, ranks=ranks)
     assert message.stderr == ""
     row = next(line for line in message.stdout.splitlines() if line.startswith("  path "))

@@ -50,7 +50,7 @@ def springs(file):
 
 
 def solid(file):
-    """The same prism as a solid."""
+    """The prism as a solid."""
     write_model(file)
     model = file["model"]
     del model["spring"], model["spring_set"]
@@ -137,7 +137,7 @@ def spoiled(folder, case):
 
 
 def fault(result, case, file):
-    """What is wrong with the outcome of a run; empty if nothing is."""
+    """Returns the faults of a run's outcome, empty if there are none."""
     lines = result.stderr.splitlines()
     if case[1:] in ALLOWED:
         good = result.returncode in (0, 2) and "error" not in result.stderr
@@ -176,7 +176,7 @@ def test_a_spoiled_array_is_refused(run, tmp_path):
 
 
 def test_a_spoiled_array_is_refused_on_two_ranks(run, tmp_path):
-    """What a model may hold, and some of what it may not."""
+    """Allowed values are accepted, and some of the others refused."""
     chosen = [case for number, case in enumerate(cases())
               if case[1:] in ALLOWED or number % 23 == 0]
     found = faults(run, tmp_path, chosen, 2)

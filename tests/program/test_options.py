@@ -14,7 +14,7 @@ OF_PETSC = re.compile(r"help$|(tao|ksp|pc|log|options)_")
 
 
 def unknown_options(text):
-    """What commands of the programs in a page ask for that no program has."""
+    """Yields the options in a page's commands that no program has."""
     for program, rest in re.findall(r"(?:^|[\s`/])(repose-\w+)( [^\n`|]*)", text):
         for name in re.findall(r" -([a-z]\w*)", rest.split("  #")[0]):
             if name not in OPTIONS.get(program, ()) and not OF_PETSC.match(name):

@@ -32,7 +32,7 @@ def tables(text):
 
 
 def evaluations(cell):
-    """What a method took where it came to the rest position, else nothing."""
+    """Evaluations of a method that found the rest position, else None."""
     match = re.match(r"(\d+) · ", cell)
     return match and int(match[1])
 

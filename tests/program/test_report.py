@@ -103,7 +103,7 @@ def test_numbers_are_those_of_the_result(report, opened, tmp_path):
 
 
 def opened_jaw(place):
-    """Where the scene takes a place of the jaw: 8° about the x axis."""
+    """Moves a place of the jaw as the scene does: 8° about the x axis."""
     turn = np.radians(8)
     return np.array([place[0], math.cos(turn) * place[1] - math.sin(turn) * place[2],
                      math.sin(turn) * place[1] + math.cos(turn) * place[2]])
@@ -152,7 +152,7 @@ def test_the_page_stands_alone(report, opened, tmp_path):
 
 
 class View:
-    """What a page draws, as sheet.js unpacks it."""
+    """Drawn data of a page, as sheet.js unpacks it."""
 
     def __init__(self, file):
         text = file.read_text(encoding="utf-8")
@@ -395,7 +395,7 @@ def test_mistakes_are_one_line(report, opened, tmp_path):
 
 @pytest.fixture
 def other_plan(opened, tmp_path):
-    """The same face, moved half as far: what a second plan could give."""
+    """The face moved half as far, as by a second plan."""
     shutil.copy(opened, tmp_path / "half.h5")
     with h5py.File(tmp_path / "half.h5", "r+") as h5:
         step = h5["step"][sorted(h5["step"])[-1]]

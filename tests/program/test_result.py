@@ -299,7 +299,7 @@ def test_views_open_as_time_series(face, view):
 
 
 def rows_of(item, h5):
-    """What a DataItem of an XDMF file shows, also where it is part of a dataset."""
+    """Returns the array of a DataItem of an XDMF file, also of one that is part of a dataset."""
     if item.get("ItemType") != "HyperSlab":
         return h5[item.text.split(":")[1]][:]
     slab, data = item

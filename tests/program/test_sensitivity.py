@@ -38,7 +38,7 @@ def prepare(folder, text):
 
 
 def solve(run, folder, text, *options, ranks=1):
-    """What a run says, and skin and its rest position."""
+    """Returns the output of a run, the skin and its rest position."""
     prepare(folder, text)
     result = run("repose-solve", "face.yaml", "-accuracy", 0.001, *options, ranks=ranks)
     assert result.returncode == 0, result

@@ -412,7 +412,7 @@ def long_run(panel, tmp_path):
 
 
 def wait_for_end(pid, seconds=60):
-    """Whether a process that is not ours ends."""
+    """Returns whether a process that is not a child ends."""
     for _ in range(10 * seconds):
         try:
             with open(f"/proc/{pid}/stat", encoding="ascii") as file:

@@ -41,7 +41,7 @@ def in_unit(tissue, factor):
 
 
 def rest(run, folder, name, model, factor=1.0):
-    """Where it comes to rest, to 1e-9 mm, with the objective."""
+    """Returns the rest position, to 1e-9 mm, and the objective."""
     write_model(folder / f"{name}.h5", model)
     volume = ("-volume", "none") if "spring/points" in model else ()
     result = run(

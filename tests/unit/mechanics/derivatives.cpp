@@ -183,7 +183,7 @@ void check_springs(const SpringLoop& loop, double scale, const std::vector<Vec3>
   });
 }
 
-/// Of a prism's volume.
+/// Derivatives of a prism's volume.
 Expansion<6> volume_oracle(const std::array<int32_t, 6>& points, const std::vector<Vec3>& x) {
   std::array<Vec3, 6> corners;
   for (int c = 0; c < 6; ++c) corners[c] = x[points[c]];

@@ -13,7 +13,8 @@ using model::PointSet;
 
 int64_t count(const auto& rows) { return static_cast<int64_t>(rows.size()); }
 
-/// How many of the first `owned` elements have a soft-tissue point and satisfy `wanted`.
+/// Counts those of the first `owned` elements that have a soft-tissue point and satisfy
+/// `requested`.
 template <class Elements, class Wanted>
 int64_t soft(const model::Model& model, const Elements& elements, int64_t owned,
              Wanted&& requested) {

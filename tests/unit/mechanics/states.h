@@ -55,7 +55,7 @@ inline model::Model uneven_solid() {
   return model;
 }
 
-/// The same with its volumes averaged around points.
+/// Returns uneven_solid() with its volumes averaged around points.
 inline model::Model averaged_solid() {
   model::Model model = uneven_solid();
   Random random(9);

@@ -21,7 +21,7 @@ namespace face_test {
 
 constexpr double radius = 45;  // mm
 
-/// What is inside a field of this sign, from voxels of 2 mm in a cube of 120 mm.
+/// Returns the inside of a field of this sign, from voxels of 2 mm in a cube of 120 mm.
 Surface solid(const std::function<double(const Vec3&)>& inside) {
   return isosurface(sampled(61, 2 * Mat3::Identity(), inside), 0);
 }

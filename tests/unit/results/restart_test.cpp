@@ -13,7 +13,7 @@ struct StepState {
   bool converged;
 };
 
-/// What a file with such steps lets a run go on from.
+/// Returns the state from which a run resumes a file with such steps.
 Restart restart_of(const std::vector<StepState>& steps) {
   const Folder folder;
   const model::Model m = small_model();
@@ -58,7 +58,7 @@ TEST(Restart, IsFromTheStartWhereNothingWasReached) {
   EXPECT_NE(refusal([] { restart_of({}); }).find("no step to resume from"), std::string::npos);
 }
 
-/// Of a result with steps at these loads, all at rest, of `m`.
+/// Returns the state from which a run of `m` resumes a result with steps at rest at these loads.
 Restart restart_of_result(const Folder& folder, const std::vector<double>& loads,
                           const model::Model& m) {
   const model::Model stored = small_model();
