@@ -13,6 +13,7 @@ namespace {
 constexpr int64_t coarse_enough = 40;  // points that are solved for by factors
 constexpr int64_t too_many = 1500;     // for factors
 constexpr double min_coarsening = 0.7;
+constexpr int coarse_sweeps = 2;  // down and up, on all levels but the finest
 
 /// The unknown points of `part` by their numbers in it: own ones, then ghosts by global number.
 std::vector<int32_t> number_points(const discrete::Part& part) {
@@ -104,12 +105,34 @@ std::vector<int64_t> ghosts(const discrete::Part& part, const std::vector<int32_
 /// A level and its vectors.
 struct ColumnMultigrid::Level {
   ColumnLevel* matrix;
+  int sweeps;
   std::vector<Lanes> b, x, r;  // [own + ghosts]
-  explicit Level(ColumnLevel& level)
+  std::vector<Lanes> change;   // of x by a further sweep, where there are any
+  explicit Level(ColumnLevel& level, int sweeps = 1)
       : matrix(&level),
+        sweeps(sweeps),
         b(level.own() + level.ghosts()),
         x(level.own() + level.ghosts()),
-        r(level.own() + level.ghosts()) {}
+        r(level.own() + level.ghosts()),
+        change(sweeps > 1 ? level.own() + level.ghosts() : 0) {}
+
+  /// Sweeps down from x = 0 on A x = b. r = b − A x. Collective.
+  void sweep_down() {
+    matrix->forward(b, x);
+    matrix->residual_of_forward(b, x, r);
+    for (int sweep = 1; sweep < sweeps; ++sweep) {
+      matrix->forward(r, change);
+      matrix->residual_of_forward(r, change, r);
+      for (size_t i = 0; i < x.size(); ++i) x[i] += change[i];
+    }
+  }
+  /// Sweeps up on A x = b, the transpose of sweep_down(). Collective.
+  void sweep_up() {
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      matrix->update_ghosts(x);
+      matrix->backward(b, x);
+    }
+  }
 };
 
 /// The coarsest matrix, whole on every rank.
@@ -185,7 +208,7 @@ ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
     if (total > min_coarsening * static_cast<double>(above.total())) break;
     next->refill(above);
     at = next->center();
-    levels_.emplace_back(next->coarse());
+    levels_.emplace_back(next->coarse(), coarse_sweeps);
     coarsening_.push_back(std::move(next));
   }
   const ColumnLevel& last = *levels_.back().matrix;
@@ -288,17 +311,14 @@ void ColumnMultigrid::cycle(size_t l) {
     coarsest_->solve(level.b, level.x);
     return;
   }
-  const ColumnLevel& matrix = *level.matrix;
-  matrix.forward(level.b, level.x);
+  level.sweep_down();
   if (l < coarsening_.size()) {
-    matrix.residual_of_forward(level.b, level.x, level.r);
     Level& coarse = levels_[l + 1];
     coarsening_[l]->restrict_to(level.r, coarse.b);
     cycle(l + 1);
     coarsening_[l]->add_to(coarse.x, level.x);
-    matrix.update_ghosts(level.x);
   }
-  matrix.backward(level.b, level.x);
+  level.sweep_up();
 }
 
 void ColumnMultigrid::apply(Vec r, Vec z) {

@@ -64,6 +64,25 @@ void choose_norm(KSP krylov) {
   if (minres) check(KSPSetNormType(krylov, KSP_NORM_PRECONDITIONED));
 }
 
+/// Solves with conjugate gradients, as long as it lives, where the preconditioner alone is chosen.
+class CgInPlaceOfPreonly {
+ public:
+  explicit CgInPlaceOfPreonly(KSP krylov) : krylov_(krylov) {
+    check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPPREONLY, &replaced_));
+    if (replaced_) check(KSPSetType(krylov_, KSPCG));
+  }
+  ~CgInPlaceOfPreonly() {
+    if (replaced_) static_cast<void>(KSPSetType(krylov_, KSPPREONLY));
+  }
+  CgInPlaceOfPreonly(const CgInPlaceOfPreonly&) = delete;
+  CgInPlaceOfPreonly& operator=(const CgInPlaceOfPreonly&) = delete;
+  bool replaced() const { return replaced_ == PETSC_TRUE; }
+
+ private:
+  KSP krylov_;
+  PetscBool replaced_ = PETSC_FALSE;
+};
+
 bool is_columns(PC pc) {
   PetscBool same = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), columns_type, &same));
@@ -358,12 +377,10 @@ double TangentSolver::error_bound(Vec displacement, Vec gradient, double slack) 
   // apart, where the preconditioner's rounding adds to it.
   const double margin = positions_.part().solid ? 50 : 200;
   constexpr double finest = 1e-12;
+  const CgInPlaceOfPreonly iterating(krylov_);  // one application bounds nothing
+  if (iterating.replaced()) measured_at_ = -1;
   const double rough = newton_distance(displacement, gradient);
-  PetscBool trusting = PETSC_FALSE;  // the preconditioner alone, by the user's wish
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(static_cast<KSP>(krylov_)), KSPPREONLY,
-                               &trusting));
-  if (!(rough > 0) || !std::isfinite(rough) || bounded_at_ == measured_at_ || trusting)
-    return rough;
+  if (!(rough > 0) || !std::isfinite(rough) || bounded_at_ == measured_at_) return rough;
   PetscReal energy = 0;
   check(VecDot(gradient, work_, &energy));
   const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm

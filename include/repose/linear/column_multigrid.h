@@ -14,10 +14,10 @@ namespace repose::linear {
 using BlockSource = std::function<void(const discrete::BlockVisitor&)>;
 
 /// Preconditioner for layered tissue: multigrid by semicoarsening along the skin
-/// (column_coarsening.h), one sweep of Gauss–Seidel by columns down and one up on each level
-/// (column_level.h), factors of the coarsest. In single precision and without units: the matrix is
-/// scaled to a largest diagonal of about 1. Where the model is a graph without layers, each point
-/// is its own column.
+/// (column_coarsening.h), sweeps of Gauss–Seidel by columns down and up on each level
+/// (column_level.h): one each on the finest, two on the others. Factors of the coarsest. In single
+/// precision and without units: the matrix is scaled to a largest diagonal of about 1. Where the
+/// model is a graph without layers, each point is its own column.
 class ColumnMultigrid {
  public:
   /// For the unknown points of `part`. Collective.
