@@ -10,7 +10,7 @@
 /// A flat rectangular piece of tissue as a model, for tests and benchmarks.
 namespace repose::test {
 
-/// What to make: columns × layers of points, skin at z = 0, the deepest layer held by bone.
+/// Size of a patch: columns × layers of points, skin at z = 0, the deepest layer held by bone.
 struct PatchSize {
   int64_t columns_x = 4, columns_y = 3;
   int64_t layers = 3;

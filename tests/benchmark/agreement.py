@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether one scene comes to one face, whatever the ranks, load steps and method: a table.
+"""Compares the faces of a scene over ranks, load steps and methods: a table.
 
     tests/benchmark/agreement.py [-bin build/bin] [-head ../shared/data/head] [-scenes head_solid,…]
                                  [-accuracy 0.01] [-time_limit 60]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How the skin follows a plan through moves that are alike: jaw and chin 5 mm forward, the chin by a
+"""Measures how the skin follows moves that are alike: jaw and chin 5 mm forward, the chin by a
 little less to a little more. Writes the table of a page.
 
     tests/benchmark/attachment.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]

@@ -1,5 +1,5 @@
-/// What every stage of a large solid's way costs before it is searched, built whole by rank 0 and
-/// shared out, or built by all ranks from their columns: a synthetic head with contact. Prints a
+/// Measures every stage of a large solid before its search, built whole by rank 0 and shared out,
+/// or built by all ranks from their columns: a synthetic head with contact. Prints a
 /// line a stage (stage_clock.h), of which build_local.py makes a table.
 ///
 ///     mpirun -n 2 benchmark_build_local SKIN_VERTICES FILE whole|raised

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What each stage of a large solid costs before its search, by ranks: a table.
+"""Measures each stage of a large solid before its search, by ranks: a table.
 
     tests/benchmark/build_local.py [-bin build/bin] [-sizes 25000,125000,750000] [-ranks 2]
                              [-output docs/measurements/growth.md]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What contact changes on a real head, what it costs, and whether it gives one face: tables and a picture.
+"""Measures contact on a real head, its cost, and agreement of faces: tables and a picture.
 
     tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
                                [-output docs/measurements/contact.md] [-cases "jaw 8 mm back,…"]

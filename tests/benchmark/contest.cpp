@@ -254,8 +254,8 @@ double seconds_of(const std::function<void()>& work) {
   return minimum;
 }
 
-/// What one evaluation, one new preconditioner, and an action of the Hessian with one application
-/// of it take.
+/// Measures one evaluation, one new preconditioner, and an action of the Hessian with one
+/// application of the preconditioner.
 void measure_costs(const Task& task) {
   const discrete::Part part = discrete::distribute(comm, task.model);
   discrete::Positions positions(comm, part);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What options of the solver cost on two shipped scenes: the table of the solver cookbook.
+"""Measures options of the solver on two shipped scenes: the table of the solver cookbook.
 
     tests/benchmark/cookbook.py [-bin build/bin] [-recipes "-load_steps 4;-tao_type ntr;…"]
                                 [-scenes head_solid,head_springs_genioplasty]

@@ -230,7 +230,7 @@ def known(step):
 
 
 def row(title, runs):
-    """Of the runs at the load path's rest position, those at another apart. Nothing for none."""
+    """Row of the runs at the load path's rest position, others counted apart; empty for no run."""
     if not runs:
         return ""
     here = [run for run in runs if not run.elsewhere]
@@ -279,7 +279,7 @@ def verdict(runs):
 
 
 def weak_place(weak):
-    """What a second study came to, where the first found the estimate wanting."""
+    """Section on a second study, of solvers whose estimate fell short in the first."""
     if not weak:
         return ""
     rows = "".join(row(solver, [run for run in weak if run.solver == solver]) for solver in WEAK[1])
@@ -319,7 +319,7 @@ def save(figure, file):
 
 
 def draw(runs, file):
-    """How often which ratio, and the estimate over the error of each run."""
+    """Draws a histogram of ratios, and the estimate over the error of each run."""
     shown = [run for run in runs if np.isfinite(run.estimate) and run.error > KNOWN
              and not run.elsewhere]
     groups = {solver: [run for run in shown if run.solver == solver] for solver in SOLVERS}
@@ -391,7 +391,7 @@ def arguments():
 
 
 def cpu_seconds():
-    """Of this process and those it waited for."""
+    """CPU time of this process and of those it waited for."""
     spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in spent)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How the work of a whole solve grows with the mesh: a table.
+"""Measures the work of a whole solve as the mesh grows: a table.
 
     tests/benchmark/growth.py [-bin build/bin] [-sizes 500,2500,12500] [-methods ntr,lmvm,stiffness]
                               [-layers 4,…] [-turgor 0] [-ranks 1]

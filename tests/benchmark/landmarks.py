@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How far landmarks that repose-landmarks proposes lie from those of files at hand: of the shipped
+"""Measures distances of landmarks that repose-landmarks proposes to given ones: of the shipped
 synthetic head, of twelve with other proportions, tilted, and of one real head where it is there.
 
     tests/benchmark/landmarks.py [-bin build/bin] [-heads 12] [-output docs/guide/landmarks.md]

@@ -1,4 +1,4 @@
-/// What every stage of a large model's way costs, in time and memory: a synthetic head is built,
+/// Measures every stage of a large model in time and memory: a synthetic head is built,
 /// written, read, shared out, evaluated, searched by 20 iterations of L-BFGS, and its step written.
 /// Nothing makes a matrix. Prints a line a stage (stage_clock.h), of which large.py makes a table.
 ///

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What each stage of a large model's way costs, in time and memory: two tables.
+"""Measures each stage of a large model in time and memory: two tables.
 
     tests/benchmark/large.py [-bin build/bin] [-sizes 477,2500,25000,250000,750000] [-ranks 1]
                              [-output docs/measurements/growth.md] [-mark large]
@@ -23,7 +23,7 @@ MEMORY = ("| points | " + ", B/spring | ".join(STAGES) + ", B/spring | most on r
 
 
 def measure(program, size, ranks):
-    """Of one size the numbers of each line that the program prints, by its first word."""
+    """Numbers of each line that the program prints for one size, by its first word."""
     with tempfile.TemporaryDirectory() as folder:
         text = run([program, size, "model"], folder, ranks, ends=[0]).text
     return {line.split()[0]: [float(number) for number in line.split()[1:]]

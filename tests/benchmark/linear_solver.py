@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What each way to solve the linear systems costs a whole solve: a table.
+"""Measures a whole solve with each linear solver: a table.
 
     tests/benchmark/linear_solver.py [-bin build/bin] [-sizes 3000,12500] [-solvers NAME;…]
                                      [-ranks 1] [-seconds 600]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How soon and how well a face follows its plan: random changes, by repose-live beside repose-solve.
+"""Measures how soon and well a face follows its plan: random changes, repose-live beside repose-solve.
 
     tests/benchmark/live.py [-bin build/bin] [-head ../shared/data/head] [-changes 30]
                             [-output docs/measurements/live.md]

@@ -37,7 +37,7 @@ class Way:
 
 
 def solve(tools, folder, scene, volume, *options):
-    """What was run and the last step; nothing where it did not come to rest in time."""
+    """Runs a scene; returns the run and its last step, None if it was not at rest in time."""
     command = [tools / "repose-solve", scene, "-volume", volume, "-output", "run",
                *options]
     try:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How far maps of plans are off at plans that they do not know, and how often their bound holds.
+"""Measures errors of maps at plans that they do not know, and how often their bound holds.
 
     tests/benchmark/map.py [-bin build/bin] [-head ../shared/data/head] [-samples 25,50,100]
                            [-held_out 60] [-processes 1] [-cache FOLDER]

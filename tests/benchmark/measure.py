@@ -1,4 +1,4 @@
-"""What the benchmarks' scripts measure: programs that they run, and what repose-solve says."""
+"""Runs programs for the benchmarks' scripts, and reads the messages of repose-solve."""
 
 import contextlib
 import dataclasses

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What coarser models are worth: a table of a scene solved with and without them.
+"""Measures the gain of coarser models: a table of a scene solved with and without them.
 
     tests/benchmark/nested.py [-bin build/bin] [-output docs/measurements/nested.md] SCENE …
 

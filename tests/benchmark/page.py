@@ -1,4 +1,4 @@
-"""What the benchmarks' scripts share: their options, and the tables in their pages."""
+"""Shared by the benchmarks' scripts: their options, and the tables in their pages."""
 
 import argparse
 import pathlib

@@ -374,7 +374,7 @@ def calculix_deck(model, solver, first):
 
 
 def calculix_positions(file, model):
-    """Of its last printed increment, None where there is none."""
+    """Positions of the last printed increment, None if there is none."""
     rows = [line.split() for line in file.read_text().splitlines()] if file.exists() else []
     rows = [row for row in rows if len(row) == 4 and row[0].isdigit()]
     count = len(model["point/position"])

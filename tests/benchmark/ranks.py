@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What ranks save of a whole solve: a table of wall times, for a machine that does nothing else.
+"""Measures wall times of a whole solve by ranks: a table, for a machine that does nothing else.
 
     tests/benchmark/ranks.py [-bin build/bin] [-sizes 12500] [-ranks 1,2] [-accuracy 0.01]
                              [-output docs/measurements/growth.md]

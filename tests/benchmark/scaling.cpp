@@ -1,6 +1,6 @@
-/// How the cost of a model grows with its points: builds synthetic heads in four layers from 2e3 to
-/// 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes; wants
-/// 6 GB of memory:
+/// Measures the cost of a model as its points grow: builds synthetic heads in four layers from 2e3
+/// to 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes;
+/// wants 6 GB of memory:
 ///     benchmark_scaling docs/measurements/scaling.md
 #include <unistd.h>
 

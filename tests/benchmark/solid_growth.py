@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How the work of solving a solid grows with the mesh, by method: a table.
+"""Measures the work of solving a solid as the mesh grows, by method: a table.
 
     tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
                                     [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]

@@ -21,7 +21,7 @@ inline double peak_bytes() {
   return 1024 * kibibytes;
 }
 
-/// Of each stage prints its name, the CPU seconds of the slowest rank, and the most memory in use
+/// Prints for each stage its name, the CPU seconds of the slowest rank, and the most memory in use
 /// during it: of all ranks together, of rank 0, and of the largest other; bytes.
 class Clock {
  public:

@@ -47,7 +47,7 @@ class Verdict:
 
 
 def volume_weight(step):
-    """Of a prism's squared change of volume, by the prisms' volumes; the paper's objective λ f_e +
+    """Weight of a prism's squared change of volume, by its volume; the paper's objective λ f_e +
     (1-λ) f_v is divided by λ."""
     if step["volume"] == b"penalty":
         return lambda volume: step["bulk_modulus"] / volume
@@ -107,7 +107,7 @@ def polished(model, found, step):
 
 
 def least_eigenvalue(model, found, step):
-    """Of the Hessian over the unknowns scaled to a diagonal of one: below 0 it is no minimum."""
+    """Least eigenvalue of the Hessian scaled to a diagonal of one: below 0 it is no minimum."""
     tissue = tissue_of(model, step)
     unknown = (3 * tissue.soft[:, None] + np.arange(3)).ravel()
     matrix = tissue.hessian(found)[unknown][:, unknown]
@@ -165,7 +165,7 @@ def with_contact(model, step):
 
 
 def judged(row, result, file, environment):
-    """What is to be said of a run that left a result."""
+    """Judges a run that left a result."""
     path = steps(file)
     step = path[-1]
     model = with_contact(model_of(file), step)

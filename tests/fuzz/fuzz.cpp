@@ -19,7 +19,7 @@
 namespace repose::fuzz {
 namespace {
 
-/// What the processes share.
+/// Progress that the processes share.
 struct Progress {
   uint64_t next, refused, taken;
 };

@@ -22,7 +22,7 @@ struct Target {
   double share = 1;  ///< of the inputs
 };
 
-/// Whether a file is taken, and not refused in one line; any other way out ends the process.
+/// Tells if a file is taken, and not refused in one line; any other way out ends the process.
 inline bool taken(const Target& target, const std::filesystem::path& file) {
   try {
     target.read(file);
@@ -77,7 +77,7 @@ inline std::vector<Target> targets(const std::filesystem::path& folder) {
   };
 }
 
-/// What files name is there, and a slice beside the one that is damaged.
+/// Adds the files that inputs name, and a slice beside the one that is damaged.
 inline void add_neighbors(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(REPOSE_MESHES))
     std::filesystem::create_symlink(entry.path(), folder / entry.path().filename());

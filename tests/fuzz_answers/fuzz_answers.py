@@ -56,7 +56,7 @@ def solve(folder, ranks, binaries, variables):
 
 
 class Verdict:
-    """What came of a scene: how it ended, faults, and whether the start leads elsewhere."""
+    """Outcome of a scene: how it ended, faults, and whether the start leads elsewhere."""
 
     def __init__(self, ended, faults=(), elsewhere="", distance=np.nan):
         self.ended, self.faults = ended, list(faults)

@@ -41,7 +41,7 @@ class Wall:
         self.controls, self.samples = controls[number:], place
 
     def weights(self, at):
-        """Of the controls in S, S_1, S_2, S_11, S_12, S_22 at parameters [W, 2]: [6, W, controls]."""
+        """Weights of controls in S, S_1, S_2, S_11, S_12, S_22 at parameters [W, 2]: [6, W, controls]."""
         along, inwards = spline(at[:, 0], self.size[0]), spline(at[:, 1], self.size[1])
         return np.stack([(along[i][:, :, None] * inwards[j][:, None]).reshape(len(at), -1)
                          for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))])

@@ -86,7 +86,7 @@ def stages(pattern, build, named):
 
 
 def targets_of(tests):
-    """What is to be built for tests: test_ROOM, and the programs for those that run programs."""
+    """Targets to build for tests: test_ROOM, and the programs for those that run programs."""
     rooms = {test.split(".")[0] for test in tests}
     programs = ["repose-solve", "repose-check", "repose-compare", "repose-osteotomy"]
     return sorted(f"test_{room}" for room in rooms - {"program", "extremes"}) + (

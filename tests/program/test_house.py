@@ -1,4 +1,4 @@
-"""What a machine can see of the house rules: rooms, sizes of functions, headers, words, links."""
+"""House rules that can be checked by program: rooms, sizes of functions, headers, words, links."""
 
 import ast
 import posixpath

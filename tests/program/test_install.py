@@ -1,4 +1,4 @@
-"""What cmake --install puts where, and that it works from there."""
+"""Files that cmake --install places, and that they work from there."""
 
 import os
 import re

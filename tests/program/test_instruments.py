@@ -71,7 +71,7 @@ def test_the_force_is_the_slope_of_the_objective(run, folder, volume, layers):
 
 
 def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):
-    """What the independent energy's forces leave at the skin is along the ball's normals."""
+    """Forces of the independent energy at the skin are along the ball's normals."""
     _, stuck = press(run, folder, accuracy=1e-4)
     sticking = last(folder / "press.h5")["objective"]
     (folder / "slide.yaml").write_text(SCENE.replace(

@@ -1,4 +1,4 @@
-"""What may go wrong with a resident solver: nothing is lost, and one line says what happened."""
+"""Failures of a resident solver: nothing is lost, and one line says what happened."""
 
 import json
 import os

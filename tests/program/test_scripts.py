@@ -1,4 +1,4 @@
-"""What every script in drivers says where something is missing: one line, and what to do."""
+"""Messages of every script in drivers if something is missing: one line, and what to do."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""What -sensitivity says of a variation is what the varied scene, solved, comes to."""
+"""The change that -sensitivity predicts for a variation is that of the varied scene, solved."""
 
 import re
 

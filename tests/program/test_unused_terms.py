@@ -1,4 +1,4 @@
-"""What a scene does not mention costs no instructions: valgrind counts those of an objective, its
+"""Terms that a scene does not mention cost no instructions: valgrind counts those of an objective, its
 gradient and its Hessian action on the same springs without prisms, with prisms and no volume term,
 and with one."""
 

@@ -38,7 +38,7 @@ inline ValueAndGradient evaluate(const mechanics::Loops& loops, const mechanics:
   return result;
 }
 
-/// What averaged volumes couple beyond prisms: Σ k g gᵀ.
+/// Adds the coupling of averaged volumes beyond prisms: Σ k g gᵀ.
 inline void add_nodal_coupling(const mechanics::NodalVolumes& nodal,
                                const mechanics::Weights& weights, const std::vector<Vec3>& x,
                                Eigen::MatrixXd& matrix) {

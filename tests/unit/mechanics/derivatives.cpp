@@ -73,7 +73,7 @@ class Derivatives : public ::testing::Test {
 };
 TYPED_TEST_SUITE(Derivatives, Terms);
 
-/// What a Taylor expansion leaves at steps h/2 and h/4, summed over directions so that none that
+/// Remainders of a Taylor expansion at steps h/2 and h/4, summed over directions so that none that
 /// happens to be straight is mistaken for accuracy.
 struct Remainder {
   double half = 0, quarter = 0;

@@ -28,7 +28,7 @@ struct Pressure {
   }
 };
 
-/// What is neither convex nor a polynomial.
+/// A term that is neither convex nor a polynomial.
 struct Chain {
   static constexpr int points = 3, numbers = 2;
   template <class Number>

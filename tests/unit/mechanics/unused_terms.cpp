@@ -3,7 +3,7 @@
 #include "assembled.h"
 #include "states.h"
 
-/// What a scene does not mention costs nothing. tests/program/test_unused_terms.py counts the
+/// Terms that a scene does not mention cost nothing. tests/program/test_unused_terms.py counts the
 /// instructions of evaluate_often() in each of these cases.
 namespace repose::mechanics {
 
@@ -22,7 +22,7 @@ namespace repose::mechanics {
 
 namespace unused_terms_test {
 
-/// What evaluate_often() returns for a patch with or without prisms.
+/// Returns the result of evaluate_often() for a patch with or without prisms.
 std::pair<double, std::vector<Vec3>> evaluated(bool prisms, const Weights& weights) {
   const model::Model model = test::layered_patch({12, 12, 4, 1.0, 0.8});
   const auto springs = static_cast<int64_t>(model.springs.points.size());

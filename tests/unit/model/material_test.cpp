@@ -17,7 +17,7 @@ Model square_of(const std::vector<scene::Stratum>& strata, double turgor) {
   return build_model(scene, patches::square(6, 60), {bone}).model;
 }
 
-/// Of the edges, N mm.
+/// Energy of the edges, N mm.
 double energy(const Model& m) {
   double sum = 0;
   for (size_t j = 0; j < m.edges.weight.size(); ++j) {

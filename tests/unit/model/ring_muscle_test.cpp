@@ -35,7 +35,7 @@ Model prisms_at(const std::vector<std::array<Vec3, 6>>& places) {
 /// A muscle about the origin, 50 mm wide between the corners.
 RingMuscle muscle_of(double tone) { return {tone, {-25, 0, 0}, {25, 0, 0}, {0, 0, 0}, 20, -15}; }
 
-/// Of edges and external forces, N mm, of displaced points.
+/// Energy of edges and external forces at displaced points, N mm.
 double energy(const Model& m, const std::vector<Vec3>& x) {
   double sum = 0;
   for (size_t j = 0; j < m.edges.weight.size(); ++j) {

@@ -153,7 +153,7 @@ TEST(Contact, ABlockThatSlidesAlongAPlaneMeetsNoResistance) {
     EXPECT_LE((rest.rows.position[i] - m.points.position[i] - Vec3(4, 3, 0)).norm(), 2e-6);
 }
 
-/// What the bottom of a layer of thickness h adds to Hertz's force, with χ = √(R δ)/h (Dimitriadis,
+/// Factor on Hertz's force from the bottom of a layer of thickness h, χ = √(R δ)/h (Dimitriadis,
 /// Horkay, Maresca, Kachar & Chadwick 2002, Biophysical Journal 82, Eq. 12, bonded).
 double thin_layer(double chi) {
   constexpr double nu = poisson, pi = std::numbers::pi;

@@ -15,14 +15,14 @@ namespace minimizer_test {
 
 using base::check;
 
-/// Of one scalar unknown: value, slope and curvature.
+/// Function of one scalar unknown: value, slope and curvature.
 using Curve = std::array<double, 3> (*)(double x);
 
 /// The same function of every scalar unknown, summed up.
 class Sum : public discrete::Function {
  public:
   Sum(discrete::Positions& positions, Curve curve) : Function(positions), curve_(curve) {}
-  /// What `order` of a curve's is at each unknown; returns the sum of it.
+  /// Computes derivative `order` of the curve at each unknown; returns their sum.
   double map(Vec displacement, int order, Vec into) const {
     const PetscScalar* x = nullptr;
     PetscScalar* y = nullptr;

@@ -31,7 +31,7 @@ inline std::vector<Vec3> gather(const std::vector<Vec3>& slab) {
   return all;
 }
 
-/// What a run came to, with all rows of its last step on every rank.
+/// Outcome of a run, with all rows of its last step on every rank.
 struct Rest {
   model::StepRows rows;
   solve::Summary summary;

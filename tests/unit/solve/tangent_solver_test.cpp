@@ -48,7 +48,7 @@ struct Solved : testing::MovedBlock {
     check(VecSet(answer, 0));
     return solver.solve(at, rhs, answer, tolerance);
   }
-  /// Of the entries of the exact Hessian, not of its action.
+  /// Residual by the entries of the exact Hessian, not by its action.
   double residual(Vec at) {
     tangent.assemble(at);
     base::VecHandle left = positions.make_vector();

@@ -109,7 +109,7 @@ model::Model small_block() {
   return m;
 }
 
-/// What goes with the spring between two points.
+/// Removes the spring between two points; returns all that is torn with it.
 model::Tear without(model::Model& m, int64_t p, int64_t q) {
   std::vector<char> torn(m.springs.points.size(), 0);
   for (size_t j = 0; j < torn.size(); ++j) {

@@ -12,7 +12,7 @@ namespace collision_test {
 
 using Corners = std::array<Vec3, 3>;
 
-/// Whether the segment from p to q goes through a triangle, by the signs of five volumes.
+/// Tells if the segment from p to q goes through a triangle, by the signs of five volumes.
 bool pierces(const Vec3& p, const Vec3& q, const Corners& t) {
   const auto volume = [](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
     return (b - a).cross(c - a).dot(d - a);

@@ -60,7 +60,7 @@ inline double volume(const Surface& s) {
   return six / 6;
 }
 
-/// What InputError says; empty where nothing is thrown.
+/// Returns the message of an InputError; empty if none is thrown.
 inline std::string refusal(const std::function<void()>& work) {
   try {
     work();
