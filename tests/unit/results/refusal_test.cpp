@@ -240,7 +240,7 @@ INSTANTIATE_TEST_SUITE_P(
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(
-    Value, ModelDefect,
+    NotFinite, ModelDefect,
     ::testing::Values(
         Defect{"PositionNotFinite",
                [](const Spoiler& f) { f.set<double>("/model/point/position", 7, nan); },
@@ -250,7 +250,12 @@ INSTANTIATE_TEST_SUITE_P(
                "/model/spring/stiffness: row 4 holds inf"},
         Defect{"SurfacePointNotFinite",
                [](const Spoiler& f) { f.set<double>("/model/bone_surface/1/points", 4, nan); },
-               "/model/bone_surface/1/points: row 1 holds nan"},
+               "/model/bone_surface/1/points: row 1 holds nan"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Index, ModelDefect,
+    ::testing::Values(
         Defect{"SpringBeyondThePoints",
                [](const Spoiler& f) { f.set<int64_t>("/model/spring/points", 5, 12); },
                "/model/spring/points: row 2 is 12, expected 0 to 11"},
@@ -269,6 +274,14 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"SurfaceTriangleOutOfRange",
                [](const Spoiler& f) { f.set<int64_t>("/model/bone_surface/0/triangles", 2, 3); },
                "/model/bone_surface/0/triangles: row 0 is 3, expected 0 to 2"},
+        Defect{"LayerNegative",
+               [](const Spoiler& f) { f.set<int64_t>("/model/point/layer", 0, -1); },
+               "/model/point/layer: row 0 is -1"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Set, ModelDefect,
+    ::testing::Values(
         Defect{"SpringSetUnknown",
                [](const Spoiler& f) { f.set<int64_t>("/model/spring/set", 1, 4); },
                "/model/spring/set: row 1 is 4, expected 0 to 3"},
@@ -282,10 +295,12 @@ INSTANTIATE_TEST_SUITE_P(
                "/model/point/set: row 5 is 4, expected 0 to 3"},
         Defect{"ExponentUnknown",
                [](const Spoiler& f) { f.set<int64_t>("/model/spring/exponent", 0, 3); },
-               "/model/spring/exponent: row 0 is 3, expected 0 to 2"},
-        Defect{"LayerNegative",
-               [](const Spoiler& f) { f.set<int64_t>("/model/point/layer", 0, -1); },
-               "/model/point/layer: row 0 is -1"},
+               "/model/spring/exponent: row 0 is 3, expected 0 to 2"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Quantity, ModelDefect,
+    ::testing::Values(
         Defect{"StiffnessNegative",
                [](const Spoiler& f) { f.set<double>("/model/spring/stiffness", 4, -1e-300); },
                "/model/spring/stiffness: row 4 is -1e-300 N/mm"},
@@ -299,7 +314,12 @@ INSTANTIATE_TEST_SUITE_P(
                "/model/spring/reference: row 2 is 0 mm, expected a finite number above 0"},
         Defect{"VolumeZero",
                [](const Spoiler& f) { f.set<double>("/model/prism/rest_volume", 1, 0); },
-               "/model/prism/rest_volume: row 1 is 0 mm³"},
+               "/model/prism/rest_volume: row 1 is 0 mm³"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Consistency, ModelDefect,
+    ::testing::Values(
         Defect{"VolumeOfAnotherPrism",
                [](const Spoiler& f) { f.set<double>("/model/prism/rest_volume", 1, 0.41); },
                "/model/prism/rest_volume: row 1 is 0.41 mm³, but the prism's volume"},

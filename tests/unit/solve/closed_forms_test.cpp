@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models.h"
+#include "../discrete/models.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/scene/rigid_motion.h"
 #include "rest.h"
@@ -158,6 +158,34 @@ TEST(Estimate, IsNoShorterThanTheWayWhereStiffnessesLieFarApart) {
     EXPECT_TRUE(rest.summary.path.complete() || orders > 6) << rest.summary.last.reason;
   }
 }
+
+class ForceLaws : public ::testing::TestWithParam<int> {};
+
+/// A chain that hangs by its end, and carries its weight straight down.
+TEST_P(ForceLaws, ChainHangsWhereTheEnergyIsLeast) {
+  constexpr int links = 12;
+  model::Model m;
+  m.bones = {"bone"};
+  m.gravity = {0, 0, -9.80665};
+  testing::add_point(m, Vec3::Zero(), PointSet::bone, 0);
+  for (int i = 1; i <= links; ++i) {
+    testing::add_point(m, {0, 0, -4.0 * i}, PointSet::soft_tissue, i);
+    testing::add_spring(m, i - 1, i, 1.5, GetParam());
+    m.points.mass[i] = 0.01 * i;
+  }
+  solve::Settings settings;
+  settings.path.accuracy = 1e-9;
+  const Rest energy = testing::find_rest(m, settings);
+  settings.functional = model::Functional::force;
+  const Rest force = testing::find_rest(m, settings);
+  EXPECT_TRUE(energy.summary.path.complete()) << energy.summary.last.reason;
+  EXPECT_TRUE(force.summary.path.complete()) << force.summary.last.reason;
+  EXPECT_LT(force.summary.last.f_f, 1e-6);
+  for (size_t i = 0; i < energy.rows.position.size(); ++i)
+    EXPECT_LT((energy.rows.position[i] - force.rows.position[i]).norm(), 2e-9) << "point " << i;
+}
+
+INSTANTIATE_TEST_SUITE_P(Exponents, ForceLaws, ::testing::Values(0, 1, 2));
 
 TEST(FindRepose, RefusesAModelWithNothingFree) {
   const model::Model m = testing::block(2, 2, 2, 2, [](int, int, int) { return PointSet::bone; });

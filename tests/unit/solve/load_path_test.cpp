@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "moved_block.h"
+#include "../discrete/moved_block.h"
 
 namespace repose {
 namespace load_path_test {

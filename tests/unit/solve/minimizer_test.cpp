@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "moved_block.h"
+#include "../discrete/moved_block.h"
 #include "quadratic.h"
 #include "repose/base/options.h"
 

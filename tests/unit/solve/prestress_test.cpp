@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "models.h"
+#include "../discrete/models.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/mechanics/spring_law.h"

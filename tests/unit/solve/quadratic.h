@@ -1,5 +1,5 @@
 #pragma once
-#include "models.h"
+#include "../discrete/models.h"
 #include "repose/discrete/function.h"
 
 namespace repose::testing {

@@ -1,7 +1,7 @@
 #pragma once
 #include <random>
 
-#include "models.h"
+#include "../discrete/models.h"
 #include "repose/model/material.h"
 #include "repose/solve/repose.h"
 

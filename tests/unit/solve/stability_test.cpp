@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "moved_block.h"
+#include "../discrete/moved_block.h"
 #include "repose/base/agreement.h"
 #include "repose/discrete/tangent.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "models.h"
+#include "../discrete/models.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/model/cut.h"

@@ -5,11 +5,10 @@
 #include "../../layered_patch.h"
 #include "discrete/countable.h"
 #include "discrete/partition.h"
-#include "repose/base/agreement.h"
+#include "gathered.h"
 #include "repose/base/error.h"
 #include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
-#include "rest.h"
 
 namespace repose {
 namespace sharing_test {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "moved_block.h"
+#include "../discrete/moved_block.h"
 #include "repose/base/agreement.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
@@ -68,6 +68,15 @@ double product(Vec a, Vec b) {
   return value;
 }
 
+// First: Scotch's random numbers, and so the parts of a sheet, depend on the partitions that a
+// process has made before.
+TEST(ColumnMultigrid, IterationsGrowLittleWithTheTissue) {
+  EXPECT_LT(Preconditioned(slab(12)).iterations(), 25);
+  EXPECT_LT(Preconditioned(slab(48)).iterations(), 30);
+  EXPECT_LT(Preconditioned(sheet(36)).iterations(), 60);
+  EXPECT_LT(Preconditioned(sheet(72)).iterations(), 85);
+}
+
 TEST(ColumnMultigrid, IsSymmetricAndPositive) {
   Preconditioned s(slab(16));
   linear::ColumnMultigrid multigrid = s.make();
@@ -78,13 +87,6 @@ TEST(ColumnMultigrid, IsSymmetricAndPositive) {
   const double size = std::sqrt(product(a, of_a) * product(b, of_b));
   EXPECT_GT(product(a, of_a), 0);
   EXPECT_NEAR(product(a, of_b), product(b, of_a), 1e-5 * size);
-}
-
-TEST(ColumnMultigrid, IterationsGrowLittleWithTheTissue) {
-  EXPECT_LT(Preconditioned(slab(12)).iterations(), 25);
-  EXPECT_LT(Preconditioned(slab(48)).iterations(), 30);
-  EXPECT_LT(Preconditioned(sheet(36)).iterations(), 60);
-  EXPECT_LT(Preconditioned(sheet(72)).iterations(), 85);
 }
 
 TEST(ColumnMultigrid, SolvesColumnsThatAreNotCoupledAtOnce) {

@@ -1,0 +1,74 @@
+#include "repose/linear/tangent_solver.h"
+
+#include <gtest/gtest.h>
+
+#include "repose/base/options.h"
+#include "solved.h"
+
+namespace repose {
+namespace tangent_solver_test {
+
+using testing::Solved;
+
+class Preconditioner : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(Preconditioner, SolvesForTheExactHessian) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s;
+  const base::VecHandle at = s.vector(1, 0.05);
+  ASSERT_TRUE(s.solve(at, 1e-12));
+  EXPECT_LT(s.residual(at), 1e-9);
+}
+
+TEST_P(Preconditioner, MadeElsewhereChangesNoAnswer) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s;
+  const base::VecHandle before = s.vector(1, 0.05), after = s.vector(2, 0.05);
+  s.solve(before, 1e-12);
+  ASSERT_TRUE(s.solve(after, 1e-12));
+  EXPECT_EQ(s.solver.renewals(), 1);
+  EXPECT_LT(s.residual(after), 1e-9);
+}
+
+TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s(mechanics::VolumeTerm::none);
+  const base::VecHandle before = s.positions.make_vector(), after = s.drawn_out();
+  s.solve(before, 1e-6);
+  s.solve(after, 1e-6);
+  EXPECT_EQ(s.solver.renewals(), 1);
+  s.solve(after, 1e-6);
+  EXPECT_EQ(s.solver.renewals(), 2);
+}
+
+TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
+  const auto by_factors_after = [](double bulk_modulus) {
+    Solved s;
+    s.objective.set_volume_weight(bulk_modulus);
+    linear::TangentSolver solver(s.positions, s.tangent);
+    const base::VecHandle start = s.positions.make_vector(), next = s.vector(1, 1e-12);
+    solver.solve(start, s.rhs, s.answer, 1e-6);
+    EXPECT_FALSE(solver.by_factors());
+    EXPECT_TRUE(solver.solve(next, s.rhs, s.answer, 1e-10));
+    EXPECT_LT(s.residual(next), 1e-6);
+    return solver.by_factors();
+  };
+  EXPECT_FALSE(by_factors_after(0.4));
+  EXPECT_TRUE(by_factors_after(4e5));
+}
+
+TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
+  const base::ScopedOption few("-ksp_max_it", "200");
+  Solved s;
+  s.objective.set_volume_weight(1e3);
+  linear::TangentSolver solver(s.positions, s.tangent);
+  solver.solve(s.positions.make_vector(), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.finished());
+  solver.solve(s.vector(1, 1e-12), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.by_factors());
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));
+
+}  // namespace tangent_solver_test
+}  // namespace repose

@@ -1,9 +1,0 @@
-#include <gtest/gtest.h>
-
-#include "repose/base/petsc.h"
-
-int main(int argc, char** argv) {
-  ::testing::InitGoogleTest(&argc, argv);
-  repose::base::Session session(argc, argv, nullptr);
-  return RUN_ALL_TESTS();
-}
