@@ -42,7 +42,7 @@ std::vector<Resolution> halved_resolutions(const model::Anatomy& anatomy) {
   return resolutions;
 }
 
-Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
+Convergence convergence_of(const model::Anatomy& anatomy, const model::Counts& own,
                            int64_t max_unknowns) {
   constexpr int finer = 2, growth = 8;  // of the unknowns
   const scene::Tissue& tissue = anatomy.scene.tissue;
@@ -53,7 +53,7 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& ow
     found.limit = "the scene fixes its layers (tissue.depths, depths_mm or mass)";
   if (!tissue.edge || !layers_are_free(tissue)) return found;
   double edge = meshtools::even_edge(anatomy.skin);
-  int64_t unknowns = 3 * model::count(own).soft;
+  int64_t unknowns = 3 * own.soft;
   int gaps = tissue.layers - 1;
   for (int k = 0; k < finer; ++k) {
     unknowns *= growth;

@@ -49,13 +49,13 @@ void read_scene(const scene::Scene& scene, Job& job) {
 }
 
 /// On rank 0.
-void build(const std::filesystem::path& input, Job& job) {
+model::Model build(const std::filesystem::path& input, Job& job) {
   model::BuiltModel built = make<model::BuiltModel>(*job.anatomy, input);
-  job.model = std::move(built.model);
   job.held = std::move(built.held);
   job.cuts = std::move(built.cuts);
   job.building = describe_build(built.report);
   job.warnings = std::move(built.report.warnings);
+  return std::move(built.model);
 }
 
 /// Every rank makes its part. Collective.
@@ -71,11 +71,11 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
   base::on_root(comm, [&] {
     model::BuildReport report = geometry->report();
     const std::string adhesion =
-        model::remark_on_adhesion(job.anatomy->scene, job.local_model->global_metadata);
+        model::remark_on_adhesion(job.anatomy->scene, job.local_model.global_metadata);
     if (!adhesion.empty()) report.remarks.push_back(adhesion);
     job.held = geometry->held();
     job.cuts = geometry->cuts();
-    report.effective_modulus = job.local_model->effective_modulus;
+    report.effective_modulus = job.local_model.effective_modulus;
     job.building = describe_build(report);
     if (base::size(comm) > 1)
       job.building +=
@@ -85,60 +85,60 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
     for (size_t i = 0; i < job.cuts.size(); ++i)
       job.building += describe_cut(job.cuts[i], doubled[i]);
     job.warnings = std::move(report.warnings);
-    job.model = std::move(job.local_model->global_metadata);
   });
 }
 
-/// Collective.
-void read(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
-          const Watch& watch, const scene::SceneChanges& changes, Job& job) {
+/// Returns the whole model on rank 0, unless every rank made its part. Collective.
+std::optional<model::Model> read(MPI_Comm comm, const std::filesystem::path& input,
+                                 const Watch& watch, const scene::SceneChanges& changes, Job& job) {
+  model::Model whole;
   bool distributed = false;
   const bool shared = base::size(comm) > 1;
   base::on_root(comm, [&] {
     if (results::is_hdf5(input)) {
-      job.model = results::read_model(input);
+      whole = results::read_model(input);
       job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
       return;
     }
     read_scene(scene::read_scene(input, changes), job);
     if (watch) watch(share_of_surfaces);
     const std::string why =
-        whole.empty() ? model::explain_central_build(job.anatomy->scene, job.initial_equilibrium)
-                      : whole;
+        model::explain_central_build(job.anatomy->scene, job.initial_equilibrium);
     distributed = why.empty();
     if (distributed) return;
-    build(input, job);
+    whole = build(input, job);
     if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
   });
   MPI_Bcast(&distributed, 1, MPI_C_BOOL, 0, comm);
-  if (distributed) build_local(comm, input, changes, job);
+  if (!distributed) return whole;
+  build_local(comm, input, changes, job);
+  return {};
 }
 
 /// Parts the lips, or makes all other cuts. On rank 0.
-void cut_tissue(bool lips, Job& job) {
-  if (job.local_model) return;  // it is cut already
-  const std::vector<int64_t> doubled = model::make_cuts(job.cuts, lips, job.model);
+void cut_tissue(bool lips, Job& job, model::Model& whole) {
+  const std::vector<int64_t> doubled = model::make_cuts(job.cuts, lips, whole);
   for (size_t i = 0; i < doubled.size(); ++i)
     if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);
 }
 
 /// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
 /// 0.
-void make_incisions(Job& job) {
-  cut_tissue(false, job);
+void make_incisions(Job& job, model::Model& whole) {
+  cut_tissue(false, job, whole);
   if (std::ranges::any_of(job.cuts, std::not_fn(&model::Cut::lips)))
     job.initial_equilibrium = false;
 }
 
-void bring_into_equilibrium(MPI_Comm comm, Job& job) {
+/// `tissue` is the whole model or this rank's part. Collective.
+template <class Tissue>
+void bring_into_equilibrium(MPI_Comm comm, Job& job, Tissue& tissue) {
   solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
   if (!job.initial_equilibrium) return;
   job.reference_state = reference_state;
-  job.building += describe_prestress(
-      job.local_model ? solve::prestress(comm, job.local_model->part, reference_state)
-                      : solve::prestress(comm, job.model, reference_state));
+  job.building += describe_prestress(solve::prestress(comm, tissue, reference_state));
 }
 
 /// After the initial equilibrium, which would balance the tone again. Collective.
@@ -146,48 +146,46 @@ void give_tone(MPI_Comm comm, Job& job) {
   model::RingMuscle muscle;
   if (job.anatomy) muscle = model::ring_muscle(job.anatomy->scene);
   MPI_Bcast(&muscle, sizeof muscle, MPI_BYTE, 0, comm);
-  if (muscle.tone == 0) return;
-  if (job.local_model) {
-    discrete::Part& part = job.local_model->part;
-    model::add_tone(muscle, part.point_row, part.owned_points, part.model);
-    return;
-  }
-  base::on_root(comm, [&] { model::add_tone(muscle, job.model); });
+  discrete::Part& part = job.local_model.part;
+  if (muscle.tone != 0) model::add_tone(muscle, part.point_row, part.owned_points, part.model);
+}
+
+/// Takes over a model that was built as a whole. Collective.
+void take_whole(MPI_Comm comm, Job& job, model::Model&& whole) {
+  base::on_root(comm, [&] { cut_tissue(true, job, whole); });
+  bring_into_equilibrium(comm, job, whole);
+  base::on_root(comm, [&] {
+    make_incisions(job, whole);
+    if (job.requested.bulk_modulus) return;
+    const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
+    job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
+  });
+  job.local_model = discrete::distribute_model(comm, std::move(whole));
 }
 
 /// Broadcasts rank 0's flags and counts to all ranks.
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
-  job.solid = job.local_model || model::is_solid(job.model);
+  job.solid = job.local_model.part.solid;
+  job.has_contact = job.local_model.part.contact;
   job.remeshed = job.anatomy && job.anatomy->given_skin;
-  job.has_contact = job.local_model ? job.local_model->part.contact : !job.model.contact.empty();
-  for (const model::Body& body : job.model.contact.bodies) job.bodies.push_back(body.name);
+  for (const model::Body& body : job.local_model.global_metadata.contact.bodies)
+    job.bodies.push_back(body.name);
   MPI_Bcast(&job.requested, sizeof job.requested, MPI_BYTE, 0, comm);
-  for (bool* flag : {&job.solid, &job.has_contact, &job.remeshed, &job.initial_equilibrium})
+  for (bool* flag : {&job.remeshed, &job.initial_equilibrium})
     MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
 }
 
 }  // namespace
 
-void distribute(MPI_Comm comm, Job& job) {
-  if (job.local_model) return;
-  job.local_model = discrete::distribute_model(comm, std::move(job.model));
-  job.model = std::move(job.local_model->global_metadata);
-}
-
-Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
-             const Watch& watch, const scene::SceneChanges& changes) {
+Job read_job(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
+             const scene::SceneChanges& changes) {
   Job job;
-  read(comm, input, whole, watch, changes, job);
-  base::on_root(comm, [&] { cut_tissue(true, job); });
-  bring_into_equilibrium(comm, job);
-  base::on_root(comm, [&] { make_incisions(job); });
+  if (std::optional<model::Model> whole = read(comm, input, watch, changes, job))
+    take_whole(comm, job, std::move(*whole));
+  else
+    bring_into_equilibrium(comm, job, job.local_model.part);
   give_tone(comm, job);
-  base::on_root(comm, [&] {
-    if (job.requested.bulk_modulus) return;
-    const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
-    job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, job.model);
-  });
   share(comm, job);
   return job;
 }

@@ -15,10 +15,9 @@ namespace repose::app {
 
 /// A scene or a model, read and built: what is to be solved.
 struct Job {
-  model::Model model;  ///< on rank 0; once the model is distributed, its global metadata
-  std::optional<discrete::LocalModel> local_model;  ///< on all ranks, once it is distributed
-  scene::Solve requested;                           ///< the scene's, bulk modulus set; on all ranks
-  std::optional<model::Anatomy> anatomy;            ///< of a scene, on rank 0
+  discrete::LocalModel local_model;  ///< on all ranks
+  scene::Solve requested;            ///< the scene's, of springs with a bulk modulus; on all ranks
+  std::optional<model::Anatomy> anatomy;  ///< of a scene, on rank 0
   std::optional<solve::ReferenceState>
       reference_state;                     ///< of an initial equilibrium, on all ranks
   bool solid = false;                      ///< the tissue is one, on all ranks
@@ -35,14 +34,11 @@ struct Job {
 
 /// Reads a scene (.yaml) with changes or a model (.h5), builds the scene's model with its initial
 /// equilibrium and makes its incisions. Each rank makes its part of a scene's model, unless the
-/// scene needs more than is known by columns or `whole` says why it is to be whole.
+/// scene needs more than is known by columns.
 /// Where no tissue fits, the places of the skin to look at are written to NAME_refused.ply. Throws
 /// InputError. `watch` is told the share that is done, on rank 0. Collective.
-Job read_job(MPI_Comm comm, const std::filesystem::path& input, const std::string& whole,
+Job read_job(MPI_Comm comm, const std::filesystem::path& input,
              const std::function<void(double)>& watch = {},
              const scene::SceneChanges& changes = {});
-
-/// Distributes the model of a job, unless the ranks made their parts. Collective.
-void distribute(MPI_Comm comm, Job& job);
 
 }  // namespace repose::app

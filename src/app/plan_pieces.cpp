@@ -12,7 +12,7 @@ namespace {
 
 /// On rank 0.
 std::vector<solve::PlanPiece> find_pieces(const Job& job) {
-  const model::Model& model = job.model;
+  const model::Model& model = job.local_model.global_metadata;
   const scene::Plan* plan =
       job.anatomy && job.anatomy->scene.plan ? &*job.anatomy->scene.plan : nullptr;
   std::vector<solve::PlanPiece> pieces;

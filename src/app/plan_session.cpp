@@ -73,7 +73,7 @@ struct PlanSession::State {
   std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
   std::optional<solve::RestSolver> solver;  // once a solve is requested
 
-  discrete::Part& part() { return job.local_model->part; }
+  discrete::Part& part() { return job.local_model.part; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
   std::vector<Vec3> weights(const std::vector<std::pair<int64_t, Vec3>>& functional);
@@ -94,7 +94,7 @@ void PlanSession::State::require_inside(const Placements& placements) const {
 void PlanSession::State::take(const Placements& placements) {
   for (size_t k = 0; k < plan.size(); ++k) plan[k].placement = placements[k];
   set_motions(plan, part().model);
-  if (base::rank(comm) == 0) set_motions(plan, job.model);
+  if (base::rank(comm) == 0) set_motions(plan, job.local_model.global_metadata);
   if (!solver) solver.emplace(comm, part(), settings);
   for (const solve::PlanPiece& piece : plan)
     solver->set_motion(piece.bone, scene::motion_of(piece.placement, piece.centroid));
@@ -178,7 +178,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
     : state_(std::make_unique<State>()) {
   State& s = *state_;
   s.comm = comm;
-  s.job = read_job(comm, input, "", {}, changes);
+  s.job = read_job(comm, input, {}, changes);
   base::on_root(comm, [&] {
     require_plan(input, s.job);
     s.box = *s.job.anatomy->scene.plan;
@@ -192,11 +192,11 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
   s.plan = plan_pieces(comm, s.job);
   s.strata = plan_strata(comm, s.job);
   for (const solve::PlanPiece& piece : s.plan) {
-    std::string name = base::rank(comm) == 0 ? s.job.model.bones[piece.bone] : "";
+    std::string name =
+        base::rank(comm) == 0 ? s.job.local_model.global_metadata.bones[piece.bone] : "";
     base::broadcast(comm, name);
     s.pieces.push_back({name, piece.bone, piece.centroid, piece.placement});
   }
-  distribute(comm, s.job);
 }
 
 PlanSession::~PlanSession() = default;
@@ -204,7 +204,7 @@ PlanSession::~PlanSession() = default;
 const std::vector<PlanSession::Piece>& PlanSession::pieces() const { return state_->pieces; }
 const scene::Plan& PlanSession::box() const { return state_->box; }
 double PlanSession::accuracy() const { return state_->settings.path.accuracy; }
-const model::Model& PlanSession::model() const { return state_->job.model; }
+const model::Model& PlanSession::model() const { return state_->job.local_model.global_metadata; }
 const std::string& PlanSession::building() const { return state_->job.building; }
 
 const surface::Surface* PlanSession::given_skin() const {
@@ -254,8 +254,8 @@ void PlanSession::write(const std::filesystem::path& name) {
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
   std::optional<results::NameLock> lock;
   base::on_root(s.comm, [&] { lock.emplace(name); });
-  results::ResultFile file(s.comm, name, s.job.model,
-                           discrete::NaturalRows::of_model(s.comm, *s.job.local_model));
+  results::ResultFile file(s.comm, name, s.job.local_model.global_metadata,
+                           discrete::NaturalRows::of_model(s.comm, s.job.local_model));
   file.append(s.last->first, s.last->second);
   file.commit();
 }

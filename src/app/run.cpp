@@ -53,21 +53,8 @@ std::string result_name(const base::Options& options, const std::filesystem::pat
   std::string name = options.has("output") ? options.text("output") : input.stem().string();
   std::error_code missing;
   if (!std::filesystem::equivalent(name + ".h5", input, missing) || missing) return name;
-  read_job(comm, input, "");
+  read_job(comm, input);
   base::refuse("{}: the result would replace the input; give another -output", input.string());
-}
-
-/// The option that needs more than the parts of a model that ranks make themselves, or nothing.
-std::string needs_whole(const base::Options& options) {
-  for (const std::string name : {"adapt", "discretisation", "sensitivity"})
-    if (options.flag(name)) return "-" + name;
-  if (options.has("restart")) return "-restart";
-  return options.text("profile") == "preview" ? "-profile preview" : "";
-}
-
-/// On rank 0.
-model::Counts counts_of(const Job& job) {
-  return job.local_model ? job.local_model->counts : model::count(job.model);
 }
 
 /// Why a result is not to be trusted as an end, or nothing.
@@ -125,7 +112,7 @@ class Run {
   std::string describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
                               const solve::Summary& summary, const Writer& writer) const;
 
-  const discrete::Part& part() const { return job_.local_model->part; }
+  const discrete::Part& part() const { return job_.local_model.part; }
 
   Job& job_;
   Strategy strategy_;
@@ -157,14 +144,15 @@ void Run::copy_result(const std::filesystem::path& file) const {
   bool same = other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes());
   MPI_Bcast(&same, 1, MPI_C_BOOL, 0, comm);
   if (same) return;
-  results::ResultFile copy(comm, name_, job_.model,
-                           discrete::NaturalRows::of_model(comm, *job_.local_model));
+  results::ResultFile copy(comm, name_, job_.local_model.global_metadata,
+                           discrete::NaturalRows::of_model(comm, job_.local_model));
   copy.keep(file, results::step_count(file));
   copy.commit();
 }
 
 std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool folds_allowed) {
-  const results::Restart from = results::read_restart(comm, file, job_.model);
+  const results::Restart from =
+      results::read_restart(comm, file, discrete::gather_model(comm, job_.local_model));
   start_ = {from.position, from.guess};
   strategy_.settings.path.start_load = from.load;
   earlier_ = file;
@@ -178,7 +166,6 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
   });
   for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
   if (!done) return {};
-  distribute(comm, job_);
   copy_result(file);
   const SolvedSkin skin(comm, job_);
   print(write_given_skin(skin, skin.points_at(start_.position)));
@@ -187,10 +174,13 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
 
 /// Springs tear, in rounds of searches; the run then begins with the state that these left.
 solve::Tearing Run::tear() {
+  if (!strategy_.tears) return {};
+  model::Model whole = discrete::gather_model(comm, job_.local_model);
   solve::Tearing tearing =
-      solve::tear(comm, job_.model, job_.tearing, strategy_.settings, start_.position);
+      solve::tear(comm, whole, job_.tearing, strategy_.settings, start_.position);
   if (tearing.rounds > 0) stages_.end("tear");
   if (!tearing.torn) return tearing;
+  job_.local_model = discrete::distribute_model(comm, std::move(whole));
   start_ = {tearing.position, false};
   strategy_.settings.path.start_load = 1;
   strategy_.settings.initial_equilibrium = false;
@@ -207,7 +197,8 @@ Coarser Run::solve_coarser() {
                                       compare ? 0 : settings.path.accuracy};
   const model::Anatomy none;
   adapt::GridSequence sequence =
-      adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none, job_.model, requested);
+      adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none,
+                            discrete::gather_model(comm, job_.local_model), requested);
   Coarser coarser{describe_sequence(sequence), {}, {}};
   const bool converging = !compare && !strategy_.preview && job_.solid;
   const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
@@ -218,7 +209,7 @@ Coarser Run::solve_coarser() {
                                  : describe_choice(sequence, accuracy);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
     settings.weights = sequence.last_settings.weights;
-    job_.model = std::move(sequence.last.model);
+    job_.local_model = discrete::distribute_model(comm, std::move(sequence.last.model));
     job_.held = std::move(sequence.last.held);
     start_ = {base::scatter(comm, sequence.last_position), true};
   } else if (!sequence.levels.empty()) {
@@ -309,7 +300,6 @@ std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>
 base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  distribute(comm, job_);
   Writer writer(comm, name_, job_, coarser, checkpoint_interval, unsettled(tearing));
   if (kept_ > 0) writer.keep(earlier_, kept_);
   const Saving saving(interrupt_, writer, name_);
@@ -362,12 +352,12 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
     if (!dry) lock.emplace(name);
   });
   Phase building(comm, "building the model");
-  Job job = read_job(comm, input, needs_whole(options), [&](double done) { building.at(done); });
+  Job job = read_job(comm, input, [&](double done) { building.at(done); });
   Strategy strategy = make_strategy(comm, options, job);
   building.end();
   stages.end("build");
   if (base::rank(comm) == 0)
-    print(job.building + describe_model(counts_of(job)) + describe_warnings(job.warnings) +
+    print(job.building + describe_model(job.local_model.counts) + describe_warnings(job.warnings) +
           strategy.explanation);
   if (dry) {
     if (options.has("output")) print(write_solved_skin(job, options.text("output")));

@@ -13,7 +13,7 @@
 namespace repose::app {
 
 SolvedSkin::SolvedSkin(MPI_Comm comm, const Job& job) : comm_(comm) {
-  const model::Model& model = job.model;
+  const model::Model& model = job.local_model.global_metadata;
   for (const Triangle& t : model.skin) row_.insert(row_.end(), t.begin(), t.end());
   std::sort(row_.begin(), row_.end());
   row_.erase(std::unique(row_.begin(), row_.end()), row_.end());
@@ -25,7 +25,7 @@ SolvedSkin::SolvedSkin(MPI_Comm comm, const Job& job) : comm_(comm) {
   const std::vector<int64_t>& beside = model.contact.cut_faces.point;
   const std::set<int64_t> sides(beside.begin(), beside.end());
   for (const int64_t row : row_) on_a_side_.push_back(sides.contains(row));
-  const discrete::Part& part = job.local_model->part;
+  const discrete::Part& part = job.local_model.part;
   initial_.points =
       points_at(discrete::NaturalRows(comm, part).natural(part.model.points.position));
 }

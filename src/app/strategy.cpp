@@ -85,7 +85,7 @@ void choose_coarse(const CoarseRequest& request, const std::string& conflict, co
   if (conflict.empty()) {
     s.preview = request.coarse == Coarse::instead && !request.required;
     if (request.coarse == Coarse::instead && request.required && job.solid) {
-      adapt::Convergence convergence = adapt::convergence_of(*job.anatomy, job.model);
+      adapt::Convergence convergence = adapt::convergence_of(*job.anatomy, job.local_model.counts);
       s.resolutions = std::move(convergence.resolutions);
       s.limit = std::move(convergence.limit);
     } else {

@@ -21,8 +21,8 @@ Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const Job& job,
       interval_(interval) {}
 
 results::ResultFile Writer::open(const std::string& ending, results::Kind kind) const {
-  return results::ResultFile(comm_, name_.string() + ending, job_.model,
-                             discrete::NaturalRows::of_model(comm_, *job_.local_model), kind);
+  return results::ResultFile(comm_, name_.string() + ending, job_.local_model.global_metadata,
+                             discrete::NaturalRows::of_model(comm_, job_.local_model), kind);
 }
 
 void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
@@ -76,8 +76,8 @@ std::vector<double> Writer::contact_pressures() const {
 }
 
 std::string Writer::reactions() const {
-  const auto forces = solve::reactions(comm_, job_.local_model->part, job_.held, last_.numbers,
-                                       last_.rows.position);
+  const auto forces =
+      solve::reactions(comm_, job_.local_model.part, job_.held, last_.numbers, last_.rows.position);
   return forces.empty() ? "" : describe_reactions(job_.held, forces);
 }
 

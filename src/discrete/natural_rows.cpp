@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "repose/base/agreement.h"
+#include "repose/discrete/message.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
@@ -272,6 +273,43 @@ void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& p
   std::vector<Vec3> rows = owned(slab);
   for (size_t i = 0; i < rows.size(); ++i) rows[i] -= part_.model.points.position[i];
   positions.restrict_to_owned(rows, displacement);
+}
+
+namespace {
+
+/// Joins the slabs of all ranks on rank 0. The first ranks are those that have rows.
+template <class Group>
+void join_slabs(MPI_Comm comm, int64_t rows, Group& slabs) {
+  const int ranks = base::size(comm), rank = base::rank(comm);
+  const auto has_rows = [&](int of) { return base::slab(rows, of, ranks).rows() > 0; };
+  if (!has_rows(rank)) return;
+  model::for_each_array(slabs, [&](const char*, auto& array) {
+    if (rank > 0) return Sender(comm, 0)(array);
+    for (int from = 1; from < ranks && has_rows(from); ++from) {
+      std::decay_t<decltype(array)> theirs;
+      Receiver(comm, from)(theirs);
+      array.insert(array.end(), theirs.begin(), theirs.end());
+    }
+  });
+}
+
+}  // namespace
+
+model::Model gather_model(MPI_Comm comm, const LocalModel& local_model) {
+  model::ModelRows rows = NaturalRows::of_model(comm, local_model);
+  join_slabs(comm, rows.counts.points, rows.points);
+  join_slabs(comm, rows.counts.springs, rows.springs);
+  join_slabs(comm, rows.counts.prisms, rows.prisms);
+  join_slabs(comm, rows.counts.edges, rows.edges);
+  join_slabs(comm, rows.contact_pairs, rows.pairs);
+  model::Model whole = local_model.global_metadata;
+  if (base::rank(comm) > 0) return whole;
+  whole.points = std::move(rows.points);
+  whole.springs = std::move(rows.springs);
+  whole.prisms = std::move(rows.prisms);
+  whole.edges = std::move(rows.edges);
+  whole.contact.pairs = std::move(rows.pairs);
+  return whole;
 }
 
 }  // namespace repose::discrete

@@ -26,6 +26,7 @@
 #include "repose/app/settings.h"
 #include "repose/base/options.h"
 #include "repose/base/program.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/results/model_file.h"
 #include "solve/contact_search.h"
 #include "solve/exact_penetration.h"
@@ -305,11 +306,12 @@ std::vector<Vec3> read_positions(const std::string& result, const model::Model& 
 
 base::Exit run(const base::Options& options) {
   check(PetscLogDefaultBegin());
-  const app::Job job = app::read_job(comm, options.arguments()[0], "");
+  const app::Job job = app::read_job(comm, options.arguments()[0]);
   if (!job.solid) base::refuse("tissue.springs: the barrier is for solids");
   solve::Settings settings = app::settings_of(job.requested, true);
   settings.path.accuracy = options.number("accuracy");
-  Comparison comparison(job.model, read_positions(options.text("result"), job.model));
+  const model::Model model = discrete::gather_model(comm, job.local_model);
+  Comparison comparison(model, read_positions(options.text("result"), model));
   comparison.run("present", settings, [&](solve::Problem& problem) {
     solve::Minimizer minimizer(problem.function(), problem.solver(), nullptr);
     solve::ContactSearch contact(problem.objective(), problem.tangent(), problem.elastic_solver(),

@@ -21,7 +21,7 @@ struct Convergence {
 
 /// Where the scene lets both the skin's edges (tissue.edge) and the layers be any number, up to two
 /// finer than its own, of at most `most_unknowns`. On rank 0.
-Convergence convergence_of(const model::Anatomy& anatomy, const model::Model& own,
+Convergence convergence_of(const model::Anatomy& anatomy, const model::Counts& own,
                            int64_t max_unknowns = 5'000'000);
 
 /// A row about the last model of a convergence, which was solved to `requested` mm.

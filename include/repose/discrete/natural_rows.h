@@ -55,4 +55,8 @@ class NaturalRows {
   Rows points_, springs_, prisms_;
 };
 
+/// Returns the whole model on rank 0, for what is no matter of columns; of the other ranks nothing
+/// but the metadata. Collective.
+model::Model gather_model(MPI_Comm comm, const LocalModel& local_model);
+
 }  // namespace repose::discrete

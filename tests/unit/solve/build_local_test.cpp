@@ -246,7 +246,9 @@ std::vector<Value> slab(const std::vector<Value>& whole) {
 void expect_its_rows(const model::Anatomy& anatomy) {
   const model::Model whole = cut_whole(anatomy);
   const discrete::LocalModel local_model = build_local(anatomy);
+  const model::Model gathered = discrete::gather_model(comm, local_model);
   if (base::rank(comm) == 0) {
+    expect_same(gathered, whole);
     EXPECT_EQ(local_model.global_metadata.skin, whole.skin);
     expect_same(local_model.global_metadata.contact.cut_faces, whole.contact.cut_faces);
   }
@@ -287,22 +289,24 @@ TEST(Raise, a_distributed_model_is_written_as_it_was) {
   for (const model::Anatomy& anatomy : {springs, jaws(1), loaded(12)}) {
     const model::Model whole = model::build_model(anatomy).model;
     const discrete::LocalModel local = discrete::distribute_model(comm, model::Model(whole));
+    const model::Model gathered = discrete::gather_model(comm, local);
     EXPECT_TRUE(local.global_metadata.points.position.empty());
     results::ResultFile(comm, name, local.global_metadata,
                         discrete::NaturalRows::of_model(comm, local))
         .commit();
     base::on_root(comm, [&] {
-      const model::Model stored = results::read_model(name + ".h5");
-      expect_same(stored, whole);
-      EXPECT_EQ(stored.points.mass, whole.points.mass);
-      EXPECT_EQ(stored.springs.points, whole.springs.points);
-      EXPECT_EQ(stored.springs.set, whole.springs.set);
-      EXPECT_EQ(stored.springs.rest_length, whole.springs.rest_length);
-      EXPECT_EQ(stored.springs.stiffness, whole.springs.stiffness);
-      EXPECT_EQ(stored.springs.exponent, whole.springs.exponent);
-      EXPECT_EQ(stored.springs.reference, whole.springs.reference);
-      EXPECT_EQ(stored.spring_sets, whole.spring_sets);
-      EXPECT_EQ(stored.skin, whole.skin);
+      for (const model::Model& stored : {results::read_model(name + ".h5"), gathered}) {
+        expect_same(stored, whole);
+        EXPECT_EQ(stored.points.mass, whole.points.mass);
+        EXPECT_EQ(stored.springs.points, whole.springs.points);
+        EXPECT_EQ(stored.springs.set, whole.springs.set);
+        EXPECT_EQ(stored.springs.rest_length, whole.springs.rest_length);
+        EXPECT_EQ(stored.springs.stiffness, whole.springs.stiffness);
+        EXPECT_EQ(stored.springs.exponent, whole.springs.exponent);
+        EXPECT_EQ(stored.springs.reference, whole.springs.reference);
+        EXPECT_EQ(stored.spring_sets, whole.spring_sets);
+        EXPECT_EQ(stored.skin, whole.skin);
+      }
     });
   }
 }
