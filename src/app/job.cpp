@@ -7,6 +7,7 @@
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/model/cut.h"
 #include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
@@ -122,23 +123,13 @@ void cut_tissue(bool lips, Job& job, model::Model& whole) {
     if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);
 }
 
-/// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut. On rank
-/// 0.
-void make_incisions(Job& job, model::Model& whole) {
-  cut_tissue(false, job, whole);
-  if (std::ranges::any_of(job.cuts, std::not_fn(&model::Cut::lips)))
-    job.initial_equilibrium = false;
-}
-
-/// `tissue` is the whole model or this rank's part. Collective.
-template <class Tissue>
-void bring_into_equilibrium(MPI_Comm comm, Job& job, Tissue& tissue) {
+void bring_into_equilibrium(MPI_Comm comm, Job& job) {
   solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
   MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
   MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
   if (!job.initial_equilibrium) return;
   job.reference_state = reference_state;
-  job.building += describe_prestress(solve::prestress(comm, tissue, reference_state));
+  job.building += describe_prestress(solve::prestress(comm, job.local_model, reference_state));
 }
 
 /// After the initial equilibrium, which would balance the tone again. Collective.
@@ -150,17 +141,43 @@ void give_tone(MPI_Comm comm, Job& job) {
   if (muscle.tone != 0) model::add_tone(muscle, part.point_row, part.owned_points, part.model);
 }
 
-/// Takes over a model that was built as a whole. Collective.
-void take_whole(MPI_Comm comm, Job& job, model::Model&& whole) {
-  base::on_root(comm, [&] { cut_tissue(true, job, whole); });
-  bring_into_equilibrium(comm, job, whole);
+/// Returns whether tension is to open incisions of a model that was built as a whole. On rank 0.
+bool opens_incisions(const Job& job) {
+  return job.initial_equilibrium && !std::ranges::all_of(job.cuts, &model::Cut::lips);
+}
+
+/// On rank 0.
+void set_bulk_modulus(const model::Model& whole, Job& job) {
+  if (job.requested.bulk_modulus) return;
+  const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
+  job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
+}
+
+/// Distributes a model that was built as a whole, with the cuts that its initial equilibrium finds.
+/// Collective.
+void distribute(MPI_Comm comm, Job& job, model::Model&& whole) {
   base::on_root(comm, [&] {
-    make_incisions(job, whole);
-    if (job.requested.bulk_modulus) return;
-    const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
-    job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
+    cut_tissue(true, job, whole);
+    if (opens_incisions(job)) return;
+    cut_tissue(false, job, whole);
+    set_bulk_modulus(whole, job);
   });
   job.local_model = discrete::distribute_model(comm, std::move(whole));
+}
+
+/// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut.
+/// Collective.
+void make_incisions(MPI_Comm comm, Job& job) {
+  bool left = opens_incisions(job);
+  MPI_Bcast(&left, 1, MPI_C_BOOL, 0, comm);
+  if (!left) return;
+  model::Model whole = discrete::gather_model(comm, job.local_model);
+  base::on_root(comm, [&] {
+    cut_tissue(false, job, whole);
+    set_bulk_modulus(whole, job);
+  });
+  job.local_model = discrete::distribute_model(comm, std::move(whole));
+  job.initial_equilibrium = false;
 }
 
 /// Broadcasts rank 0's flags and counts to all ranks.
@@ -182,9 +199,9 @@ Job read_job(MPI_Comm comm, const std::filesystem::path& input, const Watch& wat
              const scene::SceneChanges& changes) {
   Job job;
   if (std::optional<model::Model> whole = read(comm, input, watch, changes, job))
-    take_whole(comm, job, std::move(*whole));
-  else
-    bring_into_equilibrium(comm, job, job.local_model.part);
+    distribute(comm, job, std::move(*whole));
+  bring_into_equilibrium(comm, job);
+  make_incisions(comm, job);
   give_tone(comm, job);
   share(comm, job);
   return job;

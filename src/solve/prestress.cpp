@@ -8,8 +8,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
-#include "repose/discrete/message.h"
-#include "repose/discrete/part.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
 #include "repose/mechanics/prism_volume.h"
@@ -39,12 +38,12 @@ mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
 }
 
 /// Which local springs are skin, whose tension is given. The names are known on rank 0.
-std::vector<char> skin_springs(MPI_Comm comm, const Model& whole, const discrete::Part& part) {
-  const auto name = std::find(whole.spring_sets.begin(), whole.spring_sets.end(), "layer 0");
-  auto set = static_cast<int32_t>(name - whole.spring_sets.begin());
+std::vector<char> skin_springs(MPI_Comm comm, const discrete::LocalModel& local_model) {
+  const std::vector<std::string>& names = local_model.global_metadata.spring_sets;
+  auto set = static_cast<int32_t>(std::ranges::find(names, "layer 0") - names.begin());
   MPI_Bcast(&set, 1, MPI_INT32_T, 0, comm);
   std::vector<char> skin;
-  for (int32_t s : part.model.springs.set) skin.push_back(s == set);
+  for (int32_t s : local_model.part.model.springs.set) skin.push_back(s == set);
   return skin;
 }
 
@@ -232,40 +231,41 @@ double rounding_force(MPI_Comm comm, const discrete::Part& part) {
   return largest;
 }
 
-[[noreturn]] void refuse_rest_length(const Model& whole, int64_t spring, double tension,
-                                     int64_t impossible) {
-  const auto& [p, q] = whole.springs.points[spring];
-  const Vec3& at = whole.points.position[p];
-  base::refuse(
-      "the initial equilibrium requires negative rest lengths of {} springs; the first is "
-      "spring {} ({}, points {} and {} near ({:.2f}, {:.2f}, {:.2f}) mm): it would have to carry "
-      "{:.3g} N over {:.3g} mm; lower tissue.turgor or the mass, or raise the stiffness of that "
-      "set",
-      impossible, spring, whole.spring_sets[whole.springs.set[spring]], p, q, at.x(), at.y(),
-      at.z(), tension, length(whole, spring));
-}
-
 /// Refuses on all ranks where an owned spring of a rank has no positive rest length. Collective.
-void require_rest_lengths(MPI_Comm comm, const Model& whole, const discrete::Part& part,
+void require_rest_lengths(MPI_Comm comm, const discrete::LocalModel& local_model,
                           const std::vector<double>& tension) {
+  const discrete::Part& part = local_model.part;
+  const model::Springs& springs = part.model.springs;
   struct {
     double row;
     int rank;
   } first{std::numeric_limits<double>::infinity(), base::rank(comm)};
-  double worst = 0;
-  int64_t impossible = 0;
+  int64_t spring = -1, impossible = 0;
   for (int64_t j = 0; j < part.owned_springs; ++j) {
-    if (part.model.springs.rest_length[j] > 0) continue;
+    if (springs.rest_length[j] > 0) continue;
     ++impossible;
     const auto row = static_cast<double>(part.spring_row[j]);
-    if (row < first.row) first.row = row, worst = tension[j];
+    if (row < first.row) first.row = row, spring = j;
   }
   MPI_Allreduce(MPI_IN_PLACE, &impossible, 1, MPI_INT64_T, MPI_SUM, comm);
   if (impossible == 0) return;
   MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, comm);
-  MPI_Bcast(&worst, 1, MPI_DOUBLE, first.rank, comm);
-  base::on_root(
-      comm, [&] { refuse_rest_length(whole, static_cast<int64_t>(first.row), worst, impossible); });
+  int32_t set = spring < 0 ? 0 : springs.set[spring];
+  MPI_Bcast(&set, 1, MPI_INT32_T, first.rank, comm);
+  std::string name = base::rank(comm) == 0 ? local_model.global_metadata.spring_sets[set] : "";
+  base::broadcast(comm, name);
+  base::collective_try(comm, [&] {
+    if (base::rank(comm) != first.rank) return;
+    const auto& [p, q] = springs.points[spring];
+    const Vec3& at = part.model.points.position[p];
+    base::refuse(
+        "the initial equilibrium requires negative rest lengths of {} springs; the first is "
+        "spring {} ({}, points {} and {} near ({:.2f}, {:.2f}, {:.2f}) mm): it would have to carry "
+        "{:.3g} N over {:.3g} mm; lower tissue.turgor or the mass, or raise the stiffness of that "
+        "set",
+        impossible, part.spring_row[spring], name, part.point_row[p], part.point_row[q], at.x(),
+        at.y(), at.z(), tension[spring], length(part.model, spring));
+  });
 }
 
 /// l_j = r_j − T⁻¹(T_j) for all local springs but the skin's.
@@ -301,20 +301,6 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
       so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z(),
       part.solid ? "change tissue.turgor or tissue.density"
                  : "give tissue.springs a stiffness there");
-}
-
-/// Brings values of this rank's first rows together in `whole` on rank 0. Collective.
-void collect(MPI_Comm comm, std::vector<int64_t> row, std::vector<double> values,
-             std::vector<double>& whole) {
-  values.resize(row.size());
-  if (base::rank(comm) > 0) {
-    discrete::Sender(comm, 0)(row, values);
-    return;
-  }
-  for (int sender = 0; sender < base::size(comm); ++sender) {
-    if (sender > 0) discrete::Receiver(comm, sender)(row, values);
-    for (size_t j = 0; j < row.size(); ++j) whole[row[j]] = values[j];
-  }
 }
 
 double min_rest_ratio(const Model& model) {
@@ -365,24 +351,12 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
   return result;
 }
 
-Prestress balance_solid(MPI_Comm comm, Model& model, const Vec3& gravity) {
-  discrete::Part part = discrete::distribute(comm, model);
-  part.model.gravity = gravity;
-  for (Vec3& force : part.model.points.external_force) force.setZero();
-  const Prestress result = balance_solid(comm, part);
-  collect(comm, part.edge_row, part.model.edges.weight, model.edges.weight);
-  collect(comm, part.prism_row, part.model.prisms.target_volume, model.prisms.target_volume);
-  return result;
-}
-
-Prestress balance_springs(MPI_Comm comm, Model& model, const ReferenceState& as) {
-  discrete::Part part = discrete::distribute(comm, model);
-  const std::vector<char> skin = skin_springs(comm, model, part);
+/// Without external forces, under the gravity of the recording.
+Prestress balance_springs(MPI_Comm comm, discrete::LocalModel& local_model, double turgor) {
+  discrete::Part& part = local_model.part;
+  const std::vector<char> skin = skin_springs(comm, local_model);
   for (size_t j = 0; j < skin.size(); ++j)
-    part.model.springs.rest_length[j] = length(part.model, j) / (skin[j] ? 1 + as.turgor : 1.0);
-  part.model.gravity = as.gravity;
-  for (Vec3& force : part.model.points.external_force) force.setZero();
-
+    part.model.springs.rest_length[j] = length(part.model, j) / (skin[j] ? 1 + turgor : 1.0);
   Prestress result;
   Stiffness stiffness(comm, stiffness_part(part, skin));
   std::vector<double> tension(skin.size(), 0.0);
@@ -400,9 +374,8 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const ReferenceState& as)
     for (size_t j = 0; j < skin.size(); ++j)
       if (!skin[j]) tension[j] += stiffness.tension(j);
     set_rest_lengths(skin, tension, part.model);
-    require_rest_lengths(comm, model, part, tension);
+    require_rest_lengths(comm, local_model, tension);
   }
-  collect(comm, part.spring_row, part.model.springs.rest_length, model.springs.rest_length);
   result.min_rest_ratio = min_rest_ratio(part.model);
   MPI_Allreduce(MPI_IN_PLACE, &result.min_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
   return result;
@@ -410,26 +383,27 @@ Prestress balance_springs(MPI_Comm comm, Model& model, const ReferenceState& as)
 
 }  // namespace
 
-Prestress prestress(MPI_Comm comm, Model& model, ReferenceState as) {
+Prestress prestress(MPI_Comm comm, discrete::LocalModel& local_model, ReferenceState as) {
   static const PetscLogEvent event = base::log_event("RpPrestress");
   const base::Logged logged(event);
   MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
-  bool solid = model::is_solid(model);
-  MPI_Bcast(&solid, 1, MPI_C_BOOL, 0, comm);
-  return solid ? balance_solid(comm, model, as.gravity) : balance_springs(comm, model, as);
-}
-
-Prestress prestress(MPI_Comm comm, discrete::Part& part, ReferenceState as) {
-  static const PetscLogEvent event = base::log_event("RpPrestress");
-  const base::Logged logged(event);
-  MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
+  discrete::Part& part = local_model.part;
   const Vec3 gravity = std::exchange(part.model.gravity, as.gravity);
   std::vector<Vec3>& forces = part.model.points.external_force;
   const std::vector<Vec3> acting =
       std::exchange(forces, std::vector(forces.size(), Vec3(Vec3::Zero())));
-  const Prestress result = balance_solid(comm, part);
+  const Prestress result =
+      part.solid ? balance_solid(comm, part) : balance_springs(comm, local_model, as.turgor);
   part.model.gravity = gravity;
   forces = acting;
+  return result;
+}
+
+Prestress prestress(MPI_Comm comm, Model& model, ReferenceState as) {
+  discrete::LocalModel local_model = discrete::distribute_model(comm, Model(model));
+  const Prestress result = prestress(comm, local_model, as);
+  Model balanced = discrete::gather_model(comm, local_model);
+  if (base::rank(comm) == 0) model = std::move(balanced);
   return result;
 }
 

@@ -25,8 +25,8 @@ struct ReferenceState {
 /// soft-tissue point the rest lengths whose tensions, smallest in the energy norm, balance skin
 /// tension and weight at the initial position: min Σ ½ T_j²/k_j with F = 0, so (A K Aᵀ) μ = −b, T =
 /// K Aᵀ μ, l_j = r_j − T⁻¹(T_j). External forces are not balanced: they act. Changes the rest
-/// lengths of `model`. F is 1e-12 of the largest force before, or what the rounding of lengths
-/// leaves where that is more. Model and recording are read on rank 0 only. Throws InputError
+/// lengths of the model. F is 1e-12 of the largest force before, or what the rounding of lengths
+/// leaves where that is more. The recording is read on rank 0 only. Throws InputError
 /// naming the springs where a rest length would not be positive, or the point that no spring can
 /// hold. Collective.
 ///
@@ -34,8 +34,8 @@ struct ReferenceState {
 /// of its prisms that balance skin tension and weight, those of least energy Σ q² r⁴/(Y v) + Σ p²
 /// V/K with the edges' shares v of the volume, Young's modulus Y and the bulk modulus K: they shift
 /// the edges' weights and the prisms' target volumes (docs/theory/continuum.md).
+Prestress prestress(MPI_Comm comm, discrete::LocalModel& local_model, ReferenceState as);
+/// Balances a model that rank 0 alone reads and has.
 Prestress prestress(MPI_Comm comm, model::Model& model, ReferenceState as);
-/// Balances a solid that is already distributed.
-Prestress prestress(MPI_Comm comm, discrete::Part& part, ReferenceState as);
 
 }  // namespace repose::solve

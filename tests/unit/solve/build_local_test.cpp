@@ -353,7 +353,7 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   discrete::LocalModel local_model = build_local(anatomy);
   const solve::ReferenceState as{0.05, Vec3(0, 0, -9.81)};
   const solve::Prestress one = solve::prestress(comm, whole, as);
-  const solve::Prestress other = solve::prestress(comm, local_model.part, as);
+  const solve::Prestress other = solve::prestress(comm, local_model, as);
   EXPECT_GT(one.largest_force, 0);
   EXPECT_NEAR(one.largest_force, other.largest_force, 1e-12 * one.largest_force);
   EXPECT_NEAR(one.largest_pressure, other.largest_pressure, 1e-6 * one.largest_pressure);
