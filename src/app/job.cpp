@@ -59,34 +59,76 @@ model::Model build(const std::filesystem::path& input, Job& job) {
   return std::move(built.model);
 }
 
-/// Every rank makes its part. Collective.
+/// Brings the tissue of a distributed model into its initial equilibrium. Collective.
+void bring_into_equilibrium(MPI_Comm comm, Job& job) {
+  solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
+  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
+  MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
+  if (!job.initial_equilibrium) return;
+  job.reference_state = reference_state;
+  job.building += describe_prestress(solve::prestress(comm, job.local_model, reference_state));
+}
+
+/// Returns whether the tension of an initial equilibrium is to open incisions, on all ranks.
+/// Collective.
+bool opens_incisions(MPI_Comm comm, const Job& job) {
+  bool opens = job.initial_equilibrium && !std::ranges::all_of(job.cuts, &model::Cut::lips);
+  MPI_Bcast(&opens, 1, MPI_C_BOOL, 0, comm);
+  return opens;
+}
+
+/// Takes over what the builder says of a model that every rank made its part of. On rank 0.
+void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
+  model::BuildReport report = geometry.report();
+  const std::string adhesion =
+      model::remark_on_adhesion(job.anatomy->scene, job.local_model.global_metadata);
+  if (!adhesion.empty()) report.remarks.push_back(adhesion);
+  job.held = geometry.held();
+  report.effective_modulus = job.local_model.effective_modulus;
+  job.building = describe_build(report);
+  if (ranks > 1)
+    job.building += report_row("built", fmt::format("by {} ranks, each its part", ranks));
+  job.warnings = std::move(report.warnings);
+}
+
+/// Describes the cuts that a model has, from number `first` on.
+std::string describe_cuts(const model::ColumnGeometry& geometry, size_t first) {
+  std::vector<int64_t> doubled(geometry.cuts().size(), 0);
+  for (const model::DoubledColumn& at : geometry.doubled()) doubled[at.cut] += at.points;
+  std::string text;
+  for (size_t i = first; i < doubled.size(); ++i)
+    text += describe_cut(geometry.cuts()[i], doubled[i]);
+  return text;
+}
+
+/// Every rank makes its part. Incisions that tension opens are made in a second one, by what
+/// balances the first. Collective.
 void build_local(MPI_Comm comm, const std::filesystem::path& input,
                  const scene::SceneChanges& changes, Job& job) {
   std::optional<model::ColumnGeometry> geometry;  // on rank 0
-  base::on_root(comm, [&] { geometry.emplace(make<model::ColumnGeometry>(*job.anatomy, input)); });
+  base::on_root(comm, [&] {
+    geometry.emplace(make<model::ColumnGeometry>(*job.anatomy, input));
+    job.cuts = {geometry->cuts().begin(), geometry->cuts().end()};
+  });
   scene::Scene scene;
   base::collective_try(comm, [&] {
     scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
   });
-  job.local_model = discrete::build_local(comm, geometry ? &*geometry : nullptr, std::move(scene));
+  const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
+  const bool opens = opens_incisions(comm, job);
+  if (geometry) geometry->include_incisions(!opens);
+  job.local_model = discrete::build_local(comm, columns, scene);
   base::on_root(comm, [&] {
-    model::BuildReport report = geometry->report();
-    const std::string adhesion =
-        model::remark_on_adhesion(job.anatomy->scene, job.local_model.global_metadata);
-    if (!adhesion.empty()) report.remarks.push_back(adhesion);
-    job.held = geometry->held();
-    job.cuts = geometry->cuts();
-    report.effective_modulus = job.local_model.effective_modulus;
-    job.building = describe_build(report);
-    if (base::size(comm) > 1)
-      job.building +=
-          report_row("built", fmt::format("by {} ranks, each its part", base::size(comm)));
-    std::vector<int64_t> doubled(job.cuts.size(), 0);
-    for (const model::DoubledColumn& at : geometry->doubled()) doubled[at.cut] += at.points;
-    for (size_t i = 0; i < job.cuts.size(); ++i)
-      job.building += describe_cut(job.cuts[i], doubled[i]);
-    job.warnings = std::move(report.warnings);
+    take_report(*geometry, base::size(comm), job);
+    job.building += describe_cuts(*geometry, 0);
   });
+  bring_into_equilibrium(comm, job);
+  if (!opens) return;
+  const size_t lips = geometry ? geometry->cuts().size() : 0;
+  if (geometry) geometry->include_incisions(true);
+  job.local_model = discrete::build_local(comm, columns, scene, &job.local_model);
+  if (geometry) job.building += describe_cuts(*geometry, lips);
+  job.initial_equilibrium = false;
 }
 
 /// Returns the whole model on rank 0, unless every rank made its part. Collective.
@@ -103,12 +145,10 @@ std::optional<model::Model> read(MPI_Comm comm, const std::filesystem::path& inp
     }
     read_scene(scene::read_scene(input, changes), job);
     if (watch) watch(share_of_surfaces);
-    const std::string why =
-        model::explain_central_build(job.anatomy->scene, job.initial_equilibrium);
-    distributed = why.empty();
+    distributed = job.anatomy->scene.tissue.material.has_value();
     if (distributed) return;
     whole = build(input, job);
-    if (shared) job.building += report_row("built", fmt::format("by rank 0, whole: {}", why));
+    if (shared) job.building += report_row("built", "by rank 0, whole: its tissue is springs");
   });
   MPI_Bcast(&distributed, 1, MPI_C_BOOL, 0, comm);
   if (!distributed) return whole;
@@ -123,15 +163,6 @@ void cut_tissue(bool lips, Job& job, model::Model& whole) {
     if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);
 }
 
-void bring_into_equilibrium(MPI_Comm comm, Job& job) {
-  solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
-  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
-  MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
-  if (!job.initial_equilibrium) return;
-  job.reference_state = reference_state;
-  job.building += describe_prestress(solve::prestress(comm, job.local_model, reference_state));
-}
-
 /// After the initial equilibrium, which would balance the tone again. Collective.
 void give_tone(MPI_Comm comm, Job& job) {
   model::RingMuscle muscle;
@@ -141,11 +172,6 @@ void give_tone(MPI_Comm comm, Job& job) {
   if (muscle.tone != 0) model::add_tone(muscle, part.point_row, part.owned_points, part.model);
 }
 
-/// Returns whether tension is to open incisions of a model that was built as a whole. On rank 0.
-bool opens_incisions(const Job& job) {
-  return job.initial_equilibrium && !std::ranges::all_of(job.cuts, &model::Cut::lips);
-}
-
 /// On rank 0.
 void set_bulk_modulus(const model::Model& whole, Job& job) {
   if (job.requested.bulk_modulus) return;
@@ -153,31 +179,23 @@ void set_bulk_modulus(const model::Model& whole, Job& job) {
   job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
 }
 
-/// Distributes a model that was built as a whole, with the cuts that its initial equilibrium finds.
+/// Distributes a model that was built as a whole, cut as its initial equilibrium leaves it.
 /// Collective.
 void distribute(MPI_Comm comm, Job& job, model::Model&& whole) {
-  base::on_root(comm, [&] {
-    cut_tissue(true, job, whole);
-    if (opens_incisions(job)) return;
-    cut_tissue(false, job, whole);
-    set_bulk_modulus(whole, job);
-  });
-  job.local_model = discrete::distribute_model(comm, std::move(whole));
-}
-
-/// Cuts the tissue as its initial equilibrium left it, so that its tension opens the cut.
-/// Collective.
-void make_incisions(MPI_Comm comm, Job& job) {
-  bool left = opens_incisions(job);
-  MPI_Bcast(&left, 1, MPI_C_BOOL, 0, comm);
-  if (!left) return;
-  model::Model whole = discrete::gather_model(comm, job.local_model);
+  base::on_root(comm, [&] { cut_tissue(true, job, whole); });
+  const bool opens = opens_incisions(comm, job);
+  if (opens) {
+    job.local_model = discrete::distribute_model(comm, std::move(whole));
+    bring_into_equilibrium(comm, job);
+    whole = discrete::gather_model(comm, job.local_model);
+    job.initial_equilibrium = false;
+  }
   base::on_root(comm, [&] {
     cut_tissue(false, job, whole);
     set_bulk_modulus(whole, job);
   });
   job.local_model = discrete::distribute_model(comm, std::move(whole));
-  job.initial_equilibrium = false;
+  bring_into_equilibrium(comm, job);
 }
 
 /// Broadcasts rank 0's flags and counts to all ranks.
@@ -200,8 +218,6 @@ Job read_job(MPI_Comm comm, const std::filesystem::path& input, const Watch& wat
   Job job;
   if (std::optional<model::Model> whole = read(comm, input, watch, changes, job))
     distribute(comm, job, std::move(*whole));
-  bring_into_equilibrium(comm, job);
-  make_incisions(comm, job);
   give_tone(comm, job);
   share(comm, job);
   return job;

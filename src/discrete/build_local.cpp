@@ -3,11 +3,11 @@
 
 #include "by_column.h"
 #include "distribution.h"
+#include "message.h"
 #include "rank_columns.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
-#include "repose/discrete/message.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/discrete/part.h"
 
@@ -148,34 +148,73 @@ std::vector<int64_t> own_points(const Distribution& distribution, int rank) {
   return rows;
 }
 
+/// Row of a prism of the piece in the whole model.
+int64_t row_of_prism(const RankColumns& rank_columns, int64_t row) {
+  const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
+  return row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
+}
+
 /// The whole model's rows in place of the piece's. `edge_row` [edges of the
 /// piece].
 void number_rows(const RankColumns& rank_columns, const PiecePoints& points,
                  const std::vector<int64_t>& edge_row, Part& part) {
-  const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
   part.point_row = pick(points.row, part.point_row);
-  for (int64_t& row : part.prism_row)
-    row = row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
+  for (int64_t& row : part.prism_row) row = row_of_prism(rank_columns, row);
   for (int64_t& row : part.edge_row) row = edge_row[row];
   part.total_springs = 0;
   part.total_prisms = (rank_columns.layers - 1) * rank_columns.triangles;
 }
 
-/// Rows of the piece's edges in the whole model, −1 of those of others.
+/// [C] Marks a rank's columns and those beside them: the piece has all elements at these.
+std::vector<char> surrounded_columns(const RankColumns& rank_columns, int rank) {
+  std::vector<char> surrounded(rank_columns.owner.size(), 0);
+  for (const Triangle& corner : rank_columns.piece.corner)
+    if (std::ranges::any_of(corner, [&](int64_t c) { return rank_columns.owner[c] == rank; }))
+      for (const int64_t c : corner) surrounded[c] = 1;
+  return surrounded;
+}
+
+/// Rows in the whole model of the piece's edges that begin in a surrounded column, −1 of others.
 /// Collective.
 ColumnRows rows_of_edges(MPI_Comm comm, int rank, const RankColumns& rank_columns,
                          const PiecePoints& points, const model::Model& model) {
-  std::vector<int64_t> mine, column;
+  const std::vector<char> surrounded = surrounded_columns(rank_columns, rank);
+  std::vector<int64_t> known, column;
+  std::vector<char> owned;
   for (size_t e = 0; e < model.edges.points.size(); ++e) {
     const int64_t first = model.edges.points[e][0];
-    if (rank_columns.owner[points.column[first]] != rank) continue;
-    mine.push_back(static_cast<int64_t>(e));
+    if (!surrounded[points.column[first]]) continue;
+    known.push_back(static_cast<int64_t>(e));
     column.push_back(list_column(rank_columns, points.row[first]));
+    owned.push_back(rank_columns.owner[points.column[first]] == rank);
   }
-  const ColumnRows rows = rows_by_column(comm, list_columns(rank_columns), column);
+  const ColumnRows rows = rows_by_column(comm, list_columns(rank_columns), column, owned);
   ColumnRows all{std::vector<int64_t>(model.edges.points.size(), -1), rows.total};
-  for (size_t k = 0; k < mine.size(); ++k) all.row[mine[k]] = rows.row[k];
+  for (size_t k = 0; k < known.size(); ++k) all.row[known[k]] = rows.row[k];
   return all;
+}
+
+/// Gives the edges and prisms of a piece without incisions what balances those of the whole model.
+/// Edges at the border of the piece keep their weights. Collective.
+void take_balance(MPI_Comm comm, const LocalModel& balanced, const RankColumns& rank_columns,
+                  const PiecePoints& points, model::Model& model) {
+  const model::ModelRows slabs = NaturalRows::of_model(comm, balanced);
+  const NaturalRows natural(comm, balanced.part);
+  std::vector<int64_t> prism_row, known, edge_row;
+  for (size_t m = 0; m < model.prisms.points.size(); ++m)
+    prism_row.push_back(row_of_prism(rank_columns, static_cast<int64_t>(m)));
+  model.prisms.target_volume =
+      natural.at_rows(prism_row, slabs.counts.prisms, slabs.prisms.target_volume);
+  const ColumnRows rows = rows_of_edges(comm, base::rank(comm), rank_columns, points, model);
+  for (size_t e = 0; e < rows.row.size(); ++e)
+    if (rows.row[e] >= 0) known.push_back(static_cast<int64_t>(e)), edge_row.push_back(rows.row[e]);
+  const std::vector<double> weight = natural.at_rows(edge_row, rows.total, slabs.edges.weight);
+  for (size_t k = 0; k < known.size(); ++k) model.edges.weight[known[k]] = weight[k];
+}
+
+/// Parts the lips, or makes all other cuts of the piece. Collective.
+void cut_piece(MPI_Comm comm, const RankColumns& rank_columns, bool lips, model::Model& model) {
+  base::collective_try(comm, [&] { model::make_cuts(rank_columns.cuts, lips, model); });
 }
 
 /// Rows of contact in the whole model. Collective.
@@ -183,7 +222,8 @@ void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& lo
   std::vector<int64_t> column;
   for (const int64_t point : local_model.part.model.contact.pairs.point)
     column.push_back(list_column(rank_columns, local_model.part.point_row[point]));
-  ColumnRows rows = rows_by_column(comm, list_columns(rank_columns), column);
+  ColumnRows rows =
+      rows_by_column(comm, list_columns(rank_columns), column, std::vector<char>(column.size(), 1));
   local_model.part.pair_row = std::move(rows.row);
   local_model.contact_pairs = rows.total;
 }
@@ -249,7 +289,8 @@ model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
 
 }  // namespace
 
-LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene) {
+LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene,
+                       const LocalModel* balanced) {
   static const PetscLogEvent event = base::log_event("RpPartition");
   const base::Logged logged(event);
   const int rank = base::rank(comm);
@@ -262,13 +303,13 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   const std::vector<int64_t> own = own_columns(rank_columns, rank);
   set_mean_moduli(comm, scene, rank_columns, own, model, local_model);
   remove_empty_terms(comm, model);
-  base::collective_try(comm, [&] {
-    for (const model::Cut& cut : rank_columns.cuts) model::cut_along(cut, model);
-  });
+  const PiecePoints piece_points = points_of(rank_columns);
+  cut_piece(comm, rank_columns, true, model);
+  if (balanced) take_balance(comm, *balanced, rank_columns, piece_points, model);
+  cut_piece(comm, rank_columns, false, model);
   Distribution distribution{model, {}, {}, {}, {}, {}, {}, {}};
   distribute_motion(distribution);
   distribute_contact(comm, model, distribution);
-  const PiecePoints piece_points = points_of(rank_columns);
   number_points(rank_columns, piece_points, distribution);
   const std::vector<int64_t> points = own_points(distribution, rank);
   LocalNumbers local(static_cast<int64_t>(distribution.owner.size()));

@@ -4,19 +4,23 @@
 
 namespace repose::discrete {
 
-ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column) {
-  std::vector<int64_t> own, count;
-  for (const int64_t c : column) {
+ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column,
+                          const std::vector<char>& owned) {
+  std::vector<int64_t> known, own, count;
+  for (size_t i = 0; i < column.size(); ++i) {
+    const int64_t c = column[i];
+    if (known.empty() || known.back() != c) known.push_back(c);
+    if (!owned[i]) continue;
     if (own.empty() || own.back() != c) own.push_back(c), count.push_back(0);
     ++count.back();
   }
   std::vector<int64_t> first = gather_by_column(comm, columns + 1, own, count);
   if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
-  // Every rank requests the first rows of its columns.
+  // Every rank requests the first rows of the columns that it knows.
   ColumnRows rows;
   std::vector<int64_t> begin;
   if (base::rank(comm) > 0) {
-    Sender(comm, 0)(own);
+    Sender(comm, 0)(known);
     Receiver(comm, 0)(begin, rows.total);
   } else {
     rows.total = first.back();
@@ -27,12 +31,12 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
       for (const int64_t c : theirs) answer.push_back(first[c]);
       Sender(comm, other)(answer, rows.total);
     }
-    for (const int64_t c : own) begin.push_back(first[c]);
+    for (const int64_t c : known) begin.push_back(first[c]);
   }
   size_t k = 0;
   int64_t next = 0;
   for (const int64_t c : column) {
-    if (own[k] != c) ++k, next = 0;
+    if (known[k] != c) ++k, next = 0;
     rows.row.push_back(begin[k] + next++);
   }
   return rows;

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "message.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/message.h"
 
 namespace repose::discrete {
 
@@ -15,9 +15,11 @@ struct ColumnRows {
   int64_t total = 0;
 };
 
-/// Returns the global rows of items of this rank's columns; `column` [items] is ascending. O(all
-/// columns) on rank 0. Collective.
-ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column);
+/// Returns the global rows of items; `column` [items] is ascending. The items of a column count on
+/// one rank, where they are `owned` [items], and may be known on others. O(all columns) on rank 0.
+/// Collective.
+ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column,
+                          const std::vector<char>& owned);
 
 /// [columns] on rank 0 the values of all ranks' own columns; collective.
 template <class Value>

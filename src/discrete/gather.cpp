@@ -1,7 +1,7 @@
 #include "repose/discrete/gather.h"
 
+#include "message.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/message.h"
 
 namespace repose::discrete {
 

@@ -1,4 +1,4 @@
-#include "repose/discrete/message.h"
+#include "message.h"
 
 #include <algorithm>
 

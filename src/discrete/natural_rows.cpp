@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "message.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/message.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
@@ -266,6 +266,13 @@ std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
   std::vector<Vec3> rows(part_.owned_points);
   scatter_rows(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
   return rows;
+}
+
+std::vector<double> NaturalRows::at_rows(const std::vector<int64_t>& rows, int64_t total,
+                                         const std::vector<double>& slab) const {
+  std::vector<double> values(rows.size());
+  scatter_rows({rows, total, 1}, values.data(), slab.data(), SCATTER_REVERSE);
+  return values;
 }
 
 void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& positions,

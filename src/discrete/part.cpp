@@ -6,13 +6,13 @@
 
 #include "countable.h"
 #include "distribution.h"
+#include "message.h"
 #include "partition.h"
 #include "pass_bodies.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
-#include "repose/discrete/message.h"
 
 namespace repose::discrete {
 

@@ -4,7 +4,7 @@
 #include <variant>
 #include <vector>
 
-#include "repose/discrete/message.h"
+#include "message.h"
 #include "repose/mechanics/rigid_body.h"
 
 /// Bodies on their way between ranks.

@@ -6,10 +6,10 @@
 #include <set>
 
 #include "countable.h"
+#include "message.h"
 #include "partition.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
-#include "repose/discrete/message.h"
 
 namespace repose::discrete {
 
@@ -54,7 +54,7 @@ ColumnGraph graph_of(const model::ColumnGeometry& geometry) {
 }
 
 /// The columns along cuts whose sides may meet, and those beside them, go to one rank.
-void keep_cuts_whole(const std::vector<model::Cut>& cuts, std::vector<int>& owner) {
+void keep_cuts_whole(std::span<const model::Cut> cuts, std::vector<int>& owner) {
   const auto first = std::ranges::find_if(cuts, &model::Cut::meets);
   if (first == cuts.end()) return;
   const int rank = owner[first->columns.front()];
@@ -112,7 +112,7 @@ class Distributor {
     rank_columns.spacing = spacing;
     rank_columns.moves = scene_.moves;
     rank_columns.doubled = geometry_.doubled();
-    rank_columns.cuts = geometry_.cuts();
+    rank_columns.cuts = {geometry_.cuts().begin(), geometry_.cuts().end()};
     for (model::Cut& cut : rank_columns.cuts)
       cut.meets = cut.meets && owner_[cut.columns.front()] == rank;
     return rank_columns;

@@ -24,7 +24,7 @@ BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
   contact.spacing = geometry.spacing();
   if (contact.pairs.point.empty()) contact.bodies.clear();
   built.held = geometry.held();
-  built.cuts = geometry.cuts();
+  built.cuts = {geometry.cuts().begin(), geometry.cuts().end()};
   built.report = geometry.report();
   std::erase_if(built.model.elements, [](const auto& elements) { return elements.size() == 0; });
   const std::string adhesion = remark_on_adhesion(scene, built.model);

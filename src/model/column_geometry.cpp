@@ -16,13 +16,6 @@
 
 namespace repose::model {
 
-std::string explain_central_build(const scene::Scene& scene, bool prestressed) {
-  if (!scene.tissue.material) return "its tissue is springs";
-  if (prestressed && !std::ranges::all_of(scene.incisions, &scene::Incision::parts_lips))
-    return "it has incisions that its tension opens";
-  return "";
-}
-
 struct ColumnGeometry::State {
   scene::Scene scene;
   std::vector<surface::Surface> bones;
@@ -31,6 +24,7 @@ struct ColumnGeometry::State {
   std::vector<AdheringJaw> jaws;
   std::vector<char> parted;  // [columns]
   int64_t layers;
+  size_t cuts = 0;  // that are in the model, the first of layout.cuts
   std::vector<DoubledColumn> doubled = {};
   std::vector<int64_t> doubled_points = {};  // [columns]
 
@@ -45,6 +39,7 @@ struct ColumnGeometry::State {
   Counts count() const;
   void require_free_cuts() const;
   void prepare_cuts();
+  void double_columns(size_t first_cuts);
 };
 
 /// Counts the points that the layers will have.
@@ -71,19 +66,28 @@ void ColumnGeometry::State::require_free_cuts() const {
 }
 
 void ColumnGeometry::State::prepare_cuts() {
-  const auto columns = static_cast<int64_t>(layout.rim.size());
   std::ranges::stable_partition(layout.cuts, &Cut::lips);
-  parted.assign(columns, 0);
-  doubled_points.assign(columns, 0);
-  int64_t first_row = columns * layers;
+  parted.assign(layout.rim.size(), 0);
   for (Cut& cut : layout.cuts) {
     add_skin_around(layout.mesh.points, layout.mesh.triangles, cut);
     for (const int64_t column : cut.columns) parted[column] = 1;
+  }
+  double_columns(layout.cuts.size());
+}
+
+void ColumnGeometry::State::double_columns(size_t first_cuts) {
+  const auto columns = static_cast<int64_t>(layout.rim.size());
+  cuts = first_cuts;
+  doubled.clear();
+  doubled_points.assign(columns, 0);
+  int64_t first_row = columns * layers;
+  for (size_t k = 0; k < cuts; ++k) {
+    const Cut& cut = layout.cuts[k];
     std::vector<int64_t> inner(cut.columns.begin() + 1, cut.columns.end() - 1);
     std::ranges::sort(inner);
     for (const int64_t column : inner) {
       const int64_t points = std::min<int64_t>(cut.layers, soft_points(column));
-      doubled.push_back({column, &cut - layout.cuts.data(), points, first_row});
+      doubled.push_back({column, static_cast<int64_t>(k), points, first_row});
       doubled_points[column] = points;
       first_row += points;
     }
@@ -118,7 +122,13 @@ ColumnGeometry::ColumnGeometry(ColumnGeometry&&) noexcept = default;
 const SkinMesh& ColumnGeometry::skin() const { return state_->layout.mesh; }
 int64_t ColumnGeometry::layers() const { return state_->layers; }
 const BuildReport& ColumnGeometry::report() const { return state_->layout.report; }
-const std::vector<Cut>& ColumnGeometry::cuts() const { return state_->layout.cuts; }
+std::span<const Cut> ColumnGeometry::cuts() const {
+  return std::span(state_->layout.cuts).first(state_->cuts);
+}
+void ColumnGeometry::include_incisions(bool included) {
+  const std::vector<Cut>& all = state_->layout.cuts;
+  state_->double_columns(included ? all.size() : std::ranges::count_if(all, &Cut::lips));
+}
 const std::vector<DoubledColumn>& ColumnGeometry::doubled() const { return state_->doubled; }
 int64_t ColumnGeometry::soft_points(int64_t column) const {
   return state_->soft_points(column) + state_->doubled_points[column];

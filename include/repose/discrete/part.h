@@ -62,7 +62,9 @@ LocalModel distribute_model(MPI_Comm comm, model::Model&& model);
 /// Builds the parts of a fully distributed model, equal to distribute() of the scene's model: rank
 /// 0, which alone has the `geometry`, gives every rank the columns that it owns and those around
 /// them, and the rank makes the model of these. `scene` is read on all ranks; its moves are rank
-/// 0's. Throws InputError. Collective.
-LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene);
+/// 0's. `balanced` is the same model without the incisions that its tension opens, in its initial
+/// equilibrium; null where there are none. Throws InputError. Collective.
+LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene,
+                       const LocalModel* balanced = nullptr);
 
 }  // namespace repose::discrete

@@ -2,6 +2,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -153,7 +154,9 @@ class ColumnGeometry {
   /// [instruments] rows of the points that each holds.
   std::vector<std::vector<int64_t>> held() const;
   /// The incisions, not made yet, in the order in which they are: those of lips first.
-  const std::vector<Cut>& cuts() const;
+  std::span<const Cut> cuts() const;
+  /// Leaves all incisions but those of lips out of the model, or takes them in again.
+  void include_incisions(bool included);
   /// The columns that they double, in the order of the doubles.
   const std::vector<DoubledColumn>& doubled() const;
 
@@ -161,10 +164,6 @@ class ColumnGeometry {
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// Returns the reason why a scene's model cannot be built column by column, or an empty text.
-/// `prestressed` means that an initial equilibrium precedes the incisions.
-std::string explain_central_build(const scene::Scene& scene, bool prestressed);
 
 /// Returns a remark that counts the points of a scene's model that adhere to teeth; empty of a
 /// scene without adhesion.

@@ -97,10 +97,14 @@ model::Model cut_whole(const model::Anatomy& anatomy) {
   return built.model;
 }
 
-discrete::LocalModel build_local(const model::Anatomy& anatomy) {
+discrete::LocalModel build_local(const model::Anatomy& anatomy, bool incisions = true,
+                                 const discrete::LocalModel* balanced = nullptr) {
   std::optional<model::ColumnGeometry> geometry;
-  base::on_root(comm, [&] { geometry.emplace(anatomy); });
-  return discrete::build_local(comm, geometry ? &*geometry : nullptr, anatomy.scene);
+  base::on_root(comm, [&] {
+    geometry.emplace(anatomy);
+    geometry->include_incisions(incisions);
+  });
+  return discrete::build_local(comm, geometry ? &*geometry : nullptr, anatomy.scene, balanced);
 }
 
 void expect_same(const std::vector<model::TermElements>& one,
@@ -364,6 +368,29 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   EXPECT_LE(largest_force(discrete::distribute(comm, whole)), 1e-10 * one.largest_force);
 }
 
+/// The tissue of a cut along the border of ranks, and of points that the rim holds beside it.
+TEST(Raise, parts_cut_in_equilibrium_are_those_of_the_whole) {
+  for (const bool sides_touch : {false, true})
+    for (const auto rim : {scene::Rim::free, scene::Rim::fixed}) {
+      model::Anatomy uncut = rich(squares());
+      uncut.scene.rim = rim;
+      model::Anatomy anatomy = cut(uncut, sides_touch);
+      anatomy.scene.incisions.front().name = "incisions[0]";  // the only one of few squares, too
+      const solve::ReferenceState as{0.05, Vec3(0, 0, -9.81)};
+      model::BuiltModel built = model::build_model(anatomy);
+      model::make_cuts(built.cuts, true, built.model);
+      solve::prestress(comm, built.model, as);
+      model::make_cuts(built.cuts, false, built.model);
+      discrete::LocalModel balanced = build_local(anatomy, false);
+      solve::prestress(comm, balanced, as);
+      const discrete::LocalModel local_model = build_local(anatomy, true, &balanced);
+      const Part part = discrete::distribute(comm, built.model);
+      expect_same(local_model.part, part);
+      expect_same_loads(local_model.part, part);
+      ASSERT_GT(part.total_points, balanced.part.total_points);
+    }
+}
+
 TEST(Raise, a_prestress_of_next_to_no_weight_is_balanced_to_rounding) {
   for (const auto dilatation : {scene::Dilatation::prism, scene::Dilatation::nodal}) {
     model::Anatomy anatomy = rich(12);
@@ -381,19 +408,6 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
   anatomy.scene.tissue.material->regions = {
       {scene::Region{scene::SphereRegion{{0, 0, 500}, 1}}, {0.05, 0.3}}};
   EXPECT_THROW(build_local(anatomy), base::InputError);
-}
-
-TEST(Raise, what_needs_more_than_columns_is_said) {
-  scene::Scene scene = jaws(4).scene;
-  EXPECT_EQ(model::explain_central_build(scene, true), "");
-  scene.tissue.material.reset();
-  EXPECT_EQ(model::explain_central_build(scene, false), "its tissue is springs");
-  scene = jaws(4).scene;
-  scene.incisions = {{{}, 4, "mouth"}};
-  EXPECT_EQ(model::explain_central_build(scene, true), "");
-  scene.incisions.push_back({{}, 4, "incisions[0]"});
-  EXPECT_EQ(model::explain_central_build(scene, false), "");
-  EXPECT_EQ(model::explain_central_build(scene, true), "it has incisions that its tension opens");
 }
 
 }  // namespace raise_test
