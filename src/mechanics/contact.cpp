@@ -118,36 +118,6 @@ std::vector<LinearGap> BodyContact::linear_gaps(std::span<const Vec3> position, 
   return gaps;
 }
 
-std::vector<Vec3> BodyContact::places(std::span<const Vec3> position) const {
-  std::vector<Vec3> places;
-  for (size_t c = 0; c < pairs_.point.size(); ++c)
-    places.push_back(bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]));
-  return places;
-}
-
-namespace {
-
-/// The direction from a body to a point within `reach` mm of it, in space; 0 farther away.
-Vec3 direction_within(double reach, const RigidBody& body, const Vec3& beside) {
-  const double bound = body.lower_bound(beside, reach);
-  if (bound >= reach) return Vec3::Zero();
-  const surface::Distance d = bound > 0 ? body.outside(beside) : body.distance(beside);
-  return d.value < reach ? d.gradient : Vec3::Zero();
-}
-
-}  // namespace
-
-bool BodyContact::changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const {
-  constexpr double pressing = 1, was_near = 6;  // mm
-  for (size_t c = 0; c < pairs_.point.size(); ++c) {
-    if (multiplier_[c] <= 0) continue;
-    const RigidBody& body = bodies_[pairs_.body[c]];
-    const Vec3 now = direction_within(pressing, body, body.beside(position[pairs_.point[c]]));
-    if (!now.isZero(0) && now.dot(direction_within(was_near, body, before[c])) < 0) return true;
-  }
-  return false;
-}
-
 namespace {
 
 /// Steps from a point to places where a body's other side may be nearest, mm.

@@ -17,10 +17,6 @@ namespace {
 constexpr double missed = 0.25;       // of the accuracy, by contact
 constexpr double contact_safety = 2;  // the estimate is so many times what is left
 constexpr double predicted_to = 0.1;  // mm
-// Bodies with rounded edges have one rest position where sharper ones catch single points on either
-// side: it decides the side.
-constexpr ContactSearch::PresolveStage to_rounded{true, 0.1, 0.05, 0.3},
-    to_exact{false, 0.1, 0.05, 0.1};
 
 double largest_of_ranks(MPI_Comm comm, double value) {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
@@ -110,7 +106,6 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   objective_.place_bodies();
-  if (places_.empty()) places_ = objective_.body_contact().places(positions.local());
   const discrete::Part& part = positions.part();
   std::vector<Vec3> travel(positions.local().size(), Vec3::Zero());
   for (size_t i = 0; i < travel.size(); ++i)
@@ -142,31 +137,49 @@ void ContactSearch::subtract_contact() {
   check(VecAXPY(slope_, 1.0, gradient_));
 }
 
-/// Searches on the augmented Lagrangian, each followed by new multipliers. A soft penalty lets
-/// points change sides a few at a time.
-Outcome ContactSearch::presolve(Vec displacement, double accuracy, const PresolveStage& to) {
-  constexpr int maximum = 5;
+/// Searches on the augmented Lagrangian to `to` mm, then moves the multipliers by no more than
+/// `left` mm of gaps. A soft penalty lets points change sides a few at a time. Collective.
+Outcome ContactSearch::search_softly(Vec displacement, double to, bool near, double& left) {
   constexpr double softened = 0.25;  // of the penalty's stiffness
-  Outcome outcome;
-  int64_t iterations = 0;
-  objective_.round_bodies(to.rounded);
   set_stiffness(softened * stiffness_);
-  for (int n = 0; n < maximum; ++n) {
-    const bool near = n > 0 || !to.rounded;
-    outcome =
-        minimizer_.presolve(displacement, std::max(near ? to.finer : to.rough, accuracy), near);
-    iterations += outcome.iterations;
-    if (outcome.stopped) break;
+  const Outcome outcome = minimizer_.presolve(displacement, to, near);
+  if (!outcome.stopped) {
     objective_.positions().update(displacement);
-    const double left = violation();
+    left = violation();
     move_multipliers();
-    if (left <= std::max(to.left, accuracy)) break;
-    tangent_.forget_contact();
   }
-  outcome.iterations = iterations;
-  objective_.round_bodies(false);
   set_stiffness(stiffness_);
   return outcome;
+}
+
+/// Repeats the soft search until the multipliers hardly move.
+Outcome ContactSearch::presolve(Vec displacement, double accuracy) {
+  constexpr int maximum = 5;
+  constexpr double small = 0.05;  // mm of gaps
+  Outcome outcome;
+  int64_t iterations = 0;
+  double left = 0;
+  for (int n = 0; n < maximum; ++n) {
+    outcome = search_softly(displacement, accuracy, true, left);
+    iterations += outcome.iterations;
+    if (outcome.stopped || left <= std::max(small, accuracy)) break;
+  }
+  outcome.iterations = iterations;
+  return outcome;
+}
+
+/// Finds the rest position among bodies with rounded edges, which catch fewer points on either
+/// side. It is found so finely that the sides do not depend on the way to it.
+ContactSearch::End ContactSearch::approach(Vec displacement, double accuracy, int64_t& iterations) {
+  constexpr double roughly = 0.1, finely = 0.004;  // mm
+  double left = 0;
+  objective_.round_bodies(true);
+  const Outcome near = search_softly(displacement, std::max(roughly, accuracy), false, left);
+  iterations += near.iterations;
+  const End end = near.stopped ? End::stopped : newton(displacement, finely, iterations);
+  objective_.round_bodies(false);
+  tangent_.forget_contact();
+  return end;
 }
 
 /// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
@@ -236,11 +249,13 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   return outcome;
 }
 
-/// True if a point is on another side of a body than before the first prediction. Collective.
-bool ContactSearch::gone_round(Vec displacement) {
+/// True if a point presses on a body near an edge of it. Collective.
+bool ContactSearch::presses_near_edge(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  int found = objective_.body_contact().changed_side(places_, positions.local());
+  mechanics::BodyContact& contact = objective_.body_contact();
+  contact.update_gaps(positions.local());
+  int found = !contact.other_sides(positions.local()).empty();
   MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, positions.comm());
   return found;
 }
@@ -285,26 +300,26 @@ double ContactSearch::energy(Vec displacement) {
   return value - objective_.weights().elastic * objective_.contact_value();
 }
 
-/// Searches for the rest position that the sharp bodies lead to from the prediction directly. Where
-/// it is another one, `displacement` becomes that of less energy, and `outcome` states the distance
-/// to the other.
+/// Searches for the rest position that quadratic programs lead to from the prediction, without
+/// rounded bodies. Where it is another one, `displacement` becomes that of less energy, and
+/// `outcome` states the distance to the other.
 void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& outcome) {
   const ContactPressures here = pressures();
-  const int64_t evaluated = objective_.evaluations();
   const double energy_here = energy(displacement);
   set_pressures(at_prediction_);
   int64_t iterations = 0;
-  const Outcome near =
-      presolve(start_, accuracy, {false, predicted_to, predicted_to, predicted_to});
   bool taken = false;
-  if (!near.stopped && newton(start_, accuracy, iterations) == End::reached) {
+  End end = newton(start_, accuracy, iterations);
+  if (end == End::failed && !presolve(start_, accuracy).stopped)
+    end = newton(start_, accuracy, iterations);
+  if (end == End::reached) {
     OtherRest other = compare_skins(displacement, displacements(start_));
     const bool is_less = energy(start_) < energy_here;
     const bool is_other = other.distance > 2 * accuracy;
     Outcome there;
     if (is_other && is_less) there = finish(start_, accuracy);
     taken = there.converged;
-    there.iterations += outcome.iterations + near.iterations + iterations;
+    there.iterations += outcome.iterations + iterations;
     if (taken) outcome = there;
     if (is_other && taken == is_less) {
       if (taken) other.displacement = displacements(displacement);
@@ -315,8 +330,6 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     check(VecCopy(start_, displacement));
   else
     set_pressures(here);
-  objective_.evaluate(displacement, gradient_);
-  evaluations_for_other_ += objective_.evaluations() - evaluated;
 }
 
 /// Searches from `displacement`, whose energy is `energy_here`, with one point beyond the other
@@ -327,7 +340,7 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
   // Of the work of the contact's force over the gap: after the program, which is not exact, and
   // after a further step.
   constexpr double promising = 0.4, still_promising = 0.1;
-  constexpr double rounding = 1e-6;  // of the energy
+  constexpr double rounding = 1e-5;  // of the energy
   check(VecCopy(displacement, start_));
   objective_.evaluate(start_, gradient_);
   subtract_contact();
@@ -351,15 +364,16 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
 }
 
 /// Lets points that press near an edge of a body go round it, one at a time, where that ends at
-/// less energy. The position that is left is the outcome's other one.
-void ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
+/// less energy. The position that is left is the outcome's other one. Returns whether there was
+/// one. Collective.
+bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_tried = 8;
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
-  const int64_t evaluated = objective_.evaluations();
   double energy_here = energy(displacement);
   const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
   size_t next = 0;
+  bool changed = false;
   for (int n = 0; n < max_tried; ++n) {
     const ContactPressures here = pressures();
     struct {
@@ -376,11 +390,22 @@ void ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
     if (there.converged) {
       take_other(displacement, accuracy, there, outcome);
       energy_here = energy(displacement);
+      changed = true;
     } else {
       set_pressures(here);
     }
-    if (end == End::stopped) break;
+    if (end == End::stopped) return false;
   }
+  return changed;
+}
+
+/// Searches for rest positions of less energy than that of `displacement`, which it then becomes.
+void ContactSearch::find_other(Vec displacement, double accuracy, Outcome& outcome) {
+  constexpr int max_passes = 3;  // after a change, points that were left before may follow
+  const int64_t evaluated = objective_.evaluations();
+  consider_other(displacement, accuracy, outcome);
+  for (int pass = 0; pass < max_passes; ++pass)
+    if (!change_sides(displacement, accuracy, outcome)) break;
   objective_.evaluate(displacement, gradient_);
   evaluations_for_other_ += objective_.evaluations() - evaluated;
 }
@@ -413,17 +438,16 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   stiffen(1);
   int64_t iterations = 0;
   double finer = accuracy;
-  const PresolveStage to_fine{false, accuracy, accuracy, to_exact.finer};
   int left = 0;  // saddles
   const auto leaves = [&] {
     tangent_.forget_contact();
     return left < max_left && leave_saddle(objective_, solver_, displacement) && ++left > 0;
   };
+  if (approach(displacement, accuracy, iterations) == End::stopped)
+    return stopped(displacement, outcome);
   for (int round = 0; round < max_rounds;) {
-    const auto stages =
-        round + left == 0 ? std::vector{to_rounded, to_exact} : std::vector{to_fine};
-    for (const PresolveStage& to : stages) {
-      const Outcome near = presolve(displacement, accuracy, to);
+    if (round + left > 0) {
+      const Outcome near = presolve(displacement, accuracy);
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
     }
@@ -440,10 +464,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
-  if (outcome.converged && may_have_other && gone_round(displacement)) {
-    consider_other(displacement, accuracy, outcome);
-    change_sides(displacement, accuracy, outcome);
-  }
+  if (outcome.converged && may_have_other && presses_near_edge(displacement))
+    find_other(displacement, accuracy, outcome);
   return outcome;
 }
 

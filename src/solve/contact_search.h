@@ -6,22 +6,17 @@
 namespace repose::solve {
 
 /// Finds the rest position of tissue that touches bodies and itself (docs/theory/contact.md): the
-/// step to a load is predicted with its contact by a quadratic program; quasi-Newton searches on
-/// the augmented Lagrangian with a soft penalty come near, first to bodies with rounded edges;
-/// sequential quadratic programs (Nocedal & Wright 2006, chapter 18) end it, multipliers included.
-/// Where these fail, both are repeated with a finer search and a stiffer penalty. The multipliers
-/// of a load are where the next begins. At load 1, where points have gone round an edge of a body,
-/// the sharp bodies are approached directly from the prediction, too: where this ends elsewhere,
-/// the rest position of less energy is taken, and the outcome states the distance of the other.
-/// Then single points are tried on the other side of the edge that they press near.
+/// step to a load is predicted with its contact by a quadratic program; a quasi-Newton search on
+/// the augmented Lagrangian with a soft penalty comes near to the rest position among bodies with
+/// rounded edges; sequential quadratic programs (Nocedal & Wright 2006, chapter 18) lead there, and
+/// on to the bodies themselves, multipliers included. Where these fail, they are repeated after
+/// finer soft searches, with a stiffer penalty. The multipliers of a load are where the next
+/// begins. At load 1, where points press near an edge of a body, quadratic programs start from the
+/// prediction, too: where this ends elsewhere, the rest position of less energy is taken, and the
+/// outcome states the distance of the other. Then single points are tried on the other side of the
+/// edge that they press near.
 class ContactSearch : public RestSearch {
  public:
-  struct PresolveStage {
-    bool rounded;         ///< edges of bodies (discrete::Objective::round_bodies)
-    double rough, finer;  ///< mm, to which the first search goes, and those near it
-    double left;          ///< mm of gaps, from where on the next stage leads
-  };
-
   /// `tangent` is the objective's Hessian, `solver` solves with it, `minimizer` minimizes
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
@@ -43,18 +38,21 @@ class ContactSearch : public RestSearch {
   double violation();
   void move_multipliers();
   void subtract_contact();
-  Outcome presolve(Vec displacement, double accuracy, const PresolveStage& to);
+  Outcome search_softly(Vec displacement, double to, bool near, double& left);
+  Outcome presolve(Vec displacement, double accuracy);
   enum class End { reached, failed, stopped };
+  End approach(Vec displacement, double accuracy, int64_t& iterations);
   End newton(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns the share of the step that was taken, 0 for none.
   double take_step(Vec displacement, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
-  bool gone_round(Vec displacement);
+  bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy, double energy_here);
-  void change_sides(Vec displacement, double accuracy, Outcome& outcome);
+  bool change_sides(Vec displacement, double accuracy, Outcome& outcome);
+  void find_other(Vec displacement, double accuracy, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
   std::vector<Vec3> displacements(Vec state);
@@ -72,7 +70,6 @@ class ContactSearch : public RestSearch {
   double taken_ = 0;                // mm, the full step that the latest newton() ended with, or 0
   bool predicted_ = false;          // the next search begins with a prediction
   ContactPressures at_prediction_;  // of the latest search
-  std::vector<Vec3> places_;        // [touches] of points beside bodies before the first prediction
   base::VecHandle gradient_, slope_, step_, trial_, start_;
 };
 

@@ -54,15 +54,27 @@ def skin(file):
 
 @real_head
 @pytest.mark.long
-@pytest.mark.parametrize("operation", ["le_fort", "genioplasty"])
+@pytest.mark.parametrize("operation", ["le_fort", "genioplasty", "split"])
 def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operation):
-    """The genioplasty has rest positions up to 0.5 mm apart: that of less energy is taken."""
+    """The genioplasty has rest positions up to 0.5 mm apart, the split up to 2 mm: that of less
+    energy is taken."""
     scene = f"real_head_{operation}"
     first = skin(solve(scene))[1]
     assert np.linalg.norm(first, axis=1).max() > 3
     for options, ranks in (((), 2), ((), 3), (("-load_steps", 2), 1)):
         other = skin(solve(scene, *options, ranks=ranks))[1]
         assert np.linalg.norm(other - first, axis=1).max() < 2 * ACCURACY
+
+
+def test_any_minimizer_ends_at_the_position_of_less_energy_and_reports_the_other(folder, environment):
+    """A point at the saw-cut edge of the maxilla rests on its front with 13.3308 N mm."""
+    run = runner(folder, environment)
+    for options, ranks in (((), 1), ((), 3), (("-tao_type", "ntr"), 1), (("-tao_type", "cg"), 1)):
+        done = run("repose-solve", "head_le_fort.yaml", "-output", "edge", *options, ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert last(folder / "edge.h5")["objective"] == pytest.approx(13.3233, abs=5e-4)
+        (distance, *_), = np.array(OTHER.findall(done.stdout), float)
+        assert distance == pytest.approx(0.27, abs=0.05)
 
 
 @real_head

@@ -85,11 +85,6 @@ class BodyContact {
   /// each point stays beside the place of its body that it was beside.
   void carry(std::span<const Vec3> position, std::span<const RigidBody> before,
              std::vector<LinearGap>& gaps) const;
-  /// [C] Where points are beside their bodies (RigidBody::beside).
-  std::vector<Vec3> places(std::span<const Vec3> position) const;
-  /// True if a point that presses on a body was within 6 mm of it at `before`, which places()
-  /// returned, on another side: the normals, in the body's axes, are more than 90° apart.
-  bool changed_side(std::span<const Vec3> before, std::span<const Vec3> position) const;
   /// Gaps to first order of points that press on a body near an edge of it, from the body's side
   /// round that edge: negative, at most 2 mm, from a plane more than 60° from the one pressed on.
   /// At most one a constraint. At the latest update.
