@@ -19,6 +19,11 @@ double sum(MPI_Comm comm, double mine) {
   return all;
 }
 
+double largest(MPI_Comm comm, double mine) {
+  MPI_Allreduce(MPI_IN_PLACE, &mine, 1, MPI_DOUBLE, MPI_MAX, comm);
+  return mine;
+}
+
 bool anywhere(MPI_Comm comm, bool here) {
   MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_C_BOOL, MPI_LOR, comm);
   return here;
@@ -101,6 +106,8 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
                                    positions.part().owned_prisms, positions.part().owned_edges,
                                    positions.part().owned_points)),
       averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
+      largest_bulk_(largest(positions.comm(),
+                            mechanics::largest_bulk(positions.part().model, loops_.prisms))),
       body_contact_(positions.part().model.contact.pairs, positions.part().model.contact.stiffness,
                     positions.part().bodies),
       other_body_contact_(rounded_touches(positions.comm(), positions.part())),
@@ -110,6 +117,10 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
       initial_(mechanics::totals(loops_, positions.part().model.points.position)),
       links_(find_links(loops_, cut_face_contact_)),
       work_(positions.local().size()) {}
+
+void Objective::limit_bulk(double max_bulk) {
+  mechanics::limit_bulk(positions_.part().model, max_bulk, loops_);
+}
 
 void Objective::round_bodies(bool rounded) {
   if (rounded == rounded_) return;

@@ -77,16 +77,24 @@ EdgeLoop make_edge_loop(const model::Model& part, int64_t owned, bool soft) {
   return loop;
 }
 
-/// The material of a solid's prisms, in the order of the loop.
-void add_material(const model::Prisms& prisms, PrismLoop& loop) {
+/// Sets the material of a solid's prisms, in the order of the loop.
+void set_material(const model::Prisms& prisms, PrismLoop& loop) {
+  loop.shear_modulus.clear();
+  loop.nodal_modulus.clear();
   for (size_t e = 0; e < loop.row.size(); ++e) {
     const int64_t row = loop.row[e];
     const double averaged = prisms.nodal_modulus.empty() ? 0 : prisms.nodal_modulus[row];
-    loop.compliance[e] /= prisms.modulus[row] - averaged;
+    loop.compliance[e] = loop.rest_volume[e] / (prisms.modulus[row] - averaged);
     loop.target_volume[e] = own_target_volume(prisms, row);
     loop.shear_modulus.push_back(prisms.shear_modulus[row]);
     if (averaged > 0) loop.nodal_modulus.push_back(averaged);
   }
+}
+
+/// λ of a prism, N/mm².
+double bulk_of(const model::Prisms& prisms, int64_t row) {
+  return prisms.nodal_modulus.empty() ? prisms.modulus[row] - prisms.shear_modulus[row]
+                                      : prisms.nodal_modulus[row];
 }
 
 PrismLoop make_prism_loop(const model::Model& part, int64_t owned, bool soft) {
@@ -105,11 +113,39 @@ PrismLoop make_prism_loop(const model::Model& part, int64_t owned, bool soft) {
   append(prisms.points, chosen, loop, add);
   loop.target_volume = loop.rest_volume;
   loop.compliance = loop.rest_volume;
-  if (model::is_solid(part)) add_material(prisms, loop);
+  if (model::is_solid(part)) set_material(prisms, loop);
   return loop;
 }
 
 }  // namespace
+
+void limit_bulk(const model::Model& part, double max_bulk, Loops& loops) {
+  const model::Prisms& prisms = part.prisms;
+  PrismLoop& loop = loops.prisms;
+  if (loop.shear_modulus.empty()) return;
+  set_material(prisms, loop);
+  for (size_t e = 0; e < loop.row.size(); ++e) {
+    const double maximum = max_bulk * loop.shear_modulus[e];
+    const double over = bulk_of(prisms, loop.row[e]) - maximum;
+    if (!(over > 0)) continue;
+    if (!loop.nodal_modulus.empty()) {
+      loop.nodal_modulus[e] = maximum;
+      continue;
+    }
+    const double v0 = loop.rest_volume[e], modulus = v0 / loop.compliance[e];
+    loop.compliance[e] = v0 / (modulus - over);
+    loop.target_volume[e] = v0 + (loop.target_volume[e] - v0) * modulus / (modulus - over);
+  }
+  if (!loops.nodal.empty()) loops.nodal.stiffness = nodal_stiffness(part, max_bulk);
+}
+
+double largest_bulk(const model::Model& part, const PrismLoop& loop) {
+  double largest = 0;
+  if (loop.shear_modulus.empty()) return largest;
+  for (const int64_t row : loop.row)
+    largest = std::max(largest, bulk_of(part.prisms, row) / part.prisms.shear_modulus[row]);
+  return largest;
+}
 
 Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_prisms,
                  int64_t owned_edges, int64_t owned_points) {

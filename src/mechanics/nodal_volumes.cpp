@@ -1,5 +1,6 @@
 #include "repose/mechanics/nodal_volumes.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "prism_stacks.h"
@@ -155,6 +156,17 @@ double own_target_volume(const model::Prisms& prisms, int64_t row) {
   return v0 + (target - v0) * modulus / (modulus - prisms.nodal_modulus[row]);
 }
 
+std::vector<double> nodal_stiffness(const model::Model& part, double max_bulk) {
+  const model::Prisms& prisms = part.prisms;
+  std::vector<double> result(part.points.position.size(), 0.0);  // the compliance first
+  for (size_t m = 0; m < prisms.points.size(); ++m) {
+    const double bulk = std::min(prisms.nodal_modulus[m], max_bulk * prisms.shear_modulus[m]);
+    for (const int64_t p : prisms.points[m]) result[p] += share * prisms.rest_volume[m] / bulk;
+  }
+  for (double& c : result) c = c > 0 ? 1 / c : 0;
+  return result;
+}
+
 NodalVolumes make_nodal_volumes(const model::Model& part, int64_t owned, int64_t owned_prisms) {
   const model::Prisms& prisms = part.prisms;
   NodalVolumes nodal;
@@ -174,11 +186,7 @@ NodalVolumes make_nodal_volumes(const model::Model& part, int64_t owned, int64_t
       add_prism(part, row, owned_prisms, nodal);
     }
   }
-  std::vector<double> compliance(part.points.position.size(), 0.0);
-  for (size_t m = 0; m < prisms.points.size(); ++m)
-    for (const int64_t p : prisms.points[m])
-      compliance[p] += share * prisms.rest_volume[m] / prisms.nodal_modulus[m];
-  for (const double c : compliance) nodal.stiffness.push_back(c > 0 ? 1 / c : 0);
+  nodal.stiffness = nodal_stiffness(part);
   nodal.counted = owned;
   return nodal;
 }

@@ -21,6 +21,31 @@ constexpr double trusted_miss = 0.5;  // of the predicted increment; beyond, a s
 constexpr double spring_stride = 5, solid_stride = 20;
 constexpr double max_steps = 1000;  // without halvings: a motion of kilometers is no longer path
 
+// λ/μ with which a step begins where volumes are stiffer, that of ν = 0.45, and by how much it
+// grows from one search to the next, each of which comes so near to rest, mm.
+constexpr double softest_bulk = 9, bulk_growth = 6, presolved_to = 0.1;
+constexpr double stiff_bulk = 30;  // ν = 0.484: below, softer volumes first save nothing
+
+/// Limits λ of a solid to `max_bulk` times μ as long as it lives.
+class BulkLimit {
+ public:
+  BulkLimit(discrete::Objective& objective, discrete::Tangent& tangent, double max_bulk)
+      : objective_(objective), tangent_(tangent) {
+    set(max_bulk);
+  }
+  ~BulkLimit() { set(std::numeric_limits<double>::infinity()); }
+  BulkLimit(const BulkLimit&) = delete;
+  BulkLimit& operator=(const BulkLimit&) = delete;
+
+ private:
+  void set(double max_bulk) {
+    objective_.limit_bulk(max_bulk);
+    tangent_.invalidate();
+  }
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+};
+
 /// A state whose energy overflows is none to write.
 void require_value(const Outcome& outcome, double load) {
   if (outcome.objective >= discrete::overflown) discrete::refuse_overflow("energies", load);
@@ -47,6 +72,7 @@ Halvings& Halvings::operator+=(const Halvings& more) {
 
 LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& settings)
     : objective_(problem.objective()),
+      tangent_(problem.tangent()),
       function_(problem.function()),
       predictor_(objective_, problem.elastic_solver()),
       search_(search),
@@ -74,16 +100,40 @@ int64_t LoadPath::inverted(Vec displacement) {
   return objective_.totals().inverted;
 }
 
+/// Whether volumes are so stiff that a step begins with softer ones.
+bool LoadPath::begins_softer() const {
+  return objective_.largest_bulk() > stiff_bulk && !objective_.positions().part().contact;
+}
+
+bool LoadPath::predict(Vec displacement, double load) {
+  if (const auto own = search_.predict(displacement, load, increment_)) return *own;
+  if (begins_softer()) {
+    const BulkLimit limit(objective_, tangent_, softest_bulk);
+    if (predictor_.predict(displacement, load, increment_)) return true;
+  }
+  return predictor_.predict(displacement, load, increment_);
+}
+
+/// Takes trial_ near the rest position of softer volumes, then of stiffer ones. A prediction
+/// changes volumes by the square of what it turns, which nearly incompressible tissue resists so
+/// much that a search goes back by many short steps.
+void LoadPath::presolve_softer() {
+  for (double bulk = softest_bulk; 2 * bulk < objective_.largest_bulk(); bulk *= bulk_growth) {
+    const BulkLimit limit(objective_, tangent_, bulk);
+    result_.iterations += search_.presolve(trial_, std::max(settings_.accuracy, presolved_to));
+  }
+}
+
 LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
   discrete::Positions& positions = objective_.positions();
   const int64_t folded_before = inverted(displacement), evaluated = function_.evaluations();
   Attempt attempt;
   attempt.before = search_.pressures();
-  const auto own = search_.predict(displacement, load, increment_);
-  const bool predicted = own ? *own : predictor_.predict(displacement, load, increment_);
+  const bool predicted = predict(displacement, load);
   check(VecCopy(displacement, trial_));
   if (predicted) check(VecAXPY(trial_, 1.0, increment_));
   positions.set_load(load);
+  if (begins_softer()) presolve_softer();
   attempt.outcome = search_.run(trial_, settings_.accuracy);
   attempt.evaluations = function_.evaluations() - evaluated;
   result_.iterations += attempt.outcome.iterations;

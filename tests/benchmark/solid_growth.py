@@ -3,7 +3,7 @@
 
     tests/benchmark/solid_growth.py [-bin build/bin] [-sizes 500,2500,12500,125000]
                                     [-methods lmvm,ntr] [-poissons 0.45,0.49] [-ranks 1]
-                                    [-contacts off,on] [-dilatation prism]
+                                    [-contacts off,on] [-dilatation prism,nodal]
                                     [-output docs/measurements/solid.md] [-mark growth]
     tests/benchmark/solid_growth.py -sizes 750000 -ranks 2 -stages on
 
@@ -72,7 +72,12 @@ def stage_rows_of(size, poisson, chosen):
 
 
 def rows_of(size, poisson, chosen):
-    text = SCENE.replace("POISSON", poisson).replace("DILATATION", chosen.dilatation)
+    for dilatation in chosen.dilatation.split(","):
+        yield from rows_of_dilatation(size, poisson, dilatation, chosen)
+
+
+def rows_of_dilatation(size, poisson, dilatation, chosen):
+    text = SCENE.replace("POISSON", poisson).replace("DILATATION", dilatation)
     with synthetic(chosen.bin, size, text.replace("CONTACT", "")) as folder:
         for contact in chosen.contacts.split(","):
             (folder / "scene.yaml").write_text(text.replace("CONTACT", CONTACT[contact]))
@@ -88,7 +93,8 @@ def rows_of(size, poisson, chosen):
                 apart = np.linalg.norm(position - first, axis=1).max()
                 message = f"{apart:.1g}" if solved.status == 0 else "NOT CONVERGED"
                 seconds = solved.stages["solve"][0]
-                name = method + ", contact" * (contact == "on")
+                name = (method + ", contact" * (contact == "on") + ", nodal" * (dilatation == "nodal")
+                        + f", {chosen.ranks} ranks" * (chosen.ranks > 1))
                 yield (f"| {unknowns} | {poisson} | {name} | {solved.evaluations[0]} | "
                        f"{solved.evaluations[1]} | {seconds:.2f} | {1e6 * seconds / unknowns:.0f} | "
                        f"{solved.memory:.0f} | {inverted} | {message} |")

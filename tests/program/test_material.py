@@ -143,6 +143,19 @@ def test_averaged_volumes_make_one_face_on_any_ranks(run, tmp_path):
     assert last(one)["smallest_eigenvalue"] > 0
 
 
+@pytest.mark.parametrize("dilatation", ["prism", "nodal"])
+def test_nearly_incompressible_tissue_begins_with_softer_volumes(run, tmp_path, dilatation):
+    tissue = f"  material: {{poisson: 0.499, dilatation: {dilatation}}}"
+    text = scene(tissue, JAW_OPENS, "contact: {bones: off, cuts: off}")
+    faces = []
+    for ranks in 1, 3:
+        file = solve(run, tmp_path, "stiff", text, "-accuracy", 0.01, ranks=ranks)[0]
+        faces.append(last(file))
+        assert faces[-1]["evaluations"] <= 300  # from the linear prediction with λ itself: above 1000
+    assert run("repose-check", "stiff.h5").returncode == 0
+    assert apart(*faces) <= 2 * 0.01
+
+
 def test_a_region_painted_on_the_skin(run, tmp_path):
     file = solve(run, tmp_path, "plain", scene(head="paper"), "-accuracy", 0.1)[0]
     model = model_of(file)

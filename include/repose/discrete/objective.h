@@ -53,6 +53,10 @@ class Objective : public Function {
   double potential() const;  ///< W, N·mm
 
   const mechanics::Weights& weights() const { return weights_; }
+  /// Limits λ of a solid to `max_bulk` times μ (mechanics::limit_bulk), or no more where it is
+  /// infinite. A Hessian is to be invalidated then. Not collective.
+  void limit_bulk(double max_bulk);
+  double largest_bulk() const { return largest_bulk_; }  ///< λ/μ of all ranks; 0 of springs
   void set_volume_weight(double weight) { weights_.volume_weight = weight; }
   const mechanics::Loops& loops() const { return loops_; }
   bool averages_volumes() const { return averages_volumes_; }  ///< on some rank
@@ -67,6 +71,7 @@ class Objective : public Function {
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool averages_volumes_;
+  double largest_bulk_;
   mechanics::BodyContact body_contact_, other_body_contact_;  // those in use, and the others
   bool rounded_ = false;                                      // bodies in use are
   mechanics::CutFaceContact cut_face_contact_;

@@ -67,6 +67,14 @@ Loops make_loops(const model::Model& part, int64_t owned_springs, int64_t owned_
 
 using model::VolumeTerm;
 
+/// Gives the soft-tissue prisms of a solid the λ of `part`, but at most `max_bulk` times μ. What
+/// they press with at their rest volumes does not change. Infinity takes the limit back, bit by
+/// bit.
+void limit_bulk(const model::Model& part, double max_bulk, Loops& loops);
+
+/// Returns the largest λ/μ of the soft-tissue prisms of a solid; 0 where there are none.
+double largest_bulk(const model::Model& part, const PrismLoop& loop);
+
 /// An objective: Φ = elastic (f_e + W) + volume term, the latter but for `none` a quadratic of each
 /// prism's v − t with t its target volume:
 ///     paper     weight (t − v)²             (docs/theory/model.md Eq. 10, weight = 1 − λ)

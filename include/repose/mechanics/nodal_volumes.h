@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -54,6 +55,12 @@ struct NodalVolumes {
 /// Returns the volume that the part of a prism's energy that is not averaged draws it to, mm³: one
 /// with the same pressure at rest.
 double own_target_volume(const model::Prisms& prisms, int64_t row);
+
+/// Returns the stiffness of each point against a change of its averaged volume, N/mm⁵, where λ of
+/// the prisms is at most `max_bulk` times μ: [P], right where all prisms around a point are in the
+/// part.
+std::vector<double> nodal_stiffness(const model::Model& part,
+                                    double max_bulk = std::numeric_limits<double>::infinity());
 
 /// Returns the averaged volumes of `part`, whose first `owned` points and `owned_prisms` prisms are
 /// counted here. A point's C is right where all prisms around it are in the part.

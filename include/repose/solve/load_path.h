@@ -86,6 +86,9 @@ class LoadPath {
   bool ends_in_automatic_steps() const;
   int64_t inverted(Vec displacement);
   Attempt attempt(Vec displacement, double load);
+  bool predict(Vec displacement, double load);
+  bool begins_softer() const;
+  void presolve_softer();
   bool follows(const Attempt& now, const std::optional<Attempt>& coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
   void follow(Vec displacement, double longest, double end, const OnStep& on_step);
@@ -98,6 +101,7 @@ class LoadPath {
   void explain_failure();
 
   discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
   const discrete::Function& function_;
   Predictor predictor_;
   RestSearch& search_;

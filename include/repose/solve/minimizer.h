@@ -42,7 +42,10 @@ class Minimizer : public RestSearch {
   /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
   /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
   /// `near`: the search begins where the last one ended, but for contact.
-  Outcome presolve(Vec displacement, double distance, bool near = false);
+  Outcome presolve(Vec displacement, double distance, bool near);
+  int64_t presolve(Vec displacement, double distance) override {
+    return presolve(displacement, distance, false).iterations;
+  }
 
   /// Estimates the distance to the rest position and ends the search by Newton steps, where these
   /// are short enough; no search of TAO's. `taken`, mm: the full Newton step that led here, or 0.

@@ -211,6 +211,53 @@ TEST(AveragedVolumes, DoNotDependOnHowPrismsAreStacked) {
   EXPECT_NEAR(nodal_energy(one.nodal, x), nodal_energy(other.nodal, x), 1e-12 * a.value);
 }
 
+/// The model whose λ is at most `max_bulk` times μ, with the same pressures at rest volumes.
+model::Model with_less_bulk(model::Model model, double max_bulk) {
+  model::Prisms& prisms = model.prisms;
+  const bool averaged = !prisms.nodal_modulus.empty();
+  for (size_t m = 0; m < prisms.points.size(); ++m) {
+    const double before = prisms.modulus[m], shear = prisms.shear_modulus[m];
+    const double bulk = averaged ? prisms.nodal_modulus[m] : before - shear;
+    const double v0 = prisms.rest_volume[m], less = std::min(bulk, max_bulk * shear);
+    prisms.modulus[m] += less - bulk;
+    if (averaged) prisms.nodal_modulus[m] = less;
+    prisms.target_volume[m] = v0 + (prisms.target_volume[m] - v0) * before / prisms.modulus[m];
+  }
+  return model;
+}
+
+TEST(LimitedBulk, IsThatOfASofterModelAndIsTakenBackBitByBit) {
+  const auto loops_of = [](const model::Model& model) {
+    return make_loops(model, 0, static_cast<int64_t>(model.prisms.points.size()),
+                      static_cast<int64_t>(model.edges.points.size()),
+                      static_cast<int64_t>(model.points.position.size()));
+  };
+  for (const model::Model& model : {test::uneven_solid(), test::averaged_solid()}) {
+    const auto x = test::positions(model, test::State::stretched);
+    const Loops before = loops_of(model);
+    const double largest = largest_bulk(model, before.prisms), limit = 0.4 * largest;
+    Loops loops = before;
+    limit_bulk(model, limit, loops);
+    const Loops softer = loops_of(with_less_bulk(model, limit));
+    EXPECT_NEAR(largest_bulk(with_less_bulk(model, limit), softer.prisms), limit, 1e-12 * limit);
+    const auto a = test::evaluate(loops, solid_weights, x);
+    const auto b = test::evaluate(softer, solid_weights, x);
+    EXPECT_LE((a.gradient - b.gradient).norm(), 1e-12 * b.gradient.norm());
+    EXPECT_GT((test::evaluate(before, solid_weights, x).gradient - b.gradient).norm(),
+              1e-3 * b.gradient.norm());
+    EXPECT_EQ(loops.prisms.nodal_modulus.size(), softer.prisms.nodal_modulus.size());
+    limit_bulk(model, std::numeric_limits<double>::infinity(), loops);
+    EXPECT_EQ(loops.prisms.compliance, before.prisms.compliance);
+    EXPECT_EQ(loops.prisms.target_volume, before.prisms.target_volume);
+    EXPECT_EQ(loops.prisms.nodal_modulus, before.prisms.nodal_modulus);
+    EXPECT_EQ(loops.prisms.shear_modulus, before.prisms.shear_modulus);
+    EXPECT_EQ(loops.nodal.stiffness, before.nodal.stiffness);
+  }
+  Loops none = make_loops({}, 0, 0);
+  EXPECT_EQ(largest_bulk({}, none.prisms), 0);
+  limit_bulk({}, 1, none);
+}
+
 TEST_F(SolidBlock, LimitedSlopesMakeTheHessianSemidefinite) {
   for (const auto& info : test::all_states) {
     if (info.state == test::State::far || info.state == test::State::nearly_coincident) continue;
