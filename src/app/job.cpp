@@ -23,16 +23,10 @@ using Watch = std::function<void(double)>;
 /// Share of reading, completing and cutting surfaces in the time of building.
 constexpr double share_of_surfaces = 0.6;
 
-/// A model or its column geometry, from an anatomy.
-template <class Made>
-Made make(model::Anatomy& anatomy, const std::filesystem::path& input) {
+model::ColumnGeometry lay_out(model::Anatomy& anatomy, const std::filesystem::path& input) {
   try {
-    return model::build_on_solvable_skin(anatomy, [](const model::Anatomy& on) {
-      if constexpr (std::is_same_v<Made, model::ColumnGeometry>)
-        return model::ColumnGeometry(on);
-      else
-        return model::build_model(on);
-    });
+    return model::build_on_solvable_skin(
+        anatomy, [](const model::Anatomy& on) { return model::ColumnGeometry(on); });
   } catch (const model::RefusedPlaces& refused) {
     const std::string file = input.stem().string() + "_refused.ply";
     surface::write_ply(file, refused.places());
@@ -47,16 +41,6 @@ void read_scene(const scene::Scene& scene, Job& job) {
   job.requested = scene.solve;
   job.reference_state = reference_state_of(scene);
   job.initial_equilibrium = job.reference_state.has_value();
-}
-
-/// On rank 0.
-model::Model build(const std::filesystem::path& input, Job& job) {
-  model::BuiltModel built = make<model::BuiltModel>(*job.anatomy, input);
-  job.held = std::move(built.held);
-  job.cuts = std::move(built.cuts);
-  job.building = describe_build(built.report);
-  job.warnings = std::move(built.report.warnings);
-  return std::move(built.model);
 }
 
 /// Brings the tissue of a distributed model into its initial equilibrium. Collective.
@@ -77,17 +61,18 @@ bool opens_incisions(MPI_Comm comm, const Job& job) {
   return opens;
 }
 
-/// Takes over what the builder says of a model that every rank made its part of. On rank 0.
+/// Takes over what the builder says of a model. On rank 0.
 void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
+  const scene::Scene& scene = job.anatomy->scene;
   model::BuildReport report = geometry.report();
-  const std::string adhesion =
-      model::remark_on_adhesion(job.anatomy->scene, job.local_model.global_metadata);
+  const std::string adhesion = model::remark_on_adhesion(scene, job.local_model.global_metadata);
   if (!adhesion.empty()) report.remarks.push_back(adhesion);
-  job.held = geometry.held();
   report.effective_modulus = job.local_model.effective_modulus;
   job.building = describe_build(report);
   if (ranks > 1)
-    job.building += report_row("built", fmt::format("by {} ranks, each its part", ranks));
+    job.building +=
+        report_row("built", scene.tissue.material ? fmt::format("by {} ranks, each its part", ranks)
+                                                  : "by rank 0, whole: its tissue is springs");
   job.warnings = std::move(report.warnings);
 }
 
@@ -101,23 +86,57 @@ std::string describe_cuts(const model::ColumnGeometry& geometry, size_t first) {
   return text;
 }
 
-/// Every rank makes its part. Incisions that tension opens are made in a second one, by what
+/// On rank 0.
+void set_bulk_modulus(const model::Model& whole, Job& job) {
+  if (job.requested.bulk_modulus) return;
+  const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
+  job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
+}
+
+/// Springs are built whole by rank 0, which reads the geometry; `balanced` as in
+/// discrete::build_local(). Collective.
+discrete::LocalModel build_springs(MPI_Comm comm, const model::ColumnGeometry* geometry,
+                                   const discrete::LocalModel* balanced, Job& job) {
+  model::Model whole;
+  double effective_modulus = 0;
+  if (balanced) whole = discrete::gather_model(comm, *balanced);
+  base::on_root(comm, [&] {
+    if (!balanced) {
+      model::BuiltModel built = geometry->build_whole();
+      whole = std::move(built.model);
+      effective_modulus = built.report.effective_modulus;
+    }
+    for (const model::Cut& cut : geometry->cuts())
+      if (!balanced || !cut.lips) model::cut_along(cut, whole);
+    if (geometry->cuts().size() == job.cuts.size()) set_bulk_modulus(whole, job);
+  });
+  discrete::LocalModel local_model = discrete::distribute_model(comm, std::move(whole));
+  local_model.effective_modulus = effective_modulus;
+  return local_model;
+}
+
+/// Builds a scene's model. Incisions that tension opens are made in a second build, by what
 /// balances the first. Collective.
-void build_local(MPI_Comm comm, const std::filesystem::path& input,
-                 const scene::SceneChanges& changes, Job& job) {
+void build(MPI_Comm comm, const std::filesystem::path& input, const scene::SceneChanges& changes,
+           Job& job) {
   std::optional<model::ColumnGeometry> geometry;  // on rank 0
   base::on_root(comm, [&] {
-    geometry.emplace(make<model::ColumnGeometry>(*job.anatomy, input));
+    geometry.emplace(lay_out(*job.anatomy, input));
+    job.held = geometry->held();
     job.cuts = {geometry->cuts().begin(), geometry->cuts().end()};
   });
   scene::Scene scene;
   base::collective_try(comm, [&] {
     scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
   });
-  const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
+  const auto build_model = [&](const discrete::LocalModel* balanced) {
+    const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
+    return scene.tissue.material ? discrete::build_local(comm, columns, scene, balanced)
+                                 : build_springs(comm, columns, balanced, job);
+  };
   const bool opens = opens_incisions(comm, job);
   if (geometry) geometry->include_incisions(!opens);
-  job.local_model = discrete::build_local(comm, columns, scene);
+  job.local_model = build_model(nullptr);
   base::on_root(comm, [&] {
     take_report(*geometry, base::size(comm), job);
     job.building += describe_cuts(*geometry, 0);
@@ -126,41 +145,31 @@ void build_local(MPI_Comm comm, const std::filesystem::path& input,
   if (!opens) return;
   const size_t lips = geometry ? geometry->cuts().size() : 0;
   if (geometry) geometry->include_incisions(true);
-  job.local_model = discrete::build_local(comm, columns, scene, &job.local_model);
+  job.local_model = build_model(&job.local_model);
   if (geometry) job.building += describe_cuts(*geometry, lips);
   job.initial_equilibrium = false;
 }
 
-/// Returns the whole model on rank 0, unless every rank made its part. Collective.
-std::optional<model::Model> read(MPI_Comm comm, const std::filesystem::path& input,
-                                 const Watch& watch, const scene::SceneChanges& changes, Job& job) {
-  model::Model whole;
-  bool distributed = false;
-  const bool shared = base::size(comm) > 1;
+/// Collective.
+void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
+          const scene::SceneChanges& changes, Job& job) {
+  model::Model stored;
   base::on_root(comm, [&] {
-    if (results::is_hdf5(input)) {
-      whole = results::read_model(input);
-      job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
+    if (!results::is_hdf5(input)) {
+      read_scene(scene::read_scene(input, changes), job);
+      if (watch) watch(share_of_surfaces);
       return;
     }
-    read_scene(scene::read_scene(input, changes), job);
-    if (watch) watch(share_of_surfaces);
-    distributed = job.anatomy->scene.tissue.material.has_value();
-    if (distributed) return;
-    whole = build(input, job);
-    if (shared) job.building += report_row("built", "by rank 0, whole: its tissue is springs");
+    stored = results::read_model(input);
+    job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
+    set_bulk_modulus(stored, job);
   });
-  MPI_Bcast(&distributed, 1, MPI_C_BOOL, 0, comm);
-  if (!distributed) return whole;
-  build_local(comm, input, changes, job);
-  return {};
-}
-
-/// Parts the lips, or makes all other cuts. On rank 0.
-void cut_tissue(bool lips, Job& job, model::Model& whole) {
-  const std::vector<int64_t> doubled = model::make_cuts(job.cuts, lips, whole);
-  for (size_t i = 0; i < doubled.size(); ++i)
-    if (doubled[i] >= 0) job.building += describe_cut(job.cuts[i], doubled[i]);
+  bool is_scene = job.anatomy.has_value();
+  MPI_Bcast(&is_scene, 1, MPI_C_BOOL, 0, comm);
+  if (is_scene)
+    build(comm, input, changes, job);
+  else
+    job.local_model = discrete::distribute_model(comm, std::move(stored));
 }
 
 /// After the initial equilibrium, which would balance the tone again. Collective.
@@ -170,32 +179,6 @@ void give_tone(MPI_Comm comm, Job& job) {
   MPI_Bcast(&muscle, sizeof muscle, MPI_BYTE, 0, comm);
   discrete::Part& part = job.local_model.part;
   if (muscle.tone != 0) model::add_tone(muscle, part.point_row, part.owned_points, part.model);
-}
-
-/// On rank 0.
-void set_bulk_modulus(const model::Model& whole, Job& job) {
-  if (job.requested.bulk_modulus) return;
-  const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
-  job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
-}
-
-/// Distributes a model that was built as a whole, cut as its initial equilibrium leaves it.
-/// Collective.
-void distribute(MPI_Comm comm, Job& job, model::Model&& whole) {
-  base::on_root(comm, [&] { cut_tissue(true, job, whole); });
-  const bool opens = opens_incisions(comm, job);
-  if (opens) {
-    job.local_model = discrete::distribute_model(comm, std::move(whole));
-    bring_into_equilibrium(comm, job);
-    whole = discrete::gather_model(comm, job.local_model);
-    job.initial_equilibrium = false;
-  }
-  base::on_root(comm, [&] {
-    cut_tissue(false, job, whole);
-    set_bulk_modulus(whole, job);
-  });
-  job.local_model = discrete::distribute_model(comm, std::move(whole));
-  bring_into_equilibrium(comm, job);
 }
 
 /// Broadcasts rank 0's flags and counts to all ranks.
@@ -216,8 +199,7 @@ void share(MPI_Comm comm, Job& job) {
 Job read_job(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
              const scene::SceneChanges& changes) {
   Job job;
-  if (std::optional<model::Model> whole = read(comm, input, watch, changes, job))
-    distribute(comm, job, std::move(*whole));
+  read(comm, input, watch, changes, job);
   give_tone(comm, job);
   share(comm, job);
   return job;

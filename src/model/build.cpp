@@ -1,7 +1,5 @@
 #include "repose/model/build.h"
 
-#include <numeric>
-
 #include "column_layout.h"
 #include "repose/anatomy/complete.h"
 #include "repose/base/log.h"
@@ -12,25 +10,7 @@ namespace repose::model {
 
 BuiltModel build_model(const scene::Scene& scene, const surface::Surface& skin,
                        const std::vector<surface::Surface>& bones) {
-  const ColumnGeometry geometry(scene, skin, bones);
-  BuiltModel built;
-  std::vector<int64_t> columns(geometry.skin().points.size()), found;
-  std::iota(columns.begin(), columns.end(), 0);
-  built.model = build_local(scene, bones, geometry.piece(columns), found);
-  require_regions(found, scene.file.string());
-  Contact& contact = built.model.contact;
-  const std::vector<ColumnSums> sums = column_sums(built.model, geometry.layers());
-  contact.stiffness = contact_stiffness(scene, sums);
-  contact.spacing = geometry.spacing();
-  if (contact.pairs.point.empty()) contact.bodies.clear();
-  built.held = geometry.held();
-  built.cuts = {geometry.cuts().begin(), geometry.cuts().end()};
-  built.report = geometry.report();
-  std::erase_if(built.model.elements, [](const auto& elements) { return elements.size() == 0; });
-  const std::string adhesion = remark_on_adhesion(scene, built.model);
-  if (!adhesion.empty()) built.report.remarks.push_back(adhesion);
-  built.report.effective_modulus = effective_modulus(sums);
-  return built;
+  return ColumnGeometry(scene, skin, bones).build_whole();
 }
 
 Anatomy load_anatomy(const scene::Scene& scene) {
@@ -53,11 +33,7 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   return anatomy;
 }
 
-BuiltModel build_model(const Anatomy& anatomy) {
-  BuiltModel built = build_model(anatomy.scene, anatomy.skin, anatomy.bones);
-  prepend_messages(anatomy, built.report);
-  return built;
-}
+BuiltModel build_model(const Anatomy& anatomy) { return ColumnGeometry(anatomy).build_whole(); }
 
 BuiltModel build_model(const scene::Scene& scene) {
   Anatomy anatomy = load_anatomy(scene);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numeric>
 
 #include "add_adhesion.h"
 #include "add_contact.h"
@@ -258,6 +259,28 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
   if (!piece.jaws.empty()) add_adhesion(*scene.anatomy, bones, piece, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
+}
+
+BuiltModel ColumnGeometry::build_whole() const {
+  const scene::Scene& scene = state_->scene;
+  BuiltModel built;
+  std::vector<int64_t> columns(skin().points.size()), found;
+  std::iota(columns.begin(), columns.end(), 0);
+  built.model = build_local(scene, state_->bones, piece(columns), found);
+  require_regions(found, scene.file.string());
+  Contact& contact = built.model.contact;
+  const std::vector<ColumnSums> sums = column_sums(built.model, layers());
+  contact.stiffness = contact_stiffness(scene, sums);
+  contact.spacing = spacing();
+  if (contact.pairs.point.empty()) contact.bodies.clear();
+  built.held = held();
+  built.cuts = {cuts().begin(), cuts().end()};
+  built.report = report();
+  std::erase_if(built.model.elements, [](const auto& elements) { return elements.size() == 0; });
+  const std::string adhesion = remark_on_adhesion(scene, built.model);
+  if (!adhesion.empty()) built.report.remarks.push_back(adhesion);
+  built.report.effective_modulus = effective_modulus(sums);
+  return built;
 }
 
 }  // namespace repose::model

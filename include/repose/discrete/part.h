@@ -52,7 +52,7 @@ struct LocalModel {
   model::Counts counts;          ///< of the whole model, on all ranks
   int64_t contact_pairs = 0;     ///< rows of contact of the whole model
   std::vector<Vec3> outward;     ///< [this rank's slab of points] outward_normals()
-  double effective_modulus = 0;  ///< N/mm², on rank 0, of a model that build_local() made
+  double effective_modulus = 0;  ///< N/mm², on rank 0, of a scene's model
 };
 
 /// Distributes a model (read on rank 0 only) as distribute() does, and frees it. Contact's pairs of

@@ -150,6 +150,8 @@ class ColumnGeometry {
   /// The model, with its cuts made, without its points, prisms and edges: skin, bones, bodies, the
   /// grid of contact.
   Model global_metadata() const;
+  /// The model of all columns, without its cuts. Serial.
+  BuiltModel build_whole() const;
   const BuildReport& report() const;
   /// [instruments] rows of the points that each holds.
   std::vector<std::vector<int64_t>> held() const;
