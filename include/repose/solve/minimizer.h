@@ -43,7 +43,7 @@ class Minimizer : public RestSearch {
   /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
   /// `near`: the search begins where the last one ended, but for contact.
   Outcome presolve(Vec displacement, double distance, bool near);
-  int64_t presolve(Vec displacement, double distance) override {
+  int64_t presolve_within(Vec displacement, double distance) override {
     return presolve(displacement, distance, false).iterations;
   }
 

@@ -63,7 +63,7 @@ class RestSearch {
   virtual Outcome run(Vec displacement, double accuracy) = 0;
   /// Comes within about `distance` mm of rest, for another search to continue from there. Returns
   /// the iterations. Collective.
-  virtual int64_t presolve(Vec /*displacement*/, double /*distance*/) { return 0; }
+  virtual int64_t presolve_within(Vec /*displacement*/, double /*distance*/) { return 0; }
   /// Searches from a `displacement` that is near to rest. Collective.
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
