@@ -12,6 +12,16 @@ namespace {
 using base::Range;
 using enum KeyKind;
 
+/// A key whose value is one of some words.
+Key one_of(const std::string& path, const char* standard, std::vector<std::string> words,
+           const char* sentence) {
+  return {.path = path,
+          .kind = choice,
+          .standard = standard,
+          .sentence = sentence,
+          .choices = std::move(words)};
+}
+
 /// The keys of a surface taken from a volume, below `above`.
 std::vector<Key> volume_keys(const std::string& above) {
   return {{above + ".volume", volume, "",
@@ -26,11 +36,8 @@ std::vector<Key> volume_keys(const std::string& above) {
            Range::between(1, 100000)},
           {above + ".box", numbers, "",
            "Lowest x, y, z and highest: the rest of the volume is left out.", "mm"},
-          {.path = above + ".border",
-           .kind = choice,
-           .standard = "closed",
-           .sentence = "How the surface ends at the border of the volume or box: capped, or open.",
-           .choices = {"closed", "open"}},
+          one_of(above + ".border", "closed", {"closed", "open"},
+                 "How the surface ends at the border of the volume or box: capped, or open."),
           {above + ".voxel", number, "",
            "Average the volume to voxels this large first, for fewer triangles.", "mm",
            Range::above(0)},
@@ -41,9 +48,9 @@ std::vector<Key> volume_keys(const std::string& above) {
 }
 
 std::vector<Key> surface_keys() {
-  std::vector<Key> rows{{"skin", mesh, "required",
-                         "Triangle mesh of the skin, open or closed, or what volume to take it "
-                         "from."}};
+  std::vector<Key> rows{
+      {"skin", mesh, "required",
+       "Triangle mesh of the skin, open or closed, or what volume to take it from."}};
   const std::vector<Key> of_skin = volume_keys("skin"), of_bone = volume_keys("bones[]");
   rows.insert(rows.end(), of_skin.begin(), of_skin.end());
   rows.push_back(
@@ -58,25 +65,15 @@ std::vector<Key> surface_keys() {
 
 /// Keys of the attachment of tissue to bone.
 std::vector<Key> attach_keys() {
-  return {{.path = "tissue.released",
-           .kind = choice,
-           .standard = "contact",
-           .sentence = "What such tissue does then: as attach.",
-           .choices = {"fixed", "slide", "contact", "free"}},
-          {.path = "tissue.attach",
-           .kind = choice,
-           .standard = "fixed",
-           .sentence = "What tissue that ends at bone does: move with it, slide along it at its "
-                       "distance, touch it "
-                       "(lift off, never pass), or ignore it.",
-           .choices = {"fixed", "slide", "contact", "free"}},
+  return {one_of("tissue.released", "contact", {"fixed", "slide", "contact", "free"},
+                 "What such tissue does then: as attach."),
+          one_of("tissue.attach", "fixed", {"fixed", "slide", "contact", "free"},
+                 "What tissue that ends at bone does: move with it, slide along it at its "
+                 "distance, touch it (lift off, never pass), or ignore it."),
           {"tissue.attach_regions", list, "",
            "Where tissue that ends at bone does otherwise; later ones beat earlier ones."},
-          {.path = "tissue.attach_regions[].attach",
-           .kind = choice,
-           .standard = "required",
-           .sentence = "As tissue.attach.",
-           .choices = {"fixed", "slide", "contact", "free"}},
+          one_of("tissue.attach_regions[].attach", "required",
+                 {"fixed", "slide", "contact", "free"}, "As tissue.attach."),
           {"tissue.attach_regions[].gap", number, "0",
            "How far short of bone tissue ends there, at most a third of its thickness; not with "
            "fixed or slide.",
@@ -89,22 +86,21 @@ std::vector<Key> tissue_keys() {
       {"tissue.layers", integer, "required", "Point layers, skin and deepest included.", "",
        Range::between(2, 64)},
       {"tissue.depths", numbers, "",
-       "Where each layer lies, as fractions of the skin–bone distance: "
-       "one per layer, from 0 to 1, increasing; evenly spaced when not given.",
+       "Where each layer lies, as fractions of the skin–bone distance: one per layer, from 0 to 1, "
+       "increasing; evenly spaced when not given.",
        "", Range::between(0, 1)},
       {"tissue.depths_mm", numbers, "",
        "How deep the upper layers lie below the skin, 0 first, at most one per layer, increasing; "
-       "the others are spread evenly below. Excludes depths. Where tissue is too thin for "
-       "them, layers are spread evenly.",
+       "the others are spread evenly below. Excludes depths. Where tissue is too thin for them, "
+       "layers are spread evenly.",
        "mm", Range::at_least(0)},
       {.path = "tissue.edge",
        .kind = number,
        .standard = "",
        .sentence =
            "Edge length of the mesh that is solved in place of the given skin: its outside over "
-           "the "
-           "bones that move, remeshed; auto: a seventieth of the head; given: the given skin is "
-           "solved or refused. Unset: the given skin where it can be solved, else auto.",
+           "the bones that move, remeshed; auto: a seventieth of the head; given: the given skin "
+           "is solved or refused. Unset: the given skin where it can be solved, else auto.",
        .unit = "mm",
        .range = Range::between(1, 20),
        .choices = {"auto", "given"}},
@@ -152,34 +148,27 @@ std::vector<Key> region_keys(const std::string& item) {
 }
 
 std::vector<Key> contact_keys() {
-  return {
-      {"contact", map, "", "Tissue against bones and itself; without it as for a material."},
-      {.path = "contact.bones",
-       .kind = choice,
-       .standard = "on",
-       .sentence = "Free tissue stays out of bones, if it began outside; on for a material, off "
-                   "for springs.",
-       .choices = {"on", "off"}},
-      {.path = "contact.cuts",
-       .kind = choice,
-       .standard = "on",
-       .sentence = "The sides of incisions and of the mouth do not pass each other.",
-       .choices = {"on", "off"}},
-      {"contact.grid", number, "",
-       "Spacing of the grids from which distances to meshes are read, which round edges of bones "
-       "by a fifth of it; when not given half the thickness of thin bone near the tissue, 0.5 to "
-       "0.6 mm, and 0.5 mm where bone is cut.",
-       "mm", Range::between(0.1, 10)},
-      {"contact.stiffness", number, "",
-       "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",
-       Range::between(1e-9, 1e9)},
-      {"teeth", list, "",
-       "Regions where mucosa slides on teeth; an alias of tissue.attach_regions with attach: "
-       "slide."},
-      {"mouth", map, "", "Parts the lips, through all layers, so that they open and meet."},
-      {"mouth.path", curve, "required",
-       "From one corner of the mouth to the other: points near the skin, or a file of them."},
-      {"mouth.path[]", vector, "", "One of the points.", "mm"}};
+  return {{"contact", map, "", "Tissue against bones and itself; without it as for a material."},
+          one_of("contact.bones", "on", {"on", "off"},
+                 "Free tissue stays out of bones, if it began outside; on for a material, off for "
+                 "springs."),
+          one_of("contact.cuts", "on", {"on", "off"},
+                 "The sides of incisions and of the mouth do not pass each other."),
+          {"contact.grid", number, "",
+           "Spacing of the grids from which distances to meshes are read, which round edges of "
+           "bones by a fifth of it; when not given half the thickness of thin bone near the "
+           "tissue, 0.5 to 0.6 mm, and 0.5 mm where bone is cut.",
+           "mm", Range::between(0.1, 10)},
+          {"contact.stiffness", number, "",
+           "Of the penalty that multipliers make exact; by the tissue when not given.", "N/mm³",
+           Range::between(1e-9, 1e9)},
+          {"teeth", list, "",
+           "Regions where mucosa slides on teeth; an alias of tissue.attach_regions with attach: "
+           "slide."},
+          {"mouth", map, "", "Parts the lips, through all layers, so that they open and meet."},
+          {"mouth.path", curve, "required",
+           "From one corner of the mouth to the other: points near the skin, or a file of them."},
+          {"mouth.path[]", vector, "", "One of the points.", "mm"}};
 }
 
 /// Young's modulus and Poisson's ratio, below `above`.
@@ -222,11 +211,8 @@ std::vector<Key> material_keys() {
       {"tissue.material", map, "",
        "The tissue as a neo-Hookean solid; excludes springs. The default, with the preset face, "
        "where neither is given."},
-      {.path = "tissue.material.law",
-       .kind = choice,
-       .standard = "neo_hookean",
-       .sentence = "The law, of which there is one.",
-       .choices = {"neo_hookean"}},
+      one_of("tissue.material.law", "neo_hookean", {"neo_hookean"},
+             "The law, of which there is one."),
       {.path = "tissue.material.preset",
        .kind = choice,
        .standard = "face",
@@ -236,13 +222,9 @@ std::vector<Key> material_keys() {
        Range::between(1e-9, 1e9)},
       {"tissue.material.poisson", number, "", "Poisson's ratio below all strata.", "",
        Range::between(-0.9, 0.4999)},
-      {.path = "tissue.material.dilatation",
-       .kind = choice,
-       .standard = "prism",
-       .sentence =
-           "Changes of volume are resisted prism by prism, or averaged over the prisms around each "
-           "point, for tissue that is nearly incompressible.",
-       .choices = {"prism", "nodal"}},
+      one_of("tissue.material.dilatation", "prism", {"prism", "nodal"},
+             "Changes of volume are resisted prism by prism, or averaged over the prisms around "
+             "each point, for tissue that is nearly incompressible."),
       {"tissue.material.skin", map, "", "The outermost stratum; the preset's when not given."},
       {"tissue.material.skin.thickness", number, "required", "Its thickness.", "mm",
        Range::above(0)},
@@ -264,15 +246,12 @@ std::vector<Key> spring_keys() {
   return {
       {"tissue.springs", map, "",
        "The tissue as the paper's springs; excludes material. Rules by set: default, layer, "
-       "connecting, diagonal, or one of them with "
-       "its "
-       "number (\"layer 0\" is the skin, \"connecting 0\" joins layers 0 and 1). What a rule "
-       "leaves "
-       "out comes from the more general one."},
+       "connecting, diagonal, or one of them with its number (\"layer 0\" is the skin, "
+       "\"connecting 0\" joins layers 0 and 1). What a rule leaves out comes from the more general "
+       "one."},
       {"tissue.springs.isotropic", map, "",
        "In place of rules: moduli of the sets that resemble an isotropic solid, linear springs, "
-       "and "
-       "the bulk modulus of the volume term that goes with them."},
+       "and the bulk modulus of the volume term that goes with them."},
       {"tissue.springs.isotropic.young", number, "required", "Its Young's modulus.", "N/mm²",
        Range::between(1e-9, 1e9)},
       {"tissue.springs.isotropic.poisson", number, "required", "Its Poisson's ratio.", "",
@@ -281,11 +260,8 @@ std::vector<Key> spring_keys() {
        Range::above(0)},
       {"tissue.springs.*.modulus", number, "",
        "Modulus Y, from which k0 = Y · v / r_0²; excludes stiffness.", "N/mm²", Range::above(0)},
-      {.path = "tissue.springs.*.law",
-       .kind = choice,
-       .standard = "",
-       .sentence = "Spring law: T = k0 (1 + σ²)^p s with p = 0, 1, 2.",
-       .choices = {"linear", "quadratic", "quartic"}},
+      one_of("tissue.springs.*.law", "", {"linear", "quadratic", "quartic"},
+             "Spring law: T = k0 (1 + σ²)^p s with p = 0, 1, 2."),
       {.path = "tissue.springs.*.reference",
        .kind = number,
        .standard = "",
@@ -303,12 +279,9 @@ std::vector<Key> load_keys() {
            "gravity.",
            "N/kg"},
           {"boundary", map, "", "What holds the skin where it ends."},
-          {.path = "boundary.rim",
-           .kind = choice,
-           .standard = "auto",
-           .sentence = "The outermost border of an open skin; auto: fixed over bone that "
-                       "does not move, free elsewhere.",
-           .choices = {"fixed", "free", "auto"}},
+          one_of("boundary.rim", "auto", {"fixed", "free", "auto"},
+                 "The outermost border of an open skin; auto: fixed over bone that does not move, "
+                 "free elsewhere."),
           {"forces", list, "", "External forces on the skin."},
           {"forces[].at", vector, "required", "Where, on or near the skin.", "mm"},
           {"forces[].radius", number, "required", "Spread over the skin points within, by area.",
@@ -341,44 +314,44 @@ std::vector<Key> clinical_keys() {
   const auto angle = [&](const char* name, const char* sentence) {
     return Key{above + "." + name, number, "0", sentence, "degrees", Range::between(-45, 45)};
   };
-  return {{above, map, "",
-           "Form: a move in the words of surgery, in the axes of the head; rotations are about the "
-           "pivot and made first."},
-          length("advance", "Forward."),
-          length("set_back", "Backward."),
-          length("impaction", "Upward."),
-          length("lower", "Downward."),
-          length("left", "To the patient's left."),
-          angle("yaw", "The front turns to the patient's left."),
-          angle("roll", "The patient's left side goes up, which corrects a cant."),
-          angle("pitch", "The front goes down."),
-          angle("open", "As pitch, about the hinge axis through the condyles."),
-          length("overjet",
-                 "Target: upper incisors this far in front of the lower; excludes "
-                 "advance and set_back."),
-          length("overbite",
-                 "Target: upper incisors this far below the edge of the lower; excludes "
-                 "impaction and lower."),
-          {above + ".pivot", place, "",
-           "Point of the axes of yaw, roll and pitch; by default the incisors of the jaw, or "
-           "pogonion of a chin."}};
+  return {
+      {above, map, "",
+       "Form: a move in the words of surgery, in the axes of the head; rotations are about the "
+       "pivot and made first."},
+      length("advance", "Forward."),
+      length("set_back", "Backward."),
+      length("impaction", "Upward."),
+      length("lower", "Downward."),
+      length("left", "To the patient's left."),
+      angle("yaw", "The front turns to the patient's left."),
+      angle("roll", "The patient's left side goes up, which corrects a cant."),
+      angle("pitch", "The front goes down."),
+      angle("open", "As pitch, about the hinge axis through the condyles."),
+      length(
+          "overjet",
+          "Target: upper incisors this far in front of the lower; excludes advance and set_back."),
+      length("overbite",
+             "Target: upper incisors this far below the edge of the lower; excludes impaction and "
+             "lower."),
+      {above + ".pivot", place, "",
+       "Point of the axes of yaw, roll and pitch; by default the incisors of the jaw, or pogonion "
+       "of a chin."}};
 }
 
 std::vector<Key> move_keys() {
-  std::vector<Key> rows{{"moves", list, "",
-                         "Rigid motions of bones. Each entry has one form, or a list of that "
-                         "form's values applied in "
-                         "order; several entries of one bone apply in the order of the file."},
-                        {"moves[].bone", texts, "required",
-                         "The name of a bone or a piece, or several, which all make the move."}};
+  std::vector<Key> rows{
+      {"moves", list, "",
+       "Rigid motions of bones. Each entry has one form, or a list of that form's values applied "
+       "in order; several entries of one bone apply in the order of the file."},
+      {"moves[].bone", texts, "required",
+       "The name of a bone or a piece, or several, which all make the move."}};
   const std::vector<Key> forms = form_keys("moves[]"), listed = form_keys("moves[].transform[]");
   rows.insert(rows.end(), forms.begin(), forms.end());
   const std::vector<Key> clinical = clinical_keys();
   rows.insert(rows.end(), clinical.begin(), clinical.end());
-  rows.push_back(
-      {"moves[].transform", transform, "",
-       "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four rows "
-       "of four numbers, or a list of forms."});
+  rows.push_back({"moves[].transform", transform, "",
+                  "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four "
+                  "rows of four numbers, or a list of forms."});
   rows.push_back({"moves[].transform[]", transform, "",
                   "One form of such a list: a file, a matrix, or one of those below."});
   rows.insert(rows.end(), listed.begin(), listed.end());
@@ -402,29 +375,23 @@ std::vector<Key> plan_keys() {
 std::vector<Key> solve_keys() {
   return {
       {"solve", map, "", "How the rest position is found."},
-      {.path = "solve.functional",
-       .kind = choice,
-       .standard = "energy",
-       .sentence = "What is minimized.",
-       .choices = {"energy", "force"}},
+      one_of("solve.functional", "energy", {"energy", "force"}, "What is minimized."),
       {"solve.volume", map, "", "How the tissue keeps its volume."},
       {.path = "solve.volume.form",
        .kind = choice,
        .standard = "",
-       .sentence =
-           "Form of the volume term; when not given penalty, and none with functional force, which "
-           "takes none or paper only.",
+       .sentence = "Form of the volume term; when not given penalty, and none with functional "
+                   "force, which takes none or paper only.",
        .choices = {"none", "paper", "penalty"},
-       .removed =
-           {{"exact",
-             "for tissue that keeps its volume remove the volume term and solve a solid with "
-             "tissue.material {poisson: 0.499, dilatation: nodal}, or give penalty"}}},
+       .removed = {{"exact",
+                    "for tissue that keeps its volume remove the volume term and solve a solid "
+                    "with tissue.material {poisson: 0.499, dilatation: nodal}, or give penalty"}}},
       {"solve.volume.bulk_modulus", number, "",
        "Bulk modulus κ of the penalty; when not given by poisson.", "N/mm²",
        Range{.min = 0, .max = 1e9, .min_excluded = true}},
       {"solve.volume.poisson", number, "0.45",
-       "Poisson's ratio that springs, whose own is 1/4, are to have by the penalty; "
-       "bulk_modulus overrides it.",
+       "Poisson's ratio that springs, whose own is 1/4, are to have by the penalty; bulk_modulus "
+       "overrides it.",
        "", Range::between(0.25, 0.4999)},
       {"solve.lambda", number, "0.5", "Weight λ of the volume form paper; no other form uses it.",
        "", Range{.min = 0, .max = 1, .min_excluded = true}},
@@ -439,44 +406,34 @@ std::vector<Key> solve_keys() {
 }
 
 std::vector<Key> anatomy_keys() {
-  return {
-      {"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
-      {"anatomy.landmarks", file, "required",
-       "Landmarks under their standard names: .mrk.json, .fcsv, .csv or JSON; moves may name "
-       "them."},
-      {.path = "anatomy.lips",
-       .kind = choice,
-       .standard = "parted",
-       .sentence =
-           "Lips are parted along their crease, between the corners of the mouth, or joined "
-           "as in the scan; the key mouth overrides it.",
-       .choices = {"parted", "joined"}},
-      {.path = "anatomy.vestibule",
-       .kind = choice,
-       .standard = "on",
-       .sentence = "Lips and cheeks in front of the teeth, from sulcus to sulcus, touch bone and "
-                   "are not attached to it; tissue.attach_regions override it.",
-       .choices = {"on", "off"}},
-      {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
-       Range::between(0, 10)},
-      {"anatomy.lower_gap", number, "",
-       "The gap in front of the lower teeth; unset, half of the overjet, at least gap and at most "
-       "4 mm.",
-       "mm", Range::between(0, 10)},
-      {"anatomy.adhesion", number, "0.0005",
-       "Largest tension with which lips adhere to the teeth of their own jaw: reached 2 mm farther "
-       "from them than at the start, gone at 6 mm.",
-       "N/mm²", Range::between(0, 1)},
-      {"anatomy.tone", number, "0.004",
-       "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
-       "between "
-       "the lips, balanced as the head is recorded.",
-       "N/mm²", Range::between(0, 1)},
-      {"anatomy.septum", number, "",
-       "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal spine "
-       "to "
-       "pronasale to nasion; tissue.material.regions override it.",
-       "N/mm²", Range::between(1e-9, 1e9)}};
+  return {{"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
+          {"anatomy.landmarks", file, "required",
+           "Landmarks under their standard names: .mrk.json, .fcsv, .csv or JSON; moves may name "
+           "them."},
+          one_of("anatomy.lips", "parted", {"parted", "joined"},
+                 "Lips are parted along their crease, between the corners of the mouth, or joined "
+                 "as in the scan; the key mouth overrides it."),
+          one_of("anatomy.vestibule", "on", {"on", "off"},
+                 "Lips and cheeks in front of the teeth, from sulcus to sulcus, touch bone and are "
+                 "not attached to it; tissue.attach_regions override it."),
+          {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
+           Range::between(0, 10)},
+          {"anatomy.lower_gap", number, "",
+           "The gap in front of the lower teeth; unset, half of the overjet, at least gap and at "
+           "most 4 mm.",
+           "mm", Range::between(0, 10)},
+          {"anatomy.adhesion", number, "0.0005",
+           "Largest tension with which lips adhere to the teeth of their own jaw: reached 2 mm "
+           "farther from them than at the start, gone at 6 mm.",
+           "N/mm²", Range::between(0, 1)},
+          {"anatomy.tone", number, "0.004",
+           "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
+           "between the lips, balanced as the head is recorded.",
+           "N/mm²", Range::between(0, 1)},
+          {"anatomy.septum", number, "",
+           "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal "
+           "spine to pronasale to nasion; tissue.material.regions override it.",
+           "N/mm²", Range::between(1e-9, 1e9)}};
 }
 
 std::vector<Key> osteotomy_keys() {
@@ -487,11 +444,8 @@ std::vector<Key> osteotomy_keys() {
       {"osteotomies[].bone", text, "required",
        "The bone, or an earlier piece, that is cut; what is left keeps its name."},
       {"osteotomies[].piece", text, "required", "Name of the piece, from here on a bone."},
-      {.path = "osteotomies[].template",
-       .kind = choice,
-       .standard = "",
-       .sentence = "In place of planes or a surface, cuts that the landmarks of anatomy place.",
-       .choices = {"le_fort_1", "sagittal_split", "genioplasty"}},
+      one_of("osteotomies[].template", "", {"le_fort_1", "sagittal_split", "genioplasty"},
+             "In place of planes or a surface, cuts that the landmarks of anatomy place."),
       {"osteotomies[].level", number, "",
        "With template: distance of the plane above the nasal spine (le_fort_1, default 5) or below "
        "point B (genioplasty, default 4).",
@@ -512,29 +466,23 @@ std::vector<Key> osteotomy_keys() {
 }
 
 std::vector<Key> collision_keys() {
-  return {{"collision", map, "", "What is done about bones that touch on their way."},
-          {.path = "collision.mode",
-           .kind = choice,
-           .standard = "report",
-           .sentence =
-               "report: say so; stop: refuse the scene; clamp: move as far as there is no contact.",
-           .choices = {"report", "stop", "clamp"}},
-          {"collision.clearance", number, "0", "Distance to be kept between bones.", "mm",
-           Range::between(0, 50)},
-          {"collision.tolerance", number, "0.05",
-           "How much sooner than at contact a clamped motion may end.", "mm",
-           Range::between(1e-4, 10)}};
+  return {
+      {"collision", map, "", "What is done about bones that touch on their way."},
+      one_of("collision.mode", "report", {"report", "stop", "clamp"},
+             "report: say so; stop: refuse the scene; clamp: move as far as there is no contact."),
+      {"collision.clearance", number, "0", "Distance to be kept between bones.", "mm",
+       Range::between(0, 50)},
+      {"collision.tolerance", number, "0.05",
+       "How much sooner than at contact a clamped motion may end.", "mm",
+       Range::between(1e-4, 10)}};
 }
 
 std::vector<Key> instrument_keys() {
   return {{"instruments", list, "",
            "Bodies pushed into the skin: each has one shape, where it is before the push."},
           {"instruments[].push", vector, "required", "How far and where to.", "mm"},
-          {.path = "instruments[].skin",
-           .kind = choice,
-           .standard = "stick",
-           .sentence = "What the skin does on it: stick, or slide without friction.",
-           .choices = {"stick", "slide"}},
+          one_of("instruments[].skin", "stick", {"stick", "slide"},
+                 "What the skin does on it: stick, or slide without friction."),
           {"instruments[].sphere", map, "", "Shape: a ball."},
           {"instruments[].sphere.center", vector, "required", "Its center.", "mm"},
           {"instruments[].sphere.radius", number, "required", "Its radius.", "mm", Range::above(0)},
