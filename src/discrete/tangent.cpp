@@ -170,22 +170,17 @@ base::MatHandle Tangent::nodal_coupling() const {
 
 void Tangent::visit_spd_blocks(const BlockVisitor& visit) const {
   std::vector<Mat3> diagonal(at_.size(), Mat3::Zero());  // summed first: most blocks are there
+  const auto join = [&](const auto& ends, const Mat3& block) {
+    for (const int32_t p : ends) diagonal[p] += block;
+    visit(ends[0], ends[1], -block);
+  };
   for (const mechanics::SpringLoop& loop : objective_.loops().springs)
-    mechanics::for_each_spring_block(loop, at_, objective_.weights().elastic,
-                                     Curvature::semidefinite, [&](int64_t e, const Mat3& block) {
-                                       const auto [p, q] = loop.points[e];
-                                       diagonal[p] += block;
-                                       diagonal[q] += block;
-                                       visit(p, q, -block);
-                                     });
+    mechanics::for_each_spring_block(
+        loop, at_, objective_.weights().elastic, Curvature::semidefinite,
+        [&](int64_t e, const Mat3& block) { join(loop.points[e], block); });
   const mechanics::EdgeLoop& edges = objective_.loops().edges;
-  for (int64_t e = 0; e < edges.size(); ++e) {
-    const auto [p, q] = edges.points[e];
-    const Mat3 block = objective_.weights().elastic * edges.weight[e] * Mat3::Identity();
-    diagonal[p] += block;
-    diagonal[q] += block;
-    visit(p, q, -block);
-  }
+  for (int64_t e = 0; e < edges.size(); ++e)
+    join(edges.points[e], objective_.weights().elastic * edges.weight[e] * Mat3::Identity());
   const mechanics::PrismLoop& prisms = objective_.loops().prisms;
   mechanics::for_each_prism_block(
       objective_.loops(), at_, objective_.weights(),

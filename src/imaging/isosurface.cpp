@@ -83,11 +83,13 @@ class Marching {
     const uint8_t* inside = &slice.inside[at(0, row)];
     for (int64_t i = 0; i + 1 < columns_; ++i)
       if (inside[i] != inside[i + 1])
-        slice.vertex[0][at(i, row)] = add(slice, at(i, row), slice, at(i + 1, row), 0, i, row, k);
+        slice.vertex[0][at(i, row)] =
+            add(slice.values[at(i, row)], slice.values[at(i + 1, row)], 0, {i, row, k});
     if (row + 1 == rows_) return;
     for (int64_t i = 0; i < columns_; ++i)
       if (inside[i] != inside[i + columns_])
-        slice.vertex[1][at(i, row)] = add(slice, at(i, row), slice, at(i, row + 1), 1, i, row, k);
+        slice.vertex[1][at(i, row)] =
+            add(slice.values[at(i, row)], slice.values[at(i, row + 1)], 1, {i, row, k});
   }
 
   /// Vertices between the slices k and k + 1.
@@ -96,19 +98,18 @@ class Marching {
       for (int64_t i = 0; i < columns_; ++i) {
         const int64_t here = at(i, row);
         if (lower_.inside[here] != upper_.inside[here])
-          lower_.vertex[2][here] = add(lower_, here, upper_, here, 2, i, row, k);
+          lower_.vertex[2][here] = add(lower_.values[here], upper_.values[here], 2, {i, row, k});
       }
   }
 
-  /// A vertex on the edge along `axis` from grid point (column, row, k), margin included.
-  int64_t add(const Slice& from, int64_t a, const Slice& to, int64_t b, int axis, int64_t column,
-              int64_t row, int64_t k) {
-    const double low = from.values[a], high = to.values[b];
+  /// A vertex on the edge along `axis` from a grid point (column, row, slice), margin included,
+  /// between values.
+  int64_t add(double low, double high, int axis, const std::array<int64_t, 3>& from) {
     double share = (level_ - low) / (high - low);
     if (std::isinf(low)) share = 1;
     if (std::isinf(high)) share = 0;
-    Vec3 index(static_cast<double>(column - margin_), static_cast<double>(row - margin_),
-               static_cast<double>(k));
+    Vec3 index(static_cast<double>(from[0] - margin_), static_cast<double>(from[1] - margin_),
+               static_cast<double>(from[2]));
     index[axis] += std::clamp(share, nearest_to_end, 1 - nearest_to_end);
     surface_.points.push_back(volume_.origin + volume_.axes * index);
     return static_cast<int64_t>(surface_.points.size()) - 1;

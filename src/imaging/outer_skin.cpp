@@ -28,35 +28,41 @@ struct Cones {
   Surface all, ends, openings;
 };
 
-Cones cones_of(const Surface& surface, double passes) {
+struct BorderLoop {
+  double length = 0;        // mm
+  Vec3 sum = Vec3::Zero();  // mm², of the middles of its sides, by their lengths
+  std::vector<std::array<Vec3, 2>> sides;
+};
+
+/// Loops of border edges by one of their vertices.
+std::map<int64_t, BorderLoop> border_loops(const Surface& surface) {
   const EdgeTable edges(surface.triangles);
   UnionFind loops(static_cast<int64_t>(surface.points.size()));
   for (int64_t e = 0; e < edges.edges(); ++e)
     if (edges[e].size() == 1) loops.unite(edges[e].front().low, edges[e].front().high);
-  struct Loop {
-    double length = 0;
-    Vec3 sum = Vec3::Zero();
-    std::vector<std::array<Vec3, 2>> sides;
-  };
-  std::map<int64_t, Loop> of_vertex;
+  std::map<int64_t, BorderLoop> of_vertex;
   for (int64_t e = 0; e < edges.edges(); ++e) {
     if (edges[e].size() != 1) continue;
     const Vec3 &a = surface.points[edges[e].front().low],
                &b = surface.points[edges[e].front().high];
-    Loop& loop = of_vertex[loops.find(edges[e].front().low)];
+    BorderLoop& loop = of_vertex[loops.find(edges[e].front().low)];
     loop.length += (b - a).norm();
     loop.sum += (b - a).norm() * (a + b) / 2;
     loop.sides.push_back({a, b});
   }
+  return of_vertex;
+}
+
+Cones cones_of(const Surface& surface, double passes) {
   Cones cones;
-  const auto add = [](const Loop& loop, Surface& cone) {
+  const auto add = [](const BorderLoop& loop, Surface& cone) {
     for (const auto& [a, b] : loop.sides) {
       const auto first = static_cast<int64_t>(cone.points.size());
       cone.points.insert(cone.points.end(), {a, b, loop.sum / loop.length});
       cone.triangles.push_back({first, first + 1, first + 2});
     }
   };
-  for (const auto& [vertex, loop] : of_vertex) {
+  for (const auto& [vertex, loop] : border_loops(surface)) {
     if (loop.length > passes) add(loop, cones.all);
     if (loop.length > open_end)
       add(loop, cones.ends);
