@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Figures of the house: lines and public headers of each room, functions beyond a screen, functions
-with many parameters, and, with the programs' folder, the frames between main and TaoSolve.
+"""Figures of the house: lines (of them comments, and blank) and public headers of each room,
+functions beyond a screen, functions with many parameters, and, with the programs' folder, the
+frames between main and TaoSolve.
 
     tests/program/house_figures.py [build/bin] [-tree FOLDER]
 
@@ -85,20 +86,24 @@ def main():
     parser.add_argument("-tree", type=pathlib.Path, default=PROJECT)
     chosen = parser.parse_args()
     test_house.PROJECT = chosen.tree
-    lines, headers = collections.Counter(), collections.Counter()
+    lines, comments, blank = (collections.Counter() for _ in range(3))
+    headers = collections.Counter()
     lengths, many = [], []
     for name, text in sources():
         public = name.startswith("include/")
         room = room_of(name)
         lines[room] += text.count("\n")
+        comments[room] += len(re.findall(r"^ *//", text, re.M))
+        blank[room] += len(re.findall(r"^$", text, re.M)) - text.endswith("\n")
         headers[room] += public
         lengths += [length for _, length in functions(text)]
         many += [f"{name}:{line}" for line, n in parameters(text)
                  if n > PARAMETERS and declares(text, line)]
-    print("| room | lines | public headers |\n|---|--:|--:|")
+    print("| room | lines | comments | blank | public headers |\n|---|--:|--:|--:|--:|")
+    counts = (lines, comments, blank, headers)
     for room in sorted(lines):
-        print(f"| `{room}` | {lines[room]} | {headers[room]} |")
-    print(f"| all | {lines.total()} | {headers.total()} |\n")
+        print(f"| `{room}` | {' | '.join(str(count[room]) for count in counts)} |")
+    print(f"| all | {' | '.join(str(count.total()) for count in counts)} |\n")
     print(f"{len(lengths)} functions: {sum(n > USUAL for n in lengths)} above {USUAL} lines, "
           f"{sum(n > LONGEST for n in lengths)} above {LONGEST}; "
           f"{len(many)} with more than {PARAMETERS} parameters.")
