@@ -4,6 +4,7 @@
 
 #include "message.h"
 #include "repose/base/agreement.h"
+#include "repose/base/components.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
@@ -78,22 +79,10 @@ std::vector<double> NaturalRows::to_slab(const Rows& rows, const std::vector<dou
   return natural;
 }
 
-namespace {
-
-/// Number of components of a value.
-template <class Value>
-constexpr int width = 1;
-template <>
-constexpr int width<Vec3> = 3;
-template <class T, size_t n>
-constexpr int width<std::array<T, n>> = static_cast<int>(n);
-
-}  // namespace
-
 template <class Value>
 std::vector<Value> NaturalRows::to_slab_each(const Rows& rows,
                                              const std::vector<Value>& values) const {
-  constexpr int numbers = width<Value>;
+  constexpr int numbers = base::components<Value>;
   const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
   std::vector<double> owned(rows.row.size() * numbers), natural(slab.rows() * numbers);
   std::vector<Value> mine(slab.rows());
@@ -136,48 +125,33 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   rows.counts = local_model.counts;
   rows.solid = part.solid;
   rows.contact_pairs = local_model.contact_pairs;
-  const auto to_slab = [&](const Rows& of, const auto& values) {
-    return natural.to_slab_each(of, values);
+  const auto to_slabs = [&](const Rows& of, auto group) {
+    model::for_each_array(
+        group, [&](const char*, auto& values) { values = natural.to_slab_each(of, values); });
+    return group;
   };
-  const Rows& points = natural.points_;
-  const model::Points& p = part.model.points;
-  rows.points = {to_slab(points, p.position), to_slab(points, part.original_set),
-                 to_slab(points, p.target),   to_slab(points, p.layer),
-                 to_slab(points, p.column),   to_slab(points, p.bone),
-                 to_slab(points, p.mass),     to_slab(points, p.external_force)};
+  model::Points points = part.model.points;
+  points.set = part.original_set;
+  rows.points = to_slabs(natural.points_, std::move(points));
   rows.outward = local_model.outward;
-  const Rows& springs = natural.springs_;
-  const model::Springs& s = part.model.springs;
-  rows.springs = {to_slab(springs, in_rows(s.points, part.owned_springs, part.point_row)),
-                  to_slab(springs, s.set),
-                  to_slab(springs, s.rest_length),
-                  to_slab(springs, s.stiffness),
-                  to_slab(springs, s.exponent),
-                  to_slab(springs, s.reference)};
-  const Rows& prisms = natural.prisms_;
-  const model::Prisms& m = part.model.prisms;
-  int averaged = !m.nodal_modulus.empty();
+  model::Springs springs = part.model.springs;
+  springs.points = in_rows(springs.points, part.owned_springs, part.point_row);
+  rows.springs = to_slabs(natural.springs_, std::move(springs));
+  model::Prisms prisms = part.model.prisms;
+  prisms.points = in_rows(prisms.points, part.owned_prisms, part.point_row);
+  // A rank without prisms takes part in all that others have: arrays of no row are not visited.
+  int averaged = !prisms.nodal_modulus.empty();
   MPI_Allreduce(MPI_IN_PLACE, &averaged, 1, MPI_INT, MPI_MAX, comm);
-  rows.prisms = {to_slab(prisms, in_rows(m.points, part.owned_prisms, part.point_row)),
-                 to_slab(prisms, m.rest_volume),
-                 {},
-                 {},
-                 {},
-                 {}};
-  if (part.solid) {
-    rows.prisms.shear_modulus = to_slab(prisms, m.shear_modulus);
-    rows.prisms.modulus = to_slab(prisms, m.modulus);
-    rows.prisms.target_volume = to_slab(prisms, m.target_volume);
-  }
-  if (averaged != 0) rows.prisms.nodal_modulus = to_slab(prisms, m.nodal_modulus);
-  const Rows edges{part.edge_row, local_model.counts.edges, 1};
-  const model::Edges& e = part.model.edges;
-  rows.edges = {to_slab(edges, in_rows(e.points, part.owned_edges, part.point_row)),
-                to_slab(edges, e.weight)};
-  const Rows touching{part.pair_row, local_model.contact_pairs, 1};
-  const model::ContactPairs& t = part.model.contact.pairs;
-  rows.pairs = {to_slab(touching, base::pick(part.point_row, t.point)), to_slab(touching, t.body),
-                to_slab(touching, t.binding), to_slab(touching, t.area)};
+  if (part.solid && prisms.modulus.empty()) prisms.modulus.resize(1);
+  if (averaged != 0 && prisms.nodal_modulus.empty()) prisms.nodal_modulus.resize(1);
+  rows.prisms = to_slabs(natural.prisms_, std::move(prisms));
+  model::Edges edges = part.model.edges;
+  edges.points = in_rows(edges.points, part.owned_edges, part.point_row);
+  rows.edges = to_slabs({part.edge_row, local_model.counts.edges, 1}, std::move(edges));
+  model::ContactPairs pairs = part.model.contact.pairs;
+  pairs.point = base::pick(part.point_row, pairs.point);
+  pairs.offset.clear();
+  rows.pairs = to_slabs({part.pair_row, local_model.contact_pairs, 1}, std::move(pairs));
   return rows;
 }
 

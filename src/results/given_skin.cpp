@@ -18,11 +18,10 @@ void add_given_skin(const std::filesystem::path& file, const GivenSkin& skin) {
   if (base::hdf5_has(h5, "/given_skin")) return;
   {
     const base::Hdf5Group group = base::create_hdf5_group(h5, "given_skin");
-    const hsize_t vertices = skin.points.size();
-    write_array(group, "points", {vertices, 3}, flat(skin.points));
-    write_array(group, "triangles", {skin.triangles.size(), 3}, flat(skin.triangles));
-    write_array(group, "displacement", {vertices, 3}, flat(skin.displacement));
-    write_array(group, "solved", {vertices}, skin.solved.data());
+    write_array(group, "points", skin.points);
+    write_array(group, "triangles", skin.triangles);
+    write_array(group, "displacement", skin.displacement);
+    write_array(group, "solved", skin.solved);
   }
   h5.close();
   whole.commit();

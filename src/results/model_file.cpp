@@ -20,58 +20,38 @@ void require_format(const Reader& in) {
     in.refuse("/ attribute version", fmt::format("is {}, this program reads version 1", version));
 }
 
-model::Points read_points(const Reader& in) {
-  model::Points points;
-  points.position = in.vectors("/model/point/position", Shape::any);
-  const auto n = static_cast<int64_t>(points.position.size());
-  for (const int8_t set : in.integers<int8_t>("/model/point/set", n))
-    points.set.push_back(static_cast<model::PointSet>(set));
-  points.target = in.vectors("/model/point/target", n);
-  points.layer = in.integers<int32_t>("/model/point/layer", n);
-  points.column = in.integers<int64_t>("/model/point/column", n);
-  points.bone = in.integers<int32_t>("/model/point/bone", n);
-  points.mass.assign(n, 0.0);
-  points.external_force.assign(n, Vec3::Zero());
-  if (in.has("/model/point/mass")) points.mass = in.numbers("/model/point/mass", {n, {}});
-  if (in.has("/model/point/external_force"))
-    points.external_force = in.vectors("/model/point/external_force", n);
-  return points;
+/// Reads the arrays of a group, all of as many rows as the first. The `optional` ones may be
+/// absent.
+template <class Group>
+void read_arrays(const Reader& in, const std::string& group, Group& of,
+                 std::initializer_list<std::string_view> optional = {}) {
+  int64_t rows = Shape::any;
+  model::for_each_array(of, [&](const char* name, auto& values) {
+    const std::string path = fmt::format("{}/{}", group, name);
+    const bool may_lack = std::find(optional.begin(), optional.end(), name) != optional.end();
+    if (may_lack && !in.has(path)) return;
+    in.read(path, rows, values);
+    rows = static_cast<int64_t>(values.size());
+  });
 }
 
-model::Springs read_springs(const Reader& in) {
-  model::Springs springs;
-  if (!in.has("/model/spring")) return springs;
-  springs.points = in.tuples<2>("/model/spring/points", Shape::any);
-  const auto s = static_cast<int64_t>(springs.points.size());
-  springs.set = in.integers<int32_t>("/model/spring/set", s);
-  springs.rest_length = in.numbers("/model/spring/rest_length", {s, {}});
-  springs.stiffness = in.numbers("/model/spring/stiffness", {s, {}});
-  springs.exponent = in.integers<int8_t>("/model/spring/exponent", s);
-  springs.reference = in.numbers("/model/spring/reference", {s, {}});
-  return springs;
+model::Points read_points(const Reader& in) {
+  model::Points points;
+  read_arrays(in, "/model/point", points, {"mass", "external_force"});
+  points.mass.resize(points.position.size());
+  points.external_force.resize(points.position.size(), Vec3::Zero());
+  return points;
 }
 
 model::Prisms read_prisms(const Reader& in) {
   model::Prisms prisms;
   if (!in.has("/model/prism")) return prisms;
-  prisms.points = in.tuples<6>("/model/prism/points", Shape::any);
-  const auto m = static_cast<int64_t>(prisms.points.size());
-  prisms.rest_volume = in.numbers("/model/prism/rest_volume", {m, {}});
-  if (!in.has("/model/edge")) return prisms;
-  prisms.shear_modulus = in.numbers("/model/prism/shear_modulus", {m, {}});
-  prisms.modulus = in.numbers("/model/prism/modulus", {m, {}});
-  prisms.target_volume = in.numbers("/model/prism/target_volume", {m, {}});
-  if (in.has("/model/prism/nodal_modulus"))
-    prisms.nodal_modulus = in.numbers("/model/prism/nodal_modulus", {m, {}});
+  const bool solid = in.has("/model/edge");
+  // Arrays of one row stand for those that the file has.
+  prisms.modulus.resize(solid);
+  prisms.nodal_modulus.resize(solid && in.has("/model/prism/nodal_modulus"));
+  read_arrays(in, "/model/prism", prisms);
   return prisms;
-}
-
-model::Edges read_edges(const Reader& in) {
-  model::Edges edges;
-  if (!in.has("/model/edge")) return edges;
-  edges.points = in.tuples<2>("/model/edge/points", Shape::any);
-  edges.weight = in.numbers("/model/edge/weight", {static_cast<int64_t>(edges.points.size()), {}});
-  return edges;
 }
 
 std::vector<model::TermElements> read_elements(const Reader& in) {
@@ -134,21 +114,14 @@ model::Contact read_contact(const Reader& in) {
                               read_shape(in, k, kind[k], shape.data() + model::shape_numbers * k),
                               push[k]});
   }
-  model::ContactPairs& pairs = contact.pairs;
-  pairs.point = in.integers<int64_t>(group + "/point", Shape::any);
-  const auto c = static_cast<int64_t>(pairs.point.size());
-  pairs.body = in.integers<int32_t>(group + "/body_row", c);
-  for (const int8_t binding : in.integers<int8_t>(group + "/binding", c))
-    pairs.binding.push_back(static_cast<model::Binding>(binding));
-  pairs.area = in.numbers(group + "/area", {c, {}});
+  read_arrays(in, group, contact.pairs);
   if (!in.has(group + "/wall")) return contact;
   model::CutFaces& cut_faces = contact.cut_faces;
-  cut_faces.size = in.tuples<2>(group + "/wall/net", Shape::any);
-  cut_faces.begin = in.integers<int64_t>(group + "/wall/begin", Shape::any);
-  cut_faces.point = in.integers<int64_t>(group + "/wall/point", Shape::any);
-  cut_faces.weight =
-      in.numbers(group + "/wall/weight", {static_cast<int64_t>(cut_faces.point.size()), {}});
-  cut_faces.area = in.numbers(group + "/wall/area", {Shape::any, {}});
+  in.read(group + "/wall/net", Shape::any, cut_faces.size);
+  in.read(group + "/wall/begin", Shape::any, cut_faces.begin);
+  in.read(group + "/wall/point", Shape::any, cut_faces.point);
+  in.read(group + "/wall/weight", static_cast<int64_t>(cut_faces.point.size()), cut_faces.weight);
+  in.read(group + "/wall/area", Shape::any, cut_faces.area);
   return contact;
 }
 
@@ -183,9 +156,9 @@ model::Model read_model(const std::filesystem::path& file) {
   model::Model model;
   model.gravity = in.vector("/model", "gravity");
   model.points = read_points(in);
-  model.springs = read_springs(in);
+  if (in.has("/model/spring")) read_arrays(in, "/model/spring", model.springs);
   model.prisms = read_prisms(in);
-  model.edges = read_edges(in);
+  if (in.has("/model/edge")) read_arrays(in, "/model/edge", model.edges);
   model.elements = read_elements(in);
   if (in.has("/model/spring") || in.has("/model/spring_set"))
     model.spring_sets = in.names("/model/spring_set");
@@ -284,33 +257,33 @@ StoredStep read_step(const std::filesystem::path& file, int64_t step, const mode
   const model::Counts counts = model::count(model);
   StoredStep stored;
   stored.numbers = read_numbers(file, step);
-  stored.rows.position = in.vectors(group + "/point/position", counts.points);
-  stored.displacement = in.vectors(group + "/point/displacement", counts.points);
-  stored.rows.residual_force = in.vectors(group + "/point/residual_force", counts.points);
-  if (!model.skin.empty())
-    stored.advance = in.numbers(group + "/point/advance", {counts.points, {}});
+  const auto read = [&](const char* name, int64_t rows, auto& values) {
+    in.read(group + name, rows, values);
+  };
+  const auto read_if_there = [&](const char* name, int64_t rows, auto& values) {
+    if (in.has(group + name)) read(name, rows, values);
+  };
+  model::StepRows& rows = stored.rows;
+  read("/point/position", counts.points, rows.position);
+  read("/point/displacement", counts.points, stored.displacement);
+  read("/point/residual_force", counts.points, rows.residual_force);
+  if (!model.skin.empty()) read("/point/advance", counts.points, stored.advance);
   for (const std::string name : {"contact_gap", "contact_pressure"})
     if (const std::string path = group + "/point/" + name; in.has(path))
-      stored.rows.point_fields.push_back({name, false, in.numbers(path, {counts.points, {}})});
+      rows.point_fields.push_back({name, false, in.numbers(path, {counts.points, {}})});
   if (const std::string path = group + "/point/contact_force"; in.has(path))
-    stored.rows.point_fields.push_back(
-        {"contact_force", true, in.numbers(path, {counts.points, {3}})});
+    rows.point_fields.push_back({"contact_force", true, in.numbers(path, {counts.points, {3}})});
   if (in.has(group + "/spring") || counts.springs > 0) {
-    stored.rows.elongation = in.numbers(group + "/spring/elongation", {counts.springs, {}});
-    stored.rows.tension = in.numbers(group + "/spring/tension", {counts.springs, {}});
+    read("/spring/elongation", counts.springs, rows.elongation);
+    read("/spring/tension", counts.springs, rows.tension);
   }
   if (in.has(group + "/prism/volume_ratio") || counts.prisms > 0)
-    stored.rows.volume_ratio = in.numbers(group + "/prism/volume_ratio", {counts.prisms, {}});
-  if (in.has(group + "/prism/pressure"))
-    stored.rows.pressure = in.numbers(group + "/prism/pressure", {counts.prisms, {}});
-  if (in.has(group + "/prism/von_mises")) {
-    stored.rows.von_mises = in.numbers(group + "/prism/von_mises", {counts.prisms, {}});
-    stored.rows.stretch = in.vectors(group + "/prism/principal_stretch", counts.prisms);
-  }
-  const std::string bones = group + "/bone_surface/points";
-  if (in.has(bones)) stored.bone_points = in.vectors(bones, Shape::any);
-  if (const std::string path = group + "/bone_surface/displacement"; in.has(path))
-    stored.bone_displacement = in.vectors(path, Shape::any);
+    read("/prism/volume_ratio", counts.prisms, rows.volume_ratio);
+  read_if_there("/prism/pressure", counts.prisms, rows.pressure);
+  read_if_there("/prism/von_mises", counts.prisms, rows.von_mises);
+  if (!rows.von_mises.empty()) read("/prism/principal_stretch", counts.prisms, rows.stretch);
+  read_if_there("/bone_surface/points", Shape::any, stored.bone_points);
+  read_if_there("/bone_surface/displacement", Shape::any, stored.bone_displacement);
   return stored;
 }
 

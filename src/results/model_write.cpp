@@ -25,34 +25,13 @@ std::vector<double> shape_row(const model::Body& body) {
 
 namespace {
 
-/// Number of components of a value.
-template <class Value>
-constexpr hsize_t width = 0;
-template <>
-constexpr hsize_t width<Vec3> = 3;
-template <class T, size_t n>
-constexpr hsize_t width<std::array<T, n>> = n;
-
-/// The numbers of any array, row by row.
-template <class Value>
-auto numbers(const std::vector<Value>& values) {
-  if constexpr (width < Value >> 0)
-    return flat(values);
-  else if constexpr (std::is_enum_v<Value>)
-    return reinterpret_cast<const int8_t*>(values.data());
-  else
-    return values.data();
-}
-
 /// Creates the arrays of a group, of which rank 0 has the first of so many rows.
 template <class Group>
 void create_arrays(hid_t group, const Group& first, int64_t rows) {
-  model::for_each_array(first,
-                        [&]<class Value>(const char* name, const std::vector<Value>& values) {
-                          std::vector<hsize_t> shape = {static_cast<hsize_t>(rows)};
-                          if (width < Value >> 0) shape.push_back(width<Value>);
-                          write_array(group, name, shape, decltype(numbers(values)){nullptr});
-                        });
+  model::for_each_array(
+      first, [&]<class Value>(const char* name, const std::vector<Value>& values) {
+        write_array(group, name, shape_of<Value>(rows), decltype(flat(values)){nullptr});
+      });
 }
 
 void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
@@ -64,8 +43,8 @@ void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
     write_attribute(own, "term", of.term);
     write_attribute(own, "points_each", of.points_each);
     write_attribute(own, "numbers_each", of.numbers_each);
-    write_array(own, "points", {of.points.size()}, of.points.data());
-    write_array(own, "numbers", {of.numbers.size()}, of.numbers.data());
+    write_array(own, "points", of.points);
+    write_array(own, "numbers", of.numbers);
   }
 }
 
@@ -88,13 +67,13 @@ void write_bodies(hid_t group, const std::vector<model::Body>& bodies) {
     const auto* mesh = std::get_if<surface::Surface>(&body.shape);
     if (!mesh || body.bone >= 0) continue;
     const base::Hdf5Group own = base::create_hdf5_group(meshes, std::to_string(k).c_str());
-    write_array(own, "points", {mesh->points.size(), 3}, flat(mesh->points));
-    write_array(own, "triangles", {mesh->triangles.size(), 3}, flat(mesh->triangles));
+    write_array(own, "points", mesh->points);
+    write_array(own, "triangles", mesh->triangles);
   }
   write_strings(group, "body", names);
-  write_array(group, "body_bone", {count}, bone.data());
-  write_array(group, "body_kind", {count}, kind.data());
-  write_array(group, "body_push", {count, 3}, flat(push));
+  write_array(group, "body_bone", bone);
+  write_array(group, "body_kind", kind);
+  write_array(group, "body_push", push);
   write_array(group, "body_shape", {count, model::shape_numbers}, shape.data());
 }
 
@@ -108,17 +87,17 @@ void write_contact(hid_t model, const model::Contact& contact, const model::Mode
   const model::CutFaces& cut_faces = contact.cut_faces;
   if (cut_faces.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
-  write_array(wall, "net", {cut_faces.size.size(), 2}, flat(cut_faces.size));
-  write_array(wall, "begin", {cut_faces.begin.size()}, cut_faces.begin.data());
-  write_array(wall, "point", {cut_faces.point.size()}, cut_faces.point.data());
-  write_array(wall, "weight", {cut_faces.weight.size()}, cut_faces.weight.data());
-  write_array(wall, "area", {cut_faces.area.size()}, cut_faces.area.data());
+  write_array(wall, "net", cut_faces.size);
+  write_array(wall, "begin", cut_faces.begin);
+  write_array(wall, "point", cut_faces.point);
+  write_array(wall, "weight", cut_faces.weight);
+  write_array(wall, "area", cut_faces.area);
 }
 
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {
   if (skin.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "skin");
-  write_array(group, "points", {skin.size(), 3}, flat(skin));
+  write_array(group, "points", skin);
 }
 
 void write_transforms(hid_t model, const std::vector<Mat4>& transforms) {
@@ -134,17 +113,17 @@ void write_bone_surfaces(hid_t model, const std::vector<surface::Surface>& surfa
   const base::Hdf5Group group = base::create_hdf5_group(model, "bone_surface");
   for (size_t b = 0; b < surfaces.size(); ++b) {
     const base::Hdf5Group bone = base::create_hdf5_group(group, std::to_string(b).c_str());
-    write_array(bone, "points", {surfaces[b].points.size(), 3}, flat(surfaces[b].points));
-    write_array(bone, "triangles", {surfaces[b].triangles.size(), 3}, flat(surfaces[b].triangles));
+    write_array(bone, "points", surfaces[b].points);
+    write_array(bone, "triangles", surfaces[b].triangles);
   }
 }
 
 void write_merged(hid_t model, const MergedBones& bones) {
   if (bones.triangles.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "bone_surfaces");
-  write_array(group, "points", {bones.points.size(), 3}, flat(bones.points));
-  write_array(group, "triangles", {bones.triangles.size(), 3}, flat(bones.triangles));
-  write_array(group, "bone", {bones.bone.size()}, bones.bone.data());
+  write_array(group, "points", bones.points);
+  write_array(group, "triangles", bones.triangles);
+  write_array(group, "bone", bones.bone);
 }
 
 }  // namespace
@@ -184,7 +163,7 @@ void fill(MPI_Comm comm, hid_t group, const Group& slab, int64_t rows, const OnD
   std::map<std::string, const void*> values;
   std::string names;
   model::for_each_array(slab, [&](const char* name, const auto& array) {
-    values[name] = numbers(array);
+    values[name] = flat(array);
     names += std::string(name) + '\n';
   });
   base::broadcast(comm, names);

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "repose/base/components.h"
 #include "repose/base/geometry.h"
 #include "repose/base/hdf5.h"
 
@@ -51,6 +53,24 @@ class Reader {
     std::vector<std::array<int64_t, K>> result(flat.size() / K);
     for (size_t i = 0; i < flat.size(); ++i) result[i / K][i % K] = flat[i];
     return result;
+  }
+
+  /// Any of these, by the type of the values.
+  template <class Value>
+  void read(const std::string& path, int64_t rows, std::vector<Value>& values) const {
+    if constexpr (std::is_enum_v<Value>) {
+      values.clear();
+      for (const auto number : integers<std::underlying_type_t<Value>>(path, rows))
+        values.push_back(static_cast<Value>(number));
+    } else if constexpr (std::is_integral_v<Value>) {
+      values = integers<Value>(path, rows);
+    } else if constexpr (std::is_same_v<Value, double>) {
+      values = numbers(path, {rows, {}});
+    } else if constexpr (std::is_same_v<Value, Vec3>) {
+      values = vectors(path, rows);
+    } else {
+      values = tuples<base::components<Value>>(path, rows);
+    }
   }
 
   bool has_attribute(const std::string& object, const char* attribute) const;

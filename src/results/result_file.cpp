@@ -158,7 +158,8 @@ struct ResultFile::State {
   void create(const model::Model& model, const model::ModelRows& slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
-  void write_dataset(hid_t group, const char* dataset, int64_t rows, int64_t columns,
+  /// Of rows and columns, as create_rows.
+  void write_dataset(hid_t group, const char* dataset, std::array<int64_t, 2> shape,
                      const base::Slab& mine, const double* values) const;
   void write_points(hid_t step, const model::StepRows& rows);
   void write_field(hid_t group, const model::PointField& field);
@@ -246,11 +247,11 @@ base::Hdf5Group ResultFile::State::create_group(hid_t place, const std::string& 
   return created;
 }
 
-void ResultFile::State::write_dataset(hid_t group, const char* dataset, int64_t rows,
-                                      int64_t columns, const base::Slab& mine,
+void ResultFile::State::write_dataset(hid_t group, const char* dataset,
+                                      std::array<int64_t, 2> shape, const base::Slab& mine,
                                       const double* values) const {
   base::Hdf5Dataset created;
-  on_disk([&] { created = create_rows(group, dataset, rows, columns); });
+  on_disk([&] { created = create_rows(group, dataset, shape[0], shape[1]); });
   on_disk([&] { write_rows(comm, created, mine, values); });
 }
 
@@ -265,8 +266,8 @@ void ResultFile::State::note_field(const std::string& field, bool vector, size_t
 
 /// A dataset that other steps may be without.
 void ResultFile::State::write_field(hid_t group, const model::PointField& field) {
-  write_dataset(group, field.name.c_str(), counts.points, field.vector ? 3 : 0, slab(counts.points),
-                field.values.data());
+  write_dataset(group, field.name.c_str(), {counts.points, field.vector ? 3 : 0},
+                slab(counts.points), field.values.data());
   on_disk([&] {
     if (field.texts.empty() && field.flags.empty()) return;
     const base::Hdf5Dataset dataset(H5Dopen2(group, field.name.c_str(), H5P_DEFAULT));
@@ -282,9 +283,9 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
   const base::Slab mine = slab(counts.points);
   std::vector<Vec3> displacement(rows.position.size());
   for (size_t i = 0; i < displacement.size(); ++i) displacement[i] = rows.position[i] - initial[i];
-  write_dataset(group, "position", counts.points, 3, mine, flat(rows.position));
-  write_dataset(group, "displacement", counts.points, 3, mine, flat(displacement));
-  write_dataset(group, "residual_force", counts.points, 3, mine, flat(rows.residual_force));
+  write_dataset(group, "position", {counts.points, 3}, mine, flat(rows.position));
+  write_dataset(group, "displacement", {counts.points, 3}, mine, flat(displacement));
+  write_dataset(group, "residual_force", {counts.points, 3}, mine, flat(rows.residual_force));
   model::PointField advance{"advance", false, std::vector<double>(displacement.size())};
   for (size_t i = 0; i < displacement.size(); ++i)
     advance.values[i] = displacement[i].dot(outward[i]);
@@ -299,18 +300,18 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
 void ResultFile::State::write_elements(hid_t step, const model::StepRows& rows) const {
   const base::Hdf5Group prism = create_group(step, "prism");
   const base::Slab prisms = slab(counts.prisms);
-  write_dataset(prism, "volume_ratio", counts.prisms, 0, prisms, rows.volume_ratio.data());
+  write_dataset(prism, "volume_ratio", {counts.prisms, 0}, prisms, rows.volume_ratio.data());
   if (counts.pressure)
-    write_dataset(prism, "pressure", counts.prisms, 0, prisms, rows.pressure.data());
+    write_dataset(prism, "pressure", {counts.prisms, 0}, prisms, rows.pressure.data());
   if (counts.stress) {
-    write_dataset(prism, "von_mises", counts.prisms, 0, prisms, rows.von_mises.data());
-    write_dataset(prism, "principal_stretch", counts.prisms, 3, prisms, flat(rows.stretch));
+    write_dataset(prism, "von_mises", {counts.prisms, 0}, prisms, rows.von_mises.data());
+    write_dataset(prism, "principal_stretch", {counts.prisms, 3}, prisms, flat(rows.stretch));
   }
   if (counts.springs == 0) return;
   const base::Hdf5Group spring = create_group(step, "spring");
   const base::Slab springs = slab(counts.springs);
-  write_dataset(spring, "elongation", counts.springs, 0, springs, rows.elongation.data());
-  write_dataset(spring, "tension", counts.springs, 0, springs, rows.tension.data());
+  write_dataset(spring, "elongation", {counts.springs, 0}, springs, rows.elongation.data());
+  write_dataset(spring, "tension", {counts.springs, 0}, springs, rows.tension.data());
 }
 
 /// Writes the displacement of the bones and, if any has moved, where they are; returns whether any
@@ -324,8 +325,8 @@ bool ResultFile::State::write_bones(hid_t step, double load) const {
   const base::Hdf5Group group = create_group(step, "bone_surface");
   const base::Slab mine{0, static_cast<int64_t>(bones.points.size())};
   const std::vector<Vec3> displacement = displacements(bones, at_load);
-  write_dataset(group, "displacement", counts.bone_points, 3, mine, flat(displacement));
-  if (moved != 0) write_dataset(group, "points", counts.bone_points, 3, mine, flat(at_load));
+  write_dataset(group, "displacement", {counts.bone_points, 3}, mine, flat(displacement));
+  if (moved != 0) write_dataset(group, "points", {counts.bone_points, 3}, mine, flat(at_load));
   return moved != 0;
 }
 

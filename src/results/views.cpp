@@ -12,6 +12,10 @@ constexpr const char* small_integer = "NumberType=\"Char\" Precision=\"1\"";
 constexpr const char* long_integer = "NumberType=\"Int\" Precision=\"8\"";
 constexpr const char* short_integer = "NumberType=\"Int\" Precision=\"4\"";
 
+constexpr XdmfCell wedge{"TopologyType=\"Wedge\"", 13, 6},
+    line{"TopologyType=\"Polyline\" NodesPerElement=\"2\"", 3, 2},
+    triangle{"TopologyType=\"Triangle\"", 5, 3};
+
 std::vector<std::string> moving_points(size_t steps) {
   std::vector<std::string> paths;
   for (size_t step = 0; step < steps; ++step)
@@ -21,6 +25,10 @@ std::vector<std::string> moving_points(size_t steps) {
 
 XdmfArray point_vector(const char* name, const char* path) {
   return {.name = name, .path = path, .at_points = true, .vector = true};
+}
+
+XdmfArray point_integer(const char* name, const char* path, const char* type) {
+  return {.name = name, .path = path, .at_points = true, .type = type};
 }
 
 void add_fields(const std::vector<OptionalField>& fields, XdmfBlock& block) {
@@ -56,26 +64,19 @@ std::string unit_of(const std::string& name) {
 }
 
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
-  XdmfBlock block{
-      .name = "tissue",
-      .topology = "TopologyType=\"Wedge\"",
-      .vtk_cell = 13,
-      .corners = 6,
-      .connectivity = "/model/prism/points",
-      .points = counts.points,
-      .cells = counts.prisms,
-      .geometry = moving_points(steps),
-      .arrays = {
-          point_vector("displacement", "step/point/displacement"),
-          point_vector("residual_force", "step/point/residual_force"),
-          point_vector("initial_position", "/model/point/position"),
-          {.name = "set", .path = "/model/point/set", .at_points = true, .type = small_integer},
-          {.name = "layer", .path = "/model/point/layer", .at_points = true, .type = short_integer},
-          {.name = "column",
-           .path = "/model/point/column",
-           .at_points = true,
-           .type = long_integer},
-          {"volume_ratio", "step/prism/volume_ratio"}}};
+  XdmfBlock block{"tissue",
+                  wedge,
+                  "/model/prism/points",
+                  counts.points,
+                  counts.prisms,
+                  moving_points(steps),
+                  {point_vector("displacement", "step/point/displacement"),
+                   point_vector("residual_force", "step/point/residual_force"),
+                   point_vector("initial_position", "/model/point/position"),
+                   point_integer("set", "/model/point/set", small_integer),
+                   point_integer("layer", "/model/point/layer", short_integer),
+                   point_integer("column", "/model/point/column", long_integer),
+                   {"volume_ratio", "step/prism/volume_ratio"}}};
   if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
   if (counts.stress) {
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});
@@ -86,46 +87,39 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
 }
 
 XdmfBlock springs(const FileCounts& counts, size_t steps) {
-  return {.name = "springs",
-          .topology = "TopologyType=\"Polyline\" NodesPerElement=\"2\"",
-          .vtk_cell = 3,
-          .corners = 2,
-          .connectivity = "/model/spring/points",
-          .points = counts.points,
-          .cells = counts.springs,
-          .geometry = moving_points(steps),
-          .arrays = {{"elongation", "step/spring/elongation"},
-                     {"tension", "step/spring/tension"},
-                     {"rest_length", "/model/spring/rest_length"},
-                     {.name = "set", .path = "/model/spring/set", .type = short_integer}}};
+  return {"springs",
+          line,
+          "/model/spring/points",
+          counts.points,
+          counts.springs,
+          moving_points(steps),
+          {{"elongation", "step/spring/elongation"},
+           {"tension", "step/spring/tension"},
+           {"rest_length", "/model/spring/rest_length"},
+           {.name = "set", .path = "/model/spring/set", .type = short_integer}}};
 }
 
 XdmfBlock skin(const FileCounts& counts, size_t steps) {
-  return {.name = "skin",
-          .topology = "TopologyType=\"Triangle\"",
-          .vtk_cell = 5,
-          .corners = 3,
-          .connectivity = "/model/skin/points",
-          .points = counts.points,
-          .cells = counts.skin,
-          .geometry = moving_points(steps),
-          .arrays = {point_vector("displacement", "step/point/displacement"),
-                     point_vector("initial_position", "/model/point/position")}};
+  return {"skin",
+          triangle,
+          "/model/skin/points",
+          counts.points,
+          counts.skin,
+          moving_points(steps),
+          {point_vector("displacement", "step/point/displacement"),
+           point_vector("initial_position", "/model/point/position")}};
 }
 
 XdmfBlock bones(const FileCounts& counts, const std::vector<bool>& moved) {
-  XdmfBlock block{
-      .name = "bones",
-      .topology = "TopologyType=\"Triangle\"",
-      .vtk_cell = 5,
-      .corners = 3,
-      .connectivity = "/model/bone_surfaces/triangles",
-      .points = counts.bone_points,
-      .cells = counts.bone_triangles,
-      .geometry = {},
-      .arrays = {{.name = "bone", .path = "/model/bone_surfaces/bone", .type = short_integer},
-                 point_vector("displacement", "step/bone_surface/displacement"),
-                 point_vector("initial_position", "/model/bone_surfaces/points")}};
+  XdmfBlock block{"bones",
+                  triangle,
+                  "/model/bone_surfaces/triangles",
+                  counts.bone_points,
+                  counts.bone_triangles,
+                  {},
+                  {{.name = "bone", .path = "/model/bone_surfaces/bone", .type = short_integer},
+                   point_vector("displacement", "step/bone_surface/displacement"),
+                   point_vector("initial_position", "/model/bone_surfaces/points")}};
   for (size_t step = 0; step < moved.size(); ++step)
     block.geometry.push_back(moved[step] ? fmt::format("/step/{:04}/bone_surface/points", step)
                                          : "/model/bone_surfaces/points");

@@ -11,10 +11,6 @@ namespace {
 using Indices = std::vector<int64_t>;
 using Blocks = std::vector<XdmfBlock>;
 
-void write_numbers(hid_t place, const char* name, const Indices& values) {
-  write_array(place, name, {values.size()}, values.data());
-}
-
 /// Where each step begins in an array with `rows` rows a step; the same place if it does not move.
 Indices beginnings(size_t steps, int64_t rows) {
   Indices offsets(steps);
@@ -32,7 +28,7 @@ int64_t rows_of(const Blocks& blocks, bool at_points) {
   return rows;
 }
 
-void write_cells(hid_t file, hid_t root, const Blocks& blocks) {
+void write_cells(hid_t root, const Blocks& blocks) {
   Indices points, cells, ids, offsets;
   std::vector<uint8_t> types;
   std::vector<VirtualPiece> connectivity;
@@ -40,22 +36,22 @@ void write_cells(hid_t file, hid_t root, const Blocks& blocks) {
   for (const XdmfBlock& block : blocks) {
     points.push_back(block.points);
     cells.push_back(block.cells);
-    ids.push_back(block.cells * block.corners);
-    const Indices in_block = beginnings(block.cells + 1, block.corners);
+    ids.push_back(block.cells * block.cell.corners);
+    const Indices in_block = beginnings(block.cells + 1, block.cell.corners);
     offsets.insert(offsets.end(), in_block.begin(), in_block.end());
-    types.insert(types.end(), block.cells, block.vtk_cell);
+    types.insert(types.end(), block.cells, block.cell.vtk);
     connectivity.push_back({block.connectivity, corners});
     corners += ids.back();
   }
-  write_numbers(root, "NumberOfPoints", points);
-  write_numbers(root, "NumberOfCells", cells);
-  write_numbers(root, "NumberOfConnectivityIds", ids);
-  write_numbers(root, "Offsets", offsets);
-  write_array(root, "Types", {types.size()}, types.data());
-  write_virtual(file, root, "Connectivity", connectivity, {corners});
+  write_array(root, "NumberOfPoints", points);
+  write_array(root, "NumberOfCells", cells);
+  write_array(root, "NumberOfConnectivityIds", ids);
+  write_array(root, "Offsets", offsets);
+  write_array(root, "Types", types);
+  write_virtual(root, "Connectivity", connectivity, {corners});
 }
 
-void write_points(hid_t file, hid_t root, const Blocks& blocks, size_t steps) {
+void write_points(hid_t root, const Blocks& blocks, size_t steps) {
   std::vector<VirtualPiece> pieces;
   hsize_t row = 0;
   for (size_t step = 0; step < steps; ++step)
@@ -63,7 +59,7 @@ void write_points(hid_t file, hid_t root, const Blocks& blocks, size_t steps) {
       pieces.push_back({block.geometry[step], row});
       row += block.points;
     }
-  write_virtual(file, root, "Points", pieces, {row, 3});
+  write_virtual(root, "Points", pieces, {row, 3});
 }
 
 /// The pieces of the arrays of one name, at points or at cells: of every step, if they move.
@@ -81,19 +77,18 @@ std::vector<VirtualPiece> pieces_of(const Blocks& blocks, const XdmfArray& like,
 }
 
 /// An array of all parts, and where each of its steps begins.
-void write_array_of(hid_t file, hid_t data, hid_t begin, const Blocks& blocks,
-                    const XdmfArray& array, size_t steps) {
+void write_array_of(hid_t data, hid_t begin, const Blocks& blocks, const XdmfArray& array,
+                    size_t steps) {
   const int64_t rows = rows_of(blocks, array.at_points);
-  write_numbers(begin, array.title().c_str(), beginnings(steps, array.moves() ? rows : 0));
+  write_array(begin, array.title(), beginnings(steps, array.moves() ? rows : 0));
   const size_t stored = array.moves() ? steps : 1;
   std::vector<hsize_t> shape = {stored * rows};
   if (array.vector) shape.push_back(3);
-  write_virtual(file, data, array.title(), pieces_of(blocks, array, stored), shape);
+  write_virtual(data, array.title(), pieces_of(blocks, array, stored), shape);
 }
 
 /// The arrays at the points or at the cells of any part.
-void write_arrays(hid_t file, hid_t root, hid_t steps, const Blocks& blocks, bool at_points,
-                  size_t count) {
+void write_arrays(hid_t root, hid_t steps, const Blocks& blocks, bool at_points, size_t count) {
   const std::string place = at_points ? "PointData" : "CellData";
   const base::Hdf5Group data = base::create_hdf5_group(root, place.c_str());
   const base::Hdf5Group begin = base::create_hdf5_group(steps, (place + "Offsets").c_str());
@@ -102,7 +97,7 @@ void write_arrays(hid_t file, hid_t root, hid_t steps, const Blocks& blocks, boo
     for (const XdmfArray& array : block.arrays) {
       const bool known = std::find(written.begin(), written.end(), array.name) != written.end();
       if (array.at_points != at_points || known) continue;
-      write_array_of(file, data, begin, blocks, array, count);
+      write_array_of(data, begin, blocks, array, count);
       written.push_back(array.name);
     }
 }
@@ -114,19 +109,18 @@ void write_vtkhdf(hid_t file, const Blocks& blocks, const std::vector<double>& l
   const base::Hdf5Group root = base::create_hdf5_group(file, "VTKHDF");
   write_attribute(root, "Version", Indices{2, 0});
   write_attribute(root, "Type", std::string("UnstructuredGrid"));
-  write_cells(file, root, blocks);
-  write_points(file, root, blocks, count);
+  write_cells(root, blocks);
+  write_points(root, blocks, count);
   const base::Hdf5Group steps = base::create_hdf5_group(root, "Steps");
   write_attribute(steps, "NSteps", static_cast<int64_t>(count));
-  write_array(steps, "Values", {count}, loads.data());
-  write_numbers(steps, "PartOffsets", beginnings(count, 0));
-  write_numbers(steps, "NumberOfParts", Indices(count, static_cast<int64_t>(blocks.size())));
-  write_numbers(steps, "PointOffsets", beginnings(count, rows_of(blocks, true)));
+  write_array(steps, "Values", loads);
+  write_array(steps, "PartOffsets", beginnings(count, 0));
+  write_array(steps, "NumberOfParts", Indices(count, static_cast<int64_t>(blocks.size())));
+  write_array(steps, "PointOffsets", beginnings(count, rows_of(blocks, true)));
   const Indices same = beginnings(count, 0);
   write_array(steps, "CellOffsets", {count, 1}, same.data());
   write_array(steps, "ConnectivityIdOffsets", {count, 1}, same.data());
-  for (const bool at_points : {true, false})
-    write_arrays(file, root, steps, blocks, at_points, count);
+  for (const bool at_points : {true, false}) write_arrays(root, steps, blocks, at_points, count);
 }
 
 int64_t vtkhdf_bytes(const Blocks& blocks, size_t steps) {

@@ -24,14 +24,6 @@ base::Hdf5Dataset create_dataset(hid_t place, const std::string& name, hid_t typ
       H5Dcreate2(place, name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT));
 }
 
-void write_whole(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 hid_t file_type, hid_t memory_type, const void* values) {
-  const base::Hdf5Space space = make_space(shape);
-  const base::Hdf5Dataset dataset = create_dataset(place, name, file_type, space);
-  if (values && check_hdf5(H5Sget_simple_extent_npoints(space)) > 0)
-    check_hdf5(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values));
-}
-
 base::Hdf5Type fixed_string(size_t length) {
   base::Hdf5Type type(H5Tcopy(H5T_C_S1));
   check_hdf5(H5Tset_size(type, std::max<size_t>(length, 1)));
@@ -39,38 +31,14 @@ base::Hdf5Type fixed_string(size_t length) {
   return type;
 }
 
-void write_attribute(hid_t object, const char* name, hid_t file_type, hid_t memory_type,
-                     hid_t space, const void* value) {
-  const base::Hdf5Attribute attribute(
-      H5Acreate2(object, name, file_type, space, H5P_DEFAULT, H5P_DEFAULT));
-  check_hdf5(H5Awrite(attribute, memory_type, value));
-}
-
 }  // namespace
 
 void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 const double* values) {
-  write_whole(place, name, shape, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values);
-}
-
-void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 const int64_t* values) {
-  write_whole(place, name, shape, H5T_STD_I64LE, H5T_NATIVE_INT64, values);
-}
-
-void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 const int32_t* values) {
-  write_whole(place, name, shape, H5T_STD_I32LE, H5T_NATIVE_INT32, values);
-}
-
-void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 const int8_t* values) {
-  write_whole(place, name, shape, H5T_STD_I8LE, H5T_NATIVE_INT8, values);
-}
-
-void write_array(hid_t place, const std::string& name, const std::vector<hsize_t>& shape,
-                 const uint8_t* values) {
-  write_whole(place, name, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, values);
+                 std::pair<hid_t, hid_t> type, const void* values) {
+  const base::Hdf5Space space = make_space(shape);
+  const base::Hdf5Dataset dataset = create_dataset(place, name, type.first, space);
+  if (values && check_hdf5(H5Sget_simple_extent_npoints(space)) > 0)
+    check_hdf5(H5Dwrite(dataset, type.second, H5S_ALL, H5S_ALL, H5P_DEFAULT, values));
 }
 
 void write_strings(hid_t place, const std::string& name, const std::vector<std::string>& values) {
@@ -79,33 +47,20 @@ void write_strings(hid_t place, const std::string& name, const std::vector<std::
   std::string bytes;
   for (const std::string& value : values) bytes += value + std::string(width - value.size(), '\0');
   const base::Hdf5Type type = fixed_string(width);
-  write_whole(place, name, {values.size()}, type, type, bytes.data());
+  write_array(place, name, {values.size()}, {type, type}, bytes.data());
 }
 
-void write_attribute(hid_t object, const char* name, double value) {
-  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
-  write_attribute(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, one, &value);
-}
-
-void write_attribute(hid_t object, const char* name, int64_t value) {
-  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
-  write_attribute(object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, one, &value);
+void write_attribute(hid_t object, const char* name, std::pair<hid_t, hid_t> type,
+                     const base::Hdf5Space& space, const void* values) {
+  const base::Hdf5Attribute attribute(
+      H5Acreate2(object, name, type.first, space, H5P_DEFAULT, H5P_DEFAULT));
+  check_hdf5(H5Awrite(attribute, type.second, values));
 }
 
 void write_attribute(hid_t object, const char* name, const std::string& value) {
-  const base::Hdf5Space one(H5Screate(H5S_SCALAR));
   const base::Hdf5Type type = fixed_string(value.size());
-  write_attribute(object, name, type, type, one, value.c_str());
-}
-
-void write_attribute(hid_t object, const char* name, const std::vector<double>& values) {
-  write_attribute(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, make_space({values.size()}),
-                  values.data());
-}
-
-void write_attribute(hid_t object, const char* name, const std::vector<int64_t>& values) {
-  write_attribute(object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, make_space({values.size()}),
-                  values.data());
+  write_attribute(object, name, {type, type}, base::Hdf5Space(H5Screate(H5S_SCALAR)),
+                  value.c_str());
 }
 
 namespace {
@@ -121,15 +76,15 @@ void set_fill(hid_t creation, hid_t type) {
 
 }  // namespace
 
-void write_virtual(hid_t file, hid_t place, const std::string& name,
-                   const std::vector<VirtualPiece>& pieces, const std::vector<hsize_t>& shape) {
+void write_virtual(hid_t place, const std::string& name, const std::vector<VirtualPiece>& pieces,
+                   const std::vector<hsize_t>& shape) {
   const base::Hdf5Space whole = make_space(shape);
   const base::Hdf5Properties creation(H5Pcreate(H5P_DATASET_CREATE));
   check_hdf5(H5Pset_obj_track_times(creation, false));
   base::Hdf5Type type;
   const hsize_t columns = shape.size() > 1 ? shape[1] : 1;
   for (const VirtualPiece& piece : pieces) {
-    const base::Hdf5Dataset source(H5Dopen2(file, piece.path.c_str(), H5P_DEFAULT));
+    const base::Hdf5Dataset source(H5Dopen2(place, piece.path.c_str(), H5P_DEFAULT));
     const base::Hdf5Space of_source(H5Dget_space(source));
     type = base::Hdf5Type(H5Dget_type(source));
     const auto numbers = static_cast<hsize_t>(H5Sget_simple_extent_npoints(of_source));
@@ -146,20 +101,26 @@ namespace {
 
 constexpr int64_t piece_bytes = int64_t{1} << 28;
 
-/// Writes rows [begin, end) of the slab, possibly none; every rank calls it.
-void write_piece(hid_t dataset, hid_t file_space, hid_t transfer, const base::Slab& rows,
-                 int64_t columns, const void* values, hid_t memory_type) {
-  const int dimensions = columns == 0 ? 1 : 2;
+/// Writes some rows, possibly none; every rank calls it.
+void write_piece(hid_t dataset, const base::Slab& rows, const void* values, hid_t memory_type) {
+  const base::Hdf5Space space(H5Dget_space(dataset));
+  hsize_t count[2] = {0, 0};
+  const int dimensions = check_hdf5(H5Sget_simple_extent_dims(space, count, nullptr));
   const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
-  const hsize_t count[2] = {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(columns)};
+  count[0] = static_cast<hsize_t>(rows.rows());
   const base::Hdf5Space memory(H5Screate_simple(dimensions, count, nullptr));
   if (rows.rows() == 0) {
-    check_hdf5(H5Sselect_none(file_space));
+    check_hdf5(H5Sselect_none(space));
     check_hdf5(H5Sselect_none(memory));
   } else {
-    check_hdf5(H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start, nullptr, count, nullptr));
+    check_hdf5(H5Sselect_hyperslab(space, H5S_SELECT_SET, start, nullptr, count, nullptr));
   }
-  check_hdf5(H5Dwrite(dataset, memory_type, memory, file_space, transfer, values));
+  const base::Hdf5Properties transfer(H5Pcreate(H5P_DATASET_XFER));
+  check_hdf5(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE));
+  // Slabs are contiguous: nothing to gather, and MPI-IO's own collective writes hang on a disk
+  // error.
+  check_hdf5(H5Pset_dxpl_mpio_collective_opt(transfer, H5FD_MPIO_INDIVIDUAL_IO));
+  check_hdf5(H5Dwrite(dataset, memory_type, memory, space, transfer, values));
 }
 
 }  // namespace
@@ -176,13 +137,8 @@ void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Sla
   if (check_hdf5(H5Sget_simple_extent_npoints(space)) == 0) return;
   hsize_t shape[2] = {0, 0};
   check_hdf5(H5Sget_simple_extent_dims(space, shape, nullptr));
-  const auto columns = static_cast<int64_t>(shape[1]), width = std::max<int64_t>(columns, 1);
-  const base::Hdf5Properties transfer(H5Pcreate(H5P_DATASET_XFER));
-  check_hdf5(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE));
-  // Slabs are contiguous: nothing to gather, and MPI-IO's own collective writes hang on a disk
-  // error.
-  check_hdf5(H5Pset_dxpl_mpio_collective_opt(transfer, H5FD_MPIO_INDIVIDUAL_IO));
-  const auto row_bytes = static_cast<int64_t>(H5Tget_size(memory_type)) * width;
+  const auto row_bytes =
+      static_cast<int64_t>(H5Tget_size(memory_type) * std::max<hsize_t>(shape[1], 1));
   const int64_t step = std::max<int64_t>(piece_bytes / row_bytes, 1);
   int64_t longest = mine.rows();
   MPI_Allreduce(MPI_IN_PLACE, &longest, 1, MPI_INT64_T, MPI_MAX, comm);
@@ -191,7 +147,7 @@ void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Sla
   for (int64_t done = 0; done < longest; done += step) try {
       const base::Slab piece{std::min(mine.begin + done, mine.end),
                              std::min(mine.begin + done + step, mine.end)};
-      write_piece(dataset, space, transfer, piece, columns,
+      write_piece(dataset, piece,
                   values ? static_cast<const char*>(values) + (piece.begin - mine.begin) * row_bytes
                          : static_cast<const void*>(&nothing),
                   memory_type);

@@ -64,8 +64,9 @@ std::string point_item(const XdmfBlock& block, const std::string& h5, const std:
 /// both to see whether a mesh has moved, and reports an error where it has that of one only.
 std::string corner_item(const XdmfBlock& block, const std::string& h5) {
   if (block.merged == 0)
-    return data_item(h5, block.connectivity, block.cells, block.corners, integer);
-  return rows_item(h5, block.connectivity, {0, block.cells, block.cells}, block.corners, integer);
+    return data_item(h5, block.connectivity, block.cells, block.cell.corners, integer);
+  return rows_item(h5, block.connectivity, {0, block.cells, block.cells}, block.cell.corners,
+                   integer);
 }
 
 std::string attribute(const XdmfBlock& block, const XdmfArray& array, const std::string& h5,
@@ -84,7 +85,7 @@ std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, dou
       fmt::format("      <Grid Name=\"{}\" GridType=\"Uniform\">\n", escaped(block.name));
   text += fmt::format("        <Time Value=\"{}\"/>\n", load);
   text += fmt::format("        <Topology {} NumberOfElements=\"{}\">{}</Topology>\n",
-                      block.topology, block.cells, corner_item(block, h5));
+                      block.cell.topology, block.cells, corner_item(block, h5));
   text += fmt::format("        <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
                       point_item(block, h5, block.geometry[step], 3, real));
   for (const XdmfArray& array : block.arrays)

@@ -23,17 +23,22 @@ struct XdmfArray {
   std::string in_step(size_t step) const;
 };
 
+/// A kind of cell.
+struct XdmfCell {
+  const char* topology = "";  ///< attributes of the Topology element but the number of cells
+  uint8_t vtk = 0;            ///< its number in VTK
+  int corners = 0;
+};
+
 /// A mesh of one kind of cell that moves from step to step.
 struct XdmfBlock {
-  std::string name;           ///< last part of the file's name: tissue, springs, skin, bones
-  const char* topology = "";  ///< attributes of the Topology element but the number of cells
-  uint8_t vtk_cell = 0;       ///< the kind of cell as VTK numbers them
-  int corners = 0;            ///< points a cell
-  std::string connectivity;   ///< path of the i64 [cells, corners] dataset
+  std::string name;  ///< last part of the file's name: tissue, springs, skin, bones
+  XdmfCell cell;
+  std::string connectivity;  ///< path of the i64 [cells, corners] dataset
   int64_t points = 0, cells = 0;
   std::vector<std::string> geometry;  ///< [steps] path of the f64 [points, 3] dataset
-  int64_t first = 0, merged = 0;      ///< its rows in datasets of `merged` rows at points; 0: all
   std::vector<XdmfArray> arrays;
+  int64_t first = 0, merged = 0;  ///< its rows in datasets of `merged` rows at points; 0: all
 };
 
 /// The XDMF document of a block: a temporal collection of Uniform grids, one for each load (its
