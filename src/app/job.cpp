@@ -115,8 +115,8 @@ discrete::LocalModel build_springs(MPI_Comm comm, const model::ColumnGeometry* g
   return local_model;
 }
 
-/// Builds a scene's model. Incisions that tension opens are made in a second build, by what
-/// balances the first. Collective.
+/// Builds a scene's model. Where tension opens incisions, it is built without them, balanced, and
+/// built again with them and the balanced edges and volumes. Collective.
 void build(MPI_Comm comm, const std::filesystem::path& input, const scene::SceneChanges& changes,
            Job& job) {
   std::optional<model::ColumnGeometry> geometry;  // on rank 0

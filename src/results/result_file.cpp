@@ -158,7 +158,7 @@ struct ResultFile::State {
   void create(const model::Model& model, const model::ModelRows& slabs, Kind kind);
   void require_rows(const model::StepRows& rows) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
-  /// Of rows and columns, as create_rows.
+  /// Creates a dataset and writes this rank's rows of it. Collective.
   void write_dataset(hid_t group, const char* dataset, std::array<int64_t, 2> shape,
                      const base::Slab& mine, const double* values) const;
   void write_points(hid_t step, const model::StepRows& rows);

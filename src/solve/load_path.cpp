@@ -100,7 +100,7 @@ int64_t LoadPath::inverted(Vec displacement) {
   return objective_.totals().inverted;
 }
 
-/// Whether volumes are so stiff that a step begins with softer ones.
+/// Returns true if volumes are so stiff that a step begins with softer ones.
 bool LoadPath::begins_softer() const {
   return objective_.largest_bulk() > stiff_bulk && !objective_.positions().part().contact;
 }
@@ -115,8 +115,8 @@ bool LoadPath::predict(Vec displacement, double load) {
 }
 
 /// Takes trial_ near the rest position of softer volumes, then of stiffer ones. A prediction
-/// changes volumes by the square of what it turns, which nearly incompressible tissue resists so
-/// much that a search goes back by many short steps.
+/// that rotates tissue by θ changes its volume by a share θ², to which nearly incompressible tissue
+/// is so stiff that a search returns in many short steps.
 void LoadPath::presolve_softer() {
   for (double bulk = softest_bulk; 2 * bulk < objective_.largest_bulk(); bulk *= bulk_growth) {
     const BulkLimit limit(objective_, tangent_, bulk);
