@@ -1,5 +1,7 @@
 #include "column_layout.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "anatomy_check.h"
@@ -38,6 +40,34 @@ SkinMesh mesh_with_paths(const scene::Scene& scene, const surface::Surface& skin
   return make_skin_mesh(refined);
 }
 
+/// Least share of the tissue on each bone that stays attached, [bones]: of the piece of a
+/// genioplasty, which goes with a broad pedicle of soft tissue. Empty without landmarks.
+std::vector<double> pedicles(const scene::Scene& scene) {
+  std::vector<double> shares;
+  if (!scene.anatomy) return shares;
+  shares.assign(scene.bones.size(), 0);
+  for (const scene::Osteotomy& cut : scene.osteotomies)
+    if (cut.made_by == scene::OsteotomyTemplate::genioplasty)
+      shares[cut.piece] = scene.anatomy->pedicle;
+  return shares;
+}
+
+/// Releases tissue near pieces that move differently, and reports where the pedicle limits it.
+void release_from_bones(const scene::Scene& scene, const MotionRange& range, const SkinMesh& mesh,
+                        const Columns& columns, const BoneField& field, Attachment& attachment) {
+  const double distance = scene.tissue.release;
+  const std::vector<double> pedicle = pedicles(scene);
+  const std::vector<double> limits =
+      release_near_other_pieces(columns.deep, mesh.vertex_area, field, range,
+                                {distance, scene.tissue.released, pedicle}, attachment);
+  for (size_t b = 0; b < limits.size(); ++b)
+    if (limits[b] < distance)
+      attachment.remarks.push_back(fmt::format(
+          "pedicle by landmarks: tissue on '{}' is released within {:.1f} in place of {:g} mm of "
+          "other pieces, so that {:g} % of it stays attached",
+          scene.bones[b].name, std::max(limits[b], 0.0), distance, 100 * pedicle[b]));
+}
+
 /// Which columns are held as the rim; those released from bone, as do those near other pieces.
 std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range,
                              const SkinMesh& mesh, const Columns& columns, const BoneField& field,
@@ -49,8 +79,7 @@ std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range
   };
   if (scene.rim == scene::Rim::fixed) let_go();
   const std::vector<int32_t> sliding = attachment.slides_on;
-  release_near_other_pieces(columns.deep, field, range,
-                            {scene.tissue.release, scene.tissue.released}, attachment);
+  release_from_bones(scene, range, mesh, columns, field, attachment);
   if (scene.rim != scene::Rim::automatic) return rim;
   const std::vector<char> border = rim;
   for (size_t c = 0; c < rim.size(); ++c) {

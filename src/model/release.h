@@ -10,16 +10,22 @@ namespace repose::model {
 struct Release {
   double distance;    ///< mm, at most; 0: nowhere
   scene::Attach how;  ///< what it does then
+  std::vector<double> pedicle =
+      {};  ///< [bones] least share of the tissue that stays attached; or empty
 };
 
-/// Lets go of the deepest points near a bone piece whose displacement there differs from that of
+/// Releases the deepest points near a bone piece whose displacement there differs from that of
 /// their own bone (docs/theory/load_path.md: real tissue slides there). How near grows with the
 /// difference, from 0 to the whole distance where it is 4 mm, so that the attachment follows the
 /// plan without a jump where two pieces move alike. Distances are at the initial position. Of a
-/// scene with a plan the difference is the largest in its box.
-void release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
-                               const MotionRange& range, const Release& release,
-                               Attachment& attachment);
+/// scene with a plan the difference is the largest in its box. Of the columns on each bone, those
+/// nearest to other pieces are released, with no more than the share 1 − pedicle of their area
+/// (`area` [V], mm²). Returns the release distance of each bone, mm [bones]: release.distance, or
+/// less where the pedicle limits it (negative: nothing is released).
+std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep,
+                                              const std::vector<double>& area,
+                                              const BoneField& bones, const MotionRange& range,
+                                              const Release& release, Attachment& attachment);
 
 /// Lets go by the same rule of deepest points near that of a rim column (`rim` [V], 1 or 0): the
 /// rim stays where it is, so to bones that move it is another piece.

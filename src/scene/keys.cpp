@@ -430,6 +430,10 @@ std::vector<Key> anatomy_keys() {
            "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
            "between the lips, balanced as the head is recorded.",
            "N/mm²", Range::between(0, 1)},
+          {"anatomy.pedicle", number, "0.5",
+           "Least share of the tissue on the piece of a genioplasty that tissue.release leaves "
+           "attached, by area of skin; 0 sets no limit.",
+           "", Range::between(0, 1)},
           {"anatomy.septum", number, "",
            "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal "
            "spine to pronasale to nasion; tissue.material.regions override it.",

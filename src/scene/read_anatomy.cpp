@@ -74,6 +74,7 @@ AnatomyPlan read_anatomy(const Value& value) {
   if (const auto gap = map.find("lower_gap")) plan.lower_gap = gap->number();
   if (const auto adhesion = map.find("adhesion")) plan.adhesion = adhesion->number();
   if (const auto tone = map.find("tone")) plan.tone = tone->number();
+  if (const auto pedicle = map.find("pedicle")) plan.pedicle = pedicle->number();
   return plan;
 }
 

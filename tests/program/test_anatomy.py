@@ -134,6 +134,24 @@ def test_ranks_make_the_parts_of_lips_that_adhere(run, tmp_path, head):
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_a_share_of_the_tissue_of_a_chin_stays_attached_on_any_ranks(run, tmp_path, head):
+    chin = ("osteotomies: [{bone: mandible, piece: chin, template: genioplasty, kerf: 0.5}]\n"
+            "moves: [{bone: chin, clinical: {advance: 8}}]\n")
+    models = {}
+    for pedicle, ranks in ((0.7, 1), (0.7, 3), (0, 1)):
+        write_scene(tmp_path, chin, anatomy=f"landmarks: head.mrk.json, pedicle: {pedicle}")
+        result = run("repose-solve", "scene.yaml", "-output", "chin", ranks=ranks)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert ("so that 70 % of it stays attached" in result.stdout) == (pedicle > 0)
+        models[pedicle, ranks] = model_of(tmp_path / "chin.h5")
+    of_one, of_three = models[0.7, 1], models[0.7, 3]
+    assert [name for name in of_one if of_one[name].tobytes() != of_three[name].tobytes()] == []
+    chin = list(of_one["bone"]).index(b"chin")
+    attached = [(model["point/bone"] == chin).sum() for model in (of_one, models[0, 1])]
+    assert attached[0] > attached[1] > 0
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_landmarks_of_another_head_are_refused_in_one_line(run, tmp_path, head):
     for name, place in head.items():
         head[name] = (place + [0, 60, 0]).tolist()

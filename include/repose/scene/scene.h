@@ -281,6 +281,7 @@ struct AnatomyPlan {
   std::optional<double> lower_gap;  ///< mm, below stomion; unset: by the overjet
   double adhesion = 5e-4;  ///< N/mm², largest tension between lips and the teeth of their jaw
   double tone = 0.004;     ///< N/mm², of the ring muscle at the line between the lips
+  double pedicle = 0.5;  ///< least share of the tissue on a genioplasty's piece that stays attached
 };
 
 /// The gap in front of the lower teeth, mm: `lower_gap`, or half of the overjet, at least `gap` and

@@ -242,6 +242,33 @@ TEST(Build, tissue_lets_go_the_farther_the_more_differently_pieces_move) {
   EXPECT_EQ(released_at(6), 41 * 8);   // at most
 }
 
+TEST(Build, a_share_of_the_tissue_of_a_chin_stays_attached) {
+  TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::free;
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  scene::AnatomyPlan& plan = jaws.scene.anatomy.emplace();
+  plan.part_lips = plan.vestibule = false;
+  plan.adhesion = plan.tone = 0;
+  scene::Osteotomy& cut = jaws.scene.osteotomies.emplace_back();
+  cut.bone = 0;
+  cut.piece = 1;
+  cut.made_by = scene::OsteotomyTemplate::genioplasty;
+  const auto report_with = [&](double pedicle) {
+    plan.pedicle = pedicle;
+    return build_model(jaws.scene, jaws.skin, jaws.bones).report;
+  };
+  EXPECT_EQ(report_with(0).released, 41 * 8);  // four rows of 41 columns of each jaw
+  const BuildReport half = report_with(0.5);
+  EXPECT_EQ(half.released, 41 * 8);
+  EXPECT_FALSE(remarked(half, "pedicle"));
+  const BuildReport most = report_with(0.9);  // a row is 1/19.5 of the piece's tissue
+  EXPECT_EQ(most.released, 41 * (4 + 1));
+  EXPECT_TRUE(remarked(most, "tissue on 'lower' is released within 1.3 in place of 10 mm"));
+  EXPECT_EQ(report_with(1).released, 41 * 4);
+  cut.made_by = scene::OsteotomyTemplate::sagittal_split;
+  EXPECT_EQ(report_with(0.9).released, 41 * 8);
+}
+
 TEST(Build, a_plan_makes_attachment_and_contact_the_same_for_all_its_moves) {
   TwoJaws jaws;
   jaws.scene.contact.emplace();
