@@ -19,6 +19,7 @@ std::vector<int32_t> columns_of_points(const ColumnLevel& level) {
 }
 
 /// Calls visit(own column) for the columns that column `c` is coupled to, some more than once.
+/// Points on either side of a cut, which contact alone may couple, have a block of zeros.
 template <class Visit>
 void for_each_neighbor(const ColumnLevel& level, const std::vector<int32_t>& column, size_t c,
                        Visit&& visit) {
@@ -26,7 +27,7 @@ void for_each_neighbor(const ColumnLevel& level, const std::vector<int32_t>& col
   for (int64_t k = pattern.begin[level.columns()[c]]; k < pattern.begin[level.columns()[c + 1]];
        ++k)
     if (const int32_t j = pattern.column[k];
-        j < level.own() && column[j] != static_cast<int32_t>(c))
+        j < level.own() && column[j] != static_cast<int32_t>(c) && !level.block(k).isZero(0))
       visit(column[j]);
 }
 

@@ -165,6 +165,28 @@ TEST(ColumnMultigrid, AddsAndTakesBackExtraBlocksOnEachLevel) {
   EXPECT_GT(discrete::largest_block(refilled), 0.01 * length);
 }
 
+TEST(ColumnMultigrid, IsThatOfTwoSlabsWhereNothingButLinksCouplesThem) {
+  Preconditioned s(slab(24));  // lips that are parted, and may touch
+  const auto is_left = [&](int32_t p) { return s.part.model.points.position[p].x() < 23; };
+  const auto parted = [&](bool linked) {
+    return [&, linked](const discrete::BlockVisitor& visit) {
+      s.blocks([&](int32_t p, int32_t q, const Mat3& block) {
+        const bool own = std::max(p, q) < s.part.owned_points;
+        if (is_left(p) == is_left(q))
+          visit(p, q, block);
+        else if (linked && own)
+          visit(p, q, Mat3::Zero());
+      });
+    };
+  };
+  const base::VecHandle a = s.vector(4, 1.0);
+  base::VecHandle bare = s.positions.make_vector(), linked = s.positions.make_vector();
+  linear::ColumnMultigrid(MPI_COMM_WORLD, s.part, parted(false)).apply(a, bare);
+  linear::ColumnMultigrid(MPI_COMM_WORLD, s.part, parted(true)).apply(a, linked);
+  check(VecAXPY(linked, -1, bare));
+  EXPECT_LT(discrete::largest_block(linked), 1e-6 * discrete::largest_block(bare));
+}
+
 TEST(ColumnMultigrid, ServesGraphsWithoutLayers) {
   model::Model graph = slab(12);
   for (int64_t p = 0; p + 2 < static_cast<int64_t>(graph.points.position.size()); p += 4)
