@@ -301,6 +301,12 @@ bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_
          reason != KSP_DIVERGED_INDEFINITE_PC;
 }
 
+void TangentSolver::product_of_solution(Vec rhs, Vec product) {
+  Vec left = nullptr;
+  check(KSPBuildResidual(krylov_, nullptr, next_, &left));
+  check(VecWAXPY(product, -1.0, left, rhs));
+}
+
 double TangentSolver::preconditioned_step(Vec gradient) {
   if (renewals_ == 0) return 0;
   measured_at_ = -1;

@@ -33,6 +33,7 @@ ContactQp::ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
       force_(objective.positions().make_vector()),
       left_(objective.positions().make_vector()),
       direction_(objective.positions().make_vector()),
+      change_(objective.positions().make_vector()),
       response_(objective.positions().make_vector()) {}
 
 void ContactQp::linearize(Vec displacement) {
@@ -193,15 +194,22 @@ double ContactQp::line_search(double slope, double curvature) {
   return share;
 }
 
+bool ContactQp::descends(Vec direction) {
+  PetscReal descent = 0;
+  check(VecDot(left_, direction, &descent));
+  return descent > 0;
+}
+
 /// Minimizes the augmented Lagrangian of the present multipliers from `step`: Newton steps on its
-/// active sets, with the least along each.
-bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
+/// active sets, with the least along each. Where the tissue itself shows negative curvature, it
+/// ends with what conjugate gradients had reached before (Nocedal & Wright 2006, 7.1).
+ContactQp::Found ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
   bool full = false;                                // the latest step was not shortened
   for (int set = 0; set < max_sets; ++set) {
     const bool changed = choose_active();
-    if (full && !changed) return true;
+    if (full && !changed) return Found::minimum;
     if (changed) set_blocks();
     check(VecCopy(force_, left_));
     check(VecAXPY(left_, 1.0, slope));
@@ -211,31 +219,34 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
     for (size_t k = 0; k < gaps_.size(); ++k) acting[k] = pressure(k);
     add_pushes(acting, left_);
     const bool convex = solver_.solve(displacement, left_, direction_, coarse);
-    if (!convex || !solver_.finished()) return false;
+    const bool cut = !convex && reduced_ && descends(direction_);
+    if (!cut && !(convex && solver_.finished())) return Found::nothing;
     objective_.positions().scatter_to_local(direction_, moved_);
     for (size_t k = 0; k < gaps_.size(); ++k) {
       closing_[k] = change(gaps_[k], moved_);
       acting[k] = -stiffness_ * closing_[k];
     }
-    check(MatMult(tangent_.action(), direction_, left_));
-    add_pushes(acting, left_);  // H δ without the stiffness of gaps
-    check(VecDot(left_, direction_, &curvature));
+    solver_.product_of_solution(left_, change_);
+    add_pushes(acting, change_);  // H δ without the stiffness of gaps
+    check(VecDot(change_, direction_, &curvature));
     PetscReal held = 0;
     check(VecDot(force_, direction_, &along));
     check(VecDot(slope, direction_, &held));
     const double share = line_search(along + held, curvature);
     full = std::abs(share - 1) <= coarse;
     check(VecAXPY(step, share, direction_));
-    check(VecAXPY(force_, share, left_));
+    check(VecAXPY(force_, share, change_));
     for (size_t k = 0; k < gaps_.size(); ++k) closed_[k] += share * closing_[k];
     const double moved = share * discrete::largest_block(direction_);
-    if (moved <= std::max(tolerance, share_left * discrete::largest_block(step))) return true;
+    if (cut) return Found::descent;
+    if (moved <= std::max(tolerance, share_left * discrete::largest_block(step)))
+      return Found::minimum;
   }
-  return false;
+  return Found::nothing;
 }
 
 /// Rounds of minimizations and new multipliers.
-bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
+ContactQp::Found ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_rounds = 3;  // the next program goes on with the multipliers
   constexpr double share = 0.1;  // of the step
   check(VecSet(step, 0));
@@ -244,24 +255,28 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) 
   closing_.assign(gaps_.size(), 0.0);
   active_.assign(gaps_.size(), 2);  // none chosen yet
   tangent_.assemble(displacement);
+  Found found = Found::nothing;
   for (int round = 0; round < max_rounds; ++round) {
-    if (!minimize(displacement, slope, tolerance, step)) return false;
+    found = minimize(displacement, slope, tolerance, step);
+    if (found == Found::nothing) break;
     const double changed = move_multipliers();
+    if (found == Found::descent) break;
     if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;
   }
-  return true;
+  return found;
 }
 
-bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
+ContactQp::Found ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
   const std::vector<double> multiplier = multiplier_;
-  bool found = search(displacement, slope, tolerance, step);
-  reduced_ = !found;
+  reduced_ = false;
+  Found found = search(displacement, slope, tolerance, step);
+  reduced_ = found == Found::nothing;
   if (reduced_) {
     multiplier_ = multiplier;
     curvature_ = convex_curvature_;
     found = search(displacement, slope, tolerance, step);
   }
-  if (found) give_multipliers();
+  if (found != Found::nothing) give_multipliers();
   return found;
 }
 

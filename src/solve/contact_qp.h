@@ -26,11 +26,13 @@ class ContactQp {
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
   void replace(const mechanics::LinearGap& by);
+  /// How far a solve came: no step, one along which the function decreases, or the minimum.
+  enum class Found { nothing, descent, minimum };
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
   /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Where negative
-  /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a
-  /// minimum was reached. Collective.
-  bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
+  /// curvature is met, the gaps' curvature is reduced to its semidefinite part; where it is met
+  /// again, d is what was found before. Collective.
+  Found solve(Vec displacement, Vec slope, double tolerance, Vec step);
   /// True if the latest solve met negative curvature.
   bool reduced() const { return reduced_; }
 
@@ -45,9 +47,10 @@ class ContactQp {
   double pressure(size_t k) const;
   double change(const mechanics::LinearGap& gap, std::span<const Vec3> moved) const;
   void add_pushes(std::span<const double> pressure, Vec to);
+  bool descends(Vec direction);
   double line_search(double slope, double curvature);
-  bool minimize(Vec displacement, Vec slope, double tolerance, Vec step);
-  bool search(Vec displacement, Vec slope, double tolerance, Vec step);
+  Found minimize(Vec displacement, Vec slope, double tolerance, Vec step);
+  Found search(Vec displacement, Vec slope, double tolerance, Vec step);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
@@ -61,8 +64,8 @@ class ContactQp {
   std::vector<char> active_;                // [gaps]
   bool reduced_ = false;
   std::vector<discrete::Objective::Block> curvature_, convex_curvature_;
-  std::vector<Vec3> moved_;                              // [local points] a direction, mm
-  base::VecHandle force_, left_, direction_, response_;  // force_: H d
+  std::vector<Vec3> moved_;  // [local points] a direction δ, mm
+  base::VecHandle force_, left_, direction_, change_, response_;  // H d, −∇, δ, H δ, pushes
 };
 
 }  // namespace repose::solve

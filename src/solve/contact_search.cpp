@@ -118,7 +118,8 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   qp_.linearize(displacement, load, travel);
   objective_.hessian_action(travel, trial_, false);
   check(VecAXPY(slope_, 1.0, trial_));
-  const bool found = qp_.solve(displacement, slope_, predicted_to, increment);
+  const bool found =
+      qp_.solve(displacement, slope_, predicted_to, increment) == ContactQp::Found::minimum;
   tangent_.forget_contact();
   if (!found) {
     objective_.round_bodies(false);
@@ -183,10 +184,12 @@ ContactSearch::End ContactSearch::approach(Vec displacement, double accuracy, in
 }
 
 /// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
-/// from `tissue`, the value without contact. Its full length is tried first.
+/// from `tissue`, the value without contact. Its full length is tried first, or as much as the
+/// gaps, taken to first order, may hold for.
 double ContactSearch::take_step(Vec displacement, double tissue, double& value) {
   constexpr int max_halved = 6;
   constexpr double rounding = 1e-12;
+  constexpr double longest = 2;  // mm
   const auto try_step = [&](double share) {
     check(VecCopy(displacement, trial_));
     check(VecAXPY(trial_, share, step_));
@@ -194,7 +197,7 @@ double ContactSearch::take_step(Vec displacement, double tissue, double& value) 
   };
   const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
   const double largest = merit + rounding * std::abs(merit);
-  double share = 1;
+  double share = std::min(1.0, longest / discrete::largest_block(step_));
   value = try_step(share);
   for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
   if (value > largest) return 0;
@@ -202,25 +205,30 @@ double ContactSearch::take_step(Vec displacement, double tissue, double& value) 
   return share;
 }
 
-/// Steps of quadratic programs until one is shorter than half of `accuracy`.
+/// Steps of quadratic programs until one is shorter than half of `accuracy`, or the next would be:
+/// full steps fall by at least the ratio of the latest two.
 ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int64_t& iterations,
                                          int max_steps) {
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
+  constexpr double fast = 0.2;               // ratio of full steps that is trusted
   double value = objective_.evaluate(displacement, gradient_);
   taken_ = 0;
   for (int n = 0; n < max_steps; ++n) {
     subtract_contact();
     const double tissue = value - objective_.weights().elastic * objective_.contact_value();
     qp_.linearize(displacement);
-    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
+    if (qp_.solve(displacement, slope_, finer * accuracy, step_) == ContactQp::Found::nothing)
+      return End::failed;
     const double length = discrete::largest_block(step_);
     const double share = take_step(displacement, tissue, value);
     if (share == 0) return End::failed;
-    taken_ = share == 1 ? length : 0;
+    const double before = std::exchange(taken_, share == 1 ? length : 0);
     ++iterations;
-    if (length <= (qp_.reduced() ? at_saddle : near * accuracy))
-      return qp_.reduced() ? End::failed : End::reached;
+    if (qp_.reduced() && length <= at_saddle) return End::failed;
+    const bool falls = taken_ > 0 && taken_ <= fast * before;
+    const double next = falls ? length * length / before : length;
+    if (!qp_.reduced() && next <= near * accuracy) return End::reached;
     if (watch_ && !watch_({iterations, objective_.positions().load(), value,
                            discrete::largest_block(gradient_), length, objective_.evaluations(),
                            displacement}))
@@ -352,7 +360,8 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
     qp_.replace(gap);
   }
   work = largest_of_ranks(objective_.positions().comm(), work);
-  if (!qp_.solve(start_, slope_, predicted_to, step_)) return End::failed;
+  if (qp_.solve(start_, slope_, predicted_to, step_) != ContactQp::Found::minimum)
+    return End::failed;
   check(VecAXPY(start_, 1.0, step_));
   if (energy(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
@@ -438,15 +447,17 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   stiffen(1);
   int64_t iterations = 0;
   double finer = accuracy;
-  int left = 0;  // saddles
+  int left = 0;       // saddles
+  bool anew = false;  // the next programs begin after a soft search
   const auto leaves = [&] {
     tangent_.forget_contact();
+    anew = true;
     return left < max_left && leave_saddle(objective_, solver_, displacement) && ++left > 0;
   };
   if (approach(displacement, accuracy, iterations) == End::stopped)
     return stopped(displacement, outcome);
   for (int round = 0; round < max_rounds;) {
-    if (round + left > 0) {
+    if (anew) {
       const Outcome near = presolve(displacement, accuracy);
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
@@ -457,6 +468,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome = finish(displacement, accuracy);
     if (outcome.converged) break;
     if (!outcome.stable && leaves()) continue;
+    anew = end != End::reached;
     if (end == End::reached) finer /= 4;
     stiffen(std::min(2 * times_, stiffest));
     ++round;

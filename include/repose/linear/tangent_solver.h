@@ -53,6 +53,8 @@ class TangentSolver {
   /// out, δ is the iterate reached.
   bool solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance);
   bool finished() const { return finished_; }  ///< the latest solve, to the tolerance requested
+  /// H δ of the latest solve, whose right-hand side is `rhs`: what the residual leaves of it.
+  void product_of_solution(Vec rhs, Vec product);
 
   /// The Newton step −H⁻¹ ∇Φ at `displacement`, its largest block in mm: how far the rest position
   /// is in a quadratic model. Infinite where H is not positive definite along the solve.

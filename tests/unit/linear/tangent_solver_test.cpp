@@ -41,6 +41,21 @@ TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
   EXPECT_EQ(s.solver.renewals(), 2);
 }
 
+TEST_P(Preconditioner, KnowsTheProductOfARoughSolution) {
+  const base::ScopedOption type("-pc_type", GetParam());
+  Solved s;
+  const base::VecHandle at = s.vector(1, 0.05), known = s.positions.make_vector(),
+                        product = s.positions.make_vector();
+  s.solve(at, 0.3);
+  s.solver.product_of_solution(s.rhs, known);
+  base::check(MatMult(s.tangent.action(), s.answer, product));
+  PetscReal length = 0, apart = 0;
+  base::check(VecNorm(product, NORM_2, &length));
+  base::check(VecAXPY(product, -1.0, known));
+  base::check(VecNorm(product, NORM_2, &apart));
+  EXPECT_LT(apart, 1e-10 * length);
+}
+
 TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
   const auto by_factors_after = [](double bulk_modulus) {
     Solved s;
