@@ -124,35 +124,42 @@ void Coarsening::make_linear(const Vec3& at, std::vector<Candidate>& found) cons
   for (Candidate& c : found) c.weight *= 1 + slope.dot(center_[c.point] - mean);
 }
 
-void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
-                        const std::vector<int32_t>& point) {
+/// The coarse points that own point `i` moves with, by how strongly its neighbors of the layer
+/// hold it, at most `maximum`.
+void Coarsening::find_candidates(const ColumnLevel& fine, const std::vector<int32_t>& point,
+                                 int32_t i, std::vector<Candidate>& found) {
   constexpr double damping = 0.85;
   const BlockPattern& pattern = fine.pattern();
+  found.assign(1, {0.0, point[i]});
+  double total = 0;
+  for (int64_t k = pattern.begin[i]; k < pattern.begin[i + 1]; ++k) {
+    const int32_t j = pattern.column[k];
+    if (j == i || j >= fine.own() || fine.place()[j].layer != fine.place()[i].layer) continue;
+    const double strength = std::max(0.0f, pull(fine.block(k)));
+    total += strength;
+    const auto same = std::find_if(found.begin(), found.end(),
+                                   [&](const Candidate& c) { return c.point == point[j]; });
+    if (same == found.end())
+      found.push_back({strength, point[j]});
+    else
+      same->weight += strength;
+  }
+  for (Candidate& c : found) c.weight *= total > 0 ? damping / total : 0.0;
+  found.front().weight += total > 0 ? 1 - damping : 1.0;
+  std::sort(found.begin(), found.end(),
+            [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
+  if (found.size() > maximum) found.resize(maximum);
+  double sum = 0;
+  for (const Candidate& c : found) sum += c.weight;
+  for (Candidate& c : found) c.weight /= sum;
+}
+
+void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
+                        const std::vector<int32_t>& point) {
   weights_.resize(fine.own() + fine.ghosts());
   std::vector<Candidate> found;
   for (int32_t i = 0; i < fine.own(); ++i) {
-    found.assign(1, {0.0, point[i]});
-    double total = 0;
-    for (int64_t k = pattern.begin[i]; k < pattern.begin[i + 1]; ++k) {
-      const int32_t j = pattern.column[k];
-      if (j == i || j >= fine.own() || fine.place()[j].layer != fine.place()[i].layer) continue;
-      const double strength = std::max(0.0f, pull(fine.block(k)));
-      total += strength;
-      const auto same = std::find_if(found.begin(), found.end(),
-                                     [&](const Candidate& c) { return c.point == point[j]; });
-      if (same == found.end())
-        found.push_back({strength, point[j]});
-      else
-        same->weight += strength;
-    }
-    for (Candidate& c : found) c.weight *= total > 0 ? damping / total : 0.0;
-    found.front().weight += total > 0 ? 1 - damping : 1.0;
-    std::sort(found.begin(), found.end(),
-              [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
-    if (found.size() > maximum) found.resize(maximum);
-    double sum = 0;
-    for (const Candidate& c : found) sum += c.weight;
-    for (Candidate& c : found) c.weight /= sum;
+    find_candidates(fine, point, i, found);
     make_linear(at[i], found);
     Weights& weights = weights_[i];
     for (size_t m = 0; m < maximum; ++m) {

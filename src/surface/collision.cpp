@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
@@ -47,27 +48,24 @@ ShortestSegment between(const CollisionTree& a, int64_t i, const CollisionTree& 
                           place.apply(b.corners(b.nodes()[j].triangle)));
 }
 
-/// Visits pairs of nodes, the more promising of two first. `visitor.key(i, j, least distance)` is
-/// what the pair may come to at best, `visitor.bound()` what is no longer wanted, `visitor.leaf`
-/// takes a pair of leaves.
-template <class Visitor>
-void traverse(const CollisionTree& a, const CollisionTree& b, const Placement& place,
-              Visitor& visitor) {
+/// Visits pairs of nodes, the more promising of two first. `key(i, j)` is what the pair may come to
+/// at best, `bound()` what is no longer wanted, `leaf(i, j)` takes a pair of leaves.
+template <class Key, class Bound, class Leaf>
+void traverse(const CollisionTree& a, const CollisionTree& b, Key&& key, Bound&& bound,
+              Leaf&& leaf) {
   struct Task {
     int64_t i, j;
     double key;
   };
-  const auto task = [&](int64_t i, int64_t j) -> Task {
-    return {i, j, visitor.key(i, j, place.minimum(a.nodes()[i], b.nodes()[j]))};
-  };
+  const auto task = [&](int64_t i, int64_t j) -> Task { return {i, j, key(i, j)}; };
   std::vector<Task> stack{task(0, 0)};
   while (!stack.empty()) {
-    const auto [i, j, key] = stack.back();
+    const auto [i, j, best] = stack.back();
     stack.pop_back();
-    if (!(key <= visitor.bound())) continue;
+    if (!(best <= bound())) continue;
     const Node &p = a.nodes()[i], &q = b.nodes()[j];
     if (p.right < 0 && q.right < 0) {
-      visitor.leaf(i, j);
+      leaf(i, j);
       continue;
     }
     const bool split_a = q.right < 0 || (p.right >= 0 && p.half.sum() > q.half.sum());
@@ -78,48 +76,18 @@ void traverse(const CollisionTree& a, const CollisionTree& b, const Placement& p
   }
 }
 
-/// Ends at the first contact.
-struct TouchVisitor {
-  const CollisionTree &a, &b;
-  const Placement& place;
-  bool found = false;
-
-  double key(int64_t, int64_t, double minimum) const { return minimum; }
-  double bound() const { return found ? -1 : contact_margin; }
-  void leaf(int64_t i, int64_t j) {
-    const double squared = between(a, i, b, j, place).squared;
-    found = found || squared <= contact_margin * contact_margin;
-  }
-};
-
-struct NearestVisitor {
-  const CollisionTree &a, &b;
-  const Placement& place;
-  ClosestApproach best;
-
-  double key(int64_t, int64_t, double minimum) const { return minimum; }
-  double bound() const { return best.distance; }
-  void leaf(int64_t i, int64_t j) {
-    const ShortestSegment pair = between(a, i, b, j, place);
-    const double distance = std::sqrt(pair.squared);
-    if (distance < best.distance || (best.triangles[0] < 0 && distance <= best.distance))
-      best = {distance, {a.nodes()[i].triangle, b.nodes()[j].triangle}, pair.middle};
-  }
-};
-
-struct AllVisitor {
-  const CollisionTree &a, &b;
-  const Placement& place;
-  double limit;
-  std::vector<std::pair<int64_t, int64_t>> pairs;
-
-  double key(int64_t, int64_t, double minimum) const { return minimum; }
-  double bound() const { return limit; }
-  void leaf(int64_t i, int64_t j) {
-    if (between(a, i, b, j, place).squared <= limit * limit)
-      pairs.emplace_back(a.nodes()[i].triangle, b.nodes()[j].triangle);
-  }
-};
+/// Visits pairs of leaves, nearer nodes first, while `bound()` mm is not exceeded: `leaf` takes
+/// their triangles and the shortest segment between these.
+template <class Bound, class Leaf>
+void visit_leaves(const CollisionTree& a, const CollisionTree& b, const Mat4& pose, Bound&& bound,
+                  Leaf&& leaf) {
+  const Placement place(pose);
+  traverse(
+      a, b, [&](int64_t i, int64_t j) { return place.minimum(a.nodes()[i], b.nodes()[j]); }, bound,
+      [&](int64_t i, int64_t j) {
+        leaf(std::array{a.nodes()[i].triangle, b.nodes()[j].triangle}, between(a, i, b, j, place));
+      });
+}
 
 }  // namespace
 
@@ -158,30 +126,40 @@ void CollisionTree::build(std::vector<int64_t>& rows, size_t begin, size_t end) 
 }
 
 bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose) {
-  const Placement place(pose);
-  TouchVisitor visitor{a, b, place};
-  traverse(a, b, place, visitor);
-  return visitor.found;
+  bool found = false;
+  visit_leaves(
+      a, b, pose, [&] { return found ? -1 : contact_margin; },
+      [&](const auto&, const ShortestSegment& pair) {
+        found = found || pair.squared <= contact_margin * contact_margin;
+      });
+  return found;
 }
 
 std::optional<ClosestApproach> nearest(const CollisionTree& a, const CollisionTree& b,
                                        const Mat4& pose, double limit) {
-  const Placement place(pose);
-  NearestVisitor visitor{a, b, place, {}};
-  visitor.best.distance = limit;
-  traverse(a, b, place, visitor);
-  if (visitor.best.triangles[0] < 0) return {};
-  return visitor.best;
+  ClosestApproach best{.distance = limit};
+  visit_leaves(
+      a, b, pose, [&] { return best.distance; },
+      [&](const auto& triangles, const ShortestSegment& pair) {
+        const double distance = std::sqrt(pair.squared);
+        if (distance < best.distance || (best.triangles[0] < 0 && distance <= best.distance))
+          best = {distance, triangles, pair.middle};
+      });
+  if (best.triangles[0] < 0) return {};
+  return best;
 }
 
 std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
                                                       const CollisionTree& b, const Mat4& pose,
                                                       double limit) {
-  const Placement place(pose);
-  AllVisitor visitor{a, b, place, limit, {}};
-  traverse(a, b, place, visitor);
-  std::sort(visitor.pairs.begin(), visitor.pairs.end());
-  return visitor.pairs;
+  std::vector<std::pair<int64_t, int64_t>> pairs;
+  visit_leaves(
+      a, b, pose, [&] { return limit; },
+      [&](const auto& triangles, const ShortestSegment& pair) {
+        if (pair.squared <= limit * limit) pairs.emplace_back(triangles[0], triangles[1]);
+      });
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
 }
 
 namespace {
@@ -229,42 +207,6 @@ Surface refine_near(const Surface& surface, const CollisionTree& own, const Coll
   return result;
 }
 
-/// Looks for the pair that could be within the clearance first.
-class Encounter::Sweep {
- public:
-  Sweep(const Side& a, const Side& b, const Placement& place, double clearance)
-      : a_(a), b_(b), place_(place), clearance_(clearance) {}
-
-  double key(int64_t i, int64_t j, double minimum) const {
-    if (a_.only_such[i] && b_.only_such[j]) return never;
-    return time(minimum, a_.speed[i] + b_.speed[j]);
-  }
-  double bound() const { return std::min(next.load, 2.0); }
-  void leaf(int64_t i, int64_t j) {
-    const ShortestSegment pair = between(*a_.tree, i, *b_.tree, j, place_);
-    const double distance = std::sqrt(pair.squared);
-    const double load = time(distance, a_.speed[i] + b_.speed[j]);
-    if (!(load < next.load)) return;
-    next = {load,
-            {distance, {a_.tree->nodes()[i].triangle, b_.tree->nodes()[j].triangle}, pair.middle}};
-    leaves = {i, j};
-  }
-
-  static constexpr double never = std::numeric_limits<double>::infinity();
-  std::array<int64_t, 2> leaves{-1, -1};
-  Next next{never, {}};
-
- private:
-  double time(double distance, double speed) const {
-    if (!(speed > 0)) return never;
-    return std::max(0.0, distance - clearance_ - contact_margin) / speed;
-  }
-
-  const Side &a_, &b_;
-  const Placement& place_;
-  double clearance_;
-};
-
 Encounter::Side Encounter::make_side(const CollisionTree& tree, const Twist& twist) {
   Side side{&tree, {}, std::vector<char>(tree.triangles(), 0), {}};
   for (const Node& node : tree.nodes())
@@ -294,12 +236,30 @@ Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist
 }
 
 Encounter::Next Encounter::next(const Mat4& pose, double clearance) {
+  constexpr double never = std::numeric_limits<double>::infinity();
+  const CollisionTree &a = *a_.tree, &b = *b_.tree;
   const Placement place(pose);
-  Sweep sweep(a_, b_, place, clearance);
-  if (last_[0] >= 0) sweep.leaf(last_[0], last_[1]);
-  traverse(*a_.tree, *b_.tree, place, sweep);
-  last_ = sweep.leaves;
-  return sweep.next;
+  Next next{never, {}};
+  const std::array<int64_t, 2> last = std::exchange(last_, {-1, -1});
+  const auto time = [&](double distance, int64_t i, int64_t j) {
+    const double speed = a_.speed[i] + b_.speed[j];
+    return speed > 0 ? std::max(0.0, distance - clearance - contact_margin) / speed : never;
+  };
+  const auto key = [&](int64_t i, int64_t j) {
+    if (a_.only_such[i] && b_.only_such[j]) return never;
+    return time(place.minimum(a.nodes()[i], b.nodes()[j]), i, j);
+  };
+  const auto leaf = [&](int64_t i, int64_t j) {
+    const ShortestSegment pair = between(a, i, b, j, place);
+    const double distance = std::sqrt(pair.squared), load = time(distance, i, j);
+    if (!(load < next.load)) return;
+    next = {load, {distance, {a.nodes()[i].triangle, b.nodes()[j].triangle}, pair.middle}};
+    last_ = {i, j};
+  };
+  if (last[0] >= 0) leaf(last[0], last[1]);
+  traverse(
+      a, b, key, [&] { return std::min(next.load, 2.0); }, leaf);
+  return next;
 }
 
 }  // namespace repose::surface

@@ -9,12 +9,6 @@ namespace {
 
 constexpr int64_t leaf_size = 4;
 
-/// A node that is still to be visited, left without a value in arrays.
-struct Entry {
-  double bound;  ///< mm²
-  int64_t node;
-};
-
 /// Returns the point of a triangle nearest to `q`, by barycentric regions.
 Vec3 closest_point(const Vec3& q, const Corners& t) {
   const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = q - t[0], bp = q - t[1], cp = q - t[2];
@@ -115,6 +109,30 @@ int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
   return number;
 }
 
+/// Visits the rows of leaves, the child with the lesser key first, while the key of their nodes
+/// is allowed: `key(node)` mm², `allowed(key)`, `visit(row)`.
+template <class Key, class Allowed, class Visit>
+void TriangleTree::walk(Key&& key, Allowed&& allowed, Visit&& visit) const {
+  struct Entry {  // left without a value in the array
+    double key;
+    int64_t node;
+  };
+  std::array<Entry, max_depth> stack;
+  int depth = 0;
+  stack[depth++] = {key(nodes_[0]), 0};
+  while (depth > 0) {
+    const auto [least, number] = stack[--depth];
+    if (!allowed(least)) continue;
+    const Node& node = nodes_[number];
+    for (int64_t i = node.first; i < node.first + node.count; ++i) visit(i);
+    if (node.count > 0) continue;
+    Entry left{key(nodes_[number + 1]), number + 1}, right{key(nodes_[node.right]), node.right};
+    if (left.key < right.key) std::swap(left, right);
+    stack[depth++] = left;
+    stack[depth++] = right;
+  }
+}
+
 TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int64_t hint) const {
   Nearest best;
   best.squared = limit;
@@ -124,21 +142,8 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
     if (squared < best.squared) best = {squared, order_[row], point};
   };
   if (hint >= 0) offer(row_[hint]);
-  std::array<Entry, max_depth> stack;
-  int depth = 0;
-  stack[depth++] = {nodes_[0].box.squared_distance(query), 0};
-  while (depth > 0) {
-    const auto [bound, number] = stack[--depth];
-    if (!(bound < best.squared)) continue;
-    const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i) offer(i);
-    if (node.count > 0) continue;
-    Entry left{nodes_[number + 1].box.squared_distance(query), number + 1};
-    Entry right{nodes_[node.right].box.squared_distance(query), node.right};
-    if (left.bound < right.bound) std::swap(left, right);
-    stack[depth++] = left;
-    stack[depth++] = right;
-  }
+  walk([&](const Node& node) { return node.box.squared_distance(query); },
+       [&](double least) { return least < best.squared; }, offer);
   return best;
 }
 
@@ -163,33 +168,20 @@ int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) 
 
 double TriangleTree::min_max(std::span<const Vec3> points, double limit, double enough) const {
   double best = limit;
-  const auto to_box = [&](int64_t number) {
+  const auto to_box = [&](const Node& node) {
     double greatest = 0;
     for (const Vec3& point : points)
-      greatest = std::max(greatest, nodes_[number].box.squared_distance(point));
+      greatest = std::max(greatest, node.box.squared_distance(point));
     return greatest;
   };
-  const auto to_triangle = [&](int64_t t) {
+  const auto offer = [&](int64_t row) {
     double greatest = 0;
     for (size_t i = 0; i < points.size() && greatest < best; ++i)
-      greatest = std::max(greatest, squared_distance(points[i], corners_of(t)));
-    return greatest;
+      greatest = std::max(greatest, squared_distance(points[i], sorted_[row]));
+    best = std::min(best, greatest);
   };
-  std::array<Entry, max_depth> stack;
-  int depth = 0;
-  stack[depth++] = {to_box(0), 0};
-  while (depth > 0 && best > enough) {
-    const auto [bound, number] = stack[--depth];
-    if (!(bound < best)) continue;
-    const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i)
-      best = std::min(best, to_triangle(order_[i]));
-    if (node.count > 0) continue;
-    Entry left{to_box(number + 1), number + 1}, right{to_box(node.right), node.right};
-    if (left.bound < right.bound) std::swap(left, right);
-    stack[depth++] = left;
-    stack[depth++] = right;
-  }
+  walk(
+      to_box, [&](double least) { return best > enough && least < best; }, offer);
   return best;
 }
 

@@ -66,6 +66,8 @@ class Coarsening {
     int32_t point;
   };
   void find_centers(const std::vector<Vec3>& at, const std::vector<int32_t>& point, int32_t own);
+  static void find_candidates(const ColumnLevel& fine, const std::vector<int32_t>& point, int32_t i,
+                              std::vector<Candidate>& found);
   void make_linear(const Vec3& at, std::vector<Candidate>& found) const;
   void smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
               const std::vector<int32_t>& point);

@@ -98,7 +98,6 @@ class Encounter {
   };
   static Side make_side(const CollisionTree& tree, const Twist& twist);
   static void summarize(Side& side);
-  class Sweep;
 
   Side a_, b_;
   int64_t ignored_ = 0;

@@ -109,6 +109,8 @@ class TriangleTree {
   };
 
   int64_t build(int64_t first, int64_t end, int64_t parent, const std::vector<Vec3>& centers);
+  template <class Key, class Allowed, class Visit>
+  void walk(Key&& key, Allowed&& allowed, Visit&& visit) const;
   Box box_around(const Node& node) const;
   void refit(int64_t node);
 
