@@ -72,7 +72,8 @@ bool write_rest(const scene::Scene& scene, const std::filesystem::path& name) {
   const model::Model model = model::build_model(scene).model;
   scene::Solve requested = scene.solve;
   requested.volume = scene::VolumeTerm::penalty;
-  requested.bulk_modulus = model::default_bulk_modulus(scene.tissue, requested, model);
+  requested.bulk_modulus =
+      model::default_bulk_modulus(scene.tissue, requested, model::effective_modulus(model));
   const solve::Settings settings = app::settings_of(requested, false);
   results::ResultFile file(alone, name, model, model::all_rows(model));
   const solve::Summary summary =

@@ -135,8 +135,8 @@ class Study {
     Discretization& made = known_[key_of(variant)];
     base::on_root(comm, [&] {
       made.model = build(variant);
-      made.bulk_modulus = plan_.scene.solve.bulk_modulus.value_or(
-          model::default_bulk_modulus(tissue_of(variant), plan_.scene.solve, made.model));
+      made.bulk_modulus = plan_.scene.solve.bulk_modulus.value_or(model::default_bulk_modulus(
+          tissue_of(variant), plan_.scene.solve, model::effective_modulus(made.model)));
     });
     MPI_Bcast(&made.bulk_modulus, 1, MPI_DOUBLE, 0, comm);
     bring_into_equilibrium(made.model);

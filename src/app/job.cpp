@@ -7,7 +7,6 @@
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/discrete/natural_rows.h"
 #include "repose/model/cut.h"
 #include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
@@ -70,9 +69,7 @@ void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
   report.effective_modulus = job.local_model.effective_modulus;
   job.building = describe_build(report);
   if (ranks > 1)
-    job.building +=
-        report_row("built", scene.tissue.material ? fmt::format("by {} ranks, each its part", ranks)
-                                                  : "by rank 0, whole: its tissue is springs");
+    job.building += report_row("built", fmt::format("by {} ranks, each its part", ranks));
   job.warnings = std::move(report.warnings);
 }
 
@@ -86,33 +83,12 @@ std::string describe_cuts(const model::ColumnGeometry& geometry, size_t first) {
   return text;
 }
 
-/// On rank 0.
-void set_bulk_modulus(const model::Model& whole, Job& job) {
+/// Sets the bulk modulus of a model of springs where none is requested. On rank 0.
+void set_bulk_modulus(double effective_modulus, Job& job) {
   if (job.requested.bulk_modulus) return;
   const scene::Tissue tissue = job.anatomy ? job.anatomy->scene.tissue : scene::Tissue{};
-  job.requested.bulk_modulus = model::default_bulk_modulus(tissue, job.requested, whole);
-}
-
-/// Springs are built whole by rank 0, which reads the geometry; `balanced` as in
-/// discrete::build_local(). Collective.
-discrete::LocalModel build_springs(MPI_Comm comm, const model::ColumnGeometry* geometry,
-                                   const discrete::LocalModel* balanced, Job& job) {
-  model::Model whole;
-  double effective_modulus = 0;
-  if (balanced) whole = discrete::gather_model(comm, *balanced);
-  base::on_root(comm, [&] {
-    if (!balanced) {
-      model::BuiltModel built = geometry->build_whole();
-      whole = std::move(built.model);
-      effective_modulus = built.report.effective_modulus;
-    }
-    for (const model::Cut& cut : geometry->cuts())
-      if (!balanced || !cut.lips) model::cut_along(cut, whole);
-    if (geometry->cuts().size() == job.cuts.size()) set_bulk_modulus(whole, job);
-  });
-  discrete::LocalModel local_model = discrete::distribute_model(comm, std::move(whole));
-  local_model.effective_modulus = effective_modulus;
-  return local_model;
+  job.requested.bulk_modulus =
+      model::default_bulk_modulus(tissue, job.requested, effective_modulus);
 }
 
 /// Builds a scene's model. Where tension opens incisions, it is built without them, balanced, and
@@ -129,23 +105,20 @@ void build(MPI_Comm comm, const std::filesystem::path& input, const scene::Scene
   base::collective_try(comm, [&] {
     scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
   });
-  const auto build_model = [&](const discrete::LocalModel* balanced) {
-    const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
-    return scene.tissue.material ? discrete::build_local(comm, columns, scene, balanced)
-                                 : build_springs(comm, columns, balanced, job);
-  };
+  const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
   const bool opens = opens_incisions(comm, job);
   if (geometry) geometry->include_incisions(!opens);
-  job.local_model = build_model(nullptr);
+  job.local_model = discrete::build_local(comm, columns, scene);
   base::on_root(comm, [&] {
     take_report(*geometry, base::size(comm), job);
     job.building += describe_cuts(*geometry, 0);
+    if (!job.local_model.part.solid) set_bulk_modulus(job.local_model.effective_modulus, job);
   });
   bring_into_equilibrium(comm, job);
   if (!opens) return;
   const size_t lips = geometry ? geometry->cuts().size() : 0;
   if (geometry) geometry->include_incisions(true);
-  job.local_model = build_model(&job.local_model);
+  job.local_model = discrete::build_local(comm, columns, scene, &job.local_model);
   if (geometry) job.building += describe_cuts(*geometry, lips);
   job.initial_equilibrium = false;
 }
@@ -162,7 +135,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
     }
     stored = results::read_model(input);
     job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
-    set_bulk_modulus(stored, job);
+    set_bulk_modulus(model::effective_modulus(stored), job);
   });
   bool is_scene = job.anatomy.has_value();
   MPI_Bcast(&is_scene, 1, MPI_C_BOOL, 0, comm);

@@ -154,14 +154,14 @@ int64_t row_of_prism(const RankColumns& rank_columns, int64_t row) {
   return row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
 }
 
-/// The whole model's rows in place of the piece's. `edge_row` [edges of the
-/// piece].
+/// The whole model's rows in place of the piece's. `springs`, `edges` [of the piece].
 void number_rows(const RankColumns& rank_columns, const PiecePoints& points,
-                 const std::vector<int64_t>& edge_row, Part& part) {
+                 const ColumnRows& springs, const ColumnRows& edges, Part& part) {
   part.point_row = pick(points.row, part.point_row);
   for (int64_t& row : part.prism_row) row = row_of_prism(rank_columns, row);
-  for (int64_t& row : part.edge_row) row = edge_row[row];
-  part.total_springs = 0;
+  part.spring_row = pick(springs.row, part.spring_row);
+  part.edge_row = pick(edges.row, part.edge_row);
+  part.total_springs = springs.total;
   part.total_prisms = (rank_columns.layers - 1) * rank_columns.triangles;
 }
 
@@ -194,12 +194,50 @@ ColumnRows rows_of_edges(MPI_Comm comm, int rank, const RankColumns& rank_column
   return all;
 }
 
-/// Gives the edges and prisms of a piece without incisions what balances those of the whole model.
+/// Rows in the whole model of the piece's springs, whose sets are sorted by edges or columns of the
+/// skin (make_layers); the halves of a parted spring follow one another. Collective.
+ColumnRows rows_of_springs(MPI_Comm comm, int rank, const RankColumns& rank_columns,
+                           const PiecePoints& points, const model::Springs& springs) {
+  const model::Piece& piece = rank_columns.piece;
+  const int64_t layers = rank_columns.layers;
+  ColumnRows all;
+  size_t j = 0;
+  for (int64_t set = 0; set < 3 * layers - 2; ++set) {
+    const bool connects = set >= layers && set < 2 * layers - 1;
+    const int64_t each = set < 2 * layers - 1 ? 1 : 2;  // diagonals of an edge
+    const std::vector<int64_t>& number = connects ? piece.column : piece.edge;
+    std::vector<int64_t> place;
+    std::vector<char> owned;
+    std::array<int64_t, 2> before = {-1, -1};
+    int64_t k = -1;
+    for (; j < springs.points.size() && springs.set[j] == set; ++j) {
+      const auto [p, q] = springs.points[j];
+      const std::array<int64_t, 2> ends = {points.column[p], points.column[q]};
+      if (ends != before) ++k;
+      before = ends;
+      place.push_back(each * number[k / each] + k % each);
+      owned.push_back(rank_columns.owner[ends[0]] == rank);
+    }
+    const int64_t places = each * (connects ? rank_columns.columns : rank_columns.edges);
+    const ColumnRows rows = rows_by_column(comm, places, place, owned);
+    for (const int64_t row : rows.row) all.row.push_back(all.total + row);
+    all.total += rows.total;
+  }
+  return all;
+}
+
+/// Gives the elements of a piece without incisions what balances those of the whole model.
 /// Edges at the border of the piece keep their weights. Collective.
 void take_balance(MPI_Comm comm, const LocalModel& balanced, const RankColumns& rank_columns,
                   const PiecePoints& points, model::Model& model) {
   const model::ModelRows slabs = NaturalRows::of_model(comm, balanced);
   const NaturalRows natural(comm, balanced.part);
+  if (!balanced.part.solid) {
+    const ColumnRows rows =
+        rows_of_springs(comm, base::rank(comm), rank_columns, points, model.springs);
+    model.springs.rest_length = natural.at_rows(rows.row, rows.total, slabs.springs.rest_length);
+    return;
+  }
   std::vector<int64_t> prism_row, known, edge_row;
   for (size_t m = 0; m < model.prisms.points.size(); ++m)
     prism_row.push_back(row_of_prism(rank_columns, static_cast<int64_t>(m)));
@@ -282,6 +320,7 @@ model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
   model::Counts counts;
   counts.points = part.total_points;
   counts.soft = of[0], counts.boundary = of[1], counts.bone = of[2], counts.held = of[3];
+  counts.springs = part.total_springs;
   counts.prisms = part.total_prisms;
   counts.edges = edges;
   return counts;
@@ -316,14 +355,16 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   Part& part = local_model.part;
   part = make_part(distribution, {rank, points, rank_columns.first_unknown, rank_columns.unknowns},
                    local);
-  part.solid = true;
+  part.solid = scene.tissue.material.has_value();
+  const ColumnRows springs = rows_of_springs(comm, rank, rank_columns, piece_points, model.springs);
   const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, piece_points, model);
-  number_rows(rank_columns, piece_points, edges.row, part);
+  number_rows(rank_columns, piece_points, springs, edges, part);
   number_pairs(comm, rank_columns, local_model);
   local_model.outward =
       NaturalRows(comm, part).natural(pick(model::outward_normals(model), points));
   local_model.counts = count_all(comm, part, edges.total);
   local_model.global_metadata.elements = gather_elements(comm, part);
+  if (rank == 0) local_model.global_metadata.spring_sets = std::move(model.spring_sets);
   model::Contact& contact = local_model.global_metadata.contact;
   const bool cuts_meet = gather_cut_faces(comm, part, contact.cut_faces);
   part.contact = cuts_meet || !model.contact.bodies.empty();

@@ -21,8 +21,9 @@ template <class Archive>
 void pass(Archive& archive, RankColumns& d) {
   model::Piece& p = d.piece;
   archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
-          p.triangle, p.loads.instrument, p.loads.target, p.loads.force, p.loads.layer_area);
-  archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.total_unknowns,
+          p.triangle, p.edge, p.slope, p.loads.instrument, p.loads.target, p.loads.force,
+          p.loads.layer_area);
+  archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.total_unknowns,
           d.first_unknown, d.unknowns, d.spacing, d.moves, d.doubled);
   auto count = static_cast<int64_t>(d.cuts.size());
   archive(count);
@@ -106,6 +107,7 @@ class Distributor {
     rank_columns.layers = geometry_.layers();
     rank_columns.columns = static_cast<int64_t>(owner_.size());
     rank_columns.triangles = static_cast<int64_t>(geometry_.skin().triangles.size());
+    rank_columns.edges = static_cast<int64_t>(geometry_.skin().edges.size());
     rank_columns.total_unknowns = unknowns_;
     rank_columns.first_unknown = first_unknown_[rank];
     rank_columns.unknowns = first_unknown_[rank + 1] - first_unknown_[rank];

@@ -11,10 +11,10 @@ namespace repose::discrete {
 /// Columns given to a rank, and their place in the whole model.
 struct RankColumns {
   model::Piece piece;
-  std::vector<int> owner;                          ///< [C] rank of each column
-  std::vector<int64_t> place;                      ///< [C] of its first point, as in Distribution
-  std::vector<int64_t> unknown;                    ///< [C] block number of its first unknown
-  int64_t layers = 0, columns = 0, triangles = 0;  ///< of the whole
+  std::vector<int> owner;        ///< [C] rank of each column
+  std::vector<int64_t> place;    ///< [C] of its first point, as in Distribution
+  std::vector<int64_t> unknown;  ///< [C] block number of its first unknown
+  int64_t layers = 0, columns = 0, triangles = 0, edges = 0;  ///< of the whole
   int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;
   /// Cuts of the whole; those meet whose sides this rank holds.
   std::vector<model::Cut> cuts;

@@ -25,6 +25,7 @@ struct ColumnGeometry::State {
   std::vector<AdheringJaw> jaws;
   std::vector<char> parted;  // [columns]
   int64_t layers;
+  double slope = 0;
   size_t cuts = 0;  // that are in the model, the first of layout.cuts
   std::vector<DoubledColumn> doubled = {};
   std::vector<int64_t> doubled_points = {};  // [columns]
@@ -110,6 +111,8 @@ ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface
   report_columns(layout, counts.bone, layout.report);
   if (adheres(scene)) state_->jaws = adhering_jaws(*scene.anatomy, layout);
   state_->prepare_cuts();
+  if (scene.tissue.isotropic)
+    state_->slope = layer_slope(layout.mesh, layout.columns.deep, scene.tissue);
 }
 
 ColumnGeometry::ColumnGeometry(const Anatomy& anatomy)
@@ -180,6 +183,11 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   piece.triangle =
       triangles_at(layout.mesh, columns_of(layout.mesh, triangles_at(layout.mesh, centers)));
   piece.column = columns_of(layout.mesh, piece.triangle);
+  piece.slope = state_->slope;
+  for (const int64_t t : piece.triangle)
+    piece.edge.insert(piece.edge.end(), layout.mesh.triangle_edges[t].begin(),
+                      layout.mesh.triangle_edges[t].end());
+  make_unique(piece.edge);
   for (const int64_t c : piece.column) {
     piece.skin.push_back(layout.mesh.points[c]);
     piece.deep.push_back(layout.columns.deep[c]);
@@ -252,7 +260,7 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
     if (solid)
       found = set_material(scene.tissue, scene.file.string(), model);
     else
-      set_stiffness(scene.tissue, mesh, model);
+      set_stiffness(scene.tissue, mesh, piece.slope, model);
     set_loads(scene.tissue, mesh, piece.loads, model);
   }
   add_contact(scene, mesh, attachment, model);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "layers.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
 #include "repose/model/material.h"
@@ -50,25 +51,11 @@ std::map<std::string, double> isotropic_moduli(double slope) {
           {"diagonal", 5 * (1 + square) * (1 + square) / square}};
 }
 
-/// Mean thickness of a gap over the mean length of an edge.
-double slope_of(const Model& model) {
-  double sums[2][2] = {};  // length and number, of edges and gaps
-  for (size_t j = 0; j < model.springs.points.size(); ++j) {
-    const std::string kind = kind_of(model.spring_sets[model.springs.set[j]]);
-    if (kind == "diagonal") continue;
-    const auto [p, q] = model.springs.points[j];
-    auto& [length, number] = sums[kind == "connecting"];
-    length += (model.points.position[q] - model.points.position[p]).norm();
-    ++number;
-  }
-  return sums[1][0] / sums[1][1] / (sums[0][0] / sums[0][1]);
-}
-
 std::map<std::string, scene::SpringRule> isotropic_rules(const scene::Elasticity& solid,
-                                                         const Model& model) {
+                                                         double slope) {
   std::map<std::string, scene::SpringRule> rules;
   const double shear = moduli(solid).shear;
-  for (const auto& [kind, modulus] : isotropic_moduli(slope_of(model)))
+  for (const auto& [kind, modulus] : isotropic_moduli(slope))
     rules[kind] = {
         .stiffness = {}, .modulus = shear * modulus, .law = scene::Law::linear, .reference = 0.0};
   return rules;
@@ -111,9 +98,25 @@ std::vector<double> spring_volumes(const SkinMesh& mesh, const std::vector<doubl
   return volumes;
 }
 
-void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, Model& model) {
+double layer_slope(const SkinMesh& mesh, const std::vector<Vec3>& deep,
+                   const scene::Tissue& tissue) {
+  const std::vector<double> depths = layer_depths(tissue);
+  const auto points_of = [&](int64_t c) {
+    return column_points(mesh.points[c], deep[c], depths, tissue.depths_mm);
+  };
+  double thickness = 0, length = 0;
+  for (size_t c = 0; c < deep.size(); ++c) thickness += (deep[c] - mesh.points[c]).norm();
+  for (const auto& [c, d] : mesh.edges) {
+    const std::vector<Vec3> from = points_of(c), to = points_of(d);
+    for (size_t a = 0; a < from.size(); ++a) length += (to[a] - from[a]).norm();
+  }
+  const double gaps = static_cast<double>(deep.size() * (depths.size() - 1));
+  return thickness / gaps / (length / static_cast<double>(mesh.edges.size() * depths.size()));
+}
+
+void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, double slope, Model& model) {
   refuse_unknown_sets(tissue.springs, model.spring_sets);
-  const auto given = tissue.isotropic ? isotropic_rules(*tissue.isotropic, model) : tissue.springs;
+  const auto given = tissue.isotropic ? isotropic_rules(*tissue.isotropic, slope) : tissue.springs;
   std::vector<FullRule> rules;
   for (const std::string& set : model.spring_sets) rules.push_back(rule_of(given, set));
   std::vector<double> volumes;
@@ -140,12 +143,12 @@ double missing_bulk_modulus(double shear, double poisson) {
 }  // namespace
 
 double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
-                            const Model& model) {
+                            double effective_modulus) {
   if (tissue.isotropic)
     return missing_bulk_modulus(tissue.isotropic->young / (2 * (1 + tissue.isotropic->poisson)),
                                 tissue.isotropic->poisson);
   constexpr double evenly = 15;  // 1/⟨u_x² u_y²⟩ over all directions u
-  return missing_bulk_modulus(effective_modulus(model) / evenly, solve.poisson);
+  return missing_bulk_modulus(effective_modulus / evenly, solve.poisson);
 }
 
 namespace {

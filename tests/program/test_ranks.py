@@ -161,10 +161,10 @@ def test_what_only_rank_0_knows_is_refused_on_all_ranks(run, tmp_path, ranks):
     assert "error: -verify_path: the tissue may tear; leave the option out" in result.stderr
 
 
-def test_why_one_rank_builds_the_model_whole_is_told(run):
+def test_each_rank_builds_its_part_of_springs(run):
     result = run("repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-dry_run", ranks=2)
     assert result.returncode == 0, result
-    assert "by rank 0, whole: its tissue is springs\n" in result.stdout
+    assert "by 2 ranks, each its part\n" in result.stdout
 
 
 @pytest.mark.parametrize("volume", ["none", "paper"])

@@ -113,6 +113,8 @@ struct Piece {
   std::vector<AdheringJaw> jaws;  ///< frames in rows of the piece
   std::vector<Triangle> corner;   ///< [F] rows of the piece
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
+  std::vector<int64_t> edge;      ///< [E] rows of the whole skin's edges
+  double slope = 0;               ///< layer_slope() of the whole; 0 where nothing reads it
 };
 
 /// Points of a column that a cut doubles, from the skin down. The doubles are the last points of a
@@ -171,7 +173,7 @@ class ColumnGeometry {
 /// scene without adhesion.
 std::string remark_on_adhesion(const scene::Scene& scene, const Model& model);
 
-/// The model of a piece, equal to the rows of the scene's model: of points, prisms and edges at the
+/// The model of a piece, equal to the rows of the scene's model: of points and elements at the
 /// columns that the piece was made around, all there is; of others, what the piece has. Indices are
 /// the piece's, Points::column the whole skin's. `contact.stiffness` is left 0, and bodies
 /// and terms are there whether they are touched or have elements or not. `found` [regions of the
@@ -202,7 +204,7 @@ double effective_modulus(const Model& model);
 /// Y in all directions have the shear modulus Y/15, so that ν = 0.45 makes 8/15 Y of the effective
 /// modulus Y.
 double default_bulk_modulus(const scene::Tissue& tissue, const scene::Solve& solve,
-                            const Model& model);
+                            double effective_modulus);
 
 /// The surfaces of a scene's bones at their initial position, named as in the scene.
 struct Bones {

@@ -22,7 +22,7 @@ Built flat(int cells, int layers, const scene::Tissue& rules) {
   scene::Tissue tissue = rules;
   tissue.layers = layers;
   built.model = make_layers(built.mesh, deep, layer_depths(tissue));
-  set_stiffness(tissue, built.mesh, built.model);
+  set_stiffness(tissue, built.mesh, layer_slope(built.mesh, deep, tissue), built.model);
   return built;
 }
 

@@ -77,6 +77,13 @@ model::Anatomy adhering(int squares) {
   return anatomy;
 }
 
+/// The same anatomy, its tissue made of springs that resemble a solid.
+model::Anatomy of_springs(model::Anatomy anatomy) {
+  anatomy.scene.tissue.isotropic = anatomy.scene.tissue.material->deep;
+  anatomy.scene.tissue.material.reset();
+  return anatomy;
+}
+
 /// The same with parted lips and, where there are squares enough, an incision.
 model::Anatomy cut(model::Anatomy anatomy, bool sides_touch) {
   scene::Scene& scene = anatomy.scene;
@@ -134,6 +141,12 @@ void expect_same(const model::Model& one, const model::Model& other) {
   EXPECT_EQ(one.points.layer, other.points.layer);
   EXPECT_EQ(one.points.column, other.points.column);
   EXPECT_EQ(one.points.bone, other.points.bone);
+  EXPECT_EQ(one.springs.points, other.springs.points);
+  EXPECT_EQ(one.springs.set, other.springs.set);
+  EXPECT_EQ(one.springs.rest_length, other.springs.rest_length);
+  EXPECT_EQ(one.springs.stiffness, other.springs.stiffness);
+  EXPECT_EQ(one.springs.exponent, other.springs.exponent);
+  EXPECT_EQ(one.springs.reference, other.springs.reference);
   EXPECT_EQ(one.prisms.points, other.prisms.points);
   EXPECT_EQ(one.prisms.rest_volume, other.prisms.rest_volume);
   EXPECT_EQ(one.prisms.shear_modulus, other.prisms.shear_modulus);
@@ -156,10 +169,12 @@ void expect_same(const model::Model& one, const model::Model& other) {
 void expect_same(const Part& one, const Part& other) {
   expect_same(one.model, other.model);
   EXPECT_EQ(one.point_row, other.point_row);
+  EXPECT_EQ(one.spring_row, other.spring_row);
   EXPECT_EQ(one.prism_row, other.prism_row);
   EXPECT_EQ(one.edge_row, other.edge_row);
   EXPECT_EQ(one.unknown, other.unknown);
   EXPECT_EQ(one.owned_points, other.owned_points);
+  EXPECT_EQ(one.owned_springs, other.owned_springs);
   EXPECT_EQ(one.owned_prisms, other.owned_prisms);
   EXPECT_EQ(one.owned_edges, other.owned_edges);
   EXPECT_EQ(one.first_unknown, other.first_unknown);
@@ -191,7 +206,8 @@ int squares() {
 
 TEST(Raise, parts_are_those_of_the_whole_model) {
   for (const model::Anatomy& anatomy :
-       {jaws(squares()), rich(squares()), loaded(squares()), adhering(squares())}) {
+       {jaws(squares()), rich(squares()), loaded(squares()), adhering(squares()),
+        of_springs(jaws(squares())), of_springs(loaded(squares()))}) {
     const model::BuiltModel built = model::build_model(anatomy);
     const Part part = discrete::distribute(comm, built.model);
     const discrete::LocalModel local_model = build_local(anatomy);
@@ -204,6 +220,7 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
     EXPECT_EQ(local_model.counts.boundary, all.boundary);
     EXPECT_EQ(local_model.counts.bone, all.bone);
     EXPECT_EQ(local_model.counts.held, all.held);
+    EXPECT_EQ(local_model.counts.springs, all.springs);
     EXPECT_EQ(local_model.counts.prisms, all.prisms);
     EXPECT_EQ(local_model.counts.edges, all.edges);
     if (base::rank(comm) > 0) continue;
@@ -211,6 +228,7 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
     expect_same(local_model.global_metadata.elements, built.model.elements);
     EXPECT_EQ(local_model.global_metadata.skin, built.model.skin);
     EXPECT_EQ(local_model.global_metadata.bones, built.model.bones);
+    EXPECT_EQ(local_model.global_metadata.spring_sets, built.model.spring_sets);
     EXPECT_EQ(local_model.global_metadata.contact.bodies.size(), built.model.contact.bodies.size());
     EXPECT_NEAR(local_model.effective_modulus, built.report.effective_modulus, 1e-12);
   }
@@ -218,7 +236,8 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
 
 TEST(Raise, parts_of_a_cut_model_are_those_of_the_whole) {
   for (const bool sides_touch : {false, true})
-    for (const auto& uncut : {jaws(squares()), rich(squares()), loaded(squares())}) {
+    for (const auto& uncut :
+         {jaws(squares()), rich(squares()), loaded(squares()), of_springs(loaded(squares()))}) {
       const model::Anatomy anatomy = cut(uncut, sides_touch);
       const model::Model whole = cut_whole(anatomy);
       const discrete::LocalModel local_model = build_local(anatomy);
@@ -234,9 +253,10 @@ TEST(Raise, parts_of_a_cut_model_are_those_of_the_whole) {
 }
 
 TEST(Raise, a_rank_without_columns_has_an_empty_part) {
-  const model::Anatomy anatomy = jaws(1);  // four columns
-  const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
-  expect_same(build_local(anatomy).part, part);
+  for (const model::Anatomy& anatomy : {jaws(1), of_springs(jaws(1))}) {  // four columns
+    const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
+    expect_same(build_local(anatomy).part, part);
+  }
 }
 
 /// This rank's slab of rows.
@@ -264,6 +284,9 @@ void expect_its_rows(const model::Anatomy& anatomy) {
   EXPECT_EQ(rows.points.column, slab(whole.points.column));
   EXPECT_EQ(rows.points.bone, slab(whole.points.bone));
   EXPECT_EQ(rows.points.mass, slab(whole.points.mass));
+  EXPECT_EQ(rows.springs.points, slab(whole.springs.points));
+  EXPECT_EQ(rows.springs.set, slab(whole.springs.set));
+  EXPECT_EQ(rows.springs.stiffness, slab(whole.springs.stiffness));
   EXPECT_EQ(rows.prisms.points, slab(whole.prisms.points));
   EXPECT_EQ(rows.prisms.target_volume, slab(whole.prisms.target_volume));
   EXPECT_EQ(rows.prisms.nodal_modulus, slab(whole.prisms.nodal_modulus));
@@ -277,10 +300,14 @@ void expect_its_rows(const model::Anatomy& anatomy) {
   EXPECT_EQ(rows.contact_pairs, static_cast<int64_t>(whole.contact.pairs.point.size()));
 }
 
-TEST(Raise, its_rows_are_those_of_the_whole_model) { expect_its_rows(rich(24)); }
+TEST(Raise, its_rows_are_those_of_the_whole_model) {
+  for (const model::Anatomy& anatomy : {rich(24), of_springs(rich(24))}) expect_its_rows(anatomy);
+}
 
 TEST(Raise, its_rows_are_those_of_the_whole_model_with_cuts) {
-  for (const bool sides_touch : {false, true}) expect_its_rows(cut(loaded(24), sides_touch));
+  for (const bool sides_touch : {false, true})
+    for (const model::Anatomy& uncut : {loaded(24), of_springs(loaded(24))})
+      expect_its_rows(cut(uncut, sides_touch));
 }
 
 /// With few columns, some ranks have no row of prisms, or none at all.
@@ -368,12 +395,15 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   EXPECT_LE(largest_force(discrete::distribute(comm, whole)), 1e-10 * one.largest_force);
 }
 
+model::Anatomy rim_held(model::Anatomy anatomy) {
+  anatomy.scene.rim = scene::Rim::fixed;
+  return anatomy;
+}
+
 /// The tissue of a cut along the border of ranks, and of points that the rim holds beside it.
 TEST(Raise, parts_cut_in_equilibrium_are_those_of_the_whole) {
   for (const bool sides_touch : {false, true})
-    for (const auto rim : {scene::Rim::free, scene::Rim::fixed}) {
-      model::Anatomy uncut = rich(squares());
-      uncut.scene.rim = rim;
+    for (auto& uncut : {rich(squares()), rim_held(rich(squares())), of_springs(rich(squares()))}) {
       model::Anatomy anatomy = cut(uncut, sides_touch);
       anatomy.scene.incisions.front().name = "incisions[0]";  // the only one of few squares, too
       const solve::ReferenceState as{0.05, Vec3(0, 0, -9.81)};
