@@ -107,7 +107,6 @@ std::array<double, 2> vestibule_height(const scene::AnatomyPlan& plan) {
 }
 
 void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
-  constexpr double beside = 12, before = 16, behind = 38;  // mm
   const scene::AnatomyPlan& plan = *scene.anatomy;
   if (!plan.vestibule) return;
   const char* needed[] = {"b_point", "nasal_spine", "upper_incisor_edge", "mouth_right",
@@ -119,12 +118,9 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
           plan.file.string(), name));
       return;
     }
-  const Vec3 &edge = *find(plan.landmarks, "upper_incisor_edge"),
-             &right = *find(plan.landmarks, "mouth_right"),
-             &left = *find(plan.landmarks, "mouth_left");
+  const auto [front_right, back_left] = scene::vestibule_sides(plan);
   const auto [bottom, top] = vestibule_height(plan);
-  const Vec3 low(right.x() - beside, edge.y() - before, bottom),
-      high(left.x() + beside, edge.y() + behind, top);
+  const Vec3 low(front_right.x(), front_right.y(), bottom), high(back_left.x(), back_left.y(), top);
   const Vec3* stomion = find(plan.landmarks, "stomion");
   const double lower_gap = stomion ? scene::gap_of_lower_teeth(plan) : plan.gap;
   std::vector<scene::AttachRegion>& regions = scene.tissue.attach_regions;

@@ -51,11 +51,15 @@ class JawAdhesion {
  public:
   JawAdhesion(const scene::AnatomyPlan& plan, const AdheringJaw& jaw, const surface::Surface& bone,
               int64_t layers)
-      : plan_(plan), jaw_(jaw), edge_(incisor_edge(plan, jaw.upper)), tree_(bone) {
+      : plan_(plan),
+        jaw_(jaw),
+        edge_(incisor_edge(plan, jaw.upper)),
+        sides_(scene::vestibule_sides(plan)),
+        tree_(bone) {
     for (int k = 0; k < 3; ++k) frame_[k] = jaw.frame[k] * layers + layers - 1;
   }
 
-  /// Adds the element of a pair, if the point is at the teeth of its own jaw.
+  /// Adds the element of a pair, if the point is in the vestibule at the teeth of its own jaw.
   void add(size_t pair, const Vec3& skin, const Model& model, TermElements& elements) const {
     const ContactPairs& pairs = model.contact.pairs;
     if (pairs.body[pair] != jaw_.bone) return;
@@ -63,6 +67,9 @@ class JawAdhesion {
     const auto& x = model.points.position;
     if ((skin.z() > lip_line(plan_.landmarks, skin.x())) != jaw_.upper) return;
     if (std::abs(x[point].z() - edge_.z()) > crown) return;
+    if (const Eigen::Vector2d at = x[point].head<2>();
+        (at.array() < sides_[0].array()).any() || (at.array() > sides_[1].array()).any())
+      return;
     const double farthest = (jaw_.upper ? plan_.gap : scene::gap_of_lower_teeth(plan_)) + rough;
     const auto tooth = tree_.nearest(x[point], farthest * farthest);
     if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
@@ -81,6 +88,7 @@ class JawAdhesion {
   const scene::AnatomyPlan& plan_;
   AdheringJaw jaw_;
   Vec3 edge_;
+  std::array<Eigen::Vector2d, 2> sides_;  // of the vestibule
   surface::TriangleTree tree_;
   std::array<int64_t, 3> frame_;  // points
 };

@@ -87,6 +87,14 @@ double gap_of_lower_teeth(const AnatomyPlan& plan) {
   return std::max(plan.gap, std::min((lower->y() - upper->y()) / 2, largest));
 }
 
+std::array<Eigen::Vector2d, 2> vestibule_sides(const AnatomyPlan& plan) {
+  constexpr double beside = 12, before = 16, behind = 38;  // mm
+  const Vec3 &edge = plan.landmarks.at("upper_incisor_edge"),
+             &right = plan.landmarks.at("mouth_right"), &left = plan.landmarks.at("mouth_left");
+  return {Eigen::Vector2d(right.x() - beside, edge.y() - before),
+          Eigen::Vector2d(left.x() + beside, edge.y() + behind)};
+}
+
 void read_septum(const Value& anatomy, Scene& scene) {
   constexpr double reach = 5;  // mm on either side of an edge
   const auto septum = Map(anatomy).find("septum");

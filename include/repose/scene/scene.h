@@ -288,6 +288,11 @@ struct AnatomyPlan {
 /// at most 4 mm. The lower lip lies on the upper incisors, and a wedge is left to its sulcus.
 double gap_of_lower_teeth(const AnatomyPlan& plan);
 
+/// Lowest and highest x and y of the vestibule, mm: 12 mm beyond the corners of the mouth, from 16
+/// mm in front of the upper incisal edge to 38 mm behind it. Throws std::out_of_range without these
+/// landmarks.
+std::array<Eigen::Vector2d, 2> vestibule_sides(const AnatomyPlan& plan);
+
 struct Scene {
   std::filesystem::path file;
   SurfaceEntry skin;

@@ -440,5 +440,18 @@ TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
   EXPECT_THROW(build_local(anatomy), base::InputError);
 }
 
+TEST(Raise, lips_adhere_in_the_vestibule_alone) {
+  const model::Model whole = model::build_model(adhering(20)).model;
+  const double front = 100 - 16;  // of the vestibule; tissue touches the jaws from y = 60 on
+  int touching = 0;
+  for (const int64_t point : whole.contact.pairs.point)
+    touching += whole.points.position[point].y() < front;
+  EXPECT_GT(touching, 0);
+  const std::vector<int64_t>& points = whole.elements.at(0).points;
+  EXPECT_GT(points.size(), 0);
+  for (size_t e = 0; e < points.size(); e += 4)
+    EXPECT_GE(whole.points.position[points[e]].y(), front);
+}
+
 }  // namespace raise_test
 }  // namespace repose
