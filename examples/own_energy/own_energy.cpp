@@ -41,9 +41,11 @@ base::Exit run(const base::Options& options) {
   const discrete::LocalModel local = discrete::distribute_model(MPI_COMM_WORLD, std::move(model));
   results::ResultFile file(MPI_COMM_WORLD, "own_energy", local.global_metadata,
                            discrete::NaturalRows::of_model(MPI_COMM_WORLD, local));
-  const solve::Summary summary = solve::find_repose(
-      MPI_COMM_WORLD, local.part, settings, {},
-      [&](const model::StepNumbers& n, const model::StepRows& rows) { file.append(n, rows); });
+  const solve::Summary summary =
+      solve::RestSolver(MPI_COMM_WORLD, local.part, settings)
+          .find(settings, {}, [&](const model::StepNumbers& n, const model::StepRows& rows) {
+            file.append(n, rows);
+          });
   file.commit();
   base::on_root(MPI_COMM_WORLD, [] {
     const tools::check::Comparison comparison = tools::check::check_file("own_energy.h5");

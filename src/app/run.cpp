@@ -227,7 +227,8 @@ solve::Summary Run::search(Writer& writer) {
   settings.on_iterate = [&](double load, const auto& snapshot) {
     writer.on_iterate(load, snapshot);
   };
-  solve::Summary summary = solve::find_repose(comm, part(), settings, start_, std::ref(writer));
+  solve::Summary summary =
+      solve::RestSolver(comm, part(), settings).find(settings, start_, std::ref(writer));
   if (summary.path.complete() && !writer.unsettled().empty()) {
     summary.path.last.converged = false;
     summary.last.reason += "; " + writer.unsettled();

@@ -53,9 +53,11 @@ PathCheck verify_path(MPI_Comm comm, const discrete::Part& part, solve::Settings
   settings.finds_other_rest = false;
   settings.stages = nullptr;
   std::vector<Vec3> slab;
-  check.again = solve::find_repose(
-      comm, part, settings, {},
-      [&](const model::StepNumbers&, const model::StepRows& rows) { slab = rows.position; });
+  check.again =
+      solve::RestSolver(comm, part, settings)
+          .find(settings, {}, [&](const model::StepNumbers&, const model::StepRows& rows) {
+            slab = rows.position;
+          });
   if (check.again.path.complete()) compare(comm, part, position, slab, check);
   return check;
 }

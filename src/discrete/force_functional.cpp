@@ -1,4 +1,5 @@
 #include "repose/discrete/force_functional.h"
+#include "repose/discrete/reduction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,8 +37,7 @@ double ForceFunctional::largest_force(Vec displacement) {
   positions_.update(displacement);
   double largest = 0;
   for_each_force(elastic_, [&](int64_t, const Vec3& f) { largest = std::max(largest, f.norm()); });
-  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, positions_.comm());
-  return largest;
+  return max_over_ranks(positions_.comm(), largest);
 }
 
 std::span<const Vec3> ForceFunctional::directions() {
@@ -58,8 +58,7 @@ double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
     const double length = std::hypot(force.norm(), epsilon_);
     value += force.squaredNorm() / (length + epsilon_);  // √(|F|² + ε²) − ε without canceling
   });
-  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, positions_.comm());
-  value *= weights_.elastic;
+  value = weights_.elastic * sum_over_ranks(positions_.comm(), value);
   if (gradient) {
     elastic_.hessian_action(directions(), gradient);
     check(VecScale(gradient, -weights_.elastic));

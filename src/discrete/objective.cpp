@@ -7,22 +7,12 @@
 #include "flops.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
+#include "repose/discrete/reduction.h"
 #include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {
 
 namespace {
-
-double sum(MPI_Comm comm, double mine) {
-  double all = 0;
-  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, comm);
-  return all;
-}
-
-double largest(MPI_Comm comm, double mine) {
-  MPI_Allreduce(MPI_IN_PLACE, &mine, 1, MPI_DOUBLE, MPI_MAX, comm);
-  return mine;
-}
 
 bool anywhere(MPI_Comm comm, bool here) {
   MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_C_BOOL, MPI_LOR, comm);
@@ -106,8 +96,8 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
                                    positions.part().owned_prisms, positions.part().owned_edges,
                                    positions.part().owned_points)),
       averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
-      largest_bulk_(largest(positions.comm(),
-                            mechanics::largest_bulk(positions.part().model, loops_.prisms))),
+      largest_bulk_(max_over_ranks(positions.comm(),
+                                   mechanics::largest_bulk(positions.part().model, loops_.prisms))),
       body_contact_(positions.part().model.contact.pairs, positions.part().model.contact.stiffness,
                     positions.part().bodies),
       other_body_contact_(rounded_touches(positions.comm(), positions.part())),
@@ -165,7 +155,9 @@ double Objective::add_terms(double scale, std::span<Vec3> gradient) const {
   return value;
 }
 
-double Objective::contact_value() { return sum(positions_.comm(), add_contact(0.0, work_)); }
+double Objective::contact_value() {
+  return sum_over_ranks(positions_.comm(), add_contact(0.0, work_));
+}
 
 std::vector<Vec3> Objective::contact_force() {
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
@@ -206,7 +198,7 @@ double Objective::potential() const {
   if (loaded_)
     for (int64_t i = 0; i < part.owned_points; ++i)
       w -= load_force_[i].dot(positions_.local()[i] - part.model.points.position[i]);
-  return sum(positions_.comm(), w);
+  return sum_over_ranks(positions_.comm(), w);
 }
 
 double Objective::value_and_gradient(Vec displacement, Vec gradient) {
@@ -225,7 +217,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   value += weights_.elastic * (add_terms(weights_.elastic, work_) - initial_.term_energy);
   value += weights_.elastic * add_contact(weights_.elastic, work_);
   subtract_loads(weights_.elastic, work_);
-  value = sum(positions_.comm(), value);
+  value = sum_over_ranks(positions_.comm(), value);
   if (loaded_) value += weights_.elastic * potential();
   if (!std::isfinite(value) || value > overflown) {
     value = overflown;
@@ -273,12 +265,12 @@ std::vector<Vec3> Objective::residual_force() {
 mechanics::Totals Objective::totals() const {
   mechanics::Totals t = mechanics::totals(loops_, positions_.local());
   MPI_Comm comm = positions_.comm();
-  t.spring_energy = sum(comm, t.spring_energy);
-  t.solid_energy = sum(comm, t.solid_energy - initial_.solid_energy);
-  t.fixed_energy = sum(comm, t.fixed_energy - initial_.fixed_energy);
-  t.term_energy = sum(comm, t.term_energy - initial_.term_energy);
-  t.volume_squares = sum(comm, t.volume_squares);
-  t.penalty_unit = sum(comm, t.penalty_unit);
+  t.spring_energy = sum_over_ranks(comm, t.spring_energy);
+  t.solid_energy = sum_over_ranks(comm, t.solid_energy - initial_.solid_energy);
+  t.fixed_energy = sum_over_ranks(comm, t.fixed_energy - initial_.fixed_energy);
+  t.term_energy = sum_over_ranks(comm, t.term_energy - initial_.term_energy);
+  t.volume_squares = sum_over_ranks(comm, t.volume_squares);
+  t.penalty_unit = sum_over_ranks(comm, t.penalty_unit);
   MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);
   MPI_Allreduce(MPI_IN_PLACE, &t.inverted, 1, MPI_INT64_T, MPI_SUM, comm);
   return t;

@@ -1,4 +1,5 @@
 #include "repose/discrete/positions.h"
+#include "repose/discrete/reduction.h"
 
 #include <algorithm>
 
@@ -53,9 +54,7 @@ void Positions::set_motion(int32_t bone, const scene::RigidMotion& motion) {
 }
 
 double Positions::largest_travel() const {
-  double travel = motion_.largest_travel(part_.model);
-  MPI_Allreduce(MPI_IN_PLACE, &travel, 1, MPI_DOUBLE, MPI_MAX, comm_);
-  return travel;
+  return max_over_ranks(comm_, motion_.largest_travel(part_.model));
 }
 
 void Positions::scatter_to_local(Vec in, std::span<Vec3> out) const {
@@ -90,10 +89,8 @@ double largest_block(Vec v) {
   for (PetscInt k = 0; k + 2 < size; k += 3)
     largest = std::max(largest, Eigen::Map<const Vec3>(values + k).squaredNorm());
   check(VecRestoreArrayRead(v, &values));
-  double all = 0;
-  MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(static_cast<Vec>(v)));
-  MPI_Allreduce(&largest, &all, 1, MPI_DOUBLE, MPI_MAX, comm);
-  return std::sqrt(all);
+  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(static_cast<Vec>(v)));
+  return std::sqrt(max_over_ranks(comm, largest));
 }
 
 }  // namespace repose::discrete

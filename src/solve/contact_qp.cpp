@@ -5,6 +5,8 @@
 #include <iterator>
 #include <limits>
 
+#include "repose/discrete/reduction.h"
+
 namespace repose::solve {
 
 using base::check;
@@ -15,11 +17,6 @@ namespace {
 
 // mm: gaps beyond the first do not close in a step; beyond the second the exact distance serves.
 constexpr double farthest = 5, smoothed_to = 1;
-
-double largest(MPI_Comm comm, double value) {
-  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
-  return value;
-}
 
 }  // namespace
 
@@ -165,7 +162,7 @@ double ContactQp::move_multipliers() {
     maximum = std::max(maximum, std::abs(now - multiplier_[k]));
     multiplier_[k] = now;
   }
-  return largest(objective_.positions().comm(), maximum / stiffness_);
+  return discrete::max_over_ranks(objective_.positions().comm(), maximum / stiffness_);
 }
 
 /// Where the function is least along the direction: a piecewise quadratic one, `slope` and

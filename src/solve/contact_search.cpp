@@ -7,6 +7,7 @@
 
 #include "leave_saddle.h"
 #include "repose/base/agreement.h"
+#include "repose/discrete/reduction.h"
 
 namespace repose::solve {
 
@@ -17,11 +18,6 @@ namespace {
 constexpr double missed = 0.25;       // of the accuracy, by contact
 constexpr double contact_safety = 2;  // the estimate is so many times what is left
 constexpr double predicted_to = 0.1;  // mm
-
-double largest_of_ranks(MPI_Comm comm, double value) {
-  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_MAX, comm);
-  return value;
-}
 
 }  // namespace
 
@@ -85,8 +81,8 @@ double ContactSearch::violation() {
   cut_faces.update_gaps(objective_.positions().local());
   for (size_t w = 0; w < cut_faces.size(); ++w)
     maximum = std::max(maximum, std::abs(cut_faces.pressure(w) - cut_faces.multipliers()[w]));
-  return largest_of_ranks(objective_.positions().comm(),
-                          maximum / objective_.body_contact().stiffness());
+  return discrete::max_over_ranks(objective_.positions().comm(),
+                                  maximum / objective_.body_contact().stiffness());
 }
 
 void ContactSearch::move_multipliers() {
@@ -359,7 +355,7 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
     work = -gap.gap * gap.area * objective_.body_contact().multipliers()[gap.constraint];
     qp_.replace(gap);
   }
-  work = largest_of_ranks(objective_.positions().comm(), work);
+  work = discrete::max_over_ranks(objective_.positions().comm(), work);
   if (qp_.solve(start_, slope_, predicted_to, step_) != ContactQp::Found::minimum)
     return End::failed;
   check(VecAXPY(start_, 1.0, step_));
@@ -509,7 +505,7 @@ double penetration(discrete::Objective& objective) {
   mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
   cut_faces.update_gaps(position);
   for (size_t w = 0; w < cut_faces.size(); ++w) deepest = std::max(deepest, -cut_faces.gap(w));
-  return largest_of_ranks(objective.positions().comm(), deepest);
+  return discrete::max_over_ranks(objective.positions().comm(), deepest);
 }
 
 }  // namespace repose::solve

@@ -9,6 +9,7 @@
 #include "repose/base/error.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/discrete/reduction.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
 #include "repose/mechanics/prism_volume.h"
@@ -227,8 +228,7 @@ double rounding_force(MPI_Comm comm, const discrete::Part& part) {
   double largest = 0;
   for (int64_t i = 0; i < part.owned_points; ++i)
     if (part.unknown[i] >= 0) largest = std::max(largest, force[i]);
-  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
-  return largest;
+  return discrete::max_over_ranks(comm, largest);
 }
 
 /// Refuses on all ranks where an owned spring of a rank has no positive rest length. Collective.
@@ -347,7 +347,7 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
     stiffness.solve(force, result);
     result.largest_pressure += add_balance(stiffness, part.model);
   }
-  MPI_Allreduce(MPI_IN_PLACE, &result.largest_pressure, 1, MPI_DOUBLE, MPI_MAX, comm);
+  result.largest_pressure = discrete::max_over_ranks(comm, result.largest_pressure);
   return result;
 }
 

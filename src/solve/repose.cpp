@@ -16,6 +16,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/discrete/reduction.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
@@ -39,7 +40,7 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   numbers.potential = objective.potential();
   double force = 0;
   for (const Vec3& f : objective.residual_force()) force += f.norm();
-  MPI_Allreduce(&force, &numbers.f_f, 1, MPI_DOUBLE, MPI_SUM, objective.positions().comm());
+  numbers.f_f = discrete::sum_over_ranks(objective.positions().comm(), force);
   numbers.f_v = totals.volume_squares;
   numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
   numbers.volume_error_max = totals.volume_error_max;
@@ -423,14 +424,10 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
   return summary;
 }
 
-Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                    const Start& start, const Receiver& receive) {
-  return RestSolver(comm, part, settings).find(settings, start, receive);
-}
-
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
-  return find_repose(comm, discrete::distribute(comm, model), settings, start, receive);
+  const discrete::Part part = discrete::distribute(comm, model);
+  return RestSolver(comm, part, settings).find(settings, start, receive);
 }
 
 }  // namespace repose::solve

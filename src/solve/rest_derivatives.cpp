@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "repose/discrete/reduction.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/model/material.h"
 
@@ -213,7 +214,7 @@ class Adjoint {
     double carried = 0;
     for (size_t i = 0; i < weight_.size() && !travel.empty(); ++i)
       carried += weight_[i].dot(travel[i]);
-    MPI_Allreduce(MPI_IN_PLACE, &carried, 1, MPI_DOUBLE, MPI_SUM, positions_.comm());
+    carried = discrete::sum_over_ranks(positions_.comm(), carried);
     PetscReal resisted = 0;
     check(VecDot(lambda_, slope, &resisted));
     return carried - resisted;

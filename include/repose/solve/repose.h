@@ -163,8 +163,5 @@ class RestSolver {
 /// free to move. Collective.
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive);
-/// Finds the rest position of a model that is already distributed.
-Summary find_repose(MPI_Comm comm, const discrete::Part& part, const Settings& settings,
-                    const Start& start, const Receiver& receive);
 
 }  // namespace repose::solve
