@@ -191,22 +191,15 @@ double ContactQp::line_search(double slope, double curvature) {
   return share;
 }
 
-bool ContactQp::descends(Vec direction) {
-  PetscReal descent = 0;
-  check(VecDot(left_, direction, &descent));
-  return descent > 0;
-}
-
 /// Minimizes the augmented Lagrangian of the present multipliers from `step`: Newton steps on its
-/// active sets, with the least along each. Where the tissue itself shows negative curvature, it
-/// ends with what conjugate gradients had reached before (Nocedal & Wright 2006, 7.1).
-ContactQp::Found ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
+/// active sets, with the least along each.
+bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
   bool full = false;                                // the latest step was not shortened
   for (int set = 0; set < max_sets; ++set) {
     const bool changed = choose_active();
-    if (full && !changed) return Found::minimum;
+    if (full && !changed) return true;
     if (changed) set_blocks();
     check(VecCopy(force_, left_));
     check(VecAXPY(left_, 1.0, slope));
@@ -216,8 +209,7 @@ ContactQp::Found ContactQp::minimize(Vec displacement, Vec slope, double toleran
     for (size_t k = 0; k < gaps_.size(); ++k) acting[k] = pressure(k);
     add_pushes(acting, left_);
     const bool convex = solver_.solve(displacement, left_, direction_, coarse);
-    const bool cut = !convex && reduced_ && descends(direction_);
-    if (!cut && !(convex && solver_.finished())) return Found::nothing;
+    if (!convex || !solver_.finished()) return false;
     objective_.positions().scatter_to_local(direction_, moved_);
     for (size_t k = 0; k < gaps_.size(); ++k) {
       closing_[k] = change(gaps_[k], moved_);
@@ -235,15 +227,13 @@ ContactQp::Found ContactQp::minimize(Vec displacement, Vec slope, double toleran
     check(VecAXPY(force_, share, change_));
     for (size_t k = 0; k < gaps_.size(); ++k) closed_[k] += share * closing_[k];
     const double moved = share * discrete::largest_block(direction_);
-    if (cut) return Found::descent;
-    if (moved <= std::max(tolerance, share_left * discrete::largest_block(step)))
-      return Found::minimum;
+    if (moved <= std::max(tolerance, share_left * discrete::largest_block(step))) return true;
   }
-  return Found::nothing;
+  return false;
 }
 
 /// Rounds of minimizations and new multipliers.
-ContactQp::Found ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
+bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_rounds = 3;  // the next program goes on with the multipliers
   constexpr double share = 0.1;  // of the step
   check(VecSet(step, 0));
@@ -252,28 +242,24 @@ ContactQp::Found ContactQp::search(Vec displacement, Vec slope, double tolerance
   closing_.assign(gaps_.size(), 0.0);
   active_.assign(gaps_.size(), 2);  // none chosen yet
   tangent_.assemble(displacement);
-  Found found = Found::nothing;
   for (int round = 0; round < max_rounds; ++round) {
-    found = minimize(displacement, slope, tolerance, step);
-    if (found == Found::nothing) break;
+    if (!minimize(displacement, slope, tolerance, step)) return false;
     const double changed = move_multipliers();
-    if (found == Found::descent) break;
     if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;
   }
-  return found;
+  return true;
 }
 
-ContactQp::Found ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
+bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
   const std::vector<double> multiplier = multiplier_;
-  reduced_ = false;
-  Found found = search(displacement, slope, tolerance, step);
-  reduced_ = found == Found::nothing;
+  bool found = search(displacement, slope, tolerance, step);
+  reduced_ = !found;
   if (reduced_) {
     multiplier_ = multiplier;
     curvature_ = convex_curvature_;
     found = search(displacement, slope, tolerance, step);
   }
-  if (found != Found::nothing) give_multipliers();
+  if (found) give_multipliers();
   return found;
 }
 

@@ -26,13 +26,11 @@ class ContactQp {
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
   void replace(const mechanics::LinearGap& by);
-  /// How far a solve came: no step, one along which the function decreases, or the minimum.
-  enum class Found { nothing, descent, minimum };
   /// Minimizes; `slope` is b, `step` receives d. Stops where a further set would change d and the
   /// gaps by less than `tolerance` mm, or less than a tenth of d's largest 3-vector. Where negative
-  /// curvature is met, the gaps' curvature is reduced to its semidefinite part; where it is met
-  /// again, d is what was found before. Collective.
-  Found solve(Vec displacement, Vec slope, double tolerance, Vec step);
+  /// curvature is met, the gaps' curvature is reduced to its semidefinite part. Returns whether a
+  /// minimum was reached. Collective.
+  bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
   /// True if the latest solve met negative curvature.
   bool reduced() const { return reduced_; }
 
@@ -47,10 +45,9 @@ class ContactQp {
   double pressure(size_t k) const;
   double change(const mechanics::LinearGap& gap, std::span<const Vec3> moved) const;
   void add_pushes(std::span<const double> pressure, Vec to);
-  bool descends(Vec direction);
   double line_search(double slope, double curvature);
-  Found minimize(Vec displacement, Vec slope, double tolerance, Vec step);
-  Found search(Vec displacement, Vec slope, double tolerance, Vec step);
+  bool minimize(Vec displacement, Vec slope, double tolerance, Vec step);
+  bool search(Vec displacement, Vec slope, double tolerance, Vec step);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

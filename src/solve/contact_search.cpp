@@ -114,8 +114,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   qp_.linearize(displacement, load, travel);
   objective_.hessian_action(travel, trial_, false);
   check(VecAXPY(slope_, 1.0, trial_));
-  const bool found =
-      qp_.solve(displacement, slope_, predicted_to, increment) == ContactQp::Found::minimum;
+  const bool found = qp_.solve(displacement, slope_, predicted_to, increment);
   tangent_.forget_contact();
   if (!found) {
     objective_.round_bodies(false);
@@ -214,8 +213,7 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
     subtract_contact();
     const double tissue = value - objective_.weights().elastic * objective_.contact_value();
     qp_.linearize(displacement);
-    if (qp_.solve(displacement, slope_, finer * accuracy, step_) == ContactQp::Found::nothing)
-      return End::failed;
+    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
     const double share = take_step(displacement, tissue, value);
     if (share == 0) return End::failed;
@@ -356,8 +354,7 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
     qp_.replace(gap);
   }
   work = discrete::max_over_ranks(objective_.positions().comm(), work);
-  if (qp_.solve(start_, slope_, predicted_to, step_) != ContactQp::Found::minimum)
-    return End::failed;
+  if (!qp_.solve(start_, slope_, predicted_to, step_)) return End::failed;
   check(VecAXPY(start_, 1.0, step_));
   if (energy(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
