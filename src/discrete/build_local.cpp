@@ -356,7 +356,9 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   part = make_part(distribution, {rank, points, rank_columns.first_unknown, rank_columns.unknowns},
                    local);
   part.solid = scene.tissue.material.has_value();
-  const ColumnRows springs = rows_of_springs(comm, rank, rank_columns, piece_points, model.springs);
+  const ColumnRows springs =
+      part.solid ? ColumnRows{}
+                 : rows_of_springs(comm, rank, rank_columns, piece_points, model.springs);
   const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, piece_points, model);
   number_rows(rank_columns, piece_points, springs, edges, part);
   number_pairs(comm, rank_columns, local_model);

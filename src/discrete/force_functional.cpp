@@ -1,8 +1,9 @@
 #include "repose/discrete/force_functional.h"
-#include "repose/discrete/reduction.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "repose/discrete/reduction.h"
 
 namespace repose::discrete {
 

@@ -178,10 +178,10 @@ ContactSearch::End ContactSearch::approach(Vec displacement, double accuracy, in
   return end;
 }
 
-/// Takes step_, or less of it, where that lowers the augmented Lagrangian of the new multipliers
-/// from `tissue`, the value without contact. Its full length is tried first, or as much as the
-/// gaps, taken to first order, may hold for.
-double ContactSearch::take_step(Vec displacement, double tissue, double& value) {
+/// Takes step_, whose largest block is `length` mm, or less of it, where that lowers the augmented
+/// Lagrangian of the new multipliers from `tissue`, the value without contact. Its full length is
+/// tried first, or as much as the gaps, taken to first order, may hold for.
+double ContactSearch::take_step(Vec displacement, double length, double tissue, double& value) {
   constexpr int max_halved = 6;
   constexpr double rounding = 1e-12;
   constexpr double longest = 2;  // mm
@@ -192,7 +192,7 @@ double ContactSearch::take_step(Vec displacement, double tissue, double& value) 
   };
   const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
   const double largest = merit + rounding * std::abs(merit);
-  double share = std::min(1.0, longest / discrete::largest_block(step_));
+  double share = std::min(1.0, longest / length);
   value = try_step(share);
   for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
   if (value > largest) return 0;
@@ -215,7 +215,7 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
     qp_.linearize(displacement);
     if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
-    const double share = take_step(displacement, tissue, value);
+    const double share = take_step(displacement, length, tissue, value);
     if (share == 0) return End::failed;
     const double before = std::exchange(taken_, share == 1 ? length : 0);
     ++iterations;
@@ -440,17 +440,17 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   stiffen(1);
   int64_t iterations = 0;
   double finer = accuracy;
-  int left = 0;       // saddles
-  bool anew = false;  // the next programs begin after a soft search
+  int left = 0;  // saddles
+  bool needs_presolve = false;
   const auto leaves = [&] {
     tangent_.forget_contact();
-    anew = true;
+    needs_presolve = true;
     return left < max_left && leave_saddle(objective_, solver_, displacement) && ++left > 0;
   };
   if (approach(displacement, accuracy, iterations) == End::stopped)
     return stopped(displacement, outcome);
   for (int round = 0; round < max_rounds;) {
-    if (anew) {
+    if (needs_presolve) {
       const Outcome near = presolve(displacement, accuracy);
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
@@ -461,7 +461,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome = finish(displacement, accuracy);
     if (outcome.converged) break;
     if (!outcome.stable && leaves()) continue;
-    anew = end != End::reached;
+    needs_presolve = end != End::reached;
     if (end == End::reached) finer /= 4;
     stiffen(std::min(2 * times_, stiffest));
     ++round;

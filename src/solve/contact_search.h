@@ -44,7 +44,7 @@ class ContactSearch : public RestSearch {
   End approach(Vec displacement, double accuracy, int64_t& iterations);
   End newton(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns the share of the step that was taken, 0 for none.
-  double take_step(Vec displacement, double tissue, double& value);
+  double take_step(Vec displacement, double length, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   bool presses_near_edge(Vec displacement);
