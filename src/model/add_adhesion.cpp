@@ -35,9 +35,9 @@ std::optional<std::array<int64_t, 3>> frame_of(const ColumnLayout& layout, int32
 }
 
 /// z of the line between the lips at x: through stomion and the corners of the mouth.
-double lip_line(const scene::Landmarks& landmarks, double x) {
-  const Vec3& middle = landmarks.at("stomion");
-  const Vec3& corner = landmarks.at(x < middle.x() ? "mouth_right" : "mouth_left");
+double lip_line(const AdhesionRule& rule, double x) {
+  const auto& [right, middle, left] = rule.lip_line;
+  const Vec3& corner = x < middle.x() ? right : left;
   const double share = std::clamp((x - middle.x()) / (corner.x() - middle.x()), 0.0, 1.0);
   return middle.z() + share * (corner.z() - middle.z());
 }
@@ -49,15 +49,9 @@ const Vec3& incisor_edge(const scene::AnatomyPlan& plan, bool upper) {
 /// Elements of one jaw.
 class JawAdhesion {
  public:
-  JawAdhesion(const scene::AnatomyPlan& plan, const AdheringJaw& jaw, const surface::Surface& bone,
-              int64_t layers)
-      : plan_(plan),
-        jaw_(jaw),
-        edge_(incisor_edge(plan, jaw.upper)),
-        sides_(scene::vestibule_sides(plan)),
-        tree_(bone) {
-    for (int k = 0; k < 3; ++k) frame_[k] = jaw.frame[k] * layers + layers - 1;
-  }
+  JawAdhesion(const AdhesionRule& rule, size_t jaw, const surface::Surface& bone,
+              const std::array<int64_t, 3>& frame)
+      : rule_(rule), jaw_(rule.jaws[jaw]), tree_(bone), frame_(frame) {}
 
   /// Adds the element of a pair, if the point is in the vestibule at the teeth of its own jaw.
   void add(size_t pair, const Vec3& skin, const Model& model, TermElements& elements) const {
@@ -65,13 +59,10 @@ class JawAdhesion {
     if (pairs.body[pair] != jaw_.bone) return;
     const int64_t point = pairs.point[pair];
     const auto& x = model.points.position;
-    if ((skin.z() > lip_line(plan_.landmarks, skin.x())) != jaw_.upper) return;
-    if (std::abs(x[point].z() - edge_.z()) > crown) return;
-    if (const Eigen::Vector2d at = x[point].head<2>();
-        (at.array() < sides_[0].array()).any() || (at.array() > sides_[1].array()).any())
+    if ((skin.z() > lip_line(rule_, skin.x())) != jaw_.upper) return;
+    if ((x[point].array() < jaw_.low.array()).any() || (x[point].array() > jaw_.high.array()).any())
       return;
-    const double farthest = (jaw_.upper ? plan_.gap : scene::gap_of_lower_teeth(plan_)) + rough;
-    const auto tooth = tree_.nearest(x[point], farthest * farthest);
+    const auto tooth = tree_.nearest(x[point], jaw_.reach * jaw_.reach);
     if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();
     const Vec3 first = x[frame_[1]] - x[frame_[0]], second = x[frame_[2]] - x[frame_[0]];
@@ -81,14 +72,12 @@ class JawAdhesion {
     elements.points.insert(elements.points.end(), {point, frame_[0], frame_[1], frame_[2]});
     elements.numbers.insert(elements.numbers.end(),
                             {parts.x(), parts.y(), parts.z(), normal.dot(x[point] - x[frame_[0]]),
-                             plan_.adhesion * pairs.area[pair], range});
+                             rule_.tension * pairs.area[pair], rule_.range});
   }
 
  private:
-  const scene::AnatomyPlan& plan_;
-  AdheringJaw jaw_;
-  Vec3 edge_;
-  std::array<Eigen::Vector2d, 2> sides_;  // of the vestibule
+  const AdhesionRule& rule_;
+  const AdhesionRule::Jaw& jaw_;
   surface::TriangleTree tree_;
   std::array<int64_t, 3> frame_;  // points
 };
@@ -104,12 +93,37 @@ std::vector<AdheringJaw> adhering_jaws(const scene::AnatomyPlan& plan, const Col
   return jaws;
 }
 
+AdhesionRule adhesion_rule(const scene::AnatomyPlan& plan, const std::vector<AdheringJaw>& jaws) {
+  const auto [front_right, back_left] = scene::vestibule_sides(plan);
+  const scene::Landmarks& marks = plan.landmarks;
+  AdhesionRule rule{plan.adhesion,
+                    range,
+                    {marks.at("mouth_right"), marks.at("stomion"), marks.at("mouth_left")},
+                    {},
+                    {}};
+  for (const AdheringJaw& jaw : jaws) {
+    const double z = incisor_edge(plan, jaw.upper).z();
+    const double gap = jaw.upper ? plan.gap : scene::gap_of_lower_teeth(plan);
+    rule.jaws.push_back({jaw.bone,
+                         jaw.upper,
+                         {front_right.x(), front_right.y(), z - crown},
+                         {back_left.x(), back_left.y(), z + crown},
+                         gap + rough});
+  }
+  return rule;
+}
+
 void add_adhesion(const scene::AnatomyPlan& plan, const std::vector<surface::Surface>& bones,
                   const Piece& piece, Model& model) {
   TermElements elements{"adhesion", 4, 6, {}, {}};
   const auto layers = static_cast<int64_t>(model.points.position.size() / piece.column.size());
+  const AdhesionRule rule = adhesion_rule(plan, piece.jaws);
   std::vector<JawAdhesion> jaws;
-  for (const AdheringJaw& jaw : piece.jaws) jaws.emplace_back(plan, jaw, bones[jaw.bone], layers);
+  for (size_t k = 0; k < piece.jaws.size(); ++k) {
+    std::array<int64_t, 3> frame = piece.jaws[k].frame;
+    for (int64_t& column : frame) column = column * layers + layers - 1;
+    jaws.emplace_back(rule, k, bones[piece.jaws[k].bone], frame);
+  }
   const ContactPairs& pairs = model.contact.pairs;
   for (size_t c = 0; c < pairs.point.size(); ++c) {
     const int64_t column = pairs.point[c] / layers;

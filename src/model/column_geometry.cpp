@@ -39,6 +39,7 @@ struct ColumnGeometry::State {
     return layers - (is_held(column) ? 1 : 0) - (ends_in_bone(column) ? 1 : 0);
   }
   Counts count() const;
+  std::optional<AdhesionRule> adhesion() const;
   void require_free_cuts() const;
   void prepare_cuts();
   void double_columns(size_t first_cuts);
@@ -53,6 +54,14 @@ Counts ColumnGeometry::State::count() const {
     counts.soft += soft_points(c);
   }
   return counts;
+}
+
+std::optional<AdhesionRule> ColumnGeometry::State::adhesion() const {
+  if (jaws.empty()) return {};
+  AdhesionRule rule = adhesion_rule(*scene.anatomy, jaws);
+  for (size_t c = 0; c < parted.size(); ++c)
+    if (parted[c]) rule.cut_columns.push_back(static_cast<int64_t>(c));
+  return rule;
 }
 
 void ColumnGeometry::State::require_free_cuts() const {
@@ -239,6 +248,7 @@ Model ColumnGeometry::global_metadata() const {
   global_metadata.gravity = state_->scene.gravity.value_or(Vec3::Zero());
   add_bones(state_->scene, state_->bones, global_metadata);
   global_metadata.contact.spacing = spacing();
+  global_metadata.adhesion = state_->adhesion();
   return global_metadata;
 }
 
@@ -280,6 +290,7 @@ BuiltModel ColumnGeometry::build_whole() const {
   const std::vector<ColumnSums> sums = column_sums(built.model, layers());
   contact.stiffness = contact_stiffness(scene, sums);
   contact.spacing = spacing();
+  built.model.adhesion = state_->adhesion();
   if (contact.pairs.point.empty()) contact.bodies.clear();
   built.held = held();
   built.cuts = {cuts().begin(), cuts().end()};

@@ -121,6 +121,24 @@ void check_pairs(const Contact& contact, size_t points, size_t bones, const Arra
   }
 }
 
+void check_adhesion(const Model& m, const ArrayCheck& check) {
+  const AdhesionRule& rule = *m.adhesion;
+  check.number("adhesion attribute tension", 0, rule.tension, at_least_zero("N/mm²"));
+  check.number("adhesion attribute range", 0, rule.range, positive("mm", ""));
+  check.vectors("adhesion/lip_line", {rule.lip_line.begin(), rule.lip_line.end()}, 3, place);
+  for (size_t k = 0; k < rule.jaws.size(); ++k) {
+    const AdhesionRule::Jaw& jaw = rule.jaws[k];
+    check.integer("adhesion/bone", k, jaw.bone, 0, static_cast<int64_t>(m.bones.size()) - 1);
+    for (const Vec3& corner : {jaw.low, jaw.high})
+      for (const double value : corner) check.number("adhesion/box", k, value, place);
+    check.number("adhesion/reach", k, jaw.reach, {0, max_coordinate, "mm", true, ""});
+    if (m.bone_surfaces.empty() || m.bone_surfaces[jaw.bone].triangles.empty())
+      check.refuse("adhesion/bone", fmt::format("row {} names bone {}, which has no bone_surface",
+                                                k, m.bones[jaw.bone]));
+  }
+  check.integers("adhesion/cut_column", rule.cut_columns, rule.cut_columns.size(), 0, INT64_MAX);
+}
+
 void check_cut_faces(const CutFaces& cut_faces, size_t point_count, const ArrayCheck& check) {
   const auto points = static_cast<int64_t>(point_count);
   int64_t places = 0;
@@ -166,6 +184,7 @@ void check_arrays(const Model& m, const ArrayCheck& check) {
   check_elements(m.elements, points, check);
   check.indices("skin/points", m.skin, points);
   check_bones(m, check);
+  if (m.adhesion) check_adhesion(m, check);
   if (m.contact.empty()) return;
   check_pairs(m.contact, points, bones, check);
   check_cut_faces(m.contact.cut_faces, points, check);

@@ -125,6 +125,28 @@ model::Contact read_contact(const Reader& in) {
   return contact;
 }
 
+model::AdhesionRule read_adhesion(const Reader& in) {
+  const std::string group = "/model/adhesion";
+  model::AdhesionRule rule;
+  rule.tension = in.number(group, "tension");
+  rule.range = in.number(group, "range");
+  const std::vector<Vec3> line = in.vectors(group + "/lip_line", 3);
+  std::ranges::copy(line, rule.lip_line.begin());
+  const auto bone = in.integers<int32_t>(group + "/bone", Shape::any);
+  const auto jaws = static_cast<int64_t>(bone.size());
+  const auto upper = in.integers<int8_t>(group + "/upper", jaws);
+  const auto box = in.numbers(group + "/box", {jaws, {6}});
+  const auto reach = in.numbers(group + "/reach", {jaws, {}});
+  for (int64_t k = 0; k < jaws; ++k)
+    if (upper[k] != 0 && upper[k] != 1)
+      in.refuse(group + "/upper", fmt::format("row {} is {}, expected 0 or 1", k, upper[k]));
+  for (int64_t k = 0; k < jaws; ++k)
+    rule.jaws.push_back({bone[k], upper[k] != 0, Vec3::Map(box.data() + 6 * k),
+                         Vec3::Map(box.data() + 6 * k + 3), reach[k]});
+  rule.cut_columns = in.integers<int64_t>(group + "/cut_column", Shape::any);
+  return rule;
+}
+
 std::vector<Mat4> read_transforms(const Reader& in, int64_t bones) {
   const std::vector<double> flat = in.numbers("/model/bone_transform", {bones, {4, 4}});
   std::vector<Mat4> transforms(bones);
@@ -167,6 +189,7 @@ model::Model read_model(const std::filesystem::path& file) {
   if (in.has("/model/bone_transform"))
     model.bone_transform = read_transforms(in, static_cast<int64_t>(model.bones.size()));
   if (in.has("/model/bone_surface")) model.bone_surfaces = read_bone_surfaces(in, model.bones);
+  if (in.has("/model/adhesion")) model.adhesion = read_adhesion(in);
   if (in.has("/model/contact")) model.contact = read_contact(in);
   model::validate(model, file.string());
   return model;

@@ -94,6 +94,28 @@ void write_contact(hid_t model, const model::Contact& contact, const model::Mode
   write_array(wall, "area", cut_faces.area);
 }
 
+void write_adhesion(hid_t model, const model::AdhesionRule& rule) {
+  const base::Hdf5Group group = base::create_hdf5_group(model, "adhesion");
+  write_attribute(group, "tension", rule.tension);
+  write_attribute(group, "range", rule.range);
+  std::vector<int32_t> bone;
+  std::vector<int8_t> upper;
+  std::vector<double> box, reach;
+  for (const model::AdhesionRule::Jaw& jaw : rule.jaws) {
+    bone.push_back(jaw.bone);
+    upper.push_back(jaw.upper);
+    for (const Vec3& corner : {jaw.low, jaw.high})
+      box.insert(box.end(), corner.begin(), corner.end());
+    reach.push_back(jaw.reach);
+  }
+  write_array(group, "bone", bone);
+  write_array(group, "upper", upper);
+  write_array(group, "box", {bone.size(), 6}, box.data());
+  write_array(group, "reach", reach);
+  write_array(group, "lip_line", std::vector<Vec3>(rule.lip_line.begin(), rule.lip_line.end()));
+  write_array(group, "cut_column", rule.cut_columns);
+}
+
 void write_skin(hid_t model, const std::vector<Triangle>& skin) {
   if (skin.empty()) return;
   const base::Hdf5Group group = base::create_hdf5_group(model, "skin");
@@ -146,6 +168,7 @@ void write_model(const base::Hdf5File& file, const model::Model& model,
   if (all.edges > 0) create("edge", slabs.edges, all.edges);
   write_elements(group, model.elements);
   write_contact(group, model.contact, slabs);
+  if (model.adhesion) write_adhesion(group, *model.adhesion);
   write_skin(group, model.skin);
   write_strings(group, "spring_set", model.spring_sets);
   write_strings(group, "bone", model.bones);

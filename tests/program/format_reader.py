@@ -11,9 +11,11 @@ class File:
     """Arrays by path: `model`, and of each step `arrays` and `numbers`."""
 
     def __init__(self, file):
+        self.folder = file.parent
         with h5py.File(file) as h5:
             self.model = arrays_of(h5["model"])
             self.contact = dict(h5["model/contact"].attrs) if "contact" in h5["model"] else {}
+            self.adhesion = dict(h5["model/adhesion"].attrs) if "adhesion" in h5["model"] else {}
             self.gravity = h5["model"].attrs["gravity"]
             self.steps = [(arrays_of(step), dict(step.attrs)) for step in h5["step"].values()]
 
@@ -301,6 +303,75 @@ def closed_form(kind, row):
         return (at - row[:3]) @ normal, np.tile(normal, (len(at), 1))
 
     return {1: lambda at: ball(at, row[:3], row[3]), 2: capsule, 3: box, 4: half_space}[kind]
+
+
+# ----- adhesion
+
+
+def nearest_places(points, a, b, c):
+    """The nearest place of triangles [T, 3] to each of the points [P, 3]."""
+    found = np.empty_like(points)
+    middle = (a + b + c) / 3
+    radius = np.max([np.linalg.norm(x - middle, axis=1) for x in (a, b, c)], 0)
+    for row, point in enumerate(points):
+        off = np.linalg.norm(middle - point, axis=1)
+        near = off - radius <= (off + radius).min()
+        one, two, three = a[near], b[near], c[near]
+        normal = np.cross(two - one, three - one)
+        square = np.maximum((normal**2).sum(1), 1e-300)[:, None]
+        places = [point - ((point - one) * normal).sum(1)[:, None] / square * normal]
+        inside = np.ones(len(one), bool)
+        for p, q in ((one, two), (two, three), (three, one)):
+            inside &= (np.cross(q - p, places[0] - p) * normal).sum(1) >= 0
+            share = ((point - p) * (q - p)).sum(1) / np.maximum(((q - p)**2).sum(1), 1e-300)
+            places.append(p + np.clip(share, 0, 1)[:, None] * (q - p))
+        places[0] = np.where((inside & (square[:, 0] > 1e-300))[:, None], places[0], np.inf)
+        places = np.concatenate(places)
+        found[row] = places[((places - point)**2).sum(1).argmin()]
+    return found
+
+
+def adhering(file):
+    """Rows of points that adhere, of their jaws' bones, normals, areas."""
+    model, x = file.model, file.model["point/position"]
+    layer, column = model["point/layer"], model["point/column"]
+    skin = np.zeros((column.max() + 1, 3))
+    first = np.flatnonzero(layer == 0)[::-1]
+    skin[column[first]] = x[first]
+    right, middle, left = model["adhesion/lip_line"]
+    point, touches = model["contact/point"], model["contact/binding"] == 0
+    bones = np.where(model["contact/body_kind"] == 0, model["contact/body_bone"], -1)
+    at, above = x[point], skin[column[point]]
+    line = np.interp(above[:, 0], [right[0], middle[0], left[0]], [right[2], middle[2], left[2]])
+    found = []
+    for bone, upper, box, reach in zip(*(model[f"adhesion/{name}"] for name in
+                                         ("bone", "upper", "box", "reach"))):
+        rows = touches & (bones[model["contact/body_row"]] == bone)
+        rows &= (layer[point] == layer.max()) & ((at >= box[:3]) & (at <= box[3:])).all(1)
+        rows &= ~np.isin(column[point], model["adhesion/cut_column"])
+        rows = np.flatnonzero(rows & ((above[:, 2] > line) == bool(upper)))
+        corners = (model[f"bone_surface/{bone}/points"][corner]
+                   for corner in model[f"bone_surface/{bone}/triangles"].T)
+        off = at[rows] - nearest_places(at[rows], *corners)
+        away = np.linalg.norm(off, axis=1)
+        rows, off, away = (values[away <= reach] for values in (rows, off, away))
+        found += zip(point[rows], np.full(len(rows), bone), off / away[:, None],
+                     model["contact/area"][rows])
+    return sorted(found, key=lambda film: film[0])
+
+
+def adhesion(file, films, position, load):
+    """Energy and forces [N, 3] on the tissue."""
+    energy, force = 0.0, np.zeros_like(position)
+    moved, reach = motions(file, load), file.adhesion.get("range")
+    for point, bone, normal, area in films:
+        turn, shift = moved[bone]
+        way = position[point] - turn @ file.model["point/position"][point] - shift
+        s = np.clip((turn @ normal) @ way / reach, 0, 1)
+        most = 27 / 4 * area * file.adhesion["tension"]
+        energy += most * reach * (s**2 / 2 - 2 * s**3 / 3 + s**4 / 4)
+        force[point] -= most * s * (1 - s)**2 * (turn @ normal)
+    return energy, force
 
 
 # ----- contact

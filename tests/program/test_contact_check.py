@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT, runner
+from lips import solve_lips
 
 
 @pytest.fixture(scope="module")
@@ -138,3 +139,86 @@ def test_a_good_result_is_accepted_with_its_exact_penetration_and_without(good, 
 def test_skin_that_stays_apart_is_not(run, tmp_path):
     done = run("repose-solve", PROJECT / "meshes/head_solid.yaml", "-output", "apart")
     assert done.returncode == 0 and "self-contact" not in done.stdout, done
+
+
+@pytest.fixture(scope="module")
+def adhering(tmp_path_factory, environment):
+    """A result with lips that adhere to a jaw which moves away from them."""
+    top = tmp_path_factory.mktemp("adhering")
+    solve_lips(top, environment, "-load_steps", 1)
+    good = runner(top, environment)("repose-check", "lips.h5")
+    assert (good.returncode, good.stderr) == (0, ""), good
+    return top / "lips.h5"
+
+
+def elements(change):
+    def spoil(h5):
+        group = h5["model/element/0"]
+        points, numbers = group["points"][:].reshape(-1, 4), group["numbers"][:].reshape(-1, 6)
+        points, numbers = change(points, numbers)
+        for name, values in (("points", points), ("numbers", numbers)):
+            del group[name]
+            group[name] = values.ravel()
+    return spoil
+
+
+def scaled(column, factor):
+    def change(points, numbers):
+        numbers[:, column] *= factor
+        return points, numbers
+    return elements(change)
+
+
+def other_side(points, numbers):
+    """Planes that face into the teeth: the tension pushes."""
+    numbers[:, :4] *= -1
+    return points, numbers
+
+
+def next_points(points, numbers):
+    points[-2:, 0] = points[[-1, -2], 0]
+    return points, numbers
+
+
+def weak_film(h5):
+    h5["model/adhesion"].attrs["tension"] *= 0.9
+
+
+def lower_lips(h5):
+    line = h5["model/adhesion/lip_line"]
+    line[...] = line[:] - [0, 0, 9]
+
+
+def no_rule(h5):
+    del h5["model/adhesion"]
+
+
+SPOILED_ADHESION = {
+    "a point less": (elements(lambda points, numbers: (points[1:], numbers[1:])),
+                     "does not adhere, but by its place it does"),
+    "a point twice": (elements(lambda points, numbers: (
+        points[[0, *range(len(points))]], numbers[[0, *range(len(numbers))]])), "adheres twice"),
+    "planes of other points": (elements(next_points), "adhesion, "),
+    "planes that face the teeth": (elements(other_side), "adhesion, normals"),
+    "planes half a millimeter off": (elements(lambda points, numbers: (
+        points, numbers + [0, 0, 0, 0.5, 0, 0])), "adhesion, initial openings"),
+    "twice the tension": (scaled(4, 2), "adhesion, tensions"),
+    "twice the range": (scaled(5, 2), "adhesion, ranges"),
+    "another tension in the rule": (weak_film, "residual_force"),
+    "another line between the lips": (lower_lips, "but by its place"),
+    "no rule": (no_rule, "the model states where lips adhere"),
+    "another energy": (state("f_e", lambda v: v + 1e-3), "f_e"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILED_ADHESION)
+def test_a_result_that_is_wrong_about_adhesion_is_refused(adhering, tmp_path, environment, case):
+    spoil, words = SPOILED_ADHESION[case]
+    file = tmp_path / "spoiled.h5"
+    shutil.copyfile(adhering, file)
+    with h5py.File(file, "r+") as h5:
+        spoil(h5)
+    result = runner(tmp_path, environment)("repose-check", file)
+    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result.stderr
+    wrong = [line for line in result.stdout.splitlines() if "DISAGREE" in line or "NOT SO" in line]
+    assert any(words in line for line in wrong), wrong

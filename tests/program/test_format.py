@@ -1,5 +1,6 @@
 """That formats.md is enough to recompute a result: by a reader that was written from it alone."""
 
+import json
 import re
 
 import h5py
@@ -7,7 +8,9 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
-from format_reader import Contact, File, advance, motions, prescribed, solid
+from format_reader import (Contact, File, adhering, adhesion, advance, motions, prescribed,
+                           solid)
+from lips import solve_lips
 
 FIELD_ERROR_MM = 1e-4
 ROUNDING = 1e-9
@@ -39,6 +42,13 @@ def result(tmp_path_factory, environment):
 
 
 @pytest.fixture(scope="module")
+def lips(tmp_path_factory, environment):
+    """A jaw that moves away from a lip, which adheres to it."""
+    return File(solve_lips(tmp_path_factory.mktemp("lips"), environment,
+                           clinical="set_back: 3, yaw: 1"))
+
+
+@pytest.fixture(scope="module")
 def contact(result):
     return Contact(result)
 
@@ -59,13 +69,50 @@ def test_every_number_of_every_step_follows_from_the_page(result, contact):
             assert close(value, stored, scale), (name, np.abs(value - stored).max(), scale)
 
 
-def tissue(result, arrays):
+def test_adhesion_follows_from_the_page(lips):
+    films = adhering(lips)
+    elements = lips.model["element/0/points"].reshape(-1, 4)
+    assert [film[0] for film in films] == list(elements[:, 0]) and len(films) > 10
+    assert (lips.model["point/bone"][elements[:, 1:]].T == [film[1] for film in films]).all()
+    arrays, numbers = lips.steps[-1]
+    energy, _ = adhesion(lips, films, arrays["point/position"], numbers["load"])
+    assert energy > 0.01
+    for arrays, numbers in lips.steps:
+        again = tissue(lips, arrays, films, numbers["load"])
+        for name in ("f_e", "point/residual_force", "gradient_max"):
+            value, scale = again[name]
+            assert close(value, arrays[name] if name in arrays else numbers[name], scale), name
+
+
+def test_the_rule_of_adhesion_is_that_of_the_landmarks(lips):
+    """11 mm above and below the edge of the incisors; 12 mm beside the corners of the mouth, from 16
+    mm in front of the upper incisors to 38 mm behind; the gap of the vestibule and 0.6 mm."""
+    markup, = json.loads((lips.folder / "head.mrk.json").read_text())["markups"]
+    mark = {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
+    right, left = mark["mouth_right"], mark["mouth_left"]
+    upper, lower = mark["upper_incisor_edge"], mark["lower_incisor_edge"]
+    line = lips.model["adhesion/lip_line"]
+    assert np.allclose(line, [right, mark["stomion"], left], rtol=0, atol=1e-9)
+    gap = max(1, min((lower[1] - upper[1]) / 2, 4))
+    assert list(lips.model["adhesion/upper"]) == [1, 0]
+    for box, edge, reach, far in zip(lips.model["adhesion/box"], (upper, lower),
+                                     lips.model["adhesion/reach"], (1.6, gap + 0.6)):
+        low = [right[0] - 12, upper[1] - 16, edge[2] - 11]
+        high = [left[0] + 12, upper[1] + 38, edge[2] + 11]
+        assert np.allclose(box, low + high, rtol=0, atol=1e-9) and abs(reach - far) < 1e-9
+    assert lips.adhesion == {"tension": 5e-4, "range": 6}
+
+
+def tissue(result, arrays, films=(), load=0):
     """{name: (value, scale of its rounding)} of all but contact's own numbers."""
     x, model = arrays["point/position"], result.model
     soft, displacement = model["point/set"] == 0, x - model["point/position"]
     again = solid(result, x)
+    energy, pull = adhesion(result, films, x, load)
+    again["f_e"] += energy
     load = model["point/mass"][:, None] * result.gravity + model["point/external_force"]
-    force = np.where(soft[:, None], again.pop("force") + load + arrays["point/contact_force"], 0)
+    force = np.where(soft[:, None],
+                     again.pop("force") + pull + load + arrays["point/contact_force"], 0)
     size = np.linalg.norm(force, axis=1)
     found = {name: (value, max(1, np.abs(value).max())) for name, value in again.items()}
     potential = -(load * displacement)[soft].sum()
@@ -144,7 +191,7 @@ def test_what_is_no_unknown_is_where_the_page_says(result):
 
 
 SCENES = [("head_solid.yaml", "-stability"), ("head_instrument.yaml",), ("head_incision.yaml",),
-          ("paper_jaw_opening.yaml",)]
+          ("paper_jaw_opening.yaml",), ("head_jaw_advance.yaml",)]
 
 
 @pytest.mark.parametrize("scene", [" ".join(map(str, scene)) for scene in SCENES])

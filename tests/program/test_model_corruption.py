@@ -47,6 +47,11 @@ def springs(file):
     contact["wall/begin"] = np.arange(9)
     contact["wall/point"] = np.array([0, 1, 3, 4, 0, 2, 3, 5])
     contact["wall/weight"], contact["wall/area"] = np.ones(8), np.zeros(4)
+    adhesion = model.create_group("adhesion")
+    adhesion.attrs["tension"], adhesion.attrs["range"] = 5e-4, 6.0
+    adhesion["bone"], adhesion["upper"] = np.zeros(1, np.int32), np.ones(1, np.int8)
+    adhesion["box"], adhesion["reach"] = np.array([[0, 0, 0, 9, 9, 9.0]]), np.ones(1)
+    adhesion["lip_line"], adhesion["cut_column"] = np.eye(3), np.array([1, 2])
 
 
 def solid(file):
@@ -104,11 +109,11 @@ ALLOWED = {
     *((name, "missing") for name in (
         "point/mass", "point/external_force", "bone_transform", "skin/points",
         "prism/nodal_modulus")),
-    ("skin/points", "empty"),
+    ("skin/points", "empty"), ("adhesion/cut_column", "empty"),
     *((name, "-1") for name in (
         "point/external_force", "point/target", "edge/weight", "prism/target_volume",
-        "contact/body_push")),
-    ("point/layer", "huge"), ("point/column", "huge"),
+        "contact/body_push", "adhesion/lip_line", "adhesion/box")),
+    ("point/layer", "huge"), ("point/column", "huge"), ("adhesion/cut_column", "huge"),
 }
 
 
@@ -203,6 +208,8 @@ BESIDE_OTHERS = {
     "a box of negative size": (set_rows("contact/body_shape", (2, 4), -1), ["row 2", "-1"]),
     "a half-space without a normal": (set_rows("contact/body_shape", (4, 5), 0), ["row 4"]),
     "an open mesh": (broken_mesh, ["contact/body_mesh/3", "closed"]),
+    "adhesion to a jaw neither upper nor lower": (set_rows("adhesion/upper", 0, 2),
+                                                  ["adhesion/upper: row 0 is 2"]),
     "a bone without its row": (set_rows("contact/body_bone", 5, -1), ["body_kind: row 5"]),
     "a ball with a bone": (set_rows("contact/body_bone", 0, 0), ["body_kind: row 0"]),
     "a shape of no kind": (set_rows("contact/body_kind", 3, 6), ["body_kind: row 3 is 6"]),

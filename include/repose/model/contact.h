@@ -53,6 +53,23 @@ struct CutFaces {
   bool empty() const { return size.empty(); }
 };
 
+/// The rule by which deepest points of the lips adhere to teeth: elements of the term "adhesion"
+/// (docs/theory/contact.md).
+struct AdhesionRule {
+  /// A jaw with teeth, and where points adhere to it.
+  struct Jaw {
+    int32_t bone = -1;   ///< row of Model::bones
+    bool upper = false;  ///< of points below the skin above the line between the lips, or below it
+    Vec3 low, high;      ///< mm, corners of the box that they lie in
+    double reach = 0;    ///< mm, largest distance to the bone
+  };
+  double tension = 0;                ///< N/mm², the largest
+  double range = 0;                  ///< mm, the opening beyond which there is no tension
+  std::array<Vec3, 3> lip_line;      ///< mm, right corner of the mouth, stomion, left corner
+  std::vector<Jaw> jaws;             ///< the upper one first
+  std::vector<int64_t> cut_columns;  ///< on the path of a cut: none of their points adheres
+};
+
 struct Contact {
   double stiffness = 0;  ///< N/mm³, of the penalty that multipliers make exact
   double spacing = 1;    ///< mm, of the grids of distances to meshes

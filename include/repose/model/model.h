@@ -80,7 +80,8 @@ struct Model {
   Edges edges;                         ///< of a solid
   std::vector<TermElements> elements;  ///< of further terms
   Contact contact;
-  std::vector<Triangle> skin;  ///< [K] for drawing, may be empty
+  std::optional<AdhesionRule> adhesion;  ///< unset: no lips adhere to teeth
+  std::vector<Triangle> skin;            ///< [K] for drawing, may be empty
   std::vector<std::string> spring_sets;
   std::vector<std::string> bones;
   std::vector<surface::Surface> bone_surfaces;  ///< [bones] or empty; at the initial position

@@ -60,8 +60,10 @@ std::vector<Vec3> prescribed(const model::Model& model, const model::PrescribedM
 
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
                 const model::StepNumbers& numbers, const model::StepRows& rows,
-                const std::vector<Vec3>& displacement, Comparison& comparison) {
-  const RecomputedStep again = recompute(model, numbers, rows);
+                const std::vector<Vec3>& displacement, const std::vector<Film>& films,
+                Comparison& comparison) {
+  const RecomputedStep again = recompute(
+      model, numbers, rows, films, evaluate(model, films, motion, numbers.load, rows.position));
   check_ranges(numbers, comparison);
   check_numbers(numbers, again, comparison);
   const std::vector<Vec3> fixed = prescribed(model, motion, numbers.load, rows.position);

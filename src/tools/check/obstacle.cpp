@@ -34,6 +34,21 @@ double distance_to_triangle(const Vec3& p, const std::array<Vec3, 3>& t) {
   return within ? std::min(nearest, std::abs((p - t[0]).dot(normal)) / normal.norm()) : nearest;
 }
 
+/// The foot in the plane where it is inside the triangle, else the closest point of the edges.
+Vec3 closest_on_triangle(const Vec3& p, const std::array<Vec3, 3>& t) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double square = normal.squaredNorm();
+  bool within = square > 0;
+  Vec3 closest = t[0];
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &a = t[k], &b = t[(k + 1) % 3];
+    within = within && (b - a).cross(p - a).dot(normal) >= 0;
+    const Vec3 on_edge = closest_on_segment(p, a, b);
+    if ((p - on_edge).squaredNorm() < (p - closest).squaredNorm()) closest = on_edge;
+  }
+  return within ? Vec3(p - (p - t[0]).dot(normal) / square * normal) : closest;
+}
+
 /// Twice the area of the triangle (p, a, b) seen along z, the same up to its sign with a and b
 /// exchanged, so that neighbors over an edge never both count or both miss a ray.
 double area_along_z(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -133,6 +148,20 @@ double TriangleGrid::distance(const Vec3& point, double reach) const {
                [&](const Corners& t) { nearest = std::min(nearest, distance_to_triangle(p, t)); });
     if (nearest <= radius || radius == reach) return nearest;
   }
+}
+
+std::optional<Vec3> TriangleGrid::closest_point(const Vec3& point, double reach) const {
+  const Vec3 p = oblique() * point;
+  std::optional<Vec3> closest;
+  double nearest = reach;
+  visit_near(p, reach, [&](const Corners& t) {
+    const Vec3 at = closest_on_triangle(p, t);
+    if ((p - at).norm() > nearest) return;
+    nearest = (p - at).norm();
+    closest = at;
+  });
+  if (closest) *closest = oblique().transpose() * *closest;
+  return closest;
 }
 
 int64_t TriangleGrid::crossings(const Vec3& p) const {

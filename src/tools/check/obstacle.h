@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -16,6 +17,8 @@ class TriangleGrid {
 
   /// mm to the closest triangle, `reach` where none is nearer.
   double distance(const Vec3& point, double reach) const;
+  /// The closest point of the triangles, none where none is within `reach` (mm).
+  std::optional<Vec3> closest_point(const Vec3& point, double reach) const;
   /// Returns whether the surface winds around a point: by the signed crossings of a ray, or, where
   /// it has holes, by winding_number().
   bool contains(const Vec3& point) const;

@@ -47,8 +47,14 @@ std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
 class Recomputation {
  public:
   Recomputation(const model::Model& model, const model::StepNumbers& claimed,
-                const model::StepRows& rows)
-      : model_(model), claimed_(claimed), x_(rows.position), fields_(rows.point_fields) {}
+                const model::StepRows& rows, const std::vector<Film>& films,
+                const std::vector<FilmState>& adhesion)
+      : model_(model),
+        claimed_(claimed),
+        x_(rows.position),
+        fields_(rows.point_fields),
+        films_(films),
+        film_states_(adhesion) {}
 
   RecomputedStep run() {
     elastic_ = claimed_.volume == VolumeTerm::paper ? claimed_.lambda : 1.0;
@@ -56,6 +62,7 @@ class Recomputation {
     springs();
     edges();
     terms();
+    adhesion();
     contact();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
@@ -77,6 +84,7 @@ class Recomputation {
   void springs();
   void edges();
   void terms();
+  void adhesion();
   void contact();
   void forces();
   void nodal_volumes();
@@ -93,6 +101,8 @@ class Recomputation {
   const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
   const std::vector<model::PointField>& fields_;
+  const std::vector<Film>& films_;
+  const std::vector<FilmState>& film_states_;
   double elastic_ = 1;                  // weight of f
   double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;        // [N] Σ noise of the forces there, N
@@ -261,6 +271,7 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
 // Their energies are from the initial state on.
 void Recomputation::terms() {
   for (const model::TermElements& elements : model_.elements) {
+    if (elements.term == "adhesion") continue;
     const mechanics::Term& term = mechanics::term_of(elements);
     double uncertain = 0;
     for (size_t e = 0; e < elements.size(); ++e) {
@@ -281,6 +292,20 @@ void Recomputation::terms() {
     }
     step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
   }
+}
+
+// All films are closed at the initial state.
+void Recomputation::adhesion() {
+  double uncertain = 0;
+  for (size_t f = 0; f < films_.size(); ++f) {
+    const int64_t point = films_[f].point;
+    const FilmState& state = film_states_[f];
+    step_.f_e.value += state.energy;
+    uncertain += state.energy + step_.position_scale * state.force.norm();
+    if (soft(point)) step_.rows.residual_force[point] += state.force;
+    at_point_[point] += state.force.norm() + state.noise;
+  }
+  step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
 }
 
 // The forces are checked by themselves (check_contact.h).
@@ -422,8 +447,9 @@ void Recomputation::gradient() {
 }  // namespace
 
 RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
-                         const model::StepRows& rows) {
-  RecomputedStep step = Recomputation(model, claimed, rows).run();
+                         const model::StepRows& rows, const std::vector<Film>& films,
+                         const std::vector<FilmState>& adhesion) {
+  RecomputedStep step = Recomputation(model, claimed, rows, films, adhesion).run();
   step.rows.position = rows.position;
   return step;
 }

@@ -46,6 +46,23 @@ double distance_to_box(const Vec3& size, const Vec3& p) {
   return std::min(beyond.maxCoeff(), 0.0) + beyond.cwiseMax(0.0).norm();
 }
 
+TEST(Obstacle, TheClosestPointOfABoxOfTrianglesIsThatOfItsClosedForm) {
+  const Vec3 size(20, 10, 3);
+  const TriangleGrid grid(box(size, 4));
+  for (int i = -4; i <= 24; ++i)
+    for (int j = -4; j <= 14; ++j)
+      for (int k = -8; k <= 14; ++k) {
+        const Vec3 p(i, j, 0.5 * k);
+        const double apart = distance_to_box(size, p);
+        if (apart <= 0 || std::abs(apart - 4) < 1e-9) continue;
+        const auto closest = grid.closest_point(p, 4);
+        ASSERT_EQ(closest.has_value(), apart < 4) << p.transpose();
+        if (!closest) continue;
+        const Vec3 expected = p.cwiseMax(0.0).cwiseMin(size);
+        ASSERT_LE((*closest - expected).norm(), 1e-12) << p.transpose();
+      }
+}
+
 /// At points in line with its edges and faces, too.
 TEST(Obstacle, TheDistanceToABoxOfTrianglesIsThatOfItsClosedForm) {
   const Vec3 size(20, 10, 3);

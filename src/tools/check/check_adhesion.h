@@ -1,0 +1,38 @@
+#pragma once
+#include <vector>
+
+#include "repose/model/motion.h"
+#include "repose/tools/check/comparison.h"
+
+namespace repose::tools::check {
+
+/// Adhesion of one point to the plane at its nearest tooth, found by Model::adhesion and the
+/// bones' triangles (docs/reference/formats.md). Nothing is shared with the term of the solver.
+struct Film {
+  int64_t point;
+  int32_t bone;
+  Vec3 normal;      ///< unit, out of the tooth, at load 0
+  double distance;  ///< mm, of the point from the tooth
+  double tension;   ///< N, the largest
+};
+
+/// Returns the films of a model in the order of their points.
+std::vector<Film> find_films(const model::Model& model);
+
+/// Compares the model's elements of adhesion with the films.
+void check_adhesion(const model::Model& model, const std::vector<Film>& films,
+                    Comparison& comparison);
+
+/// What a film does at a state.
+struct FilmState {
+  double energy;  ///< N mm
+  Vec3 force;     ///< N, on its point
+  double noise;   ///< N, size of what rounding of positions makes of the force, over its relative
+                  ///< size
+};
+/// Evaluates the films at a load and the positions of all points (mm).
+std::vector<FilmState> evaluate(const model::Model& model, const std::vector<Film>& films,
+                                const model::PrescribedMotion& motion, double load,
+                                const std::vector<Vec3>& position);
+
+}  // namespace repose::tools::check
