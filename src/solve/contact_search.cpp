@@ -242,6 +242,20 @@ Outcome ContactSearch::finish(Vec displacement, double accuracy) {
   return outcome;
 }
 
+/// finish() at a position that programs have reached. They go on where it misses the accuracy: an
+/// end before the next step relies on what that step is expected to be.
+Outcome ContactSearch::finish_reached(Vec displacement, double accuracy, int64_t& iterations) {
+  constexpr int max_finer = 2;
+  constexpr double finer = 0.25;
+  Outcome outcome = finish(displacement, accuracy);
+  double to = accuracy;
+  for (int n = 0; n < max_finer && !outcome.converged && outcome.stable; ++n) {
+    if (newton(displacement, to *= finer, iterations) != End::reached) break;
+    outcome = finish(displacement, accuracy);
+  }
+  return outcome;
+}
+
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   outcome.converged = false;
   outcome.stopped = true;
@@ -319,7 +333,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     const bool is_less = energy(start_) < energy_here;
     const bool is_other = other.distance > 2 * accuracy;
     Outcome there;
-    if (is_other && is_less) there = finish(start_, accuracy);
+    if (is_other && is_less) there = finish_reached(start_, accuracy, iterations);
     taken = there.converged;
     there.iterations += outcome.iterations + iterations;
     if (taken) outcome = there;
@@ -388,7 +402,9 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
     const End end =
         change_side(mine ? &sides[next++] : nullptr, displacement, accuracy, energy_here);
     Outcome there;
-    if (end == End::reached) there = finish(start_, accuracy);
+    int64_t iterations = 0;
+    if (end == End::reached) there = finish_reached(start_, accuracy, iterations);
+    there.iterations += iterations;
     if (there.converged) {
       take_other(displacement, accuracy, there, outcome);
       energy_here = energy(displacement);
@@ -439,7 +455,6 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   check(VecCopy(displacement, start_));
   stiffen(1);
   int64_t iterations = 0;
-  double finer = accuracy;
   int left = 0;  // saddles
   bool needs_presolve = false;
   const auto leaves = [&] {
@@ -455,14 +470,14 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
     }
-    const End end = newton(displacement, finer, iterations);
+    const End end = newton(displacement, accuracy, iterations);
     if (end == End::stopped) return stopped(displacement, outcome);
     if (end == End::failed && qp_.reduced() && leaves()) continue;
-    outcome = finish(displacement, accuracy);
+    outcome = end == End::reached ? finish_reached(displacement, accuracy, iterations)
+                                  : finish(displacement, accuracy);
     if (outcome.converged) break;
     if (!outcome.stable && leaves()) continue;
     needs_presolve = end != End::reached;
-    if (end == End::reached) finer /= 4;
     stiffen(std::min(2 * times_, stiffest));
     ++round;
   }
@@ -482,7 +497,7 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   const End end = newton(displacement, accuracy, iterations);
   if (end == End::stopped) return stopped(displacement, {});
   if (end == End::reached) {
-    Outcome outcome = finish(displacement, accuracy);
+    Outcome outcome = finish_reached(displacement, accuracy, iterations);
     outcome.iterations += iterations;
     if (outcome.converged) return outcome;
   }

@@ -47,6 +47,7 @@ class ContactSearch : public RestSearch {
   double take_step(Vec displacement, double length, double tissue, double& value);
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
+  Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
   bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);

@@ -18,7 +18,7 @@ import repose  # noqa: E402
 
 SCENE = PROJECT / "meshes/head_live.yaml"
 A = {"mandible": {"translate": [0, -5, 1], "rotate": [2, 0, 0]}, "maxilla": {"translate": [0, -2, 0]}}
-ROUNDING = 1e-6  # mm, between processes
+ROUNDING = 1e-6  # mm, between processes and between sessions
 B = {"mandible": {"translate": [1, -3, 0]}, "chin": {"translate": [0, -6, 0]}}
 
 
@@ -119,7 +119,7 @@ def test_a_change_of_material_or_border_is_the_scene_with_these_values(session, 
         assert "\n" not in str(refusal.value)
     assert distance(session.solve(A), changed) == 0, "a refused change leaves the scene as it was"
     session.change()
-    assert distance(session.solve(A), before) == 0
+    assert distance(session.solve(A), before) < ROUNDING, "another session with the same values"
 
 
 def test_a_later_solve_ends_the_one_under_way(session):
