@@ -164,6 +164,30 @@ void remark_tone(const scene::Scene& scene, std::vector<std::string>& remarks) {
       "ring muscle by landmarks: a tone of up to {:g} N/mm² between subnasale and B′", plan.tone));
 }
 
+/// Reports a head that is pitched in the scan, by the angles of nasion and the upper incisors above
+/// the condyles: proportions change one as much as the other, the other way round.
+void remark_pitch(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
+  constexpr double upright = 14, most = 6;  // degrees, the sum of both angles, and of pitch
+  const Vec3 *right = find(plan.landmarks, "condyle_right_center"),
+             *left = find(plan.landmarks, "condyle_left_center"),
+             *nasion = find(plan.landmarks, "nasion_bone"),
+             *edge = find(plan.landmarks, "upper_incisor_edge");
+  if (!right || !left || !nasion || !edge) return;
+  const HeadFrame frame = frame_of(plan);
+  const Vec3 hinge = frame.to_frame((*right + *left) / 2);
+  const auto angle = [&](const Vec3& at) {
+    const Vec3 way = frame.to_frame(at) - hinge;
+    return std::atan2(way.z(), -way.y()) * 180 / M_PI;
+  };
+  const double pitch = (angle(*nasion) + angle(*edge) - upright) / 2;
+  if (std::abs(pitch) < most) return;
+  remarks.push_back(fmt::format(
+      "the head lies about {:.0f} degrees chin {} in the scan, by its condyles, nasion and upper "
+      "incisors: forward and up of clinical moves and the planes of le_fort_1 and genioplasty are "
+      "those of the scan; turn surfaces and landmarks upright if they are to be the head's",
+      std::abs(pitch), pitch > 0 ? "up" : "down"));
+}
+
 void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
   constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
   const Vec3 *spine = find(plan.landmarks, "nasal_spine"),
@@ -187,6 +211,7 @@ void complete(const surface::Surface& skin, const std::vector<surface::Surface>&
               scene::Scene& scene, std::vector<std::string>& remarks) {
   if (!scene.anatomy) return;
   require_same_head(*scene.anatomy, skin, bones);
+  remark_pitch(*scene.anatomy, remarks);
   remark_teeth(*scene.anatomy, remarks);
   part_lips(skin, scene, remarks);
   add_vestibule(scene, remarks);

@@ -50,6 +50,17 @@ struct SheetCorner {
   bool high;
 };
 
+/// The axes of the mandible, whatever the scan's pitch: its level goes through the edge of the
+/// lower incisors and a share of the way from the condyles to menton, as on heads that are upright.
+HeadAxes mandible_axes(const TemplatePlacement& head) {
+  constexpr double share = 0.371;
+  const Vec3 hinge = head.hinge(), &left = head.axes().left;
+  const Vec3 forward =
+      head.at("lower_incisor_edge") - (hinge + share * (head.at("menton_bone") - hinge));
+  const Vec3 back = (forward.dot(left) * left - forward).normalized();
+  return {left, back, left.cross(back)};
+}
+
 void place_sagittal_split(const TemplatePlacement& head, Osteotomy& cut) {
   constexpr double below_condyle = 0.255, below_menton = 10;  // of the height; mm
   constexpr std::array<SheetCorner, 8> corners{{{0.70, 0.425, false},
@@ -62,8 +73,8 @@ void place_sagittal_split(const TemplatePlacement& head, Osteotomy& cut) {
                                                 {0.56, 1.12, true}}};
   constexpr std::array<Triangle, 6> right{
       {{0, 3, 2}, {0, 2, 1}, {0, 1, 5}, {0, 5, 4}, {1, 2, 7}, {1, 7, 6}}};
-  const auto& [left, back, up] = head.axes();
   const Vec3 hinge = head.hinge(), edge = head.at("lower_incisor_edge");
+  const auto [left, back, up] = mandible_axes(head);
   const double half = (head.at("condyle_left_center") - hinge).norm();
   const double length = (hinge - edge).dot(back), menton = (head.at("menton_bone") - hinge).dot(up);
   CutSheet sheet;

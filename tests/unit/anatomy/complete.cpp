@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "../../folder.h"
 #include "repose/anatomy/propose.h"
@@ -50,6 +52,31 @@ Completed complete_shipped(const std::vector<std::string>& without = {},
 bool says(const Completed& done, const std::string& part) {
   return std::any_of(done.remarks.begin(), done.remarks.end(),
                      [&](const std::string& line) { return line.find(part) != std::string::npos; });
+}
+
+/// The remarks on the shipped head, turned with its landmarks about the x axis.
+Completed complete_turned(double degrees) {
+  const std::string head = REPOSE_MESHES "/head_";
+  surface::Surface skin = surface::read_surface(head + "skin.ply"),
+                   skull = surface::read_surface(head + "skull.ply"),
+                   mandible = surface::read_surface(head + "mandible.ply");
+  Completed done;
+  scene::AnatomyPlan& plan = done.scene.anatomy.emplace();
+  plan.landmarks = propose_landmarks(skin, skull, mandible, {}).found;
+  const Mat3 turn = Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::UnitX()).toRotationMatrix();
+  for (auto& [name, place] : plan.landmarks) place = turn * place;
+  for (surface::Surface* surface : {&skin, &skull, &mandible})
+    for (Vec3& place : surface->points) place = turn * place;
+  plan.part_lips = plan.vestibule = false;
+  complete(skin, {skull, mandible}, done.scene, done.remarks);
+  return done;
+}
+
+TEST(CompleteScene, AHeadThatIsPitchedInTheScanIsReported) {
+  EXPECT_TRUE(says(complete_turned(-10), "the head lies about 10 degrees chin up in the scan"));
+  EXPECT_TRUE(says(complete_turned(10), "10 degrees chin down"));
+  EXPECT_FALSE(says(complete_turned(0), "degrees chin"));
+  EXPECT_FALSE(says(complete_turned(4), "degrees chin"));
 }
 
 TEST(CompleteScene, AnOpenMouthIsNotParted) {

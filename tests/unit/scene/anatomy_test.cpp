@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+
 #include "folder.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/scene.h"
@@ -145,6 +148,18 @@ TEST(OsteotomyTemplate, SplitIsAlikeOnBothSides) {
   ASSERT_EQ(sheet.points.size(), 16u);
   for (size_t i = 0; i < 8; ++i)
     expect_near(sheet.points[i + 8], sheet.points[i].cwiseProduct(Vec3(-1, 1, 1)));
+}
+
+TEST(OsteotomyTemplate, SplitGoesWithTheMandibleWhateverTheScansPitch) {
+  const CutSheet level = *read(head(), split).osteotomies[0].sheet;
+  for (const double degrees : {-15, 10}) {
+    const Mat3 turn = Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::UnitX()).toRotationMatrix();
+    Landmarks turned = head();
+    for (auto& [name, place] : turned) place = turn * place;
+    const CutSheet sheet = *read(turned, split).osteotomies[0].sheet;
+    for (size_t i = 0; i < 16; ++i)  // of landmarks with six digits
+      EXPECT_LT((sheet.points[i] - turn * level.points[i]).norm(), 1e-3) << i;
+  }
 }
 
 TEST(OsteotomyTemplate, ExcludesCutsOfOnesOwn) {

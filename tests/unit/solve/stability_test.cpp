@@ -100,6 +100,24 @@ TEST(RoughEigenvalue, IsThatOfAStringAndLeavesTheSolverUsable) {
   }
 }
 
+/// Of a block out of equilibrium, whose Hessian is indefinite: the value is the Rayleigh quotient
+/// of the mode, and near the smallest eigenvalue.
+TEST(RoughEigenvalue, IsThatOfItsMode) {
+  const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty, 0.4};
+  Energy energy(MPI_COMM_WORLD, testing::held_block(), weights);
+  const base::VecHandle moved = testing::random_vector(energy.positions, 1, 0.8);
+  const double smallest = energy.smallest(moved, linear::TangentSolver::factors_limit);
+  const double found = solve::rough_smallest_eigenvalue(energy.solver, moved, energy.mode);
+  EXPECT_LT(found, 0);
+  EXPECT_NEAR(found, smallest, 0.1 * std::abs(smallest));
+  const base::VecHandle product = energy.positions.make_vector();
+  check(MatMult(energy.tangent.action(), energy.mode, product));
+  double along = 0, square = 0;
+  check(VecDot(energy.mode, product, &along));
+  check(VecDot(energy.mode, energy.mode, &square));
+  EXPECT_NEAR(found, along / square, 1e-9 * std::abs(found));
+}
+
 /// A weight on a spring, at rest below its support or on top of it: m g / r across, of either sign.
 class Pendulum : public ::testing::TestWithParam<std::tuple<bool, int64_t>> {};
 
