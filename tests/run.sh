@@ -28,6 +28,6 @@ echo "skipped:"
 grep -hE '^(\[  SKIPPED \] [^ ]+$|SKIPPED \[)' build-ci/Testing/Temporary/LastTest.log | sort | uniq || echo "  nothing"
 if [ ${#selection[@]} -gt 0 ]; then
   echo "left out: $(ctest --preset ci -N -L long | sed -n 's/^ *Test *#[0-9]*: //p' | paste -sd' ')" \
-    "and tests marked long in $(grep -l 'pytest.mark.long' tests/program/*.py | wc -l) files: tests/run.sh --all"
+    "and some tests of $(grep -lE 'pytest.mark.long|RUNS_ALL' tests/program/test_*.py | wc -l) files: tests/run.sh --all"
 fi
 exit $status

@@ -9,6 +9,7 @@ import subprocess
 
 import pytest
 
+RUNS_ALL = bool(os.environ.get("REPOSE_ALL"))  # tests/run.sh --all
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 TIME_LIMIT = 120  # seconds
 PATIENCE = float(os.environ.get("REPOSE_PATIENCE", 1))  # limits times this: slow builds
@@ -66,7 +67,7 @@ def pytest_configure(config):
 
 def pytest_collection_modifyitems(config, items):
     """Deselects the long tests unless REPOSE_ALL is set."""
-    if os.environ.get("REPOSE_ALL"):
+    if RUNS_ALL:
         return
     long_tests = [item for item in items if item.get_closest_marker("long")]
     items[:] = [item for item in items if item not in long_tests]
@@ -75,7 +76,7 @@ def pytest_collection_modifyitems(config, items):
 
 def pytest_sessionfinish(session, exitstatus):
     """A file whose tests are all long is no failure."""
-    if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not os.environ.get("REPOSE_ALL"):
+    if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not RUNS_ALL:
         session.exitstatus = pytest.ExitCode.OK
 
 
