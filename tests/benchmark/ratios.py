@@ -6,10 +6,12 @@ templates, moves are in the words of surgery.
     tests/benchmark/ratios.py [-bin build/bin] [-output docs/measurements/ratios.md] [-edge 4]
                               [-head ../shared/data/head] [-phantoms 12]
                               [-ways "default;bonded lips"] [-operations "advance,set-back"]
-                              [-first 1] [-keep FOLDER]
+                              [-first 1] [-keep FOLDER] [-variants "all"]
 
 The folder of the head holds skin.ply, skull.ply and mandible.ply. With -phantoms so many synthetic
-heads take its place, numbered from -first, solved in the first of the ways. Needs
+heads take its place, numbered from -first, solved in the first of the ways. With -variants (some
+of VARIANTS, or all) the head is mirrored, turned, scaled or cropped, or its landmarks are moved at
+random. Needs
 apt-get install --no-install-recommends python3-h5py python3-meshio python3-scipy
 """
 
@@ -21,6 +23,7 @@ import tempfile
 
 import meshio
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from measure import run
 from page import option_parser, print_table
@@ -28,14 +31,13 @@ from phantom_heads import Shape, write_surfaces
 from heads import BONES, DATA  # page knows where it is
 from tissue import last, model_of
 
-# Operation → bone, template, clinical move, direction (LPS) and mm.
-FORWARD, BACK, UP = (0, -1, 0), (0, 1, 0), (0, 0, 1)
+# Operation → bone, template, clinical move and mm.
 OPERATIONS = {
-    "advance": ("mandible", "sagittal_split", "advance: 5", FORWARD, 5),
-    "set-back": ("mandible", "sagittal_split", "set_back: 5", BACK, 5),
-    "chin": ("mandible", "genioplasty", "advance: 8", FORWARD, 8),
-    "Le Fort I": ("skull", "le_fort_1", "advance: 5", FORWARD, 5),
-    "impaction": ("skull", "le_fort_1", "impaction: 4", UP, 4)}
+    "advance": ("mandible", "sagittal_split", "advance: 5", 5),
+    "set-back": ("mandible", "sagittal_split", "set_back: 5", 5),
+    "chin": ("mandible", "genioplasty", "advance: 8", 8),
+    "Le Fort I": ("skull", "le_fort_1", "advance: 5", 5),
+    "impaction": ("skull", "le_fort_1", "impaction: 4", 4)}
 NAMES = {"pronasale": "pronasale", "subnasale": "subnasale", "upper_lip": "labrale superius",
          "lower_lip": "labrale inferius", "b_soft": "B′", "pogonion_soft": "pogonion′"}
 # (operation, landmark) → what is published, and the lowest and highest ratio within it: one standard
@@ -65,6 +67,22 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "no tone, lower gap 1": (", tone: 0, lower_gap: 1", "")}
 LIMIT = 60  # s, of a search
 
+
+def turned(*rotation):
+    """The head turned by so many degrees about x, y and z."""
+    return lambda points: points @ Rotation.from_euler("xyz", rotation, degrees=True).as_matrix().T
+
+
+# Variant of the head → how its points are moved, mm by which its skin is cropped from below, and
+# standard deviation of its landmarks, mm.
+VARIANTS = {
+    "mirrored": (lambda points: points * [-1, 1, 1], 0, 0),
+    "0.9 times": (lambda points: 0.9 * points, 0, 0),
+    "1.1 times": (lambda points: 1.1 * points, 0, 0), "yaw 5": (turned(0, 0, 5), 0, 0),
+    "roll 5": (turned(0, 5, 0), 0, 0), "chin up 10": (turned(-10, 0, 0), 0, 0),
+    "chin down 10": (turned(10, 0, 0), 0, 0), "cropped": (lambda points: points, 8, 0),
+    "landmarks ± 1": (lambda points: points, 0, 1)}
+
 PHANTOM_HEAD = ("| operation, mm | landmark | published | median | lowest … highest | below, above |\n"
                 "|---|---|---|--:|--:|--:|")
 
@@ -80,8 +98,38 @@ def landmarks_of(options, folder):
     return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
 
 
+def make_variant(options, folder, name):
+    """The folder and landmarks of a variant of the head."""
+    move, cropped, deviation = VARIANTS[name]
+    head = folder / name.replace(" ", "_")
+    head.mkdir(exist_ok=True)
+    for surface in ("skin", *BONES):
+        mesh = meshio.read(options.head / f"{surface}.ply")
+        triangles = mesh.cells_dict["triangle"]
+        if surface == "skin":
+            z = mesh.points[:, 2]
+            triangles = triangles[(z[triangles] > z.min() + cropped).all(axis=1)]
+        used, triangles = np.unique(triangles, return_inverse=True)
+        triangles = triangles.reshape(-1, 3)[:, ::-1 if name == "mirrored" else 1]
+        points = move(mesh.points[used].astype(float))
+        meshio.Mesh(points, {"triangle": triangles.astype(np.int32)}).write(head / f"{surface}.ply")
+    own = argparse.Namespace(**{**vars(options), "head": head})
+    landmarks = landmarks_of(own, head)
+    if deviation:
+        move_landmarks(head / "head.mrk.json", deviation)
+    return own, head, landmarks
+
+
+def move_landmarks(file, deviation):
+    """Moves the landmarks of a file by normal deviates of so many mm along each axis."""
+    text, random = json.loads(file.read_text()), np.random.default_rng(1)
+    for point in text["markups"][0]["controlPoints"]:
+        point["position"] = list(np.array(point["position"]) + random.normal(0, deviation, 3))
+    file.write_text(json.dumps(text))
+
+
 def scene_of(options, operation, way):
-    bone, template, move, _, _ = OPERATIONS[operation]
+    bone, template, move, _ = OPERATIONS[operation]
     anatomy, tissue = WAYS[way]
     bones = ", ".join(f"{{name: {name}, file: {options.head / name}.ply}}" for name in BONES)
     kerf = ", kerf: 4.5" if operation == "impaction" else ", kerf: 0.5"
@@ -106,7 +154,7 @@ def lip_pressure(model, landmarks):
 
 def ratios_of(options, folder, operation, way, landmarks):
     """Landmark → way of the skin over that of the bone; empty where the scene is refused."""
-    _, _, _, direction, length = OPERATIONS[operation]
+    length = OPERATIONS[operation][-1]
     name = f"{operation}_{way}".replace(" ", "_").replace(",", "")
     (folder / f"{name}.yaml").write_text(scene_of(options, operation, way))
     done = run([options.bin / "repose-solve", f"{name}.yaml", "-skip_other_rest", "-time_limit", LIMIT,
@@ -120,7 +168,8 @@ def ratios_of(options, folder, operation, way, landmarks):
           f"{1e6 * lip_pressure(model, landmarks):.0f} Pa", file=sys.stderr)
     skin = np.flatnonzero(model["point/layer"] == 0)
     initial = model["point/position"][skin]
-    ratio = (rest[skin] - initial) @ direction / length
+    way_of_bone = model["bone_transform"][-1, :3, 3]
+    ratio = (rest[skin] - initial) @ way_of_bone / length**2
     return {mark: ratio[np.argsort(np.linalg.norm(initial - landmarks[mark], axis=1))[:3]].mean()
             for mark in NAMES if mark in landmarks}
 
@@ -142,21 +191,31 @@ def operations_of(options):
     return options.operations.split(",") if options.operations else list(OPERATIONS)
 
 
-def rows(options, folder):
-    ways, outside, count = ways_of(options), dict.fromkeys(ways_of(options), 0), 0
+def columns_of(options, folder):
+    """Column of the table → options, folder and landmarks of its head, and way."""
+    if options.variants:
+        way = ways_of(options)[0]
+        names = VARIANTS if options.variants == "all" else options.variants.split(";")
+        return {name: (*make_variant(options, folder, name), way) for name in names}
     landmarks = landmarks_of(options, folder)
+    return {way: (options, folder, landmarks, way) for way in ways_of(options)}
+
+
+def rows(options, columns):
+    outside, count = dict.fromkeys(columns, 0), 0
     for operation in operations_of(options):
-        found = {way: ratios_of(options, folder, operation, way, landmarks) for way in ways}
+        found = {name: ratios_of(own, folder, operation, way, landmarks)
+                 for name, (own, folder, landmarks, way) in columns.items()}
         for key, (published, _, _) in PUBLISHED.items():
             if key[0] != operation:
                 continue
-            cells = [cell(found[way], key) for way in ways]
-            for way, text in zip(ways, cells):
-                outside[way] += text.startswith("**")
+            cells = [cell(found[name], key) for name in columns]
+            for name, text in zip(columns, cells):
+                outside[name] += text.startswith("**")
             count += 1
-            yield (f"| {operation} {OPERATIONS[operation][4]} | {NAMES[key[1]]} | {published} | "
+            yield (f"| {operation} {OPERATIONS[operation][-1]} | {NAMES[key[1]]} | {published} | "
                    + " | ".join(cells) + " |")
-    yield (f"| **outside**, of {count} | | | " + " | ".join(str(outside[way]) for way in ways) + " |")
+    yield f"| **outside**, of {count} | | | " + " | ".join(map(str, outside.values())) + " |"
 
 
 def ramp(values, start, end):
@@ -202,24 +261,25 @@ def phantom_rows(options, folder):
     for key, (published, low, high) in PUBLISHED.items():
         found = np.round([head[key] for head in heads if key in head], 2)
         if len(found):
-            yield (f"| {key[0]} {OPERATIONS[key[0]][4]} | {NAMES[key[1]]} | {published} | "
+            yield (f"| {key[0]} {OPERATIONS[key[0]][-1]} | {NAMES[key[1]]} | {published} | "
                    f"{np.median(found):.2f} | {found.min():.2f} … {found.max():.2f} | "
                    f"{np.sum(found < low)}, {np.sum(found > high)} of {len(found)} |")
 
 
 def main():
     options = option_parser(__doc__, edge=4.0, ways="default;bonded lips", head="", operations="",
-                            keep="", phantoms=0, first=1).parse_args()
+                            keep="", phantoms=0, first=1, variants="").parse_args()
     options.head = pathlib.Path(options.head).resolve() if options.head else DATA
-    ways = ways_of(options)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(options.keep or name).resolve()
         folder.mkdir(exist_ok=True)
         if options.phantoms:
             print_table(PHANTOM_HEAD, phantom_rows(options, folder), options.output, "phantoms")
             return
-        print_table("| operation, mm | landmark | published | " + " | ".join(ways) + " |\n|---|---|---|"
-                    + "--:|" * len(ways), rows(options, folder), options.output)
+        columns = columns_of(options, folder)
+        head = "| operation, mm | landmark | published | " + " | ".join(columns) + " |\n|---|---|---|"
+        print_table(head + "--:|" * len(columns), rows(options, columns), options.output,
+                    "variants" if options.variants else "measured")
 
 
 if __name__ == "__main__":

@@ -150,6 +150,24 @@ def test_the_cookbook_holds_its_recipes(environment, tmp_path):
     assert [row[0] for row in re.findall(r"^\| `(.+?)` " + count, guide, re.M)] == recipes
 
 
+def test_ratios_of_a_mirrored_head_are_those_of_the_head(environment, tmp_path):
+    for package in ("scipy", "meshio", "h5py"):
+        pytest.importorskip(package)
+    found = []
+    result = run_script("ratios.py", tmp_path, environment, "-phantoms", 1, "-edge", 6, "-ways", "default",
+                        "-operations", "chin", "-keep", "kept")
+    assert (result.returncode, "error" in result.stderr) == (0, False), result
+    found.append(float(re.findall(r"^\| chin 8 .*$", result.stdout, re.M)[0].split("|")[4]))
+    result = run_script("ratios.py", tmp_path, environment, "-head", "kept/phantom_1", "-edge", 6, "-ways",
+                        "default", "-operations", "chin", "-variants", "mirrored;yaw 5;landmarks ± 1")
+    assert (result.returncode, "error" in result.stderr) == (0, False), result
+    row, = re.findall(r"^\| chin 8 .*$", result.stdout, re.M)
+    found += [float(cell.strip(" *")) for cell in row.split("|")[4:7]]
+    given, mirrored, turned, noisy = found
+    assert max(abs(mirrored - given), abs(turned - given)) < 0.08 and abs(noisy - given) < 0.2
+
+
+
 def test_ratios_of_synthetic_heads_and_their_pictures(environment, tmp_path):
     for package in ("scipy", "meshio", "h5py", "vtkmodules"):
         pytest.importorskip(package)
