@@ -164,6 +164,7 @@ def test_ratios_of_a_mirrored_head_are_those_of_the_head(environment, tmp_path):
     row, = re.findall(r"^\| chin 8 .*$", result.stdout, re.M)
     found += [float(cell.strip(" *")) for cell in row.split("|")[4:7]]
     given, mirrored, turned, noisy = found
+    assert 0.6 < given < 1
     assert max(abs(mirrored - given), abs(turned - given)) < 0.08 and abs(noisy - given) < 0.2
 
 
