@@ -58,7 +58,7 @@ Contest::Contest(const model::Model& model, const Functional& functional, const 
 
 Contest::Contest(const model::Model& model, const mechanics::Weights& weights, bool force,
                  const Rules& rules)
-    : part_(discrete::distribute(comm, model)),
+    : part_(discrete::build_local_from_root(comm, model).part),
       positions_(comm, part_),
       problem_(positions_, weights, force),
       reference_(positions_.make_vector()),

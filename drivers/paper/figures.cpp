@@ -55,8 +55,9 @@ void write_equilibrium(scene::Scene scene, const std::filesystem::path& file) {
   model::Model strained = model;
   strain_skin(strained, turgor);
   solve::prestress(alone, model, {turgor, model.gravity});
-  const discrete::Part part = discrete::distribute(alone, model);
-  const std::vector<Vec3> before = initial_forces(discrete::distribute(alone, strained));
+  const discrete::Part part = discrete::build_local_from_root(alone, model).part;
+  const std::vector<Vec3> before =
+      initial_forces(discrete::build_local_from_root(alone, strained).part);
   const std::vector<Vec3> after = initial_forces(part);
   std::string text = "x,y,z,before_x,before_y,before_z,after_x,after_y,after_z,layer\n";
   for (int64_t i = 0; i < part.owned_points; ++i) {

@@ -14,7 +14,7 @@ namespace {
 void measure_solver(const model::Model& model, Size& size) {
   constexpr int evaluations = 100;
   double bytes = heap_bytes(), begin = cpu_seconds();
-  const discrete::Part part = discrete::distribute(PETSC_COMM_SELF, model);
+  const discrete::Part part = discrete::build_local_from_root(PETSC_COMM_SELF, model).part;
   discrete::Positions positions(PETSC_COMM_SELF, part);
   discrete::Objective objective(positions, {});
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();

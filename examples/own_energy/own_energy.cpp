@@ -38,7 +38,8 @@ base::Exit run(const base::Options& options) {
     skin.numbers.assign(model.skin.size(), options.number("pressure"));
     model.elements.push_back(std::move(skin));
   });
-  const discrete::LocalModel local = discrete::distribute_model(MPI_COMM_WORLD, std::move(model));
+  const discrete::LocalModel local =
+      discrete::build_local_from_root(MPI_COMM_WORLD, std::move(model));
   results::ResultFile file(MPI_COMM_WORLD, "own_energy", local.global_metadata,
                            discrete::NaturalRows::of_model(MPI_COMM_WORLD, local));
   const solve::Summary summary =

@@ -142,7 +142,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
   if (is_scene)
     build(comm, input, changes, job);
   else
-    job.local_model = discrete::distribute_model(comm, std::move(stored));
+    job.local_model = discrete::build_local(comm, std::move(stored));
 }
 
 /// After the initial equilibrium, which would balance the tone again. Collective.

@@ -180,7 +180,7 @@ solve::Tearing Run::tear() {
       solve::tear(comm, whole, job_.tearing, strategy_.settings, start_.position);
   if (tearing.rounds > 0) stages_.end("tear");
   if (!tearing.torn) return tearing;
-  job_.local_model = discrete::distribute_model(comm, std::move(whole));
+  job_.local_model = discrete::build_local_from_root(comm, std::move(whole));
   start_ = {tearing.position, false};
   strategy_.settings.path.start_load = 1;
   strategy_.settings.initial_equilibrium = false;
@@ -209,7 +209,7 @@ Coarser Run::solve_coarser() {
                                  : describe_choice(sequence, accuracy);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
     settings.weights = sequence.last_settings.weights;
-    job_.local_model = discrete::distribute_model(comm, std::move(sequence.last.model));
+    job_.local_model = discrete::build_local_from_root(comm, std::move(sequence.last.model));
     job_.held = std::move(sequence.last.held);
     start_ = {base::scatter(comm, sequence.last_position), true};
   } else if (!sequence.levels.empty()) {

@@ -2,8 +2,8 @@
 #include <map>
 
 #include "by_column.h"
-#include "distribution.h"
 #include "message.h"
+#include "piece.h"
 #include "rank_columns.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
@@ -53,32 +53,21 @@ std::vector<int64_t> own_columns(const RankColumns& rank_columns, int rank) {
   return own;
 }
 
-/// The means over the whole tissue: rank 0's effective modulus and, for all,
-/// contact's stiffness. Collective.
-void set_mean_moduli(MPI_Comm comm, const scene::Scene& scene, const RankColumns& rank_columns,
-                     const std::vector<int64_t>& own, model::Model& model,
-                     LocalModel& local_model) {
+/// Sets contact's stiffness by means over the whole tissue and returns the effective modulus, on
+/// rank 0. Collective.
+double set_mean_moduli(MPI_Comm comm, const scene::Scene& scene, const RankColumns& rank_columns,
+                       model::Model& model) {
+  const std::vector<int64_t> own = own_columns(rank_columns, base::rank(comm));
   const auto mine = pick(model::column_sums(model, rank_columns.layers), own);
   const auto sums =
       gather_by_column(comm, rank_columns.columns, pick(rank_columns.piece.column, own), mine);
+  double effective_modulus = 0;
   base::on_root(comm, [&] {
-    local_model.effective_modulus = model::effective_modulus(sums);
+    effective_modulus = model::effective_modulus(sums);
     model.contact.stiffness = model::contact_stiffness(scene, sums);
   });
   MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
-}
-
-/// Distributes contact of the piece's points, where any rank has contact.
-/// Collective.
-void distribute_contact(MPI_Comm comm, model::Model& model, Distribution& distribution) {
-  int64_t touching = !model.contact.pairs.point.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT64_T, MPI_MAX, comm);
-  if (touching == 0) {
-    model.contact.bodies.clear();
-    return;
-  }
-  base::collective_try(comm, [&] { distribution.bodies = mechanics::make_bodies(model); });
-  distribution.contact_offset = mechanics::contact_offsets(model, distribution.bodies);
+  return effective_modulus;
 }
 
 /// Points of a piece's model whose cuts are made.
@@ -122,47 +111,28 @@ int64_t list_columns(const RankColumns& rank_columns) {
   return rank_columns.columns + static_cast<int64_t>(rank_columns.doubled.size());
 }
 
-/// By the columns of a piece what a plan says of its points.
-void number_points(const RankColumns& rank_columns, const PiecePoints& points,
-                   Distribution& distribution) {
+/// By the columns of a piece what is known of its points.
+void number_points(const RankColumns& rank_columns, const PiecePoints& points, Piece& piece) {
   std::vector<int64_t> unknown = rank_columns.unknown;
   for (size_t i = 0; i < points.column.size(); ++i) {
     const int64_t c = points.column[i];
-    distribution.owner.push_back(rank_columns.owner[c]);
-    distribution.place.push_back(rank_columns.place[c] + points.place[i]);
-    const bool soft = distribution.set[i] == PointSet::soft_tissue;
-    distribution.unknown.push_back(soft ? unknown[c]++ : -1);
+    piece.owner.push_back(rank_columns.owner[c]);
+    piece.place.push_back(rank_columns.place[c] + points.place[i]);
+    const bool soft = piece.model.points.set[i] == PointSet::soft_tissue;
+    piece.unknown.push_back(soft ? unknown[c]++ : -1);
   }
-  distribution.total_points = rank_columns.columns * rank_columns.layers;
-  for (const model::DoubledColumn& at : rank_columns.doubled)
-    distribution.total_points += at.points;
-  distribution.total_unknowns = rank_columns.total_unknowns;
-}
-
-/// Rows of the piece's points that a rank owns, by their places.
-std::vector<int64_t> own_points(const Distribution& distribution, int rank) {
-  std::vector<int64_t> rows;
-  for (size_t i = 0; i < distribution.owner.size(); ++i)
-    if (distribution.owner[i] == rank) rows.push_back(static_cast<int64_t>(i));
-  std::ranges::sort(rows, {}, [&](int64_t row) { return distribution.place[row]; });
-  return rows;
+  piece.point_row = points.row;
+  piece.counts.points = rank_columns.columns * rank_columns.layers;
+  for (const model::DoubledColumn& at : rank_columns.doubled) piece.counts.points += at.points;
+  piece.total_unknowns = rank_columns.total_unknowns;
+  piece.first_unknown = rank_columns.first_unknown;
+  piece.unknowns = rank_columns.unknowns;
 }
 
 /// Row of a prism of the piece in the whole model.
 int64_t row_of_prism(const RankColumns& rank_columns, int64_t row) {
   const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
   return row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
-}
-
-/// The whole model's rows in place of the piece's. `springs`, `edges` [of the piece].
-void number_rows(const RankColumns& rank_columns, const PiecePoints& points,
-                 const ColumnRows& springs, const ColumnRows& edges, Part& part) {
-  part.point_row = pick(points.row, part.point_row);
-  for (int64_t& row : part.prism_row) row = row_of_prism(rank_columns, row);
-  part.spring_row = pick(springs.row, part.spring_row);
-  part.edge_row = pick(edges.row, part.edge_row);
-  part.total_springs = springs.total;
-  part.total_prisms = (rank_columns.layers - 1) * rank_columns.triangles;
 }
 
 /// [C] Marks a rank's columns and those beside them: the piece has all elements at these.
@@ -226,6 +196,22 @@ ColumnRows rows_of_springs(MPI_Comm comm, int rank, const RankColumns& rank_colu
   return all;
 }
 
+/// Numbers the piece's elements in the whole model. Collective.
+void number_elements(MPI_Comm comm, const RankColumns& rank_columns, const PiecePoints& points,
+                     Piece& piece) {
+  const int rank = base::rank(comm);
+  ColumnRows springs, edges = rows_of_edges(comm, rank, rank_columns, points, piece.model);
+  if (!piece.solid)
+    springs = rows_of_springs(comm, rank, rank_columns, points, piece.model.springs);
+  piece.spring_row = std::move(springs.row);
+  piece.edge_row = std::move(edges.row);
+  for (size_t m = 0; m < piece.model.prisms.points.size(); ++m)
+    piece.prism_row.push_back(row_of_prism(rank_columns, static_cast<int64_t>(m)));
+  piece.counts.springs = springs.total;
+  piece.counts.prisms = (rank_columns.layers - 1) * rank_columns.triangles;
+  piece.counts.edges = edges.total;
+}
+
 /// Gives the elements of a piece without incisions what balances those of the whole model.
 /// Edges at the border of the piece keep their weights. Collective.
 void take_balance(MPI_Comm comm, const LocalModel& balanced, const RankColumns& rank_columns,
@@ -266,19 +252,18 @@ void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& lo
   local_model.contact_pairs = rows.total;
 }
 
-/// The sides of cuts in rows of the whole model, on rank 0, from the rank that has them. Returns on
-/// all ranks whether one does. Collective.
-bool gather_cut_faces(MPI_Comm comm, const Part& part, model::CutFaces& whole) {
+/// The sides of cuts in rows of the whole model, on rank 0, from the rank that has them.
+/// Collective.
+model::CutFaces gather_cut_faces(MPI_Comm comm, const Part& part) {
   model::CutFaces faces = part.model.contact.cut_faces;
   for (int64_t& point : faces.point) point = part.point_row[point];
-  int has = faces.empty() ? -1 : base::rank(comm);
+  int has = faces.empty() ? 0 : base::rank(comm);
   MPI_Allreduce(MPI_IN_PLACE, &has, 1, MPI_INT, MPI_MAX, comm);
   if (has > 0 && has == base::rank(comm))
     Sender(comm, 0)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
   if (has > 0 && base::rank(comm) == 0)
     Receiver(comm, has)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
-  if (base::rank(comm) == 0) whole = std::move(faces);
-  return has >= 0;
+  return base::rank(comm) == 0 ? faces : model::CutFaces{};
 }
 
 void append(const model::TermElements& elements, size_t e, model::TermElements& to) {
@@ -313,65 +298,40 @@ std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part
   return all;
 }
 
-model::Counts count_all(MPI_Comm comm, const Part& part, int64_t edges) {
-  int64_t of[4] = {};
-  for (int64_t i = 0; i < part.owned_points; ++i) ++of[static_cast<int>(part.model.points.set[i])];
-  MPI_Allreduce(MPI_IN_PLACE, of, 4, MPI_INT64_T, MPI_SUM, comm);
-  model::Counts counts;
-  counts.points = part.total_points;
-  counts.soft = of[0], counts.boundary = of[1], counts.bone = of[2], counts.held = of[3];
-  counts.springs = part.total_springs;
-  counts.prisms = part.total_prisms;
-  counts.edges = edges;
-  return counts;
-}
-
 }  // namespace
 
 LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene,
                        const LocalModel* balanced) {
   static const PetscLogEvent event = base::log_event("RpPartition");
   const base::Logged logged(event);
-  const int rank = base::rank(comm);
-  LocalModel local_model;
+  model::Model global_metadata;
   std::vector<surface::Surface> bones;
   const RankColumns rank_columns =
-      distribute_columns(comm, geometry, scene, local_model.global_metadata, bones);
+      distribute_columns(comm, geometry, scene, global_metadata, bones);
   scene.moves = rank_columns.moves;
-  model::Model model = build_piece(comm, scene, bones, rank_columns);
-  const std::vector<int64_t> own = own_columns(rank_columns, rank);
-  set_mean_moduli(comm, scene, rank_columns, own, model, local_model);
+  Piece piece;
+  model::Model& model = piece.model;
+  model = build_piece(comm, scene, bones, rank_columns);
+  piece.solid = scene.tissue.material.has_value();
+  const double effective_modulus = set_mean_moduli(comm, scene, rank_columns, model);
   remove_empty_terms(comm, model);
-  const PiecePoints piece_points = points_of(rank_columns);
+  const PiecePoints points = points_of(rank_columns);
   cut_piece(comm, rank_columns, true, model);
-  if (balanced) take_balance(comm, *balanced, rank_columns, piece_points, model);
+  if (balanced) take_balance(comm, *balanced, rank_columns, points, model);
   cut_piece(comm, rank_columns, false, model);
-  Distribution distribution{model, {}, {}, {}, {}, {}, {}, {}};
-  distribute_motion(distribution);
-  distribute_contact(comm, model, distribution);
-  number_points(rank_columns, piece_points, distribution);
-  const std::vector<int64_t> points = own_points(distribution, rank);
-  LocalNumbers local(static_cast<int64_t>(distribution.owner.size()));
-  Part& part = local_model.part;
-  part = make_part(distribution, {rank, points, rank_columns.first_unknown, rank_columns.unknowns},
-                   local);
-  part.solid = scene.tissue.material.has_value();
-  const ColumnRows springs =
-      part.solid ? ColumnRows{}
-                 : rows_of_springs(comm, rank, rank_columns, piece_points, model.springs);
-  const ColumnRows edges = rows_of_edges(comm, rank, rank_columns, piece_points, model);
-  number_rows(rank_columns, piece_points, springs, edges, part);
+  piece.bones = bone_motions(model);
+  number_points(rank_columns, points, piece);
+  number_elements(comm, rank_columns, points, piece);
+  LocalModel local_model = build_part(comm, piece);
+  const Part& part = local_model.part;
+  local_model.effective_modulus = effective_modulus;
   number_pairs(comm, rank_columns, local_model);
-  local_model.outward =
-      NaturalRows(comm, part).natural(pick(model::outward_normals(model), points));
-  local_model.counts = count_all(comm, part, edges.total);
-  local_model.global_metadata.elements = gather_elements(comm, part);
-  if (rank == 0) local_model.global_metadata.spring_sets = std::move(model.spring_sets);
-  model::Contact& contact = local_model.global_metadata.contact;
-  const bool cuts_meet = gather_cut_faces(comm, part, contact.cut_faces);
-  part.contact = cuts_meet || !model.contact.bodies.empty();
-  local_model.global_metadata.contact.bodies = model.contact.bodies;
-  local_model.global_metadata.contact.stiffness = model.contact.stiffness;
+  global_metadata.elements = gather_elements(comm, part);
+  global_metadata.contact.cut_faces = gather_cut_faces(comm, part);
+  if (part.contact) global_metadata.contact.bodies = model.contact.bodies;
+  global_metadata.contact.stiffness = model.contact.stiffness;
+  if (base::rank(comm) == 0) global_metadata.spring_sets = std::move(model.spring_sets);
+  local_model.global_metadata = std::move(global_metadata);
   return local_model;
 }
 

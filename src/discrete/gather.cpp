@@ -5,31 +5,12 @@
 
 namespace repose::discrete {
 
-namespace {
-
-/// The arrays of all ranks one after the other, each of any length.
-template <class T>
-std::vector<T> gathered(MPI_Comm comm, std::vector<T> mine) {
-  if (base::rank(comm) > 0) {
-    Sender(comm, 0)(mine);
-    return {};
-  }
-  for (int from = 1; from < base::size(comm); ++from) {
-    std::vector<T> theirs;
-    Receiver(comm, from)(theirs);
-    mine.insert(mine.end(), theirs.begin(), theirs.end());
-  }
-  return mine;
-}
-
-}  // namespace
-
 std::vector<double> gather(MPI_Comm comm, const double* values, size_t count) {
-  return gathered(comm, std::vector<double>(values, values + count));
+  return gather_arrays(comm, std::vector<double>(values, values + count));
 }
 
 std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab) {
-  return gathered(comm, slab);
+  return gather_arrays(comm, slab);
 }
 
 std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab,
@@ -44,7 +25,7 @@ std::vector<Vec3> gather_points(MPI_Comm comm, const std::vector<Vec3>& slab,
   std::vector<Vec3> picked;
   for (const int64_t row : rows)
     if (row >= begin && row < begin + mine) picked.push_back(slab[row - begin]);
-  return gathered(comm, picked);
+  return gather_arrays(comm, picked);
 }
 
 }  // namespace repose::discrete

@@ -30,4 +30,11 @@ void Receiver::receive_bytes(void* data, size_t size) {
   });
 }
 
+void Broadcaster::broadcast_bytes(void* data, size_t size) {
+  auto* bytes = static_cast<char*>(data);
+  in_pieces(size, [&](size_t begin, int length) {
+    MPI_Bcast(bytes + begin, length, MPI_BYTE, 0, comm_);
+  });
+}
+
 }  // namespace repose::discrete

@@ -1,16 +1,15 @@
 #include "repose/discrete/part.h"
 
 #include <algorithm>
-#include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include "countable.h"
-#include "distribution.h"
+#include "exchange.h"
 #include "message.h"
 #include "partition.h"
-#include "pass_bodies.h"
+#include "piece.h"
 #include "repose/base/agreement.h"
-#include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
 
@@ -21,189 +20,404 @@ namespace {
 using base::pick;
 using model::Model;
 using model::PointSet;
+using RowsOfRanks = std::vector<std::vector<int64_t>>;  // [ranks] rows that each receives
 
-/// The shares of all ranks in one model.
-struct OwnedRanges {
-  std::vector<int64_t> order;          // [N] point rows by their places
-  std::vector<int64_t> begin;          // [ranks + 1] into order
-  std::vector<int64_t> unknown_begin;  // [ranks + 1]
-  OwnedRange of(int rank) const {
-    return {rank, std::span(order).subspan(begin[rank], begin[rank + 1] - begin[rank]),
-            unknown_begin[rank], unknown_begin[rank + 1] - unknown_begin[rank]};
-  }
+/// Calls visit(point) for every point of an element, of whatever kind.
+template <class Model, class Visit>
+void for_each_point(Model& model, const Visit& visit) {
+  const auto visit_all = [&](auto& elements) {
+    for (auto& points : elements)
+      for (auto& point : points) visit(point);
+  };
+  const auto visit_each = [&](auto& points) {
+    for (auto& point : points) visit(point);
+  };
+  visit_all(model.springs.points);
+  visit_all(model.prisms.points);
+  visit_all(model.edges.points);
+  visit_all(model.skin);
+  visit_each(model.contact.pairs.point);
+  visit_each(model.contact.cut_faces.point);
+  for (auto& elements : model.elements) visit_each(elements.points);
+}
+
+/// Owners and numbers of all points, on rank 0.
+struct Numbers {
+  std::vector<int64_t> column;  // [N] 0-based, consecutive, in order of first appearance
+  int64_t columns = 0;
+  std::vector<int> owner;               // [N]
+  std::vector<int64_t> order;           // [N] rows by their places
+  std::vector<int64_t> place, unknown;  // [N] as in Piece
+  std::vector<int64_t> unknown_begin;   // [ranks + 1]
 };
 
-OwnedRanges number_points(const ColumnGraph& graph, int ranks, Distribution& distribution) {
-  const int64_t n = static_cast<int64_t>(distribution.owner.size());
-  OwnedRanges ranges;
-  ranges.order.resize(n);
-  for (int64_t i = 0; i < n; ++i) ranges.order[i] = i;
-  const std::vector<int64_t> column = pick(memory_order(graph), graph.column_of_point);
-  std::stable_sort(ranges.order.begin(), ranges.order.end(), [&](int64_t a, int64_t b) {
-    return std::pair(distribution.owner[a], column[a]) <
-           std::pair(distribution.owner[b], column[b]);
+void number_columns(const std::vector<int64_t>& names, Numbers& numbers) {
+  std::unordered_map<int64_t, int64_t> number;
+  numbers.column.reserve(names.size());
+  for (const int64_t name : names)
+    numbers.column.push_back(
+        number.emplace(name, static_cast<int64_t>(number.size())).first->second);
+  numbers.columns = static_cast<int64_t>(number.size());
+}
+
+void number_points(const ColumnGraph& graph, const std::vector<PointSet>& set, int ranks,
+                   Numbers& numbers) {
+  const auto n = static_cast<int64_t>(set.size());
+  numbers.order.resize(n);
+  std::iota(numbers.order.begin(), numbers.order.end(), 0);
+  const std::vector<int64_t> column = pick(memory_order(graph), numbers.column);
+  std::stable_sort(numbers.order.begin(), numbers.order.end(), [&](int64_t a, int64_t b) {
+    return std::pair(numbers.owner[a], column[a]) < std::pair(numbers.owner[b], column[b]);
   });
-  distribution.place.resize(n);
-  for (int64_t k = 0; k < n; ++k) distribution.place[ranges.order[k]] = k;
-  ranges.begin.assign(ranks + 1, n);
-  ranges.unknown_begin.assign(ranks + 1, 0);
-  distribution.unknown.assign(n, -1);
+  numbers.place.resize(n);
+  numbers.unknown.assign(n, -1);
+  numbers.unknown_begin.assign(ranks + 1, 0);
   int64_t next = 0;
-  int rank = -1;
   for (int64_t k = 0; k < n; ++k) {
-    const int64_t row = ranges.order[k];
-    while (rank < distribution.owner[row]) {
-      ranges.begin[++rank] = k;
-      ranges.unknown_begin[rank] = next;
-    }
-    if (distribution.set[row] == PointSet::soft_tissue) distribution.unknown[row] = next++;
+    const int64_t row = numbers.order[k];
+    numbers.place[row] = k;
+    if (set[row] == PointSet::soft_tissue) numbers.unknown[row] = next++;
+    numbers.unknown_begin[numbers.owner[row] + 1] = next;
   }
-  while (rank < ranks - 1) ranges.unknown_begin[++rank] = next;
-  ranges.unknown_begin[ranks] = next;
-  distribution.total_points = n;
-  distribution.total_unknowns = next;
-  return ranges;
+  for (int r = 0; r < ranks; ++r)
+    numbers.unknown_begin[r + 1] = std::max(numbers.unknown_begin[r + 1], numbers.unknown_begin[r]);
 }
 
 /// The columns along cuts whose sides may meet go to one rank.
-void keep_cuts_whole(const ColumnGraph& graph, Distribution& distribution) {
-  const model::CutFaces& cut_faces = distribution.model.contact.cut_faces;
-  if (cut_faces.empty()) return;
-  const int owner = distribution.owner[cut_faces.point.front()];
-  std::vector<char> moves(graph.columns(), 0);
-  for (const int64_t point : cut_faces.point) moves[graph.column_of_point[point]] = 1;
-  for (size_t p = 0; p < distribution.owner.size(); ++p)
-    if (moves[graph.column_of_point[p]]) distribution.owner[p] = owner;
+void keep_cuts_whole(const Model& model, Numbers& numbers) {
+  const std::vector<int64_t>& points = model.contact.cut_faces.point;
+  if (points.empty()) return;
+  std::vector<char> moves(numbers.columns, 0);
+  for (const int64_t point : points) moves[numbers.column[point]] = 1;
+  const int owner = numbers.owner[points.front()];
+  for (size_t p = 0; p < numbers.owner.size(); ++p)
+    if (moves[numbers.column[p]]) numbers.owner[p] = owner;
 }
-
-void distribute_contact(Distribution& distribution, const ColumnGraph& graph) {
-  if (distribution.model.contact.empty()) return;
-  keep_cuts_whole(graph, distribution);
-  distribution.bodies = mechanics::make_bodies(distribution.model);
-  distribution.contact_offset = mechanics::contact_offsets(distribution.model, distribution.bodies);
-}
-
-template <class Archive>
-void pass_elements(Archive& archive, std::vector<model::TermElements>& all) {
-  auto count = static_cast<int64_t>(all.size());
-  archive(count);
-  all.resize(count);
-  for (model::TermElements& elements : all) {
-    std::vector<char> name(elements.term.begin(), elements.term.end());
-    archive(name, elements.points_each, elements.numbers_each, elements.points, elements.numbers);
-    elements.term.assign(name.begin(), name.end());
-  }
-}
-
-/// Sends or receives a part: `archive` decides which.
-template <class Archive>
-void pass(Archive& archive, Part& part) {
-  model::Model& m = part.model;
-  archive(m.gravity, m.points.position, m.points.set, m.points.target, m.points.layer,
-          m.points.column, m.points.bone, m.points.mass, m.points.external_force);
-  archive(m.springs.points, m.springs.set, m.springs.rest_length, m.springs.stiffness,
-          m.springs.exponent, m.springs.reference);
-  archive(m.prisms.points, m.prisms.rest_volume, m.prisms.shear_modulus, m.prisms.modulus,
-          m.prisms.target_volume, m.prisms.nodal_modulus, m.edges.points, m.edges.weight,
-          m.bone_transform);
-  model::Contact& c = m.contact;
-  archive(c.stiffness, c.spacing, c.pairs.point, c.pairs.body, c.pairs.binding, c.pairs.area,
-          c.pairs.offset, c.cut_faces.size, c.cut_faces.begin, c.cut_faces.point,
-          c.cut_faces.weight, c.cut_faces.area, part.contact);
-  pass_elements(archive, m.elements);
-  pass_bodies(archive, part.bodies);
-  pass_meshes(archive, part.body_meshes);
-  archive(part.solid, part.owned_points, part.owned_springs, part.owned_prisms, part.owned_edges,
-          part.point_row, part.spring_row, part.prism_row, part.edge_row, part.pair_row,
-          part.original_set, part.unknown);
-  archive(part.first_unknown, part.owned_unknowns, part.total_points, part.total_springs,
-          part.total_prisms, part.total_unknowns);
-}
-
-Distribution make_distribution(const Model& model, const ColumnGraph& graph,
-                               const std::vector<int>& column_owner) {
-  Distribution distribution{model, pick(column_owner, graph.column_of_point), {}, {}, {}, {}, {},
-                            {}};
-  distribute_motion(distribution);
-  distribute_contact(distribution, graph);
-  return distribution;
-}
-
-/// Rank 0 parts with `part`, which a rank takes over; the others do nothing.
-void send_part(MPI_Comm comm, int to, Part& part) {
-  if (base::rank(comm) == 0) {
-    Sender sender(comm, to);
-    pass(sender, part);
-    part = {};
-  } else if (base::rank(comm) == to) {
-    Receiver receiver(comm, 0);
-    pass(receiver, part);
-    part.model.bones.resize(part.model.bone_transform.size());  // as many, without their names
-  }
-}
-
-}  // namespace
-
-Part distribute(MPI_Comm comm, const Model& model) {
-  static const PetscLogEvent event = base::log_event("RpPartition");
-  const base::Logged logged(event);
-  const int ranks = base::size(comm);
-  ColumnGraph graph;
-  base::on_root(comm, [&] {
-    require_countable(static_cast<int64_t>(model.points.position.size()));
-    graph = column_graph(model);
-  });
-  const std::vector<int> column_owner = partition(comm, graph);
-  std::optional<Distribution> distribution;  // on rank 0
-  OwnedRanges ranges;
-  std::optional<LocalNumbers> local;
-  base::on_root(comm, [&] {
-    distribution.emplace(make_distribution(model, graph, column_owner));
-    ranges = number_points(std::exchange(graph, {}), ranks, *distribution);
-    local.emplace(static_cast<int64_t>(distribution->owner.size()));
-  });
-  Part part;
-  for (int r = ranks - 1; r >= 0; --r) {
-    base::on_root(comm, [&] { part = make_part(*distribution, ranges.of(r), *local); });
-    if (r == 0) break;
-    base::collective_try(comm, [&] { send_part(comm, r, part); });
-  }
-  return part;
-}
-
-namespace {
 
 /// Removes contact's pairs of points that are not free to move.
-void remove_fixed_pairs(Model& model) {
+void remove_fixed_pairs(const std::vector<PointSet>& set, Model& model) {
   model::ContactPairs& pairs = model.contact.pairs;
   std::vector<int64_t> free;
   for (size_t c = 0; c < pairs.point.size(); ++c)
-    if (model.points.set[pairs.point[c]] == PointSet::soft_tissue)
-      free.push_back(static_cast<int64_t>(c));
+    if (set[pairs.point[c]] == PointSet::soft_tissue) free.push_back(static_cast<int64_t>(c));
   pairs = {pick(pairs.point, free), pick(pairs.body, free), pick(pairs.binding, free),
            pick(pairs.area, free)};
 }
 
+int64_t sum(MPI_Comm comm, size_t mine) {
+  auto total = static_cast<int64_t>(mine);
+  MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_INT64_T, MPI_SUM, comm);
+  return total;
+}
+
+/// The ranks that need the elements of each column: those that own it or a column beside it.
+struct ColumnRanks {
+  std::vector<int64_t> begin;  // [columns + 1]
+  std::vector<int> rank;
+};
+
+ColumnRanks ranks_of_columns(const ColumnGraph& graph, const Numbers& numbers) {
+  std::vector<int> owner(graph.columns());
+  for (size_t p = 0; p < numbers.owner.size(); ++p) owner[numbers.column[p]] = numbers.owner[p];
+  ColumnRanks ranks{{0}, {}};
+  for (int64_t c = 0; c < graph.columns(); ++c) {
+    const auto first = static_cast<int64_t>(ranks.rank.size());
+    ranks.rank.push_back(owner[c]);
+    for (int64_t k = graph.row_begin[c]; k < graph.row_begin[c + 1]; ++k)
+      ranks.rank.push_back(owner[graph.neighbor[k]]);
+    std::sort(ranks.rank.begin() + first, ranks.rank.end());
+    ranks.rank.erase(std::unique(ranks.rank.begin() + first, ranks.rank.end()), ranks.rank.end());
+    ranks.begin.push_back(static_cast<int64_t>(ranks.rank.size()));
+  }
+  return ranks;
+}
+
+/// Columns of the points of the elements that this rank holds.
+class HeldColumns {
+ public:
+  HeldColumns(MPI_Comm comm, const Model& held, const Numbers& numbers)
+      : index_(sum(comm, held.points.position.size())) {
+    for_each_point(held, [&](int64_t point) { index_.add(point); });
+    column_ = Exchange::fetch(comm, index_.sort(),
+                              static_cast<int64_t>(numbers.column.size()))(numbers.column);
+  }
+  int64_t of(int64_t point) const { return column_[index_.place(point)]; }
+
+ private:
+  RowIndex index_;
+  std::vector<int64_t> column_;
+};
+
+/// The graph of all columns, on rank 0. Collective.
+ColumnGraph gather_graph(MPI_Comm comm, const Model& held, const HeldColumns& column,
+                         int64_t columns) {
+  MPI_Bcast(&columns, 1, MPI_INT64_T, 0, comm);
+  const ColumnGraph mine = column_graph(columns, [&](const auto& link) {
+    const auto join = [&](int64_t p, int64_t q) {
+      const int64_t c = column.of(p), d = column.of(q);
+      if (c != d) link(c, d), link(d, c);
+    };
+    for (const auto& [p, q] : held.springs.points) join(p, q);
+    for (const auto& [p, q] : held.edges.points) join(p, q);
+    for (const auto& corners : held.prisms.points)
+      for (int c = 1; c < 6; ++c) join(corners[0], corners[c]);
+  });
+  if (base::size(comm) == 1) return mine;
+  std::vector<std::array<int64_t, 2>> links;
+  for (int64_t c = 0; c < columns; ++c)
+    for (int64_t k = mine.row_begin[c]; k < mine.row_begin[c + 1]; ++k)
+      links.push_back({c, mine.neighbor[k]});
+  links = gather_arrays(comm, std::move(links));
+  return column_graph(base::rank(comm) == 0 ? columns : 0, [&](const auto& link) {
+    for (const auto& [c, d] : links) link(c, d);
+  });
+}
+
+/// Sends the elements that ranks hold to those that need them.
+class ElementExchange {
+  static std::span<const int64_t> points_of(std::span<const int64_t> points) { return points; }
+  static std::span<const int64_t> points_of(const int64_t& point) { return {&point, 1}; }
+
+ public:
+  ElementExchange(MPI_Comm comm, const ColumnRanks& needing, const HeldColumns& column)
+      : comm_(comm), needing_(needing), column_(column) {}
+
+  /// Replaces a group of arrays whose elements have these `points`; returns their rows in the
+  /// whole model. Collective.
+  template <class Group, class Points>
+  std::vector<int64_t> operator()(const Points& points, Group& group) const {
+    const Exchange exchange(comm_, rows(points));
+    std::vector<int64_t> row(points.size());
+    const int64_t first = first_row(row.size());
+    std::iota(row.begin(), row.end(), first);
+    row = exchange(row);
+    model::for_each_array(group, [&](const char*, auto& values) { values = exchange(values); });
+    return row;
+  }
+  void operator()(std::vector<Triangle>& triangles) const {
+    triangles = Exchange(comm_, rows(triangles))(triangles);
+  }
+  void operator()(model::TermElements& elements) const {
+    std::vector<std::span<const int64_t>> points;
+    for (size_t e = 0; e < elements.size(); ++e) points.push_back(elements.points_of(e));
+    const RowsOfRanks each = rows(points);
+    elements.points = Exchange(comm_, blocks(each, elements.points_each))(elements.points);
+    elements.numbers = Exchange(comm_, blocks(each, elements.numbers_each))(elements.numbers);
+  }
+
+ private:
+  template <class Points>
+  RowsOfRanks rows(const Points& elements) const {
+    RowsOfRanks rows(base::size(comm_));
+    for (size_t e = 0; e < elements.size(); ++e)
+      for (const int64_t point : points_of(elements[e])) {
+        const int64_t c = column_.of(point);
+        for (int64_t k = needing_.begin[c]; k < needing_.begin[c + 1]; ++k) {
+          std::vector<int64_t>& to_rank = rows[needing_.rank[k]];
+          if (to_rank.empty() || to_rank.back() != static_cast<int64_t>(e))
+            to_rank.push_back(static_cast<int64_t>(e));
+        }
+      }
+    return rows;
+  }
+  /// Rows of arrays with so many values an element.
+  static RowsOfRanks blocks(const RowsOfRanks& each, int64_t values) {
+    RowsOfRanks all(each.size());
+    for (size_t r = 0; r < each.size(); ++r)
+      for (const int64_t e : each[r])
+        for (int64_t k = 0; k < values; ++k) all[r].push_back(values * e + k);
+    return all;
+  }
+  int64_t first_row(size_t held) const {
+    auto mine = static_cast<int64_t>(held), end = mine;
+    MPI_Scan(&mine, &end, 1, MPI_INT64_T, MPI_SUM, comm_);
+    return end - mine;
+  }
+
+  MPI_Comm comm_;
+  const ColumnRanks& needing_;
+  const HeldColumns& column_;
+};
+
+/// Copies what is neither point nor spring, prism, edge nor pair of contact.
+Model copy_metadata(Model& model) {
+  Model rows;
+  const auto swap_rows = [&] {
+    std::swap(model.points, rows.points);
+    std::swap(model.springs, rows.springs);
+    std::swap(model.prisms, rows.prisms);
+    std::swap(model.edges, rows.edges);
+    std::swap(model.contact.pairs, rows.contact.pairs);
+  };
+  swap_rows();
+  Model metadata = model;
+  swap_rows();
+  return metadata;
+}
+
+/// How the bones move, whose points are gathered on rank 0. Collective.
+BoneMotions gather_motions(MPI_Comm comm, const Model& held) {
+  std::vector<int64_t> rows;
+  for (size_t p = 0; p < held.points.set.size(); ++p)
+    if (held.points.set[p] == PointSet::bone) rows.push_back(static_cast<int64_t>(p));
+  Model carried;
+  carried.bones = held.bones;
+  carried.bone_transform = held.bone_transform;
+  carried.points.position = gather_arrays(comm, pick(held.points.position, rows));
+  carried.points.set = gather_arrays(comm, pick(held.points.set, rows));
+  carried.points.target = gather_arrays(comm, pick(held.points.target, rows));
+  carried.points.bone = gather_arrays(comm, pick(held.points.bone, rows));
+  BoneMotions motions;
+  base::on_root(comm, [&] { motions = bone_motions(carried); });
+  Broadcaster{comm}(motions.transform, motions.straight);
+  return motions;
+}
+
+/// Sends or receives bodies; their names stay behind.
+template <class Archive>
+void pass_bodies(Archive& archive, std::vector<model::Body>& bodies) {
+  auto count = static_cast<int64_t>(bodies.size());
+  archive(count);
+  bodies.resize(count);
+  const Vec3 zero = Vec3::Zero();
+  const model::Body::Shape kinds[] = {scene::Sphere{zero, 0}, scene::Capsule{zero, zero, 0},
+                                      scene::Box{zero, zero}, scene::HalfSpace{zero, zero},
+                                      surface::Surface{}};
+  for (model::Body& body : bodies) {
+    auto kind = static_cast<int64_t>(body.shape.index());
+    archive(body.bone, body.push, kind);
+    if (kind != static_cast<int64_t>(body.shape.index())) body.shape = kinds[kind];
+    std::visit(
+        [&](auto& shape) {
+          if constexpr (requires { shape.triangles; })
+            archive(shape.points, shape.triangles);
+          else
+            archive(shape);
+        },
+        body.shape);
+  }
+}
+
+/// Gives all ranks what rank 0 alone holds of a model and each needs, in the rows of the whole.
+/// Collective.
+void share_globals(MPI_Comm comm, bool averaged, const Numbers& numbers, Piece& piece) {
+  Model& m = piece.model;
+  model::CutFaces& faces = m.contact.cut_faces;
+  int cut_owner = faces.empty() ? 0 : numbers.owner[faces.point.front()];
+  Broadcaster share(comm);
+  auto bones = static_cast<int64_t>(m.bones.size()),
+       terms = static_cast<int64_t>(m.elements.size());
+  share(bones, terms, cut_owner, m.gravity, m.contact.stiffness, m.contact.spacing);
+  m.bones.resize(bones);
+  m.elements.resize(terms);
+  for (model::TermElements& elements : m.elements) {
+    base::broadcast(comm, elements.term);
+    share(elements.points_each, elements.numbers_each);
+  }
+  pass_bodies(share, m.contact.bodies);
+  if (m.contact.bodies.empty()) m.bone_surfaces.clear();
+  pass_surfaces(share, m.bone_surfaces);
+  share(faces.size, faces.begin, faces.point, faces.weight, faces.area);
+  if (base::rank(comm) != cut_owner) faces = {};
+  // Arrays of one row make ranks without prisms take part in all that others have.
+  if (piece.solid && m.prisms.modulus.empty()) m.prisms.modulus.resize(1);
+  if (averaged && m.prisms.nodal_modulus.empty()) m.prisms.nodal_modulus.resize(1);
+}
+
+/// Sends all elements to the ranks that need them. Returns the rows of contact's pairs. Collective.
+std::vector<int64_t> exchange_elements(const ElementExchange& exchange, Piece& piece) {
+  Model& m = piece.model;
+  piece.spring_row = exchange(m.springs.points, m.springs);
+  piece.prism_row = exchange(m.prisms.points, m.prisms);
+  piece.edge_row = exchange(m.edges.points, m.edges);
+  exchange(m.skin);
+  for (model::TermElements& elements : m.elements) exchange(elements);
+  return exchange(m.contact.pairs.point, m.contact.pairs);
+}
+
+/// Fetches the points that the rank owns and those of its elements, and numbers these. Collective.
+void fetch_points(MPI_Comm comm, const Numbers& numbers, Piece& piece) {
+  RowsOfRanks places(base::size(comm));
+  for (size_t k = 0; k < numbers.order.size(); ++k)
+    places[numbers.owner[numbers.order[k]]].push_back(static_cast<int64_t>(k));
+  RowIndex index(piece.counts.points);
+  for (const int64_t row : Exchange(comm, places)(numbers.order)) index.add(row);
+  for_each_point(piece.model, [&](int64_t point) { index.add(point); });
+  piece.point_row = index.sort();
+  for_each_point(piece.model, [&](int64_t& point) { point = index.place(point); });
+  model::Points& points = piece.model.points;
+  const auto held = static_cast<int64_t>(points.position.size());
+  const Exchange fetched = Exchange::fetch(comm, piece.point_row, held);
+  model::for_each_array(points, [&](const char*, auto& values) { values = fetched(values); });
+  const auto numbered = static_cast<int64_t>(numbers.owner.size());
+  const Exchange given = Exchange::fetch(comm, piece.point_row, numbered);
+  piece.owner = given(numbers.owner);
+  piece.place = given(numbers.place);
+  piece.unknown = given(numbers.unknown);
+}
+
+/// Assigns the points to ranks, and to `piece` its unknowns. Collective.
+void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet>& set,
+            Numbers& numbers, ColumnRanks& needing, Piece& piece) {
+  ColumnGraph graph = gather_graph(comm, piece.model, column, numbers.columns);
+  graph.weight.assign(numbers.columns, 1);
+  for (size_t p = 0; p < set.size(); ++p)
+    if (set[p] == PointSet::soft_tissue) ++graph.weight[numbers.column[p]];
+  const std::vector<int> owner = partition(comm, graph);
+  base::on_root(comm, [&] {
+    numbers.owner = pick(owner, numbers.column);
+    keep_cuts_whole(piece.model, numbers);
+    number_points(graph, set, base::size(comm), numbers);
+    needing = ranks_of_columns(graph, numbers);
+  });
+  Broadcaster{comm}(needing.begin, needing.rank, numbers.unknown_begin);
+  const int rank = base::rank(comm);
+  piece.total_unknowns = numbers.unknown_begin.back();
+  piece.first_unknown = numbers.unknown_begin[rank];
+  piece.unknowns = numbers.unknown_begin[rank + 1] - piece.first_unknown;
+}
+
 }  // namespace
 
-LocalModel distribute_model(MPI_Comm comm, Model&& model) {
-  LocalModel local_model;
+LocalModel build_local(MPI_Comm comm, Model&& rows) {
+  static const PetscLogEvent event = base::log_event("RpPartition");
+  const base::Logged logged(event);
+  Piece piece;
+  piece.model = std::move(rows);
+  Model& held = piece.model;
+  piece.counts.points = sum(comm, held.points.position.size());
+  piece.counts.springs = sum(comm, held.springs.points.size());
+  piece.counts.prisms = sum(comm, held.prisms.points.size());
+  piece.counts.edges = sum(comm, held.edges.points.size());
+  piece.solid = sum(comm, held.prisms.modulus.size()) > 0;
+  const bool averaged = sum(comm, held.prisms.nodal_modulus.size()) > 0;
+  const std::vector<int64_t> names = gather_arrays(comm, held.points.column);
+  const std::vector<PointSet> set = gather_arrays(comm, held.points.set);
+  Numbers numbers;
   base::on_root(comm, [&] {
-    remove_fixed_pairs(model);
-    local_model.counts = model::count(model);
-    local_model.contact_pairs = static_cast<int64_t>(model.contact.pairs.point.size());
+    require_countable(piece.counts.points);
+    number_columns(names, numbers);
+    remove_fixed_pairs(set, held);
   });
-  MPI_Bcast(&local_model.counts, sizeof local_model.counts, MPI_BYTE, 0, comm);
-  MPI_Bcast(&local_model.contact_pairs, 1, MPI_INT64_T, 0, comm);
-  local_model.part = distribute(comm, model);
-  local_model.outward = base::scatter(comm, model::outward_normals(model));
-  model.points = {};
-  model.springs = {};
-  model.prisms = {};
-  model.edges = {};
-  model.contact.pairs = {};
-  local_model.global_metadata = std::move(model);
+  ColumnRanks needing;
+  const HeldColumns column(comm, held, numbers);
+  assign(comm, column, set, numbers, needing, piece);
+  piece.bones = gather_motions(comm, held);
+  Model global_metadata = copy_metadata(held);
+  const int64_t pairs = sum(comm, held.contact.pairs.point.size());
+  share_globals(comm, averaged, numbers, piece);
+  const std::vector<int64_t> pair_row =
+      exchange_elements(ElementExchange(comm, needing, column), piece);
+  fetch_points(comm, numbers, piece);
+  LocalModel local_model = build_part(comm, piece);
+  local_model.part.pair_row = pick(pair_row, local_model.part.pair_row);
+  local_model.contact_pairs = pairs;
+  local_model.global_metadata = std::move(global_metadata);
   return local_model;
+}
+
+LocalModel build_local_from_root(MPI_Comm comm, Model model) {
+  return build_local(comm, base::rank(comm) == 0 ? std::move(model) : Model());
 }
 
 }  // namespace repose::discrete

@@ -2,10 +2,6 @@
 
 #include <petscmat.h>
 
-#include <algorithm>
-#include <numeric>
-#include <unordered_map>
-
 #include "repose/base/agreement.h"
 #include "repose/base/petsc.h"
 
@@ -14,44 +10,6 @@ namespace repose::discrete {
 namespace {
 
 using base::check;
-
-/// Calls link(c, d) for every two columns that an element joins, both ways, as often as elements
-/// join them.
-template <class Link>
-void for_each_link(const model::Model& model, const std::vector<int64_t>& column, Link&& link) {
-  const auto join = [&](int64_t p, int64_t q) {
-    if (column[p] == column[q]) return;
-    link(column[p], column[q]);
-    link(column[q], column[p]);
-  };
-  for (const auto& [p, q] : model.springs.points) join(p, q);
-  for (const auto& [p, q] : model.edges.points) join(p, q);
-  for (const auto& corners : model.prisms.points)
-    for (int c = 1; c < 6; ++c) join(corners[0], corners[c]);
-}
-
-/// Fills in the graph's edges, each once, by columns: of a fine model there are many times more
-/// links than edges.
-void add_edges(const model::Model& model, ColumnGraph& graph) {
-  std::vector<int64_t>&begin = graph.row_begin, &neighbor = graph.neighbor;
-  for_each_link(model, graph.column_of_point, [&](int64_t c, int64_t) { ++begin[c + 1]; });
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<int64_t> end(begin.begin(), begin.end() - 1);
-  neighbor.resize(begin.back());
-  for_each_link(model, graph.column_of_point,
-                [&](int64_t c, int64_t d) { neighbor[end[c]++] = d; });
-  auto kept = neighbor.begin();
-  for (size_t c = 0; c < end.size(); ++c) {
-    const auto first = neighbor.begin() + begin[c], last = neighbor.begin() + end[c];
-    std::sort(first, last);
-    begin[c] = kept - neighbor.begin();
-    for (auto next = first; next != last; ++next)
-      if (next == first || *next != kept[-1]) *kept++ = *next;
-  }
-  begin.back() = kept - neighbor.begin();
-  neighbor.erase(kept, neighbor.end());
-  neighbor.shrink_to_fit();
-}
 
 /// A copy in PETSc's own memory, which PETSc frees.
 PetscInt* petsc_copy(const std::vector<int64_t>& values) {
@@ -123,22 +81,6 @@ std::vector<int64_t> memory_order(const ColumnGraph& graph) {
   }
   for (size_t k = 0; k < visited.size(); ++k) place[visited[k]] = static_cast<int64_t>(k);
   return place;
-}
-
-ColumnGraph column_graph(const model::Model& model) {
-  ColumnGraph graph;
-  std::unordered_map<int64_t, int64_t> number;
-  graph.column_of_point.reserve(model.points.column.size());
-  for (int64_t name : model.points.column)
-    graph.column_of_point.push_back(
-        number.emplace(name, static_cast<int64_t>(number.size())).first->second);
-  graph.weight.assign(number.size(), 1);
-  for (size_t p = 0; p < model.points.set.size(); ++p)
-    if (model.points.set[p] == model::PointSet::soft_tissue)
-      ++graph.weight[graph.column_of_point[p]];
-  graph.row_begin.assign(number.size() + 1, 0);
-  add_edges(model, graph);
-  return graph;
 }
 
 std::vector<int> partition(MPI_Comm comm, const ColumnGraph& graph) {

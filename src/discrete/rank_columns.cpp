@@ -32,15 +32,7 @@ void pass(Archive& archive, RankColumns& d) {
     archive(cut.columns, cut.layers, cut.meets, cut.lips, cut.around, cut.edge);
 }
 
-template <class Archive>
-void pass(Archive& archive, std::vector<surface::Surface>& bones) {
-  auto count = static_cast<int64_t>(bones.size());
-  archive(count);
-  bones.resize(count);
-  for (surface::Surface& bone : bones) archive(bone.points, bone.triangles);
-}
-
-/// As column_graph() of the model, but for the columns of its points.
+/// The graph of the skin, which is that of the model.
 ColumnGraph graph_of(const model::ColumnGeometry& geometry) {
   const model::SkinMesh& skin = geometry.skin();
   ColumnGraph graph;
@@ -160,11 +152,11 @@ RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geome
       if (rank == 0) {
         Sender sender(comm, r);
         pass(sender, rank_columns);
-        pass(sender, bones);
+        pass_surfaces(sender, bones);
       } else if (rank == r) {
         Receiver receiver(comm, 0);
         pass(receiver, rank_columns);
-        pass(receiver, bones);
+        pass_surfaces(receiver, bones);
       }
     });
   }

@@ -24,7 +24,8 @@ struct RankColumns {
 };
 
 /// Distributes the `geometry`, which rank 0 alone reads: to every rank its piece, and the bones; to
-/// rank 0 the model's global metadata. Columns are shared out as by distribute(). Collective.
+/// rank 0 the model's global metadata. Columns are shared out as by build_local() of a model.
+/// Collective.
 RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
                                const scene::Scene& scene, model::Model& global_metadata,
                                std::vector<surface::Surface>& bones);

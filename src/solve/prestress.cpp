@@ -400,7 +400,7 @@ Prestress prestress(MPI_Comm comm, discrete::LocalModel& local_model, ReferenceS
 }
 
 Prestress prestress(MPI_Comm comm, Model& model, ReferenceState as) {
-  discrete::LocalModel local_model = discrete::distribute_model(comm, Model(model));
+  discrete::LocalModel local_model = discrete::build_local_from_root(comm, model);
   const Prestress result = prestress(comm, local_model, as);
   Model balanced = discrete::gather_model(comm, local_model);
   if (base::rank(comm) == 0) model = std::move(balanced);

@@ -426,7 +426,7 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
 
 Summary find_repose(MPI_Comm comm, const model::Model& model, const Settings& settings,
                     const Start& start, const Receiver& receive) {
-  const discrete::Part part = discrete::distribute(comm, model);
+  const discrete::Part part = discrete::build_local_from_root(comm, model).part;
   return RestSolver(comm, part, settings).find(settings, start, receive);
 }
 

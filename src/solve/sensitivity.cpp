@@ -111,7 +111,7 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
     held = held_at(other, rest.position);
     travel = travel_of_fixed(other, rest.position);
   });
-  const discrete::Part part = discrete::distribute(comm, held);
+  const discrete::Part part = discrete::build_local_from_root(comm, held).part;
   discrete::Positions positions(comm, part);
   const discrete::NaturalRows natural(comm, part);
   share_rows(comm, travel, part.total_points);

@@ -265,7 +265,7 @@ class Comparison {
   template <class Search>
   void run(const char* method, const solve::Settings& settings, Search&& search) {
     const discrete::Part part =
-        discrete::distribute(comm, model_);  // with empty grids of distances
+        discrete::build_local_from_root(comm, model_).part;  // with empty grids of distances
     discrete::Positions positions(comm, part);
     solve::Problem problem(positions, settings.weights, false);
     const int64_t systems = logged("KSPSolve"), cycles = logged("PCApply");

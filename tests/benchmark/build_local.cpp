@@ -51,7 +51,7 @@ discrete::Part whole(const model::Anatomy& anatomy, const std::string& name, Fil
   clock.end("build");
   file.emplace(comm, name, model);
   clock.end("write");
-  discrete::Part part = discrete::distribute(comm, model);
+  discrete::Part part = discrete::build_local_from_root(comm, model).part;
   clock.end("distribute");
   return part;
 }

@@ -257,7 +257,7 @@ double seconds_of(const std::function<void()>& work) {
 /// Measures one evaluation, one new preconditioner, and an action of the Hessian with one
 /// application of the preconditioner.
 void measure_costs(const Task& task) {
-  const discrete::Part part = discrete::distribute(comm, task.model);
+  const discrete::Part part = discrete::build_local_from_root(comm, task.model).part;
   discrete::Positions positions(comm, part);
   solve::Problem problem(positions, task.weights, false);
   const base::VecHandle at = positions.make_vector(), gradient = positions.make_vector();

@@ -51,7 +51,7 @@ void make_model(int64_t skin_vertices, const std::string& name, Clock& clock) {
   model::Model model;
   if (base::rank(comm) == 0) model = model::build_model(jaw_advance(), skin, bones).model;
   clock.end("build");
-  const discrete::LocalModel local = discrete::distribute_model(comm, std::move(model));
+  const discrete::LocalModel local = discrete::build_local_from_root(comm, std::move(model));
   results::ResultFile file(comm, name, local.global_metadata,
                            discrete::NaturalRows::of_model(comm, local));
   file.commit();
@@ -87,7 +87,7 @@ void measure(int64_t skin_vertices, const std::string& name) {
   if (base::rank(comm) == 0)
     std::printf("counts %ld %ld\n", static_cast<long>(counts.points),
                 static_cast<long>(counts.springs));
-  const discrete::LocalModel local = discrete::distribute_model(comm, std::move(model));
+  const discrete::LocalModel local = discrete::build_local_from_root(comm, std::move(model));
   const discrete::Part& part = local.part;
   discrete::Positions positions(comm, part);
   const discrete::NaturalRows natural(comm, part);

@@ -59,7 +59,7 @@ scene::Scene jaw_opening() {
 /// Adds the costs of the objective and of a preconditioner for its Hessian.
 void measure_solver(const model::Model& model, Cost& cost) {
   const double before = heap_bytes();
-  const discrete::Part part = discrete::distribute(MPI_COMM_SELF, model);
+  const discrete::Part part = discrete::build_local_from_root(MPI_COMM_SELF, model).part;
   discrete::Positions positions(MPI_COMM_SELF, part);
   const mechanics::Weights weights{1, mechanics::VolumeTerm::penalty,
                                    10 * model::effective_modulus(model)};

@@ -40,10 +40,6 @@ struct Part {
   int64_t total_points = 0, total_springs = 0, total_prisms = 0, total_unknowns = 0;
 };
 
-/// Shares `model` (read on rank 0 only) out over the ranks by a graph partition of its columns
-/// (PT-Scotch through MatPartitioning). Collective.
-Part distribute(MPI_Comm comm, const model::Model& model);
-
 /// A rank's part of a model, and global numbers of it.
 struct LocalModel {
   Part part;
@@ -55,14 +51,19 @@ struct LocalModel {
   double effective_modulus = 0;  ///< N/mm², on rank 0, of a scene's model
 };
 
-/// Distributes a model (read on rank 0 only) as distribute() does, and frees it. Contact's pairs of
-/// points that are not free to move are left out: they have no effect. Collective.
-LocalModel distribute_model(MPI_Comm comm, model::Model&& model);
+/// Builds the parts of a model by a graph partition of its columns (PT-Scotch through
+/// MatPartitioning). Points, springs, prisms and edges lie on the ranks in any consecutive rows, in
+/// order of the ranks; rank 0 alone may have them all, and has all else. Contact's pairs of points
+/// that are not free to move are left out: they have no effect. Takes `rows`. InputError.
+/// Collective.
+LocalModel build_local(MPI_Comm comm, model::Model&& rows);
+/// Builds the parts of a model that rank 0 has; what other ranks pass is not read. Collective.
+LocalModel build_local_from_root(MPI_Comm comm, model::Model model);
 
-/// Builds the parts of a fully distributed model, equal to distribute() of the scene's model: rank
-/// 0, which alone has the `geometry`, gives every rank the columns that it owns and those around
-/// them, and the rank makes the model of these. `scene` is read on all ranks; its moves are rank
-/// 0's. `balanced` is the same model without the incisions that its tension opens, in its initial
+/// Builds the parts of a scene's model, equal to those of a model that rank 0 builds: rank 0, which
+/// alone has the `geometry`, gives every rank the columns that it owns and those around them, and
+/// the rank makes the model of these. `scene` is read on all ranks; its moves are rank 0's.
+/// `balanced` is the same model without the incisions that its tension opens, in its initial
 /// equilibrium; null where there are none. Throws InputError. Collective.
 LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, scene::Scene scene,
                        const LocalModel* balanced = nullptr);

@@ -53,13 +53,6 @@ class DistanceField {
   float value_at(const Index& at) const;
   int64_t computed_values() const;  ///< grid values that are known
 
-  /// Sends or receives its surface and grid, without values.
-  template <class Archive>
-  void pass(Archive& archive) {
-    archive(surface_.points, surface_.triangles, grid_.origin, grid_.spacing, grid_.reach,
-            grid_.blocks, grid_.rounded);
-  }
-
  private:
   struct Grid {
     Vec3 origin = Vec3::Zero();     // mm, of grid point (0, 0, 0)

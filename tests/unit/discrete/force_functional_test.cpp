@@ -203,7 +203,7 @@ TEST_P(ForceTerms, ValueAndGradientDoNotDependOnTheRanks) {
   base::VecHandle at = f.vector(1, 0.4), gradient = f.positions.make_vector();
   const double value = f.functional.evaluate(at, gradient);
   const double norm = std::sqrt(dot(gradient, gradient));
-  const discrete::Part serial = discrete::distribute(MPI_COMM_SELF, f.whole);
+  const discrete::Part serial = discrete::build_local_from_root(MPI_COMM_SELF, f.whole).part;
   double expected[2] = {0, 0};
   if (base::rank(MPI_COMM_WORLD) == 0) {
     discrete::Positions positions(MPI_COMM_SELF, serial);

@@ -49,7 +49,7 @@ inline model::Model averaged_block() {
 /// A model shared out over the ranks, by default a held block, whose unknowns can be moved.
 struct MovedBlock {
   model::Model whole;
-  discrete::Part part = discrete::distribute(MPI_COMM_WORLD, whole);
+  discrete::Part part = discrete::build_local_from_root(MPI_COMM_WORLD, whole).part;
   discrete::Positions positions{MPI_COMM_WORLD, part};
 
   explicit MovedBlock(model::Model model = held_block()) : whole(std::move(model)) {}

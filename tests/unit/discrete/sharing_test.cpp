@@ -4,6 +4,7 @@
 
 #include "../../layered_patch.h"
 #include "discrete/countable.h"
+#include "discrete/exchange.h"
 #include "discrete/partition.h"
 #include "gathered.h"
 #include "repose/base/error.h"
@@ -24,30 +25,47 @@ model::Model patch() {
   return m;
 }
 
-TEST(Sharing, ColumnsAreNeighborsWhereAnElementJoinsThem) {
-  const model::Model m = patch();
-  std::set<std::array<int64_t, 2>> joined;
-  const auto join = [&](const auto& points) {
-    for (const int64_t p : points)
-      for (const int64_t q : points)
-        if (p / 3 != q / 3) joined.insert({p / 3, q / 3});
-  };
-  for (const auto& points : m.springs.points) join(points);
-  for (const auto& points : m.prisms.points) join(points);
-  const discrete::ColumnGraph graph = discrete::column_graph(m);
-  std::vector<std::array<int64_t, 2>> found;
-  for (int64_t c = 0; c < graph.columns(); ++c)
-    for (int64_t k = graph.row_begin[c]; k < graph.row_begin[c + 1]; ++k)
-      found.push_back({c, graph.neighbor[k]});
-  EXPECT_EQ(found, std::vector(joined.begin(), joined.end()));
-  EXPECT_EQ(graph.neighbor.size(), joined.size());
+TEST(Sharing, AGraphHasEveryLinkOnce) {
+  const std::set<std::array<int64_t, 2>> links = {{0, 1}, {0, 3}, {1, 0}, {1, 3}, {3, 0}, {3, 1}};
+  const discrete::ColumnGraph graph = discrete::column_graph(5, [&](const auto& link) {
+    for (int often = 0; often < 3; ++often)
+      for (auto at = links.rbegin(); at != links.rend(); ++at) link((*at)[0], (*at)[1]);
+  });
+  EXPECT_EQ(graph.row_begin, (std::vector<int64_t>{0, 2, 4, 4, 6, 6}));
+  EXPECT_EQ(graph.neighbor, (std::vector<int64_t>{1, 3, 0, 3, 0, 1}));
+}
+
+/// [n] rows of a rank that holds more the higher it is, and none where it is 1.
+std::vector<int64_t> rows_held(int64_t n) {
+  const int rank = base::rank(MPI_COMM_WORLD), ranks = base::size(MPI_COMM_WORLD);
+  std::vector<int64_t> begin(ranks + 1, 0), rows;
+  for (int r = 0; r < ranks; ++r) begin[r + 1] = begin[r] + (r == 1 ? 0 : n / ranks);
+  begin[ranks] = n;
+  for (int64_t row = begin[rank]; row < begin[rank + 1]; ++row) rows.push_back(row);
+  return rows;
+}
+
+TEST(Sharing, RowsAreFetchedFromWhereTheyLie) {
+  constexpr int64_t n = 200;
+  const std::vector<int64_t> mine = rows_held(n);
+  discrete::RowIndex index(n);
+  for (int64_t row = base::rank(MPI_COMM_WORLD); row < n; row += 3) index.add(row), index.add(row);
+  const std::vector<int64_t> rows = index.sort();
+  ASSERT_EQ(rows.size(), (n - base::rank(MPI_COMM_WORLD) + 2) / 3);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    EXPECT_EQ(rows[k], base::rank(MPI_COMM_WORLD) + 3 * static_cast<int64_t>(k));
+    EXPECT_EQ(index.place(rows[k]), static_cast<int64_t>(k));
+  }
+  const discrete::Exchange fetch =
+      discrete::Exchange::fetch(MPI_COMM_WORLD, rows, static_cast<int64_t>(mine.size()));
+  EXPECT_EQ(fetch(mine), rows);
 }
 
 TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   const model::Model m = patch();
   std::vector<Vec3> moved = m.points.position;
   for (size_t i = 0; i < moved.size(); ++i) moved[i].z() += 1e-3 * static_cast<double>(i);
-  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, m);
+  const discrete::Part part = discrete::build_local_from_root(MPI_COMM_WORLD, m).part;
   discrete::Positions positions(MPI_COMM_WORLD, part);
   discrete::Objective objective(positions, {});
   const base::VecHandle displacement = positions.make_vector();

@@ -77,7 +77,7 @@ TEST_P(Terms, ValueAndGradientDoNotDependOnTheRanks) {
   const double value = m.objective.evaluate(at, gradient);
   PetscReal norm = 0;
   check(VecNorm(gradient, NORM_2, &norm));
-  discrete::Part serial_part = discrete::distribute(MPI_COMM_SELF, m.whole);
+  discrete::Part serial_part = discrete::build_local_from_root(MPI_COMM_SELF, m.whole).part;
   double expected[2] = {0, 0};
   if (base::rank(MPI_COMM_WORLD) == 0) {
     discrete::Positions positions(MPI_COMM_SELF, serial_part);

@@ -19,7 +19,8 @@ class Oscillator : public ::testing::Test {
  protected:
   static constexpr double damping = 0.7, end = 3.0;
 
-  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
+  const discrete::Part part =
+      discrete::build_local_from_root(MPI_COMM_WORLD, testing::resting_block()).part;
   discrete::Positions positions{MPI_COMM_WORLD, part};
   testing::Quadratic function{positions, 3};
   const base::VecHandle x = positions.make_vector();

@@ -11,7 +11,8 @@ namespace polak_ribiere_test {
 
 /// With exact line minima a quadratic of four curvatures is minimized in four iterations.
 TEST(PolakRibiere, MinimizesAQuadraticInItsNumberOfCurvatures) {
-  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
+  const discrete::Part part =
+      discrete::build_local_from_root(MPI_COMM_WORLD, testing::resting_block()).part;
   discrete::Positions positions(MPI_COMM_WORLD, part);
   testing::Quadratic function(positions, 4);
   const base::VecHandle x = positions.make_vector();
@@ -25,7 +26,8 @@ TEST(PolakRibiere, MinimizesAQuadraticInItsNumberOfCurvatures) {
 }
 
 TEST(PolakRibiere, EndsAtOnceAtAMinimum) {
-  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, testing::resting_block());
+  const discrete::Part part =
+      discrete::build_local_from_root(MPI_COMM_WORLD, testing::resting_block()).part;
   discrete::Positions positions(MPI_COMM_WORLD, part);
   testing::Quadratic function(positions, 4);
   const base::VecHandle x = positions.make_vector();
@@ -38,7 +40,7 @@ TEST(PolakRibiere, EndsAtOnceAtAMinimum) {
 TEST(PolakRibiere, FindsTheRestPositionOfTissue) {
   model::Model m = testing::resting_block();
   testing::aim(m, [](const Vec3& x) -> Vec3 { return x + Vec3(1, 0.5, -0.2 * x.x()); });
-  const discrete::Part part = discrete::distribute(MPI_COMM_WORLD, m);
+  const discrete::Part part = discrete::build_local_from_root(MPI_COMM_WORLD, m).part;
   discrete::Positions positions(MPI_COMM_WORLD, part);
   positions.set_load(1);
   discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 0.3});

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "../../folder.h"
 #include "../model/patches.h"
 #include "repose/base/agreement.h"
@@ -209,7 +211,7 @@ TEST(Raise, parts_are_those_of_the_whole_model) {
        {jaws(squares()), rich(squares()), loaded(squares()), adhering(squares()),
         of_springs(jaws(squares())), of_springs(loaded(squares()))}) {
     const model::BuiltModel built = model::build_model(anatomy);
-    const Part part = discrete::distribute(comm, built.model);
+    const Part part = discrete::build_local_from_root(comm, built.model).part;
     const discrete::LocalModel local_model = build_local(anatomy);
     expect_same(local_model.part, part);
     expect_same_loads(local_model.part, part);
@@ -241,7 +243,7 @@ TEST(Raise, parts_of_a_cut_model_are_those_of_the_whole) {
       const model::Anatomy anatomy = cut(uncut, sides_touch);
       const model::Model whole = cut_whole(anatomy);
       const discrete::LocalModel local_model = build_local(anatomy);
-      const Part part = discrete::distribute(comm, whole);
+      const Part part = discrete::build_local_from_root(comm, whole).part;
       ASSERT_GT(part.total_points, 4 * static_cast<int64_t>(uncut.skin.points.size()));
       expect_same(local_model.part, part);
       expect_same_loads(local_model.part, part);
@@ -252,9 +254,43 @@ TEST(Raise, parts_of_a_cut_model_are_those_of_the_whole) {
     }
 }
 
+/// Rows of a group from the end of one rank to that of the next; ranks hold the more the higher.
+template <class Group>
+void keep_some(size_t n, Group& group) {
+  const int64_t rank = base::rank(comm), ranks = base::size(comm);
+  const auto begin_of = [&](int64_t r) {
+    return static_cast<int64_t>(n) * r * (r + 1) / (ranks * (ranks + 1));
+  };
+  std::vector<int64_t> rows(begin_of(rank + 1) - begin_of(rank));
+  std::iota(rows.begin(), rows.end(), begin_of(rank));
+  model::for_each_array(group,
+                        [&](const char*, auto& values) { values = base::pick(values, rows); });
+}
+
+TEST(Raise, parts_are_the_same_wherever_rows_lie) {
+  for (const model::Anatomy& uncut :
+       {rich(squares()), loaded(squares()), of_springs(loaded(squares()))}) {
+    const model::Model whole = cut_whole(cut(uncut, true));
+    const discrete::LocalModel one = discrete::build_local_from_root(comm, whole);
+    model::Model rows = base::rank(comm) == 0 ? whole : model::Model();
+    rows.points = whole.points, rows.springs = whole.springs;
+    rows.prisms = whole.prisms, rows.edges = whole.edges;
+    keep_some(whole.points.position.size(), rows.points);
+    keep_some(whole.springs.points.size(), rows.springs);
+    keep_some(whole.prisms.points.size(), rows.prisms);
+    keep_some(whole.edges.points.size(), rows.edges);
+    const discrete::LocalModel other = discrete::build_local(comm, std::move(rows));
+    expect_same(one.part, other.part);
+    expect_same_loads(one.part, other.part);
+    EXPECT_EQ(one.outward, other.outward);
+    EXPECT_EQ(one.counts.soft, other.counts.soft);
+    EXPECT_EQ(one.contact_pairs, other.contact_pairs);
+  }
+}
+
 TEST(Raise, a_rank_without_columns_has_an_empty_part) {
   for (const model::Anatomy& anatomy : {jaws(1), of_springs(jaws(1))}) {  // four columns
-    const Part part = discrete::distribute(comm, model::build_model(anatomy).model);
+    const Part part = discrete::build_local_from_root(comm, model::build_model(anatomy).model).part;
     expect_same(build_local(anatomy).part, part);
   }
 }
@@ -319,7 +355,7 @@ TEST(Raise, a_distributed_model_is_written_as_it_was) {
   base::broadcast(comm, name);
   for (const model::Anatomy& anatomy : {springs, jaws(1), loaded(12)}) {
     const model::Model whole = model::build_model(anatomy).model;
-    const discrete::LocalModel local = discrete::distribute_model(comm, model::Model(whole));
+    const discrete::LocalModel local = discrete::build_local_from_root(comm, whole);
     const model::Model gathered = discrete::gather_model(comm, local);
     EXPECT_TRUE(local.global_metadata.points.position.empty());
     results::ResultFile(comm, name, local.global_metadata,
@@ -392,7 +428,8 @@ TEST(Raise, a_prestress_of_parts_is_that_of_the_whole) {
   EXPECT_EQ(local_model.part.model.gravity, Vec3(0, 0, -9.81));
   // What is written is what was balanced, whoever owns it.
   EXPECT_LE(largest_force(local_model.part), 1e-10 * one.largest_force);
-  EXPECT_LE(largest_force(discrete::distribute(comm, whole)), 1e-10 * one.largest_force);
+  EXPECT_LE(largest_force(discrete::build_local_from_root(comm, whole).part),
+            1e-10 * one.largest_force);
 }
 
 model::Anatomy rim_held(model::Anatomy anatomy) {
@@ -414,7 +451,7 @@ TEST(Raise, parts_cut_in_equilibrium_are_those_of_the_whole) {
       discrete::LocalModel balanced = build_local(anatomy, false);
       solve::prestress(comm, balanced, as);
       const discrete::LocalModel local_model = build_local(anatomy, true, &balanced);
-      const Part part = discrete::distribute(comm, built.model);
+      const Part part = discrete::build_local_from_root(comm, built.model).part;
       expect_same(local_model.part, part);
       expect_same_loads(local_model.part, part);
       ASSERT_GT(part.total_points, balanced.part.total_points);

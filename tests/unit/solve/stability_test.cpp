@@ -24,7 +24,7 @@ struct Energy {
   base::VecHandle mode;  // of the last call of `smallest`
 
   Energy(MPI_Comm comm, const model::Model& model, const mechanics::Weights& weights = {})
-      : part(discrete::distribute(comm, model)),
+      : part(discrete::build_local_from_root(comm, model).part),
         positions(comm, part),
         objective(positions, weights),
         tangent(objective),

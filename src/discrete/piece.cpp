@@ -1,0 +1,278 @@
+#include "piece.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "repose/base/agreement.h"
+#include "repose/base/geometry.h"
+#include "repose/discrete/natural_rows.h"
+#include "repose/model/motion.h"
+
+namespace repose::discrete {
+
+using base::pick;
+using model::Model;
+using model::PointSet;
+
+BoneMotions bone_motions(const Model& model) {
+  const model::PrescribedMotion motion(model);
+  BoneMotions motions;
+  for (int32_t b = 0; b < static_cast<int32_t>(model.bones.size()); ++b) {
+    motions.transform.push_back(motion.bone_matrix(b, 1.0));
+    motions.straight.push_back(motion.straight(b));
+  }
+  return motions;
+}
+
+namespace {
+
+/// Gives local numbers to rows as they are met, owned points first.
+class LocalNumbers {
+ public:
+  explicit LocalNumbers(size_t rows) : local_(rows, -1) {}
+  int64_t of(int64_t row) {
+    if (local_[row] < 0) {
+      local_[row] = static_cast<int64_t>(rows_.size());
+      rows_.push_back(row);
+    }
+    return local_[row];
+  }
+  const std::vector<int64_t>& rows() const { return rows_; }
+
+ private:
+  std::vector<int64_t> local_, rows_;
+};
+
+bool touches(const Piece& piece, std::span<const int64_t> element, int rank) {
+  return std::any_of(element.begin(), element.end(), [&](int64_t row) {
+    return piece.owner[row] == rank && piece.unknown[row] >= 0;
+  });
+}
+
+/// [N] Points around which one rank has all prisms of a solid: its own, because those of an edge
+/// say how stiff it is (solve/prestress.h), and where volumes are averaged those of the prisms at
+/// its unknowns.
+std::vector<char> surrounded_points(const Piece& piece, int rank) {
+  std::vector<char> surrounded(piece.owner.size(), 0);
+  for (size_t row = 0; row < surrounded.size(); ++row) surrounded[row] = piece.owner[row] == rank;
+  if (piece.model.prisms.nodal_modulus.empty()) return surrounded;
+  for (const auto& prism : piece.model.prisms.points)
+    if (piece.owner[prism[0]] == rank || touches(piece, prism, rank))
+      for (const int64_t row : prism) surrounded[row] = 1;
+  return surrounded;
+}
+
+/// Rows of the elements of one rank: those whose first point it owns, then those it also needs.
+/// Both in blocks by where their first met point is, within a block as before: a loop then works on
+/// points that fit into the cache together.
+template <size_t n>
+std::vector<int64_t> element_rows(const Piece& piece,
+                                  const std::vector<std::array<int64_t, n>>& elements, int rank,
+                                  int64_t& owned, const std::vector<char>& surrounded = {}) {
+  constexpr int64_t points_in_block = 1024;
+  const int64_t blocks = piece.counts.points / points_in_block + 1;
+  const auto block_of = [&](const std::array<int64_t, n>& element) {
+    const bool mine = piece.owner[element[0]] == rank;
+    const bool near =
+        !surrounded.empty() &&
+        std::any_of(element.begin(), element.end(), [&](int64_t p) { return surrounded[p] != 0; });
+    if (!mine && !near && !touches(piece, element, rank)) return 2 * blocks;
+    int64_t first = piece.place[element[0]];
+    for (const int64_t point : element) first = std::min(first, piece.place[point]);
+    return (mine ? 0 : blocks) + first / points_in_block;
+  };
+  std::vector<int64_t> begin(2 * blocks + 2, 0);
+  for (const auto& element : elements) ++begin[block_of(element) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  owned = begin[blocks];
+  std::vector<int64_t> rows(begin[2 * blocks]);
+  for (size_t e = 0; e < elements.size(); ++e)
+    if (const int64_t block = block_of(elements[e]); block < 2 * blocks)
+      rows[begin[block]++] = static_cast<int64_t>(e);
+  return rows;
+}
+
+template <size_t n>
+void number(std::vector<std::array<int64_t, n>>& elements, LocalNumbers& local) {
+  for (auto& element : elements)
+    for (int64_t& point : element) point = local.of(point);
+}
+
+template <size_t n>
+std::vector<std::array<int64_t, n>> pick_elements(
+    const std::vector<std::array<int64_t, n>>& elements, const std::vector<int64_t>& rows,
+    LocalNumbers& local) {
+  std::vector<std::array<int64_t, n>> picked = pick(elements, rows);
+  number(picked, local);
+  return picked;
+}
+
+void pick_points(const Piece& piece, Part& part) {
+  const model::Points& all = piece.model.points;
+  model::Points& mine = part.model.points;
+  mine.position = pick(all.position, part.point_row);
+  mine.set = pick(all.set, part.point_row);
+  mine.target = pick(all.target, part.point_row);
+  mine.layer = pick(all.layer, part.point_row);
+  mine.column = pick(all.column, part.point_row);
+  mine.bone = pick(all.bone, part.point_row);
+  mine.mass = pick(all.mass, part.point_row);
+  mine.external_force = pick(all.external_force, part.point_row);
+  part.unknown = pick(piece.unknown, part.point_row);
+  part.original_set.assign(mine.set.begin(), mine.set.begin() + part.owned_points);
+  for (size_t p = 0; p < mine.set.size(); ++p)
+    if (mine.set[p] == PointSet::bone && piece.bones.straight[mine.bone[p]])
+      mine.set[p] = PointSet::held;
+}
+
+/// [bodies] Triangles of the model's bodies at load 0; empty for closed forms.
+std::vector<surface::Surface> body_meshes(const Model& model) {
+  std::vector<surface::Surface> meshes;
+  for (const model::Body& body : model.contact.bodies) {
+    const auto* shape = std::get_if<surface::Surface>(&body.shape);
+    if (body.bone >= 0) shape = &model.bone_surfaces[body.bone];
+    meshes.push_back(shape ? *shape : surface::Surface{});
+  }
+  return meshes;
+}
+
+/// The constraints of the points that a rank owns.
+model::Contact pick_contact(const Piece& piece, const std::vector<double>& offset,
+                            LocalNumbers& local, int rank, std::vector<int64_t>& pair_row) {
+  const model::Contact& all = piece.model.contact;
+  const auto mine = [&](const std::vector<int64_t>& points) {
+    std::vector<int64_t> rows;
+    for (size_t c = 0; c < points.size(); ++c)
+      if (piece.owner[points[c]] == rank && piece.unknown[points[c]] >= 0)
+        rows.push_back(static_cast<int64_t>(c));
+    return rows;
+  };
+  const auto number_all = [&](std::vector<int64_t>& points) {
+    for (int64_t& point : points) point = local.of(point);
+  };
+  model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
+  const std::vector<int64_t>& rows = pair_row = mine(all.pairs.point);
+  part.pairs = {pick(all.pairs.point, rows), pick(all.pairs.body, rows),
+                pick(all.pairs.binding, rows), pick(all.pairs.area, rows), pick(offset, rows)};
+  number_all(part.pairs.point);
+  if (all.cut_faces.empty() || piece.owner[all.cut_faces.point.front()] != rank) return part;
+  part.cut_faces = all.cut_faces;
+  number_all(part.cut_faces.point);
+  return part;
+}
+
+void pick_springs(const Piece& piece, LocalNumbers& local, int rank, Part& part) {
+  const Model& model = piece.model;
+  auto rows = element_rows(piece, model.springs.points, rank, part.owned_springs);
+  part.model.springs = {pick_elements(model.springs.points, rows, local),
+                        pick(model.springs.set, rows),
+                        pick(model.springs.rest_length, rows),
+                        pick(model.springs.stiffness, rows),
+                        pick(model.springs.exponent, rows),
+                        pick(model.springs.reference, rows)};
+  rows.resize(part.owned_springs);
+  part.spring_row = pick(piece.spring_row, rows);
+}
+
+/// Prisms, and edges.
+void pick_solid(const Piece& piece, LocalNumbers& local, int rank, Part& part) {
+  const Model& model = piece.model;
+  std::vector<char> surrounded;
+  if (model::is_solid(model)) surrounded = surrounded_points(piece, rank);
+  auto rows = element_rows(piece, model.prisms.points, rank, part.owned_prisms, surrounded);
+  part.model.prisms = model::pick_prisms(model.prisms, rows);
+  number(part.model.prisms.points, local);
+  rows.resize(part.owned_prisms);
+  part.prism_row = pick(piece.prism_row, rows);
+  rows = element_rows(piece, model.edges.points, rank, part.owned_edges);
+  part.model.edges = {pick_elements(model.edges.points, rows, local),
+                      pick(model.edges.weight, rows)};
+  rows.resize(part.owned_edges);
+  part.edge_row = pick(piece.edge_row, rows);
+}
+
+/// Those of further terms that a rank owns the first point of, or an unknown.
+model::TermElements pick_elements(const Piece& piece, const model::TermElements& all,
+                                  LocalNumbers& local, int rank) {
+  model::TermElements mine{all.term, all.points_each, all.numbers_each, {}, {}};
+  for (size_t e = 0; e < all.size(); ++e) {
+    const auto points = all.points_of(e);
+    const auto numbers = all.numbers_of(e);
+    if (piece.owner[points[0]] != rank && !touches(piece, points, rank)) continue;
+    for (const int64_t point : points) mine.points.push_back(local.of(point));
+    mine.numbers.insert(mine.numbers.end(), numbers.begin(), numbers.end());
+  }
+  return mine;
+}
+
+/// Rows of the piece's points that a rank owns, by their places.
+std::vector<int64_t> own_points(const Piece& piece, int rank) {
+  std::vector<int64_t> rows;
+  for (size_t i = 0; i < piece.owner.size(); ++i)
+    if (piece.owner[i] == rank) rows.push_back(static_cast<int64_t>(i));
+  std::ranges::sort(rows, {}, [&](int64_t row) { return piece.place[row]; });
+  return rows;
+}
+
+/// The bodies, where any rank has contact, and the constraints. Collective.
+void add_contact(MPI_Comm comm, const Piece& piece, LocalNumbers& local, Part& part) {
+  const Model& model = piece.model;
+  int touching = !model.contact.empty();
+  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT, MPI_MAX, comm);
+  part.contact = touching != 0;
+  if (part.contact)
+    base::collective_try(comm, [&] { part.bodies = mechanics::make_bodies(model); });
+  part.model.contact = pick_contact(piece, mechanics::contact_offsets(model, part.bodies), local,
+                                    base::rank(comm), part.pair_row);
+  if (!part.bodies.empty()) part.body_meshes = body_meshes(model);
+}
+
+Part make_part(MPI_Comm comm, const Piece& piece, const std::vector<int64_t>& own) {
+  const Model& model = piece.model;
+  const int rank = base::rank(comm);
+  Part part;
+  part.owned_points = static_cast<int64_t>(own.size());
+  LocalNumbers local(piece.owner.size());
+  for (const int64_t row : own) local.of(row);
+  pick_springs(piece, local, rank, part);
+  pick_solid(piece, local, rank, part);
+  for (const model::TermElements& elements : model.elements)
+    part.model.elements.push_back(pick_elements(piece, elements, local, rank));
+  add_contact(comm, piece, local, part);
+  part.point_row = local.rows();
+  pick_points(piece, part);
+  part.point_row = pick(piece.point_row, part.point_row);
+  part.solid = piece.solid;
+  part.model.gravity = model.gravity;
+  part.model.bones = model.bones;
+  part.model.bone_transform = piece.bones.transform;
+  part.first_unknown = piece.first_unknown;
+  part.owned_unknowns = piece.unknowns;
+  part.total_points = piece.counts.points;
+  part.total_springs = piece.counts.springs;
+  part.total_prisms = piece.counts.prisms;
+  part.total_unknowns = piece.total_unknowns;
+  return part;
+}
+
+void count_points(MPI_Comm comm, const Part& part, model::Counts& counts) {
+  int64_t of[4] = {};
+  for (const PointSet set : part.original_set) ++of[static_cast<int>(set)];
+  MPI_Allreduce(MPI_IN_PLACE, of, 4, MPI_INT64_T, MPI_SUM, comm);
+  counts.soft = of[0], counts.boundary = of[1], counts.bone = of[2], counts.held = of[3];
+}
+
+}  // namespace
+
+LocalModel build_part(MPI_Comm comm, Piece& piece) {
+  const std::vector<int64_t> own = own_points(piece, base::rank(comm));
+  const std::vector<Vec3> outward = pick(model::outward_normals(piece.model), own);
+  LocalModel local_model;
+  local_model.part = make_part(comm, piece, own);
+  local_model.outward = NaturalRows(comm, local_model.part).natural(outward);
+  local_model.counts = piece.counts;
+  count_points(comm, local_model.part, local_model.counts);
+  return local_model;
+}
+
+}  // namespace repose::discrete

@@ -1,0 +1,39 @@
+#pragma once
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "repose/discrete/part.h"
+
+namespace repose::discrete {
+
+/// Motion of bones: how each moves as a whole.
+struct BoneMotions {
+  std::vector<Mat4> transform;  ///< [bones] to load 1
+  std::vector<char> straight;   ///< [bones] the points go straight to their targets
+};
+
+/// Returns how the bones of a model with all their points move. InputError.
+BoneMotions bone_motions(const model::Model& model);
+
+/// What a rank has of a model before it keeps its part: at least all elements at its points, in the
+/// order of the whole model.
+struct Piece {
+  model::Model model;
+  bool solid = false;  ///< the whole model is one
+  BoneMotions bones;
+  std::vector<int> owner;        ///< [N] rank of each point
+  std::vector<int64_t> place;    ///< [N] of each point, rank after rank, column after column
+  std::vector<int64_t> unknown;  ///< [N] block number or −1
+  /// Rows in the whole model: [N], [springs], [prisms], [edges]. −1 where no part needs it.
+  std::vector<int64_t> point_row, spring_row, prism_row, edge_row;
+  model::Counts counts;  ///< of the whole model; kinds of points are counted by build_part()
+  int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;  ///< blocks, of all and of this rank
+};
+
+/// Builds this rank's part of a model from its piece, with the counts and normals of the whole.
+/// Rows of contact are those of the piece's pairs. Collective.
+LocalModel build_part(MPI_Comm comm, Piece& piece);
+
+}  // namespace repose::discrete
