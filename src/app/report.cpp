@@ -290,14 +290,19 @@ std::string describe_finished(const std::string& file, const model::StepNumbers&
                          : ""));
 }
 
-std::string describe_failure(const solve::Summary& s, bool stretched) {
+std::string describe_failure(const solve::Summary& s, bool stretched, bool adheres) {
   if (s.path.complete()) return "";
-  return fmt::format("NOT CONVERGED: the run ended at load {:.4g} with {} to go ({}).{}\n",
-                     s.path.load,
-                     std::isfinite(s.last.displacement_error)
-                         ? fmt::format("an estimated {:.3g} mm", s.last.displacement_error)
-                         : "an unknown distance",
-                     s.last.reason, remedy(s, stretched));
+  const bool by_adhesion = adheres && (s.path.halvings.failed > 0 || !s.path.last.stopped);
+  return fmt::format(
+      "NOT CONVERGED: the run ended at load {:.4g} with {} to go ({}).{}\n", s.path.load,
+      std::isfinite(s.last.displacement_error)
+          ? fmt::format("an estimated {:.3g} mm", s.last.displacement_error)
+          : "an unknown distance",
+      s.last.reason,
+      remedy(s, stretched) + (by_adhesion
+                                  ? " Lips adhere to teeth here, which keeps some searches from "
+                                    "ending: anatomy.adhesion: 0 leaves adhesion out."
+                                  : ""));
 }
 
 std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,

@@ -320,7 +320,8 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
     if (summary.path.complete()) self_contact = skin.describe_self_contact(now);
   });
   print(answer);
-  print(folds + describe_failure(summary, job_.reference_state.has_value()));
+  print(folds + describe_failure(summary, job_.reference_state.has_value(),
+                                 job_.local_model.global_metadata.adhesion.has_value()));
   print(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
         describe_tangents(writer.point_fields()));
