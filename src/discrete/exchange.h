@@ -4,10 +4,7 @@
 #include <bit>
 #include <cstdint>
 #include <numeric>
-#include <span>
 #include <vector>
-
-#include "repose/base/geometry.h"
 
 namespace repose::discrete {
 
@@ -16,14 +13,16 @@ class Exchange {
  public:
   /// `rows` [ranks] are those of this rank's arrays that each rank is to receive. Collective.
   Exchange(MPI_Comm comm, const std::vector<std::vector<int64_t>>& rows);
-  /// Fetches `rows`, ascending, of arrays whose rows follow one another from rank to rank, of which
-  /// this rank holds as many as `held`. Collective.
+  /// Fetches `rows`, by the ranks that hold them, of arrays whose rows follow one another from rank
+  /// to rank, of which this rank holds as many as `held`. Collective.
   static Exchange fetch(MPI_Comm comm, const std::vector<int64_t>& rows, int64_t held);
 
   /// Returns the received rows of an array, by sending ranks. Collective.
-  template <class T>
-  std::vector<T> operator()(const std::vector<T>& mine) const {
-    const std::vector<T> sent = base::pick(mine, std::span(rows_));
+  template <class Array, class T = typename Array::value_type>
+  std::vector<T> operator()(const Array& mine) const {
+    std::vector<T> sent;
+    sent.reserve(rows_.size());
+    for (const int64_t row : rows_) sent.push_back(mine[row]);
     std::vector<T> received(std::accumulate(received_.begin(), received_.end(), size_t{0}));
     send_all(sent.data(), received.data(), sizeof(T));
     return received;

@@ -1,17 +1,16 @@
 #include "repose/discrete/natural_rows.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "exchange.h"
 #include "message.h"
 #include "repose/base/agreement.h"
-#include "repose/base/components.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
 
 namespace repose::discrete {
-
-using base::check;
 
 namespace {
 
@@ -22,45 +21,21 @@ double tension(const model::Springs& springs, int64_t e, double elongation) {
   });
 }
 
-const double* numbers(std::span<const Vec3> points) {
-  return points.empty() ? nullptr : points.data()->data();
-}
-
 }  // namespace
 
-void NaturalRows::scatter_chunk(const Rows& rows, const double* owned_values,
-                                const double* natural_values, ScatterMode mode) const {
-  const auto count = static_cast<PetscInt>(rows.row.size());
-  const auto slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
-  const auto mine = static_cast<PetscInt>(slab.rows());
-  base::VecHandle owned, natural;
-  check(VecCreateMPIWithArray(comm_, 1, rows.block * count, PETSC_DETERMINE, owned_values,
-                              owned.out()));
-  check(VecCreateMPIWithArray(comm_, 1, rows.block * mine, PETSC_DETERMINE, natural_values,
-                              natural.out()));
-  PetscInt first = 0;
-  check(VecGetOwnershipRange(owned, &first, nullptr));
-  const std::vector<PetscInt> targets(rows.row.begin(), rows.row.end());
-  base::IndexSetHandle from, to;
-  check(ISCreateStride(comm_, rows.block * count, first, 1, from.out()));
-  check(ISCreateBlock(comm_, rows.block, count, targets.data(), PETSC_COPY_VALUES, to.out()));
-  base::ScatterHandle scatter;
-  check(VecScatterCreate(owned, from, natural, to, scatter.out()));
-  const bool forward = mode == SCATTER_FORWARD;
-  const Vec source = forward ? owned : natural, target = forward ? natural : owned;
-  check(VecScatterBegin(scatter, source, target, INSERT_VALUES, mode));
-  check(VecScatterEnd(scatter, source, target, INSERT_VALUES, mode));
-}
-
-void NaturalRows::scatter_rows(const Rows& rows, const double* owned, const double* natural,
-                               ScatterMode mode) const {
+template <class Work>
+void NaturalRows::for_each_chunk(const Rows& rows, const Work& work) const {
+  const int ranks = base::size(comm_);
+  std::vector<int64_t> end;
+  for (int r = 0; r < ranks; ++r) end.push_back(base::slab(rows.total, r, ranks).end);
   const auto size = static_cast<int64_t>(rows.row.size());
   int64_t longest = 0;
   MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
   for (int64_t begin = 0; begin < longest; begin += at_once_) {
-    const int64_t first = std::min(begin, size), count = std::min(at_once_, size - first);
-    scatter_chunk({rows.row.subspan(first, count), rows.total, rows.block},
-                  owned + first * rows.block, natural, mode);
+    std::vector<std::vector<int64_t>> places(ranks);
+    for (int64_t i = begin; i < std::min(begin + at_once_, size); ++i)
+      places[std::ranges::upper_bound(end, rows.row[i]) - end.begin()].push_back(i);
+    work(places);
   }
 }
 
@@ -68,40 +43,35 @@ NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
     : comm_(comm),
       part_(part),
       at_once_(at_once),
-      points_{std::span(part.point_row).first(part.owned_points), part.total_points, 3},
-      springs_{part.spring_row, part.total_springs, 1},
-      prisms_{part.prism_row, part.total_prisms, 1} {}
+      points_{std::span(part.point_row).first(part.owned_points), part.total_points},
+      springs_{part.spring_row, part.total_springs},
+      prisms_{part.prism_row, part.total_prisms} {}
 
-std::vector<double> NaturalRows::to_slab(const Rows& rows, const std::vector<double>& owned) const {
+template <class Value>
+std::vector<Value> NaturalRows::to_slab(const Rows& rows, std::span<const Value> owned) const {
   const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
-  std::vector<double> natural(slab.rows());
-  scatter_rows(rows, owned.data(), natural.data(), SCATTER_FORWARD);
+  std::vector<Value> natural(slab.rows());
+  for_each_chunk(rows, [&](const std::vector<std::vector<int64_t>>& places) {
+    const Exchange exchange(comm_, places);
+    const std::vector<int64_t> row = exchange(rows.row);
+    const std::vector<Value> values = exchange(owned);
+    for (size_t k = 0; k < row.size(); ++k) natural[row[k] - slab.begin] = values[k];
+  });
   return natural;
 }
 
 template <class Value>
-std::vector<Value> NaturalRows::to_slab_each(const Rows& rows,
-                                             const std::vector<Value>& values) const {
-  constexpr int numbers = base::components<Value>;
-  const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
-  std::vector<double> owned(rows.row.size() * numbers), natural(slab.rows() * numbers);
-  std::vector<Value> mine(slab.rows());
-  const auto at = [](auto& value, int k) -> auto& {
-    if constexpr (numbers == 1)
-      return value;
-    else
-      return value[k];
-  };
-  for (size_t i = 0; i < rows.row.size(); ++i)
-    for (int k = 0; k < numbers; ++k)
-      owned[numbers * i + k] = static_cast<double>(at(values[i], k));
-  scatter_rows({rows.row, rows.total, numbers}, owned.data(), natural.data(), SCATTER_FORWARD);
-  for (size_t i = 0; i < mine.size(); ++i)
-    for (int k = 0; k < numbers; ++k) {
-      auto& number = at(mine[i], k);
-      number = static_cast<std::decay_t<decltype(number)>>(natural[numbers * i + k]);
-    }
-  return mine;
+std::vector<Value> NaturalRows::from_slab(const Rows& rows, const std::vector<Value>& slab) const {
+  std::vector<Value> values(rows.row.size());
+  for_each_chunk(rows, [&](const std::vector<std::vector<int64_t>>& places) {
+    std::vector<int64_t> place, row;
+    for (const std::vector<int64_t>& of_rank : places)
+      for (const int64_t i : of_rank) place.push_back(i), row.push_back(rows.row[i]);
+    const auto held = static_cast<int64_t>(slab.size());
+    const std::vector<Value> fetched = Exchange::fetch(comm_, row, held)(slab);
+    for (size_t k = 0; k < place.size(); ++k) values[place[k]] = fetched[k];
+  });
+  return values;
 }
 
 namespace {
@@ -126,8 +96,9 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   rows.solid = part.solid;
   rows.contact_pairs = local_model.contact_pairs;
   const auto to_slabs = [&](const Rows& of, auto group) {
-    model::for_each_array(
-        group, [&](const char*, auto& values) { values = natural.to_slab_each(of, values); });
+    model::for_each_array(group, [&](const char*, auto& values) {
+      values = natural.to_slab(of, std::span(std::as_const(values)));
+    });
     return group;
   };
   model::Points points = part.model.points;
@@ -147,11 +118,11 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   rows.prisms = to_slabs(natural.prisms_, std::move(prisms));
   model::Edges edges = part.model.edges;
   edges.points = in_rows(edges.points, part.owned_edges, part.point_row);
-  rows.edges = to_slabs({part.edge_row, local_model.counts.edges, 1}, std::move(edges));
+  rows.edges = to_slabs({part.edge_row, local_model.counts.edges}, std::move(edges));
   model::ContactPairs pairs = part.model.contact.pairs;
   pairs.point = base::pick(part.point_row, pairs.point);
   pairs.offset.clear();
-  rows.pairs = to_slabs({part.pair_row, local_model.contact_pairs, 1}, std::move(pairs));
+  rows.pairs = to_slabs({part.pair_row, local_model.contact_pairs}, std::move(pairs));
   return rows;
 }
 
@@ -162,9 +133,9 @@ void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& r
     const auto& [p, q] = springs.points[e];
     values[e] = (position[q] - position[p]).norm() - springs.rest_length[e];
   }
-  rows.elongation = to_slab(springs_, values);
+  rows.elongation = to_slab<double>(springs_, values);
   for (int64_t e = 0; e < part_.owned_springs; ++e) values[e] = tension(springs, e, values[e]);
-  rows.tension = to_slab(springs_, values);
+  rows.tension = to_slab<double>(springs_, values);
 }
 
 void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& rows) const {
@@ -175,7 +146,7 @@ void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& ro
     for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
   }
-  rows.volume_ratio = to_slab(prisms_, ratio);
+  rows.volume_ratio = to_slab<double>(prisms_, ratio);
 }
 
 void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& rows) const {
@@ -195,19 +166,16 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
     von_mises[e] = state.von_mises;
     stretch[e] = state.stretch;
   }
-  rows.pressure = to_slab(prisms_, pressure);
-  rows.von_mises = to_slab(prisms_, von_mises);
-  const base::Slab slab = base::slab(prisms_.total, base::rank(comm_), base::size(comm_));
-  rows.stretch.resize(slab.rows());
-  scatter_rows({prisms_.row, prisms_.total, 3}, numbers(stretch), numbers(rows.stretch),
-               SCATTER_FORWARD);
+  rows.pressure = to_slab<double>(prisms_, pressure);
+  rows.von_mises = to_slab<double>(prisms_, von_mises);
+  rows.stretch = to_slab<Vec3>(prisms_, stretch);
 }
 
 void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const {
-  const Rows points{points_.row, points_.total, 1};
   const ContactState state = contact_state(objective);
-  rows.point_fields.push_back({"contact_gap", false, to_slab(points, state.gap)});
-  rows.point_fields.push_back({"contact_pressure", false, to_slab(points, state.pressure)});
+  rows.point_fields.push_back({"contact_gap", false, to_slab<double>(points_, state.gap)});
+  rows.point_fields.push_back(
+      {"contact_pressure", false, to_slab<double>(points_, state.pressure)});
   rows.point_fields.push_back(field("contact_force", state.force));
 }
 
@@ -224,29 +192,23 @@ model::StepRows NaturalRows::rows(Objective& objective) const {
 }
 
 std::vector<Vec3> NaturalRows::natural(std::span<const Vec3> values) const {
-  const base::Slab slab = base::slab(points_.total, base::rank(comm_), base::size(comm_));
-  std::vector<Vec3> rows(slab.rows());
-  scatter_rows(points_, numbers(values), numbers(rows), SCATTER_FORWARD);
-  return rows;
+  return to_slab(points_, values);
 }
 
 model::PointField NaturalRows::field(const std::string& name, std::span<const Vec3> values) const {
-  const std::vector<Vec3> rows = natural(values);
-  const double* first = numbers(rows);
-  return {name, true, {first, first + 3 * rows.size()}};
+  model::PointField field{name, true, {}};
+  for (const Vec3& value : natural(values))
+    field.values.insert(field.values.end(), value.begin(), value.end());
+  return field;
 }
 
 std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
-  std::vector<Vec3> rows(part_.owned_points);
-  scatter_rows(points_, numbers(rows), numbers(slab), SCATTER_REVERSE);
-  return rows;
+  return from_slab(points_, slab);
 }
 
 std::vector<double> NaturalRows::at_rows(const std::vector<int64_t>& rows, int64_t total,
                                          const std::vector<double>& slab) const {
-  std::vector<double> values(rows.size());
-  scatter_rows({rows, total, 1}, values.data(), slab.data(), SCATTER_REVERSE);
-  return values;
+  return from_slab({rows, total}, slab);
 }
 
 void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& positions,

@@ -10,7 +10,7 @@ namespace repose::discrete {
 /// collective.
 class NaturalRows {
  public:
-  /// Carries so many rows at once: a scatter takes several times the memory of what it carries.
+  /// Carries so many rows at once: an exchange takes twice the memory of what it carries.
   NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
 
   /// The arrays of a step at the objective's last update.
@@ -36,17 +36,15 @@ class NaturalRows {
   struct Rows {
     std::span<const int64_t> row;  // natural rows of what this rank owns
     int64_t total;
-    int block;  // numbers a row
   };
-  /// Copies from the owned values to this rank's slab, or the other way.
-  void scatter_rows(const Rows& rows, const double* owned, const double* natural,
-                    ScatterMode mode) const;
-  void scatter_chunk(const Rows& rows, const double* owned, const double* natural,
-                     ScatterMode mode) const;
-  std::vector<double> to_slab(const Rows& rows, const std::vector<double>& owned) const;
-  /// Brings the first of `values`, as many as there are rows, whatever they are.
+  /// Calls work(places) for chunks of rows: of each rank places of those that lie in its slab.
+  template <class Work>
+  void for_each_chunk(const Rows& rows, const Work& work) const;
+  /// Brings the first of `owned`, as many as there are rows, to the slabs.
   template <class Value>
-  std::vector<Value> to_slab_each(const Rows& rows, const std::vector<Value>& values) const;
+  std::vector<Value> to_slab(const Rows& rows, std::span<const Value> owned) const;
+  template <class Value>
+  std::vector<Value> from_slab(const Rows& rows, const std::vector<Value>& slab) const;
   void add_springs(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_stress(std::span<const Vec3> position, model::StepRows& rows) const;
   void add_contact(Objective& objective, model::StepRows& rows) const;
