@@ -377,19 +377,19 @@ void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet
   piece.unknowns = numbers.unknown_begin[rank + 1] - piece.first_unknown;
 }
 
-}  // namespace
-
-LocalModel build_local(MPI_Comm comm, Model&& rows) {
-  static const PetscLogEvent event = base::log_event("RpPartition");
-  const base::Logged logged(event);
-  Piece piece;
-  piece.model = std::move(rows);
-  Model& held = piece.model;
+void count_rows(MPI_Comm comm, Piece& piece) {
+  const Model& held = piece.model;
   piece.counts.points = sum(comm, held.points.position.size());
   piece.counts.springs = sum(comm, held.springs.points.size());
   piece.counts.prisms = sum(comm, held.prisms.points.size());
   piece.counts.edges = sum(comm, held.edges.points.size());
   piece.solid = sum(comm, held.prisms.modulus.size()) > 0;
+}
+
+/// Makes of the rows that this rank holds the piece that it needs. Returns the rows of contact's
+/// pairs, and the model's global metadata on rank 0. Collective.
+std::vector<int64_t> exchange_rows(MPI_Comm comm, Piece& piece, Model& global_metadata) {
+  Model& held = piece.model;
   const bool averaged = sum(comm, held.prisms.nodal_modulus.size()) > 0;
   const std::vector<int64_t> names = gather_arrays(comm, held.points.column);
   const std::vector<PointSet> set = gather_arrays(comm, held.points.set);
@@ -403,15 +403,26 @@ LocalModel build_local(MPI_Comm comm, Model&& rows) {
   const HeldColumns column(comm, held, numbers);
   assign(comm, column, set, numbers, needing, piece);
   piece.bones = gather_motions(comm, held);
-  Model global_metadata = copy_metadata(held);
-  const int64_t pairs = sum(comm, held.contact.pairs.point.size());
+  global_metadata = copy_metadata(held);
   share_globals(comm, averaged, numbers, piece);
-  const std::vector<int64_t> pair_row =
-      exchange_elements(ElementExchange(comm, needing, column), piece);
+  std::vector<int64_t> pair_row = exchange_elements(ElementExchange(comm, needing, column), piece);
   fetch_points(comm, numbers, piece);
+  return pair_row;
+}
+
+}  // namespace
+
+LocalModel build_local(MPI_Comm comm, Model&& rows) {
+  static const PetscLogEvent event = base::log_event("RpPartition");
+  const base::Logged logged(event);
+  Piece piece;
+  piece.model = std::move(rows);
+  count_rows(comm, piece);
+  Model global_metadata;
+  const std::vector<int64_t> pair_row = exchange_rows(comm, piece, global_metadata);
   LocalModel local_model = build_part(comm, piece);
   local_model.part.pair_row = pick(pair_row, local_model.part.pair_row);
-  local_model.contact_pairs = pairs;
+  local_model.contact_pairs = sum(comm, local_model.part.pair_row.size());
   local_model.global_metadata = std::move(global_metadata);
   return local_model;
 }
