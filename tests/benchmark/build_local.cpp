@@ -49,11 +49,12 @@ discrete::Part whole(const model::Anatomy& anatomy, const std::string& name, Fil
   model::Model model;
   if (base::rank(comm) == 0) model = model::build_model(anatomy).model;
   clock.end("build");
-  file.emplace(comm, name, model);
-  clock.end("write");
-  discrete::Part part = discrete::build_local_from_root(comm, model).part;
+  discrete::LocalModel local_model = discrete::build_local_from_root(comm, std::move(model));
   clock.end("distribute");
-  return part;
+  file.emplace(comm, name, local_model.global_metadata,
+               discrete::NaturalRows::of_model(comm, local_model));
+  clock.end("write");
+  return std::move(local_model.part);
 }
 
 discrete::Part local_model(const model::Anatomy& anatomy, const std::string& name, File& file,
