@@ -1,6 +1,7 @@
 #include "repose/model/stiffness.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "layers.h"
 #include "repose/base/error.h"
@@ -200,13 +201,20 @@ double effective_modulus(const std::vector<ColumnSums>& columns) {
 }
 
 double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns) {
-  constexpr double times = 25;  // the tissue's own stiffness
+  // Of the tissue's own stiffness at its thickness, and at the width of a column, where a softer
+  // penalty takes many rounds of multipliers.
+  constexpr double times = 25, times_at_width = 7;
   if (scene.contact && scene.contact->stiffness) return *scene.contact->stiffness;
   std::vector<double> thickness;
-  for (const ColumnSums& column : columns) thickness.push_back(column.thickness);
+  double volume = 0, length = 0;
+  for (const ColumnSums& column : columns) {
+    thickness.push_back(column.thickness);
+    volume += column.volume, length += column.thickness;
+  }
   const auto middle = thickness.begin() + static_cast<std::ptrdiff_t>(thickness.size() / 2);
   std::nth_element(thickness.begin(), middle, thickness.end());
-  return times * effective_modulus(columns) / *middle;
+  const double modulus = effective_modulus(columns), width = std::sqrt(volume / length);
+  return std::max(times * modulus / *middle, times_at_width * modulus / width);
 }
 
 }  // namespace repose::model

@@ -104,5 +104,18 @@ TEST(Stiffness, a_rule_for_a_set_that_is_not_there_is_refused) {
   }
 }
 
+TEST(Stiffness, that_of_contact_follows_the_width_of_columns_where_they_are_slim) {
+  const double modulus = 0.02, thickness = 10;
+  const auto of_width = [&](double width) {
+    ColumnSums column;
+    column.thickness = thickness;
+    column.volume = width * width * thickness;
+    column.stiffness = modulus * column.volume;
+    return contact_stiffness(scene::Scene{}, std::vector<ColumnSums>(5, column));
+  };
+  EXPECT_DOUBLE_EQ(of_width(4), 25 * modulus / thickness);
+  EXPECT_DOUBLE_EQ(of_width(0.5), 7 * modulus / 0.5);
+}
+
 }  // namespace stiffness_test
 }  // namespace repose::model
