@@ -257,13 +257,11 @@ void number_pairs(MPI_Comm comm, const RankColumns& rank_columns, LocalModel& lo
 model::CutFaces gather_cut_faces(MPI_Comm comm, const Part& part) {
   model::CutFaces faces = part.model.contact.cut_faces;
   for (int64_t& point : faces.point) point = part.point_row[point];
-  int has = faces.empty() ? 0 : base::rank(comm);
-  MPI_Allreduce(MPI_IN_PLACE, &has, 1, MPI_INT, MPI_MAX, comm);
-  if (has > 0 && has == base::rank(comm))
-    Sender(comm, 0)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
-  if (has > 0 && base::rank(comm) == 0)
-    Receiver(comm, has)(faces.size, faces.begin, faces.point, faces.weight, faces.area);
-  return base::rank(comm) == 0 ? faces : model::CutFaces{};
+  const auto gather_to_root = [&](auto&... arrays) {
+    ((arrays = gather_arrays(comm, std::move(arrays))), ...);
+  };
+  gather_to_root(faces.size, faces.begin, faces.point, faces.weight, faces.area);
+  return faces;
 }
 
 void append(const model::TermElements& elements, size_t e, model::TermElements& to) {
@@ -279,15 +277,8 @@ std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part
   std::vector<model::TermElements> all = part.model.elements;
   for (model::TermElements& elements : all) {
     for (int64_t& point : elements.points) point = part.point_row[point];
-    if (base::rank(comm) > 0) {
-      Sender(comm, 0)(elements.points, elements.numbers);
-      continue;
-    }
-    model::TermElements theirs = elements;
-    for (int other = 1; other < base::size(comm); ++other) {
-      Receiver(comm, other)(theirs.points, theirs.numbers);
-      for (size_t e = 0; e < theirs.size(); ++e) append(theirs, e, elements);
-    }
+    elements.points = gather_arrays(comm, std::move(elements.points));
+    elements.numbers = gather_arrays(comm, std::move(elements.numbers));
     const model::TermElements unsorted = std::move(elements);
     elements = {unsorted.term, unsorted.points_each, unsorted.numbers_each, {}, {}};
     std::map<int64_t, size_t> by_point;

@@ -25,19 +25,10 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
 template <class Value>
 std::vector<Value> gather_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& own,
                                     const std::vector<Value>& values) {
-  if (base::rank(comm) > 0) {
-    Sender(comm, 0)(own, values);
-    return {};
-  }
-  std::vector<Value> all(columns);
-  std::vector<int64_t> theirs;
-  std::vector<Value> sent;
-  for (int sender = 0; sender < base::size(comm); ++sender) {
-    if (sender > 0) Receiver(comm, sender)(theirs, sent);
-    const std::vector<int64_t>& column = sender > 0 ? theirs : own;
-    const std::vector<Value>& value = sender > 0 ? sent : values;
-    for (size_t k = 0; k < column.size(); ++k) all[column[k]] = value[k];
-  }
+  const std::vector<int64_t> column = gather_arrays(comm, own);
+  const std::vector<Value> value = gather_arrays(comm, values);
+  std::vector<Value> all(base::rank(comm) == 0 ? columns : 0);
+  for (size_t k = 0; k < column.size(); ++k) all[column[k]] = value[k];
   return all;
 }
 

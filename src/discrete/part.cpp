@@ -12,6 +12,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
+#include "repose/discrete/reduction.h"
 
 namespace repose::discrete {
 
@@ -104,12 +105,6 @@ void remove_fixed_pairs(const std::vector<PointSet>& set, Model& model) {
            pick(pairs.area, free)};
 }
 
-int64_t sum(MPI_Comm comm, size_t mine) {
-  auto total = static_cast<int64_t>(mine);
-  MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_INT64_T, MPI_SUM, comm);
-  return total;
-}
-
 /// The ranks that need the elements of each column: those that own it or a column beside it.
 struct ColumnRanks {
   std::vector<int64_t> begin;  // [columns + 1]
@@ -136,7 +131,7 @@ ColumnRanks ranks_of_columns(const ColumnGraph& graph, const Numbers& numbers) {
 class HeldColumns {
  public:
   HeldColumns(MPI_Comm comm, const Model& held, const Numbers& numbers)
-      : index_(sum(comm, held.points.position.size())) {
+      : index_(count_over_ranks(comm, held.points.position.size())) {
     for_each_point(held, [&](int64_t point) { index_.add(point); });
     column_ = Exchange::fetch(comm, index_.sort(),
                               static_cast<int64_t>(numbers.column.size()))(numbers.column);
@@ -188,8 +183,7 @@ class ElementExchange {
   std::vector<int64_t> operator()(const Points& points, Group& group) const {
     const Exchange exchange(comm_, rows(points));
     std::vector<int64_t> row(points.size());
-    const int64_t first = first_row(row.size());
-    std::iota(row.begin(), row.end(), first);
+    std::iota(row.begin(), row.end(), count_before(comm_, row.size()));
     row = exchange(row);
     model::for_each_array(group, [&](const char*, auto& values) { values = exchange(values); });
     return row;
@@ -228,12 +222,6 @@ class ElementExchange {
         for (int64_t k = 0; k < values; ++k) all[r].push_back(values * e + k);
     return all;
   }
-  int64_t first_row(size_t held) const {
-    auto mine = static_cast<int64_t>(held), end = mine;
-    MPI_Scan(&mine, &end, 1, MPI_INT64_T, MPI_SUM, comm_);
-    return end - mine;
-  }
-
   MPI_Comm comm_;
   const ColumnRanks& needing_;
   const HeldColumns& column_;
@@ -255,7 +243,7 @@ Model copy_metadata(Model& model) {
   return metadata;
 }
 
-/// How the bones move, whose points are gathered on rank 0. Collective.
+/// Returns the motion of the bones, on all ranks. Collective.
 BoneMotions gather_motions(MPI_Comm comm, const Model& held) {
   std::vector<int64_t> rows;
   for (size_t p = 0; p < held.points.set.size(); ++p)
@@ -379,18 +367,18 @@ void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet
 
 void count_rows(MPI_Comm comm, Piece& piece) {
   const Model& held = piece.model;
-  piece.counts.points = sum(comm, held.points.position.size());
-  piece.counts.springs = sum(comm, held.springs.points.size());
-  piece.counts.prisms = sum(comm, held.prisms.points.size());
-  piece.counts.edges = sum(comm, held.edges.points.size());
-  piece.solid = sum(comm, held.prisms.modulus.size()) > 0;
+  piece.counts.points = count_over_ranks(comm, held.points.position.size());
+  piece.counts.springs = count_over_ranks(comm, held.springs.points.size());
+  piece.counts.prisms = count_over_ranks(comm, held.prisms.points.size());
+  piece.counts.edges = count_over_ranks(comm, held.edges.points.size());
+  piece.solid = count_over_ranks(comm, held.prisms.modulus.size()) > 0;
 }
 
 /// Makes of the rows that this rank holds the piece that it needs. Returns the rows of contact's
 /// pairs, and the model's global metadata on rank 0. Collective.
 std::vector<int64_t> exchange_rows(MPI_Comm comm, Piece& piece, Model& global_metadata) {
   Model& held = piece.model;
-  const bool averaged = sum(comm, held.prisms.nodal_modulus.size()) > 0;
+  const bool averaged = count_over_ranks(comm, held.prisms.nodal_modulus.size()) > 0;
   const std::vector<int64_t> names = gather_arrays(comm, held.points.column);
   const std::vector<PointSet> set = gather_arrays(comm, held.points.set);
   Numbers numbers;
@@ -422,7 +410,7 @@ LocalModel build_local(MPI_Comm comm, Model&& rows) {
   const std::vector<int64_t> pair_row = exchange_rows(comm, piece, global_metadata);
   LocalModel local_model = build_part(comm, piece);
   local_model.part.pair_row = pick(pair_row, local_model.part.pair_row);
-  local_model.contact_pairs = sum(comm, local_model.part.pair_row.size());
+  local_model.contact_pairs = count_over_ranks(comm, local_model.part.pair_row.size());
   local_model.global_metadata = std::move(global_metadata);
   return local_model;
 }

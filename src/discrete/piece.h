@@ -17,8 +17,8 @@ struct BoneMotions {
 /// Returns how the bones of a model with all their points move. InputError.
 BoneMotions bone_motions(const model::Model& model);
 
-/// What a rank has of a model before it keeps its part: at least all elements at its points, in the
-/// order of the whole model.
+/// The share of a model that a rank's part is built from: at least all elements at its points, in
+/// the order of the whole model.
 struct Piece {
   model::Model model;
   bool solid = false;  ///< the whole model is one

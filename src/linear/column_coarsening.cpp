@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "repose/discrete/reduction.h"
+
 namespace repose::linear {
 
 namespace {
@@ -176,9 +178,7 @@ std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& f
     std::array<int64_t, maximum> point;
     std::array<float, maximum> weight;
   };
-  int64_t first = 0;
-  const int64_t mine = own;
-  MPI_Exscan(&mine, &first, 1, MPI_INT64_T, MPI_SUM, comm);
+  const int64_t first = discrete::count_before(comm, own);
   std::vector<Message> sent(fine.own()), received(fine.ghosts());
   for (int32_t i = 0; i < fine.own(); ++i)
     for (int m = 0; m < maximum; ++m) {

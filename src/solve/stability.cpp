@@ -2,9 +2,7 @@
 
 #include <slepceps.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
-#include <vector>
 
 #include "repose/base/error.h"
 
@@ -91,7 +89,7 @@ void choose_shift_and_invert(EPS eps, Mat matrix) {
 void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
   ST st = nullptr;
   KSP krylov = nullptr;
-  check(EPSSetType(eps, EPSLOBPCG));
+  check(EPSSetType(eps, EPSGD));
   check(EPSSetWhichEigenpairs(eps, EPS_SMALLEST_REAL));
   check(EPSGetST(eps, &st));
   check(STSetType(st, STPRECOND));
@@ -137,99 +135,6 @@ double first_mode(EPS eps, Vec mode) {
   return value;
 }
 
-/// A vector and its product with the matrix.
-struct Direction {
-  base::VecHandle vector, image;
-};
-
-/// LOBPCG (Knyazev 2001) for one eigenvector, from a random one on. Products of the search
-/// directions are combined as these are, so that an iteration takes one product with the matrix.
-class RayleighRitz {
- public:
-  /// `shape` is a vector laid out as the matrix's rows.
-  RayleighRitz(Mat matrix, PC preconditioner, Vec shape)
-      : matrix_(matrix), preconditioner_(preconditioner) {
-    for (Direction* each : {&x_, &w_, &p_}) {
-      check(VecDuplicate(shape, each->vector.out()));
-      check(VecDuplicate(shape, each->image.out()));
-    }
-    check(VecDuplicate(shape, residual_.out()));
-    check(VecSetRandom(residual_, nullptr));
-    check(PCApply(preconditioner_, residual_, x_.vector));  // smooth
-    check(VecNormalize(x_.vector, nullptr));
-    check(MatMult(matrix_, x_.vector, x_.image));
-    check(VecDot(x_.vector, x_.image, &value_));
-  }
-
-  double value() const { return value_; }  ///< the Rayleigh quotient
-  /// Norm of the residual of the unit vector.
-  double residual() {
-    PetscReal norm = 0;
-    check(VecWAXPY(residual_, -value_, x_.vector, x_.image));
-    check(VecNorm(residual_, NORM_2, &norm));
-    return norm;
-  }
-  /// Goes to the least Rayleigh quotient in the span of the vector, the preconditioned residual and
-  /// the previous step. After residual().
-  void advance() {
-    check(PCApply(preconditioner_, residual_, w_.vector));
-    check(MatMult(matrix_, w_.vector, w_.image));
-    std::vector<Direction*> basis = {&x_};
-    if (orthonormalize(w_, basis)) basis.push_back(&w_);
-    if (has_step_ && orthonormalize(p_, basis)) basis.push_back(&p_);
-    const auto size = static_cast<Eigen::Index>(basis.size());
-    Eigen::MatrixXd products(size, size);
-    for (Eigen::Index i = 0; i < size; ++i)
-      for (Eigen::Index j = i; j < size; ++j) {
-        check(VecDot(basis[i]->vector, basis[j]->image, &products(i, j)));
-        products(j, i) = products(i, j);
-      }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz(products);
-    const Eigen::VectorXd least = ritz.eigenvectors().col(0);
-    value_ = ritz.eigenvalues()[0];
-    combine(basis, least);
-  }
-  void take_vector(Vec to) const { check(VecCopy(x_.vector, to)); }
-
- private:
-  /// Returns whether the direction is not in the span of the basis, but for rounding.
-  static bool orthonormalize(Direction& direction, const std::vector<Direction*>& basis) {
-    constexpr double rounding = 1e-10;
-    PetscReal before = 0, after = 0;
-    check(VecNorm(direction.vector, NORM_2, &before));
-    for (const Direction* other : basis) {
-      PetscScalar along = 0;
-      check(VecDot(direction.vector, other->vector, &along));
-      check(VecAXPY(direction.vector, -along, other->vector));
-      check(VecAXPY(direction.image, -along, other->image));
-    }
-    check(VecNorm(direction.vector, NORM_2, &after));
-    if (!(after > rounding * before)) return false;
-    check(VecScale(direction.vector, 1 / after));
-    check(VecScale(direction.image, 1 / after));
-    return true;
-  }
-  /// The step becomes the part of the combination without the vector.
-  void combine(const std::vector<Direction*>& basis, const Eigen::VectorXd& shares) {
-    const bool has_residual = basis.size() > 1 && basis[1] == &w_;
-    const double of_step = basis.back() == &p_ ? shares[shares.size() - 1] : 0;
-    for (const auto part : {&Direction::vector, &Direction::image}) {
-      const Vec x = x_.*part, w = w_.*part, p = p_.*part;
-      check(VecScale(p, of_step));
-      if (has_residual) check(VecAXPY(p, shares[1], w));
-      check(VecAYPX(x, shares[0], p));
-    }
-    has_step_ = true;
-  }
-
-  Mat matrix_;
-  PC preconditioner_;
-  Direction x_, w_, p_;  // the vector, the preconditioned residual, the step
-  base::VecHandle residual_;
-  double value_ = 0;
-  bool has_step_ = false;
-};
-
 }  // namespace
 
 double largest_eigenvalue(Mat hessian) {
@@ -259,17 +164,16 @@ double rough_smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement
   constexpr double tolerance = 0.1;  // of the eigenvalue
   constexpr int maximum = 200;       // iterations
   solver.prepare(displacement);
-  RayleighRitz iteration(solver.hessian().action(), solver.preconditioner(), mode);
-  for (int k = 0; k < maximum; ++k) {
-    if (iteration.residual() <= tolerance * std::abs(iteration.value())) {
-      iteration.take_vector(mode);
-      scale_mode(mode);
-      return iteration.value();
-    }
-    iteration.advance();
+  const Mat action = solver.hessian().action();
+  double value = 0;
+  {
+    const EpsHandle eps = symmetric_problem(action, tolerance, maximum);
+    choose_preconditioned(eps, solver);
+    value = first_mode(eps, mode);
   }
-  check(VecSet(mode, 0));
-  return std::nan("");
+  // SLEPc takes them away from the preconditioner that it was lent.
+  check(PCSetOperators(solver.preconditioner(), action, solver.preconditioner_matrix()));
+  return value;
 }
 
 }  // namespace repose::solve

@@ -80,17 +80,21 @@ SPOILED = {
 }
 
 
-@pytest.mark.parametrize("case", SPOILED)
-def test_a_result_that_is_wrong_about_contact_is_refused(good, tmp_path, environment, case):
-    spoil, words = SPOILED[case]
-    file = tmp_path / "spoiled.h5"
-    shutil.copyfile(good, file)
+def refused(result, folder, environment, spoil, words):
+    """A spoiled copy of the result is refused with these words."""
+    file = folder / "spoiled.h5"
+    shutil.copyfile(result, file)
     with h5py.File(file, "r+") as h5:
         spoil(h5)
-    result = runner(tmp_path, environment)("repose-check", file)
-    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result.stderr
-    wrong = [line for line in result.stdout.splitlines() if "DISAGREE" in line or "NOT SO" in line]
+    done = runner(folder, environment)("repose-check", file)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+    wrong = [line for line in done.stdout.splitlines() if "DISAGREE" in line or "NOT SO" in line]
     assert any(words in line for line in wrong), wrong
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_a_result_that_is_wrong_about_contact_is_refused(good, tmp_path, environment, case):
+    refused(good, tmp_path, environment, *SPOILED[case])
 
 
 @pytest.fixture(scope="module")
@@ -213,12 +217,4 @@ SPOILED_ADHESION = {
 
 @pytest.mark.parametrize("case", SPOILED_ADHESION)
 def test_a_result_that_is_wrong_about_adhesion_is_refused(adhering, tmp_path, environment, case):
-    spoil, words = SPOILED_ADHESION[case]
-    file = tmp_path / "spoiled.h5"
-    shutil.copyfile(adhering, file)
-    with h5py.File(file, "r+") as h5:
-        spoil(h5)
-    result = runner(tmp_path, environment)("repose-check", file)
-    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result.stderr
-    wrong = [line for line in result.stdout.splitlines() if "DISAGREE" in line or "NOT SO" in line]
-    assert any(words in line for line in wrong), wrong
+    refused(adhering, tmp_path, environment, *SPOILED_ADHESION[case])

@@ -10,7 +10,7 @@ namespace repose::discrete {
 /// collective.
 class NaturalRows {
  public:
-  /// Carries so many rows at once: an exchange takes twice the memory of what it carries.
+  /// `at_once` rows are carried at a time, in twice their memory.
   NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
 
   /// The arrays of a step at the objective's last update.

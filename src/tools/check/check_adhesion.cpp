@@ -142,6 +142,7 @@ std::vector<Film> find_films(const Model& model) {
       const std::optional<Vec3> tooth = teeth.closest_point(at, jaw.reach);
       if (!tooth || teeth.contains(at)) continue;
       const double distance = (at - *tooth).norm();
+      if (!(distance > 0)) continue;
       films.push_back(
           {i, jaw.bone, (at - *tooth) / distance, distance, rule.tension * pairs.area[c]});
     }

@@ -23,12 +23,11 @@ std::vector<Film> find_films(const model::Model& model);
 void check_adhesion(const model::Model& model, const std::vector<Film>& films,
                     Comparison& comparison);
 
-/// What a film does at a state.
+/// Energy and force of a film at given positions.
 struct FilmState {
   double energy;  ///< N mm
   Vec3 force;     ///< N, on its point
-  double noise;   ///< N, size of what rounding of positions makes of the force, over its relative
-                  ///< size
+  double noise;   ///< N; times the relative rounding of positions, that of the force
 };
 /// Evaluates the films at a load and the positions of all points (mm).
 std::vector<FilmState> evaluate(const model::Model& model, const std::vector<Film>& films,

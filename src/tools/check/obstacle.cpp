@@ -17,23 +17,6 @@ Vec3 closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return a + t * along;
 }
 
-double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  return (p - closest_on_segment(p, a, b)).norm();
-}
-
-/// The distance to the plane where the foot is inside the triangle, else to the nearest edge.
-double distance_to_triangle(const Vec3& p, const std::array<Vec3, 3>& t) {
-  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-  bool within = normal.squaredNorm() > 0;
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 &a = t[k], &b = t[(k + 1) % 3];
-    within = within && (b - a).cross(p - a).dot(normal) >= 0;
-    nearest = std::min(nearest, distance_to_segment(p, a, b));
-  }
-  return within ? std::min(nearest, std::abs((p - t[0]).dot(normal)) / normal.norm()) : nearest;
-}
-
 /// The foot in the plane where it is inside the triangle, else the closest point of the edges.
 Vec3 closest_on_triangle(const Vec3& p, const std::array<Vec3, 3>& t) {
   const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
@@ -144,8 +127,9 @@ double TriangleGrid::distance(const Vec3& point, double reach) const {
   const Vec3 p = oblique() * point;
   double nearest = reach;
   for (double radius = std::min(edge_, reach);; radius = std::min(2 * radius, reach)) {
-    visit_near(p, radius,
-               [&](const Corners& t) { nearest = std::min(nearest, distance_to_triangle(p, t)); });
+    visit_near(p, radius, [&](const Corners& t) {
+      nearest = std::min(nearest, (p - closest_on_triangle(p, t)).norm());
+    });
     if (nearest <= radius || radius == reach) return nearest;
   }
 }
@@ -196,7 +180,7 @@ Vec3 TriangleGrid::uniform_normal(const Vec3& point, double radius) const {
   std::vector<Vec3> normals;
   visit_near(p, radius, [&](const Corners& t) {
     const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-    if (!(normal.norm() > 0) || distance_to_triangle(p, t) > radius) return;
+    if (!(normal.norm() > 0) || (p - closest_on_triangle(p, t)).norm() > radius) return;
     mean += normal;
     normals.push_back(normal.normalized());
   });
@@ -214,7 +198,7 @@ double signed_distance(const scene::Sphere& ball, const Vec3& p) {
 }
 
 double signed_distance(const scene::Capsule& capsule, const Vec3& p) {
-  return distance_to_segment(p, capsule.from, capsule.to) - capsule.radius;
+  return (p - closest_on_segment(p, capsule.from, capsule.to)).norm() - capsule.radius;
 }
 
 double signed_distance(const scene::Box& box, const Vec3& p) {
