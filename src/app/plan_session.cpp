@@ -237,6 +237,7 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   s.take(request.plan);
   solve::Settings with = s.settings;
   with.path.accuracy = request.accuracy;
+  with.finds_other_rest = request.other_rest;
   with.abandoned = request.abandoned;
   with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional)};
   answer.summary = s.search(with, start);

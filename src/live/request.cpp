@@ -60,9 +60,9 @@ void read_accuracy(const json& value, Request& request) {
   request.accuracy = value.get<double>();
 }
 
-void read_tangents(const json& value, Request& request) {
-  if (!value.is_boolean()) refuse_value("tangents", "true or false", value);
-  request.tangents = value.get<bool>();
+bool read_flag(const json& value, const char* name) {
+  if (!value.is_boolean()) refuse_value(name, "true or false", value);
+  return value.get<bool>();
 }
 
 void read_gradient_of(const json& value, Request& request) {
@@ -82,6 +82,16 @@ void read_base(const json& value, Request& request) {
   if (value == "rest" || value == "scene") return;
   if (!value.is_object()) refuse_value("base", "\"rest\", \"scene\" or a plan", value);
   request.base = read_plan(value, "base");
+}
+
+/// After `base`.
+void read_other_rest(const json& value, Request& request) {
+  request.other_rest = read_flag(value, "other_rest");
+  if (request.other_rest && request.base)
+    base::refuse(
+        "other_rest is searched for from the state before the bones move, not from a "
+        "plan; leave base out");
+  if (request.other_rest) request.from_rest = true;
 }
 
 void read_points(const json& value, Request& request) {
@@ -122,9 +132,11 @@ const std::vector<VerbMembers>& verbs() {
        Verb::solve,
        {{"plan", [](const json& value, Request& r) { r.plan = read_plan(value, "plan"); }},
         {"accuracy", read_accuracy},
-        {"tangents", read_tangents},
+        {"tangents",
+         [](const json& value, Request& r) { r.tangents = read_flag(value, "tangents"); }},
         {"gradient_of", read_gradient_of},
         {"base", read_base},
+        {"other_rest", read_other_rest},
         {"points", read_points}}},
       {"change",
        Verb::change,

@@ -222,6 +222,11 @@ json Service::write_gradient(const solve::Gradient& gradient) const {
           {"convex", gradient.convex}};
 }
 
+json write_other_rest(const solve::Outcome& last) {
+  if (!last.other) return {};
+  return {{"distance", last.other->distance}, {"place", last.other->place}};
+}
+
 void Service::solve(const Request& request, Reply& reply) {
   find_visible();
   PlanSession::Request requested;
@@ -233,6 +238,7 @@ void Service::solve(const Request& request, Reply& reply) {
   for (const PlanSession::Piece& piece : session_->pieces()) scenes.push_back(piece.scenes);
   const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
   if (!request.from_rest) requested.base = &from;
+  requested.other_rest = request.other_rest;
   requested.abandoned = [this] { return requests_->superseded(ends_a_solve); };
   const double before = base::cpu_seconds();
   const PlanSession::Answer answer = session_->solve(requested);
@@ -244,6 +250,7 @@ void Service::solve(const Request& request, Reply& reply) {
   head["reason"] = path.last.reason;
   head["evaluations"] = answer.summary.evaluations;
   head["from_base"] = answer.from_base;
+  if (request.other_rest) head["other_rest"] = write_other_rest(path.last);
   head["seconds"] = base::cpu_seconds() - before;
   if (answer.summary.gradient) head["gradient"] = write_gradient(*answer.summary.gradient);
   if (base::rank(comm_) > 0) return;

@@ -47,6 +47,21 @@ def test_answers_do_not_depend_on_their_order(session):
         assert distance(first, fresh.solve(A)) < ROUNDING
 
 
+def test_another_rest_position_is_looked_for_on_request(session):
+    """Tissue of the chin rests on either side of the edge of its cut, by 0.13 mm of the skin."""
+    plan = {"maxilla": {"translate": [0, -3, 0]}, "mandible": {"translate": [0, -4, 0]},
+            "chin": {"translate": [0, -6, 0]}}
+    plain = session.solve(plan, accuracy=0.01, base="rest")
+    face = session.solve(plan, accuracy=0.01, other_rest=True)
+    assert plain.other_rest is None and "other_rest" not in plain.info
+    assert face.converged and face.info["evaluations"] > plain.info["evaluations"]
+    assert 0.05 < face.other_rest["distance"] < 0.5 and len(face.other_rest["place"]) == 3
+    with pytest.raises(repose.Refused, match="not from a plan; leave base out"):
+        session.ask({"do": "solve", "plan": plan, "base": plan, "other_rest": True})
+    with pytest.raises(repose.Refused, match="other_rest must be true or false, not '1'"):
+        session.ask({"do": "solve", "plan": plan, "other_rest": 1})
+
+
 def test_tangents_predict_a_face_nearby(session):
     face = session.solve(A, accuracy=0.01, tangents=True)
     assert not face.tangent.missing and len(face.tangent.columns) == 18

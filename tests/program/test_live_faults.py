@@ -75,21 +75,25 @@ def test_every_nth_answer_is_solved_again_from_a_cold_start(small):
 class Cold:
     """A solver whose face is given."""
 
-    def __init__(self, position, converged=True):
+    def __init__(self, position, converged=True, other=None):
         self.face = repose.Face({}, position, position, None, 0.001, converged, {}, None,
-                                {"reason": "the limit of iterations"})
+                                {"reason": "the limit of iterations", "other_rest": other})
         self.closed = False
 
-    def solve(self, plan, accuracy, base):
-        assert base == "rest"
+    def solve(self, plan, accuracy, other_rest):
+        assert other_rest
         return self.face
 
     def close(self):
         self.closed = True
 
 
+OTHER = {"distance": 0.61, "place": [7.2, 8, 9]}
+
+
 @pytest.mark.parametrize("shift, converged, words", [
-    (0.0, True, "the same face within 0.000 mm"),
+    (0.0, True, "the same face within 0.000 mm; at [7, 8, 9] mm tissue has another rest position, 0.61 mm "
+                "away"),
     (0.9, True, "NOT verified: a search from a cold start ends 0.90 mm away, at [7, 8, 9] mm"),
     (0.0, False, "not verified: the search from a cold start ended with the limit of iterations")])
 def test_a_face_that_differs_is_reported(shift, converged, words):
@@ -97,7 +101,7 @@ def test_a_face_that_differs_is_reported(shift, converged, words):
     other = position + [[0, 0, 0], [0, shift, 0]]
 
     def start():
-        cold.append(Cold(other, converged))
+        cold.append(Cold(other, converged, OTHER))
         return cold[-1]
     verifier = Verifier(start, 1)
     verifier.add(PLAN, position, 0.1)

@@ -88,6 +88,12 @@ class Face:
     gradient: object = None   # Gradient, where requested
 
     @property
+    def other_rest(self):
+        """{"distance": mm, largest over the skin, "place": on the initial skin, mm} of another rest
+        position, of more energy; None where none was found or searched for."""
+        return self.info.get("other_rest")
+
+    @property
     def displacement(self):
         return self.position - self.initial
 
@@ -186,13 +192,18 @@ class Session:
         self._take_description(*self.ask({"do": "change", **values}))
         self.changes = values
 
-    def solve(self, plan, accuracy=None, tangents=False, base="scene", gradient_of=None):
+    def solve(self, plan, accuracy=None, tangents=False, base="scene", gradient_of=None,
+              other_rest=False):
         """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
         "scene", the plan of the scene's moves, "rest", the initial state, or another plan. `gradient_of`
         {row: [x, y, z]}: weights of points of the skin, by the derivatives of whose sum Σ w · x the face
-        has a `gradient`."""
+        has a `gradient`. With `other_rest` the search begins at the initial state and looks for another
+        rest position, which contact may allow: the face is that of less energy, and its `other_rest`
+        says how far and where the skin of the other one is."""
         request = {"do": "solve", "plan": _plain(plan), "tangents": tangents,
                    "base": base if isinstance(base, str) else _plain(base)}
+        if other_rest:
+            request |= {"base": "rest", "other_rest": True}
         if accuracy is not None:
             request["accuracy"] = accuracy
         if gradient_of:

@@ -10,8 +10,8 @@ ROUNDING = 0.005  # mm
 
 @dataclasses.dataclass
 class Verification:
-    """An answer beside that of a solver of its own, which was started for it and began at the initial
-    state. `agrees`: their distance is within the accuracy of both."""
+    """An answer beside that of a solver of its own, which was started for it, began at the initial state
+    and looked for another rest position. `agrees`: their distance is within the accuracy of both."""
     plan: dict
     distance: float  # mm, largest over the skin
     agrees: bool
@@ -81,7 +81,7 @@ class Verifier:
         try:
             if changes:
                 cold.change(**changes)
-            face = cold.solve(plan, accuracy, base="rest")
+            face = cold.solve(plan, accuracy, other_rest=True)
         finally:
             with self._lock:
                 self._cold = None
@@ -94,6 +94,9 @@ class Verifier:
             message = f"not verified: the search from a cold start ended with {face.info['reason']}"
         elif agrees:
             message = f"verified from a cold start: the same face within {apart.max():.3f} mm"
+            if face.other_rest:
+                message += (f"; at {np.round(face.other_rest['place']).astype(int).tolist()} mm tissue has "
+                            f"another rest position, {face.other_rest['distance']:.2f} mm away")
         else:
             message = (f"NOT verified: a search from a cold start ends {apart.max():.2f} mm away, at "
                        f"{np.round(position[apart.argmax()]).astype(int).tolist()} mm; there may be two "

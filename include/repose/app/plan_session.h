@@ -35,6 +35,7 @@ class PlanSession {
     /// Weights w by row of the point, on rank 0: the gradient of Σ w · x by the same; empty: none.
     std::vector<std::pair<int64_t, Vec3>> functional = {};
     const Placements* base = nullptr;  ///< where it begins; null: the initial state
+    bool other_rest = false;           ///< from the initial state, search for another rest position
     std::function<bool()> abandoned;   ///< as solve::Settings
   };
   struct Answer {
