@@ -13,7 +13,7 @@ namespace {
 
 constexpr double crown = 11;   // mm, of an incisor, from its edge
 constexpr double rough = 0.6;  // mm, by which mucosa may end farther from teeth than the gap
-constexpr double range = 6;    // mm, from which the film is open
+constexpr double range = 2;    // mm off the plane, for 1/√2 of the largest tension
 
 /// Three columns that end in a bone, far from one line; none where there are no such.
 std::optional<std::array<int64_t, 3>> frame_of(const ColumnLayout& layout, int32_t bone) {

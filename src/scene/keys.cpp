@@ -406,38 +406,39 @@ std::vector<Key> solve_keys() {
 }
 
 std::vector<Key> anatomy_keys() {
-  return {{"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
-          {"anatomy.landmarks", file, "required",
-           "Landmarks under their standard names: .mrk.json, .fcsv, .csv or JSON; moves may name "
-           "them."},
-          one_of("anatomy.lips", "parted", {"parted", "joined"},
-                 "Lips are parted along their crease, between the corners of the mouth, or joined "
-                 "as in the scan; the key mouth overrides it."),
-          one_of("anatomy.vestibule", "on", {"on", "off"},
-                 "Lips and cheeks in front of the teeth, from sulcus to sulcus, touch bone and are "
-                 "not attached to it; tissue.attach_regions override it."),
-          {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
-           Range::between(0, 10)},
-          {"anatomy.lower_gap", number, "",
-           "The gap in front of the lower teeth; unset, half of the overjet, at least gap and at "
-           "most 4 mm.",
-           "mm", Range::between(0, 10)},
-          {"anatomy.adhesion", number, "0.0005",
-           "Largest tension with which lips adhere to the teeth of their own jaw: reached 2 mm "
-           "farther from them than at the start, gone at 6 mm.",
-           "N/mm²", Range::between(0, 1)},
-          {"anatomy.tone", number, "0.004",
-           "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
-           "between the lips, balanced as the head is recorded.",
-           "N/mm²", Range::between(0, 1)},
-          {"anatomy.pedicle", number, "0.5",
-           "Least share of the tissue on the piece of a genioplasty that tissue.release leaves "
-           "attached, by area of skin; 0 sets no limit.",
-           "", Range::between(0, 1)},
-          {"anatomy.septum", number, "",
-           "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal "
-           "spine to pronasale to nasion; tissue.material.regions override it.",
-           "N/mm²", Range::between(1e-9, 1e9)}};
+  return {
+      {"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
+      {"anatomy.landmarks", file, "required",
+       "Landmarks under their standard names: .mrk.json, .fcsv, .csv or JSON; moves may name "
+       "them."},
+      one_of("anatomy.lips", "parted", {"parted", "joined"},
+             "Lips are parted along their crease, between the corners of the mouth, or joined "
+             "as in the scan; the key mouth overrides it."),
+      one_of("anatomy.vestibule", "on", {"on", "off"},
+             "Lips and cheeks in front of the teeth, from sulcus to sulcus, touch bone and are "
+             "not attached to it; tissue.attach_regions override it."),
+      {"anatomy.gap", number, "1", "Gap of the vestibule between mucosa and teeth.", "mm",
+       Range::between(0, 10)},
+      {"anatomy.lower_gap", number, "",
+       "The gap in front of the lower teeth; unset, half of the overjet, at least gap and at "
+       "most 4 mm.",
+       "mm", Range::between(0, 10)},
+      {"anatomy.adhesion", number, "0.0005",
+       "Largest tension with which lips adhere to the teeth of their own jaw; 2 mm farther from "
+       "them than at the start it is 0.7 of that.",
+       "N/mm²", Range::between(0, 1)},
+      {"anatomy.tone", number, "0.006",
+       "Tone of the ring muscle of the mouth in a solid: stress along its fibers at the line "
+       "between the lips, balanced as the head is recorded.",
+       "N/mm²", Range::between(0, 1)},
+      {"anatomy.pedicle", number, "0.5",
+       "Least share of the tissue on the piece of a genioplasty that tissue.release leaves "
+       "attached, by area of skin; 0 sets no limit.",
+       "", Range::between(0, 1)},
+      {"anatomy.septum", number, "",
+       "Young's modulus of the nose within 5 mm of its septum's free edges, from the nasal "
+       "spine to pronasale to nasion; tissue.material.regions override it.",
+       "N/mm²", Range::between(1e-9, 1e9)}};
 }
 
 std::vector<Key> osteotomy_keys() {

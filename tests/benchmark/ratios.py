@@ -61,7 +61,7 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "skin 0.15": ("", ", material: {preset: face, skin: {thickness: 1.5, young: 0.15}}"),
         "joined lips": (", lips: joined", ""), "septum 0.2": (", septum: 0.2", ""),
         "septum 1": (", septum: 1", ""), "no tone": (", tone: 0", ""),
-        "tone 3": (", tone: 0.003", ""), "tone 5": (", tone: 0.005", ""), "tone 6": (", tone: 0.006", ""),
+        "tone 4": (", tone: 0.004", ""), "tone 8": (", tone: 0.008", ""),
         "lower gap 1": (", lower_gap: 1", ""), "lower gap 2": (", lower_gap: 2", ""),
         "lower gap 4": (", lower_gap: 4", ""),
         "no tone, lower gap 1": (", tone: 0, lower_gap: 1", "")}

@@ -367,10 +367,10 @@ def adhesion(file, films, position, load):
     for point, bone, normal, area in films:
         turn, shift = moved[bone]
         way = position[point] - turn @ file.model["point/position"][point] - shift
-        s = np.clip((turn @ normal) @ way / reach, 0, 1)
-        most = 27 / 4 * area * file.adhesion["tension"]
-        energy += most * reach * (s**2 / 2 - 2 * s**3 / 3 + s**4 / 4)
-        force[point] -= most * s * (1 - s)**2 * (turn @ normal)
+        s = max(0, (turn @ normal) @ way / reach)
+        most = area * file.adhesion["tension"]
+        energy += most * reach * ((1 + s**2)**0.5 - 1)
+        force[point] -= most * s / (1 + s**2)**0.5 * (turn @ normal)
     return energy, force
 
 

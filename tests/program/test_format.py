@@ -100,7 +100,7 @@ def test_the_rule_of_adhesion_is_that_of_the_landmarks(lips):
         low = [right[0] - 12, upper[1] - 16, edge[2] - 11]
         high = [left[0] + 12, upper[1] + 38, edge[2] + 11]
         assert np.allclose(box, low + high, rtol=0, atol=1e-9) and abs(reach - far) < 1e-9
-    assert lips.adhesion == {"tension": 5e-4, "range": 6}
+    assert lips.adhesion == {"tension": 5e-4, "range": 2}
 
 
 def tissue(result, arrays, films=(), load=0):

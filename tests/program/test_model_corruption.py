@@ -49,7 +49,7 @@ def springs(file):
     contact["wall/point"] = np.array([0, 1, 3, 4, 0, 2, 3, 5])
     contact["wall/weight"], contact["wall/area"] = np.ones(8), np.zeros(4)
     adhesion = model.create_group("adhesion")
-    adhesion.attrs["tension"], adhesion.attrs["range"] = 5e-4, 6.0
+    adhesion.attrs["tension"], adhesion.attrs["range"] = 5e-4, 2.0
     adhesion["bone"], adhesion["upper"] = np.zeros(1, np.int32), np.ones(1, np.int8)
     adhesion["box"], adhesion["reach"] = np.array([[0, 0, 0, 9, 9, 9.0]]), np.ones(1)
     adhesion["lip_line"], adhesion["cut_column"] = np.eye(3), np.array([1, 2])

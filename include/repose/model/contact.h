@@ -63,10 +63,10 @@ struct AdhesionRule {
     Vec3 low, high;      ///< mm, corners of the box that they lie in
     double reach = 0;    ///< mm, largest distance to the bone
   };
-  double tension = 0;                ///< N/mm², the largest
-  double range = 0;                  ///< mm, the opening beyond which there is no tension
-  std::array<Vec3, 3> lip_line;      ///< mm, right corner of the mouth, stomion, left corner
-  std::vector<Jaw> jaws;             ///< the upper one first
+  double tension = 0;            ///< N/mm², the largest
+  double range = 0;              ///< mm off the plane, at which tension is 1/√2 of the largest
+  std::array<Vec3, 3> lip_line;  ///< mm, right corner of the mouth, stomion, left corner
+  std::vector<Jaw> jaws;         ///< the upper one first
   std::vector<int64_t> cut_columns;  ///< on the path of a cut: none of their points adheres
 };
 

@@ -280,7 +280,7 @@ struct AnatomyPlan {
   double gap = 1;                   ///< mm, of the vestibule, between mucosa and teeth
   std::optional<double> lower_gap;  ///< mm, below stomion; unset: by the overjet
   double adhesion = 5e-4;  ///< N/mm², largest tension between lips and the teeth of their jaw
-  double tone = 0.004;     ///< N/mm², of the ring muscle at the line between the lips
+  double tone = 0.006;     ///< N/mm², of the ring muscle at the line between the lips
   double pedicle = 0.5;  ///< least share of the tissue on a genioplasty's piece that stays attached
 };
 

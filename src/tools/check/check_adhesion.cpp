@@ -193,14 +193,13 @@ std::vector<FilmState> evaluate(const Model& model, const std::vector<Film>& fil
     const Vec3 normal = turn * film.normal, &at = position[film.point];
     const double range = model.adhesion->range, s = normal.dot(at - start) / range;
     FilmState state{0, Vec3::Zero(), 0};
-    const double full = film.tension * range * 27 / 4;
-    if (s >= 1) state.energy = full / 12;
-    if (s > 0 && s < 1) {
-      state.energy = full * (s * s / 2 - 2 * s * s * s / 3 + s * s * s * s / 4);
-      state.force = -film.tension * 27 / 4 * s * (1 - s) * (1 - s) * normal;
+    if (s > 0) {
+      const double root = std::hypot(1.0, s);
+      state.energy = film.tension * range * (root - 1);
+      state.force = -film.tension * s / root * normal;
     }
     const double size = at.lpNorm<Eigen::Infinity>();
-    state.noise = film.tension * 27 / 4 * size * (1 / range + 1 / film.distance);
+    state.noise = film.tension * size * (1 / range + 1 / film.distance);
     states.push_back(state);
   }
   return states;

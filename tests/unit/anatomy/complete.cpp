@@ -130,7 +130,7 @@ TEST(CompleteScene, AMissingSulcusLeavesTheVestibuleOut) {
 }
 
 TEST(CompleteScene, TheToneIsStatedOrWhyThereIsNone) {
-  EXPECT_TRUE(says(complete_shipped(), "ring muscle by landmarks: a tone of up to 0.004 N/mm²"));
+  EXPECT_TRUE(says(complete_shipped(), "ring muscle by landmarks: a tone of up to 0.006 N/mm²"));
   const Completed without = complete_shipped({"b_soft"});
   EXPECT_TRUE(says(without, "landmark b_soft is missing, so the ring muscle has no tone"));
 }

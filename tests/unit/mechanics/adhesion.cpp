@@ -3,14 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "states.h"
 
-/// The cohesive law in closed form, and its derivatives on either side of its largest tension.
+/// The law in closed form, and its derivatives.
 namespace repose::mechanics {
 namespace adhesion_test {
 
-constexpr double offset = 2, force = 3, range = 6;  // mm, N, mm
+constexpr double offset = 2, force = 3, range = 2;  // mm, N, mm
 
 /// Places of the tissue's point, so far from where the film begins to open, and of a bone in z = 0.
 std::vector<Vec3> places(double opened) {
@@ -24,20 +25,30 @@ double energy(const std::vector<Vec3>& x, Eigen::VectorXd& gradient) {
   return DifferentiatedTerm<Adhesion>().gradient(x, numbers, gradient);
 }
 
-TEST(Adhesion, HasItsLargestTensionAtAThirdOfItsRangeAndNoneBeyond) {
+TEST(Adhesion, GrowsToItsLargestTensionAndNeverFalls) {
   Eigen::VectorXd gradient;
   EXPECT_EQ(energy(places(-1), gradient), 0);
   EXPECT_EQ(gradient.norm(), 0);
-  energy(places(range / 3), gradient);
-  EXPECT_NEAR(gradient[2], force, 1e-14);
-  EXPECT_NEAR(gradient[5] + gradient[8] + gradient[11], -force, 1e-14) << "on the bone";
-  for (const double opened : {0.1, 1.0, 3.0, 5.9}) {
+  EXPECT_NEAR(energy(places(range), gradient), force * range * (std::sqrt(2.0) - 1), 1e-14);
+  EXPECT_NEAR(gradient[2], force / std::sqrt(2.0), 1e-14);
+  EXPECT_NEAR(gradient[5] + gradient[8] + gradient[11], -gradient[2], 1e-14) << "on the bone";
+  double before = 0;
+  for (const double opened : {1e-6, 0.1, 1.0, 6.0, 40.0}) {
     energy(places(opened), gradient);
-    EXPECT_GT(gradient[2], 0) << opened;
+    EXPECT_GT(gradient[2], before) << opened;
     EXPECT_LT(gradient[2], force) << opened;
+    before = gradient[2];
   }
-  EXPECT_NEAR(energy(places(range + 1), gradient), 0.5625 * force * range, 1e-14);
-  EXPECT_EQ(gradient.norm(), 0);
+  EXPECT_GT(before, 0.99 * force);
+}
+
+TEST(Adhesion, IsConvexInTheTissuesPosition) {
+  for (const double opened : {-1.0, 0.5, 1.5, 12.0}) {
+    const Mat3 own =
+        DifferentiatedTerm<Adhesion>().hessian(places(opened), numbers).topLeftCorner<3, 3>();
+    EXPECT_GE(own(2, 2), 0) << opened;
+    EXPECT_EQ(own.norm(), own(2, 2)) << opened;
+  }
 }
 
 TEST(Adhesion, GoesWithTheBone) {
