@@ -1,10 +1,9 @@
 #include "reader.h"
 
-#include "stored_array.h"
-
 namespace repose::results {
 
 using base::check_hdf5;
+using base::StoredArray;
 
 namespace {
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <hdf5.h>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -76,10 +77,33 @@ Hdf5Group create_hdf5_group(hid_t place, const char* name);
 /// Returns whether there is something at a path whose parent exists.
 bool hdf5_has(hid_t file, const std::string& path);
 
-/// All numbers of a dataset, as doubles.
-std::vector<double> read_hdf5_numbers(hid_t file, const std::string& path);
+/// A dataset or an attribute of an open file, read the same way. Failures of HDF5 are Hdf5Error;
+/// what the format does not allow is an InputError whose text begins with `where`.
+class StoredArray {
+ public:
+  /// `where`: file and path, as a message names it.
+  StoredArray(Hdf5Dataset dataset, std::string where);
+  StoredArray(Hdf5Attribute attribute, std::string where);
 
-/// The first string of a dataset, of fixed or variable length.
-std::string read_hdf5_text(hid_t file, const std::string& path);
+  const std::vector<int64_t>& shape() const { return shape_; }
+  int64_t size() const;
+  std::vector<double> numbers() const;
+  std::vector<int64_t> whole_numbers() const;
+  std::vector<std::string> strings() const;
+
+ private:
+  void inspect();
+  void read(hid_t memory_type, void* data) const;
+  std::vector<std::string> variable_strings() const;
+  std::vector<std::string> fixed_strings() const;
+  [[noreturn]] void refuse_type(const char* expected) const;
+
+  Hdf5Dataset dataset_;
+  Hdf5Attribute attribute_;
+  Hdf5Type type_;
+  Hdf5Space space_;
+  std::vector<int64_t> shape_;
+  std::string where_;
+};
 
 }  // namespace repose::base

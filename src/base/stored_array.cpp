@@ -1,11 +1,8 @@
-#include "stored_array.h"
-
 #include <cmath>
 
-namespace repose::results {
+#include "repose/base/hdf5.h"
 
-using base::check_hdf5;
-using base::refuse;
+namespace repose::base {
 
 namespace {
 
@@ -37,7 +34,7 @@ std::string describe(hid_t type) {
 
 }  // namespace
 
-StoredArray::StoredArray(base::Hdf5Dataset dataset, std::string where)
+StoredArray::StoredArray(Hdf5Dataset dataset, std::string where)
     : dataset_(std::move(dataset)),
       type_(H5Dget_type(dataset_)),
       space_(H5Dget_space(dataset_)),
@@ -45,7 +42,7 @@ StoredArray::StoredArray(base::Hdf5Dataset dataset, std::string where)
   inspect();
 }
 
-StoredArray::StoredArray(base::Hdf5Attribute attribute, std::string where)
+StoredArray::StoredArray(Hdf5Attribute attribute, std::string where)
     : attribute_(std::move(attribute)),
       type_(H5Aget_type(attribute_)),
       space_(H5Aget_space(attribute_)),
@@ -114,7 +111,7 @@ std::vector<std::string> StoredArray::strings() const {
 
 std::vector<std::string> StoredArray::variable_strings() const {
   std::vector<char*> pointers(size(), nullptr);
-  const base::Hdf5Type memory(H5Tcopy(type_));
+  const Hdf5Type memory(H5Tcopy(type_));
   read(memory, pointers.data());
   std::vector<std::string> result;
   for (const char* text : pointers) result.emplace_back(text ? text : "");
@@ -124,7 +121,7 @@ std::vector<std::string> StoredArray::variable_strings() const {
 
 std::vector<std::string> StoredArray::fixed_strings() const {
   const size_t width = H5Tget_size(type_) + 1;
-  const base::Hdf5Type memory(H5Tcopy(H5T_C_S1));
+  const Hdf5Type memory(H5Tcopy(H5T_C_S1));
   check_hdf5(H5Tset_size(memory, width));
   check_hdf5(H5Tset_cset(memory, H5Tget_cset(type_)));
   std::vector<char> bytes(size() * width, '\0');
@@ -134,4 +131,4 @@ std::vector<std::string> StoredArray::fixed_strings() const {
   return result;
 }
 
-}  // namespace repose::results
+}  // namespace repose::base
