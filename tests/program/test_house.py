@@ -30,7 +30,7 @@ ROOMS = {
     "tools/check": {"base", "model", "mechanics", "results"},
     "tools/comparison": {"base", "surface", "imaging", "meshtools"},
     "tools/decimation": {"base", "surface"},
-    "tools/phantom": {"base", "surface"},
+    "tools/phantom": {"base", "scene", "surface"},
     "tools/range_scan": {"base", "surface"},
     "tools/registration": {"base", "surface"},
 }

@@ -59,11 +59,11 @@ const std::vector<Probe>& probes() {
   return table;
 }
 
-std::vector<Landmark> landmarks() {
-  std::vector<Landmark> result{{"condyle_right_center", {-50, 0, 0}},
-                               {"condyle_left_center", {50, 0, 0}}};
+std::map<std::string, Vec3> landmarks() {
+  std::map<std::string, Vec3> result{{"condyle_right_center", {-50, 0, 0}},
+                                     {"condyle_left_center", {50, 0, 0}}};
   for (const Probe& probe : probes())
-    result.push_back({probe.name, first_met(probe.solid, probe.from, probe.direction)});
+    result[probe.name] = first_met(probe.solid, probe.from, probe.direction);
   return result;
 }
 

@@ -1,8 +1,8 @@
-#include <cmath>
 #include <string_view>
 
 #include "repose/base/error.h"
 #include "repose/base/whole_file.h"
+#include "repose/scene/landmarks.h"
 #include "repose/surface/read.h"
 #include "repose/tools/phantom/phantom.h"
 
@@ -10,40 +10,25 @@ namespace repose::tools::phantom {
 using namespace surface;
 namespace {
 
-std::string coordinates(const Vec3& point) {
-  // Adding 0 turns −0, which some readers print, into 0; so does rounding to the last digit shown.
-  const auto tidy = [](double x) { return std::round(x * 1e4) / 1e4 + 0.0; };
-  return fmt::format("{:.4f}, {:.4f}, {:.4f}", tidy(point.x()), tidy(point.y()), tidy(point.z()));
+using Landmarks = std::map<std::string, Vec3>;
+
+/// Rounds positions to the digits that files hold. Adding 0 turns −0, which some readers print,
+/// into 0.
+Landmarks rounded(Landmarks landmarks) {
+  for (auto& [name, at] : landmarks) at = (at.array() * 1e4).round() / 1e4 + 0.0;
+  return landmarks;
 }
 
-std::string landmarks_json(const std::vector<Landmark>& landmarks) {
+std::string landmarks_json(const Landmarks& landmarks) {
   std::string text = "{\n";
-  for (const Landmark& landmark : landmarks)
-    text += fmt::format("  \"{}\": [{}],\n", landmark.name, coordinates(landmark.position));
+  for (const auto& [name, at] : landmarks)
+    text += fmt::format("  \"{}\": [{:.4f}, {:.4f}, {:.4f}],\n", name, at.x(), at.y(), at.z());
   text +=
       "  \"condyle_axis\": {\n"
       "    \"point\": [0.0, 0.0, 0.0],\n"
       "    \"direction_right_to_left\": [1.0, 0.0, 0.0]\n"
       "  }\n}\n";
   return text;
-}
-
-/// A list of fiducials as 3D Slicer's Markups module reads it.
-std::string fiducials_json(const std::vector<Landmark>& landmarks) {
-  std::string points;
-  for (size_t i = 0; i < landmarks.size(); ++i)
-    points += fmt::format(
-        "        {{\"id\": \"{}\", \"label\": \"{}\", \"position\": [{}], "
-        "\"positionStatus\": \"defined\"}}{}\n",
-        i + 1, landmarks[i].name, coordinates(landmarks[i].position),
-        i + 1 < landmarks.size() ? "," : "");
-  return "{\n"
-         "  \"@schema\": \"https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/"
-         "Markups/Resources/Schema/markups-schema-v1.0.3.json#\",\n"
-         "  \"markups\": [\n    {\n      \"type\": \"Fiducial\",\n"
-         "      \"coordinateSystem\": \"LPS\",\n      \"coordinateUnits\": \"mm\",\n"
-         "      \"controlPoints\": [\n" +
-         points + "      ]\n    }\n  ]\n}\n";
 }
 
 struct SceneText {
@@ -104,8 +89,9 @@ std::vector<std::filesystem::path> write_phantom(const std::filesystem::path& pr
   write_ply(named("_skin.ply"), phantom.skin);
   write_ply(named("_skull.ply"), phantom.skull);
   write_ply(named("_mandible.ply"), phantom.mandible);
-  base::write_whole_file(named("_landmarks.json"), landmarks_json(phantom.landmarks));
-  base::write_whole_file(named(".mrk.json"), fiducials_json(phantom.landmarks));
+  const Landmarks landmarks = rounded(phantom.landmarks);
+  base::write_whole_file(named("_landmarks.json"), landmarks_json(landmarks));
+  base::write_whole_file(named(".mrk.json"), scene::markups_text(landmarks));
   const std::string stem = prefix.filename().string();
   base::write_whole_file(named("_jaw_opening.yaml"), scene_yaml(opening, tissue, stem));
   base::write_whole_file(named("_jaw_advance.yaml"), scene_yaml(advance, tissue, stem));

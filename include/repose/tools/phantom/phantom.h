@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -24,16 +25,11 @@ struct PhantomOptions {
 constexpr int64_t phantom_vertices_min = 477, phantom_vertices_max = 2'000'000;
 constexpr double phantom_bone_edge_min = 0.5, phantom_bone_edge_max = 6;
 
-struct Landmark {
-  std::string name;
-  Vec3 position;  ///< mm
-};
-
 struct Phantom {
   Surface skin;      ///< annulus (V − E + F = 0), two border loops: mouth and outer rim
   Surface skull;     ///< closed, one component, outward
   Surface mandible;  ///< closed, one component, outward
-  std::vector<Landmark> landmarks;
+  std::map<std::string, Vec3> landmarks;  ///< mm, by name
 };
 
 /// The skin alone: exactly `vertices` points on the analytic surface, triangles close to
