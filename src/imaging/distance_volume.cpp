@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 
 namespace repose::imaging {
@@ -110,16 +111,12 @@ Volume distance_volume(const Surface& surface, Volume grid, double reach) {
 }
 
 Volume distance_volume(const Surface& surface, double voxel, double margin, double reach) {
-  Vec3 low = surface.points.front(), high = low;
-  for (const Vec3& point : surface.points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
+  const Eigen::AlignedBox3d box = bounding_box(surface.points);
   Volume grid;
   grid.axes = voxel * Mat3::Identity();
-  grid.origin = low - Vec3::Constant(margin);
+  grid.origin = box.min() - Vec3::Constant(margin);
   for (int a = 0; a < 3; ++a)
-    grid.size[a] = 2 + static_cast<int64_t>((high[a] - low[a] + 2 * margin) / voxel);
+    grid.size[a] = 2 + static_cast<int64_t>((box.sizes()[a] + 2 * margin) / voxel);
   grid.values.assign(grid.size[0] * grid.size[1] * grid.size[2], 1);
   return distance_volume(surface, std::move(grid), reach);
 }

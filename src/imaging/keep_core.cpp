@@ -13,7 +13,6 @@ using Mask = std::vector<char>;
 Mask largest_part(const Volume& volume, double level) {
   Mask seen(volume.values.size(), 0);
   std::vector<int64_t> largest, part;
-  const std::array<int64_t, 3> step{1, volume.size[0], volume.size[0] * volume.size[1]};
   const auto add = [&](int64_t voxel) {
     if (seen[voxel] || volume.values[voxel] < level) return;
     seen[voxel] = 1;
@@ -22,12 +21,7 @@ Mask largest_part(const Volume& volume, double level) {
   for (int64_t first = 0; first < static_cast<int64_t>(seen.size()); ++first) {
     part.clear();
     add(first);
-    for (size_t next = 0; next < part.size(); ++next)
-      for (int axis = 0; axis < 3; ++axis) {
-        const int64_t voxel = part[next], along = voxel / step[axis] % volume.size[axis];
-        if (along > 0) add(voxel - step[axis]);
-        if (along + 1 < volume.size[axis]) add(voxel + step[axis]);
-      }
+    for (size_t next = 0; next < part.size(); ++next) volume.visit_neighbors(part[next], add);
     if (part.size() > largest.size()) largest.swap(part);
   }
   Mask mask(seen.size(), 0);

@@ -95,20 +95,14 @@ void keep_outside(double radius, Volume& distance) {
   std::vector<char> reached(distance.values.size(), 0);
   std::vector<int64_t> front{0};
   reached[0] = 1;
-  const std::array<int64_t, 3> step{1, distance.size[0], distance.size[0] * distance.size[1]};
   while (!front.empty()) {
     const int64_t voxel = front.back();
     front.pop_back();
-    for (int axis = 0; axis < 3; ++axis) {
-      const int64_t along = voxel / step[axis] % distance.size[axis];
-      for (const int64_t side : {-1, 1}) {
-        if (along + side < 0 || along + side >= distance.size[axis]) continue;
-        const int64_t next = voxel + side * step[axis];
-        if (reached[next] || distance.values[next] < radius) continue;
-        reached[next] = 1;
-        front.push_back(next);
-      }
-    }
+    distance.visit_neighbors(voxel, [&](int64_t next) {
+      if (reached[next] || distance.values[next] < radius) return;
+      reached[next] = 1;
+      front.push_back(next);
+    });
   }
   for (size_t v = 0; v < reached.size(); ++v)
     distance.values[v] = reached[v] || distance.values[v] < radius ? -distance.values[v] : 0;
@@ -126,12 +120,7 @@ Volume thinned(const Volume& volume, int64_t stride) {
 }
 
 double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
-  Vec3 low = surface.points.front(), high = low;
-  for (const Vec3& point : surface.points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
-  const Vec3 size = high - low + Vec3::Constant(2 * margin);
+  const Vec3 size = bounding_box(surface.points).sizes() + Vec3::Constant(2 * margin);
   return std::max(rolling.voxel, std::cbrt(size.prod() / max_voxels));
 }
 

@@ -142,10 +142,8 @@ std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
 std::vector<int64_t> coincident_points(const std::vector<Vec3>& points) {
   std::vector<int64_t> first(points.size());
   if (points.empty()) return first;
-  Vec3 minimum = points[0];
-  for (const auto& point : points) minimum = minimum.cwiseMin(point);
   const double tolerance = std::max(1e-9 * bounding_diagonal(points), 1e-300);
-  PointGrid grid(points, minimum, tolerance);
+  PointGrid grid(points, bounding_box(points).min(), tolerance);
   for (size_t i = 0; i < points.size(); ++i) {
     const auto number = static_cast<int64_t>(i);
     const int64_t found = grid.find(points[i]);
@@ -155,14 +153,14 @@ std::vector<int64_t> coincident_points(const std::vector<Vec3>& points) {
   return first;
 }
 
+Eigen::AlignedBox3d bounding_box(const std::vector<Vec3>& points) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& point : points) box.extend(point);
+  return box;
+}
+
 double bounding_diagonal(const std::vector<Vec3>& points) {
-  if (points.empty()) return 0;
-  Vec3 minimum = points[0], maximum = points[0];
-  for (const auto& point : points) {
-    minimum = minimum.cwiseMin(point);
-    maximum = maximum.cwiseMax(point);
-  }
-  return (maximum - minimum).norm();
+  return points.empty() ? 0 : bounding_box(points).diagonal().norm();
 }
 
 double six_volumes(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {

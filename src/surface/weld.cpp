@@ -5,6 +5,7 @@
 #include "repose/surface/edges.h"
 #include "repose/surface/intersections.h"
 #include "repose/surface/read.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::surface {
 namespace {
@@ -25,17 +26,6 @@ void drop_duplicates(std::vector<Triangle>& triangles) {
   });
 }
 
-int longest_side(const Surface& surface, const Triangle& t) {
-  int longest = 0;
-  double maximum = -1;
-  for (int k = 0; k < 3; ++k) {
-    const double length = (surface.points[t[(k + 1) % 3]] - surface.points[t[k]]).squaredNorm();
-    if (length > maximum) longest = k;
-    maximum = std::max(maximum, length);
-  }
-  return longest;
-}
-
 /// A triangle without area has a vertex on its longest side: merely dropped, it would leave a slit.
 /// Where one triangle lies beyond that side, the pair u v b, v u d becomes b u d, d v b. One pass,
 /// each triangle at most once, orientation left to orient(); returns whether anything was flipped.
@@ -51,7 +41,7 @@ bool flip_flat_triangles(Surface& surface) {
     const HalfEdge& beyond = flat[edge[0].triangle] ? edge[1] : edge[0];
     Triangle &thin = surface.triangles[side.triangle], &wide = surface.triangles[beyond.triangle];
     if (touched[side.triangle] || touched[beyond.triangle]) continue;
-    if (longest_side(surface, thin) != side.corner) continue;
+    if (longest_edge(corners(surface, thin)) != side.corner) continue;
     const int64_t u = thin[side.corner], v = thin[(side.corner + 1) % 3];
     const int64_t b = thin[(side.corner + 2) % 3], d = wide[(beyond.corner + 2) % 3];
     if (b == d || edges.contains(b, d) || !made.insert(std::minmax(b, d)).second) continue;

@@ -26,6 +26,25 @@ struct Volume {
 
   int64_t index(int64_t i, int64_t j, int64_t k) const { return (k * size[1] + j) * size[0] + i; }
   float at(int64_t i, int64_t j, int64_t k) const { return values[index(i, j, k)]; }
+  /// (i, j, k) of a voxel, given as its row of `values` like those below.
+  std::array<int64_t, 3> index_of(int64_t voxel) const {
+    return {voxel % size[0], voxel / size[0] % size[1], voxel / size[0] / size[1]};
+  }
+  Vec3 center(int64_t voxel) const {  ///< mm, LPS
+    const auto [i, j, k] = index_of(voxel);
+    return origin +
+           axes * Vec3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
+  }
+  /// Calls visit(voxel) for the voxels that share a face with one.
+  template <class Visit>
+  void visit_neighbors(int64_t voxel, Visit&& visit) const {
+    int64_t stride = 1;
+    for (int axis = 0; axis < 3; stride *= size[axis++]) {
+      const int64_t along = voxel / stride % size[axis];
+      if (along > 0) visit(voxel - stride);
+      if (along + 1 < size[axis]) visit(voxel + stride);
+    }
+  }
   double spacing(int axis) const { return axes.col(axis).norm(); }  ///< mm
 };
 

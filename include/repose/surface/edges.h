@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
 #include <span>
@@ -85,6 +86,7 @@ std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
 /// diagonal), itself where there is none earlier. O(P) for points that do not crowd.
 std::vector<int64_t> coincident_points(const std::vector<Vec3>& points);
 
+Eigen::AlignedBox3d bounding_box(const std::vector<Vec3>& points);
 double bounding_diagonal(const std::vector<Vec3>& points);  ///< mm, 0 for no points
 
 /// Six times the signed volume under the triangles seen from the first point.

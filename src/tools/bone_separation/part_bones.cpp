@@ -54,7 +54,7 @@ class Bone {
   bool hold(const Vec3& point, double radius, uint8_t terminal, Terminals& terminals) const {
     bool found = false;
     for (size_t node = 0; node < voxels_.size(); ++node)
-      if ((center(voxels_[node]) - point).squaredNorm() <= radius * radius) {
+      if ((volume_.center(voxels_[node]) - point).squaredNorm() <= radius * radius) {
         terminals[node] = terminal;
         found = true;
       }
@@ -73,20 +73,9 @@ class Bone {
   }
 
  private:
-  std::array<int64_t, 3> index(int64_t voxel) const {
-    const auto& [columns, rows, slices] = volume_.size;
-    return {voxel % columns, voxel / columns % rows, voxel / columns / rows};
-  }
-
-  Vec3 center(int64_t voxel) const {
-    const auto [i, j, k] = index(voxel);
-    return volume_.origin + volume_.axes * Vec3(static_cast<double>(i), static_cast<double>(j),
-                                                static_cast<double>(k));
-  }
-
   /// The node of the next voxel along an axis; −1: none.
   int32_t next(int64_t voxel, int axis) const {
-    if (index(voxel)[axis] + 1 == volume_.size[axis]) return -1;
+    if (volume_.index_of(voxel)[axis] + 1 == volume_.size[axis]) return -1;
     const std::array<int64_t, 3> stride = {1, volume_.size[0], volume_.size[0] * volume_.size[1]};
     return node_[voxel + stride[axis]];
   }

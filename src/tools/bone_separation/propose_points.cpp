@@ -93,12 +93,7 @@ class Head {
   }
 
  private:
-  Vec3 center(int64_t voxel) const {
-    const auto& [columns, rows, slices] = volume_.size;
-    return volume_.origin + volume_.axes * Vec3(static_cast<double>(voxel % columns),
-                                                static_cast<double>(voxel / columns % rows),
-                                                static_cast<double>(voxel / columns / rows));
-  }
+  Vec3 center(int64_t voxel) const { return volume_.center(voxel); }
 
   double above_teeth(const Vec3& at) const {
     return at.z() - teeth_[0] - teeth_[1] * (at.y() - front_);
@@ -109,21 +104,10 @@ class Head {
            std::abs(at.x() - middle_) < slab_width;
   }
 
-  template <class Visit>
-  void visit_neighbors(int64_t voxel, const Visit& visit) const {
-    int64_t stride = 1, rest = voxel;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int64_t i = rest % volume_.size[axis];
-      if (i > 0) visit(voxel - stride);
-      if (i + 1 < volume_.size[axis]) visit(voxel + stride);
-      stride *= volume_.size[axis];
-      rest /= volume_.size[axis];
-    }
-  }
-
   bool is_inside(int64_t voxel) const {
     int count = 0;
-    visit_neighbors(voxel, [&](int64_t other) { count += volume_.values[other] >= level_; });
+    volume_.visit_neighbors(voxel,
+                            [&](int64_t other) { count += volume_.values[other] >= level_; });
     return count == 6;
   }
 
@@ -202,7 +186,7 @@ class Head {
       if (center(found[next]).z() > chin_ + jaw_height ||
           static_cast<double>(found.size()) * voxel_volume > jaw_volume)
         return {};
-      visit_neighbors(found[next], add);
+      volume_.visit_neighbors(found[next], add);
     }
     return found;
   }
