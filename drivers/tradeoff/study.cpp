@@ -12,10 +12,10 @@
 #include "repose/adapt/coarse_model.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/base/options.h"
 #include "repose/base/program.h"
-#include "repose/discrete/gather.h"
 #include "repose/meshtools/remesh.h"
 #include "repose/model/build.h"
 #include "repose/solve/prestress.h"
@@ -174,7 +174,7 @@ class Study {
     const solve::Summary summary =
         solve::find_repose(comm, made.model, settings, {},
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             run.position = discrete::gather_points(comm, rows.position);
+                             run.position = base::gather(comm, rows.position);
                            });
     Measurement& m = run.measurement;
     m.seconds = base::cpu_seconds() - begin;

@@ -9,9 +9,9 @@
 
 #include "repose/adapt/transfer.h"
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/base/options.h"
-#include "repose/discrete/gather.h"
 #include "repose/meshtools/remesh.h"
 #include "repose/model/motion.h"
 
@@ -78,7 +78,7 @@ class SequenceSolver {
     const solve::Summary summary =
         solve::find_repose(comm_, built.model, settings, start_for(built.model),
                            [&](const model::StepNumbers&, const model::StepRows& rows) {
-                             position = discrete::gather_points(comm_, rows.position);
+                             position = base::gather(comm_, rows.position);
                            });
     if (!summary.path.complete()) {
       sequence_.refusal =
@@ -89,7 +89,7 @@ class SequenceSolver {
     level.evaluations = summary.evaluations;
     level.assemblies = summary.assemblies;
     base::on_root(comm_, [&] { store(std::move(built), std::move(position), level); });
-    MPI_Bcast(&level.discretization_error, 1, MPI_DOUBLE, 0, comm_);
+    base::broadcast(comm_, level.discretization_error);
     level.seconds = MPI_Wtime() - begin;
     sequence_.levels.push_back(level);
     sequence_.last_settings = settings;
@@ -108,7 +108,7 @@ class SequenceSolver {
     double volume_ratio = 1;  // f_v of a strain grows with the volume of the prisms
     if (base::rank(comm_) == 0 && settings.weights.volume == mechanics::VolumeTerm::paper)
       volume_ratio = mean_volume(fine_) / mean_volume(model);
-    MPI_Bcast(&volume_ratio, 1, MPI_DOUBLE, 0, comm_);
+    base::broadcast(comm_, volume_ratio);
     settings.weights.volume_weight *= volume_ratio;
     return settings;
   }

@@ -45,8 +45,7 @@ void read_scene(const scene::Scene& scene, Job& job) {
 /// Brings the tissue of a distributed model into its initial equilibrium. Collective.
 void bring_into_equilibrium(MPI_Comm comm, Job& job) {
   solve::ReferenceState reference_state = job.reference_state.value_or(solve::ReferenceState{});
-  MPI_Bcast(&job.initial_equilibrium, 1, MPI_C_BOOL, 0, comm);
-  MPI_Bcast(&reference_state, sizeof reference_state, MPI_BYTE, 0, comm);
+  base::broadcast(comm, job.initial_equilibrium, reference_state);
   if (!job.initial_equilibrium) return;
   job.reference_state = reference_state;
   job.building += describe_prestress(solve::prestress(comm, job.local_model, reference_state));
@@ -56,7 +55,7 @@ void bring_into_equilibrium(MPI_Comm comm, Job& job) {
 /// Collective.
 bool opens_incisions(MPI_Comm comm, const Job& job) {
   bool opens = job.initial_equilibrium && !std::ranges::all_of(job.cuts, &model::Cut::lips);
-  MPI_Bcast(&opens, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, opens);
   return opens;
 }
 
@@ -138,7 +137,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
     set_bulk_modulus(model::effective_modulus(stored), job);
   });
   bool is_scene = job.anatomy.has_value();
-  MPI_Bcast(&is_scene, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, is_scene);
   if (is_scene)
     build(comm, input, changes, job);
   else
@@ -149,7 +148,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
 void give_tone(MPI_Comm comm, Job& job) {
   model::RingMuscle muscle;
   if (job.anatomy) muscle = model::ring_muscle(job.anatomy->scene);
-  MPI_Bcast(&muscle, sizeof muscle, MPI_BYTE, 0, comm);
+  base::broadcast(comm, muscle);
   discrete::Part& part = job.local_model.part;
   if (muscle.tone != 0) model::add_tone(muscle, part.point_row, part.owned_points, part.model);
 }
@@ -162,9 +161,7 @@ void share(MPI_Comm comm, Job& job) {
   job.remeshed = job.anatomy && job.anatomy->given_skin;
   for (const model::Body& body : job.local_model.global_metadata.contact.bodies)
     job.bodies.push_back(body.name);
-  MPI_Bcast(&job.requested, sizeof job.requested, MPI_BYTE, 0, comm);
-  for (bool* flag : {&job.remeshed, &job.initial_equilibrium})
-    MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, job.requested, job.remeshed, job.initial_equilibrium);
 }
 
 }  // namespace

@@ -49,24 +49,14 @@ std::vector<solve::Stratum> find_strata(const Job& job) {
 std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
   std::vector<solve::PlanPiece> pieces;
   base::on_root(comm, [&] { pieces = find_pieces(job); });
-  auto count = static_cast<int>(pieces.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  pieces.resize(count);
-  for (solve::PlanPiece& piece : pieces) {
-    MPI_Bcast(&piece.bone, 1, MPI_INT32_T, 0, comm);
-    for (Vec3* vector : {&piece.centroid, &piece.placement.translation, &piece.placement.rotation})
-      MPI_Bcast(vector->data(), 3, MPI_DOUBLE, 0, comm);
-  }
+  base::broadcast(comm, pieces);
   return pieces;
 }
 
 std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job) {
   std::vector<solve::Stratum> strata;
   if (base::rank(comm) == 0) strata = find_strata(job);
-  auto count = static_cast<int>(strata.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  strata.resize(count);
-  MPI_Bcast(strata.data(), static_cast<int>(count * sizeof(solve::Stratum)), MPI_BYTE, 0, comm);
+  base::broadcast(comm, strata);
   return strata;
 }
 

@@ -7,8 +7,8 @@
 #include "plan_pieces.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
-#include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/result_file.h"
@@ -104,7 +104,7 @@ void PlanSession::State::take(const Placements& placements) {
 std::vector<Vec3> PlanSession::State::weights(
     const std::vector<std::pair<int64_t, Vec3>>& functional) {
   bool any = !functional.empty();
-  MPI_Bcast(&any, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, any);
   if (!any) return {};
   std::vector<Vec3> all;
   if (base::rank(comm) == 0) {
@@ -184,8 +184,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
     s.box = *s.job.anatomy->scene.plan;
   });
   s.box.pieces.clear();
-  MPI_Bcast(s.box.translate.data(), 3, MPI_DOUBLE, 0, comm);
-  MPI_Bcast(s.box.rotate.data(), 3, MPI_DOUBLE, 0, comm);
+  base::broadcast(comm, s.box.translate, s.box.rotate);
   s.settings = settings_of(s.job.requested, s.job.solid);
   s.settings.initial_equilibrium = s.job.initial_equilibrium;
   s.settings.finds_other_rest = false;
@@ -217,7 +216,7 @@ bool PlanSession::has_cuts() const { return !state_->job.cuts.empty(); }
 std::vector<Vec3> PlanSession::initial() const {
   State& s = *state_;
   const discrete::NaturalRows natural(s.comm, s.part());
-  return discrete::gather_points(s.comm, natural.natural(s.part().model.points.position));
+  return base::gather(s.comm, natural.natural(s.part().model.points.position));
 }
 
 int64_t PlanSession::points() const { return state_->part().total_points; }
@@ -242,10 +241,10 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional)};
   answer.summary = s.search(with, start);
   answer.from_base = answer.summary.path.leapt;
-  answer.position = discrete::gather_points(s.comm, s.last->second.position);
+  answer.position = base::gather(s.comm, s.last->second.position);
   for (const model::PointField& field : s.last->second.point_fields) {
     answer.field.push_back(field);
-    answer.field.back().values = discrete::gather(s.comm, field.values.data(), field.values.size());
+    answer.field.back().values = base::gather(s.comm, field.values);
   }
   return answer;
 }

@@ -142,7 +142,7 @@ void Run::copy_result(const std::filesystem::path& file) const {
   std::ifstream one(file, std::ios::binary), other(name_ + ".h5", std::ios::binary);
   using Bytes = std::istreambuf_iterator<char>;
   bool same = other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes());
-  MPI_Bcast(&same, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, same);
   if (same) return;
   results::ResultFile copy(comm, name_, job_.local_model.global_metadata,
                            discrete::NaturalRows::of_model(comm, job_.local_model));
@@ -164,7 +164,7 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
     folded = from.end->inverted_prisms > 0 && !folds_allowed;
     print(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
   });
-  for (bool* flag : {&done, &folded}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, done, folded);
   if (!done) return {};
   copy_result(file);
   const SolvedSkin skin(comm, job_);

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "report.h"
-#include "repose/discrete/gather.h"
+#include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/surface/intersections.h"
 
@@ -25,13 +25,19 @@ SolvedSkin::SolvedSkin(MPI_Comm comm, const Job& job) : comm_(comm) {
   const std::vector<int64_t>& beside = model.contact.cut_faces.point;
   const std::set<int64_t> sides(beside.begin(), beside.end());
   for (const int64_t row : row_) on_a_side_.push_back(sides.contains(row));
+  base::broadcast(comm, row_);
   const discrete::Part& part = job.local_model.part;
   initial_.points =
       points_at(discrete::NaturalRows(comm, part).natural(part.model.points.position));
 }
 
 std::vector<Vec3> SolvedSkin::points_at(const std::vector<Vec3>& slab) const {
-  return discrete::gather_points(comm_, slab, row_);
+  const int64_t begin = base::count_before(comm_, slab.size()),
+                end = begin + static_cast<int64_t>(slab.size());
+  std::vector<Vec3> mine;
+  for (const int64_t row : row_)
+    if (row >= begin && row < end) mine.push_back(slab[row - begin]);
+  return base::gather(comm_, std::move(mine));
 }
 
 std::string SolvedSkin::describe_self_contact(const std::vector<Vec3>& points) const {

@@ -25,7 +25,7 @@ class SolvedSkin {
  private:
   MPI_Comm comm_;
   surface::Surface initial_;
-  std::vector<int64_t> row_;     // [points] of the model
+  std::vector<int64_t> row_;     // [points] of the model, ascending, on all ranks
   std::vector<char> on_a_side_;  // [points] it is on a side of a cut that contact keeps apart
 };
 

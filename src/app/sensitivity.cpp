@@ -96,8 +96,8 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
                                        const std::function<void(double)>& watch) {
   std::vector<Variation> all;
   if (job.anatomy) all = variations(job.anatomy->scene);
-  auto count = static_cast<int>(all.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  auto count = all.size();
+  base::broadcast(comm, count);
   all.resize(count);
   std::vector<Sensitivity> found;
   for (const Variation& variation : all) {

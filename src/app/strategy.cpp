@@ -200,11 +200,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
     choose_coarse(request, first_conflict(all, &Conflict::to_coarse), job, s);
     choose_sensitivity(options, job, s);
   });
-  MPI_Bcast(&s.coarse, sizeof s.coarse, MPI_BYTE, 0, comm);
-  auto models = static_cast<int>(s.resolutions.size());
-  MPI_Bcast(&models, 1, MPI_INT, 0, comm);
-  s.resolutions.resize(models);
-  for (bool* flag : {&s.preview, &s.sensitivity, &s.tears}) MPI_Bcast(flag, 1, MPI_C_BOOL, 0, comm);
+  base::broadcast(comm, s.coarse, s.resolutions, s.preview, s.sensitivity, s.tears);
   choose_tangents(comm, options, job, s);
   if (base::rank(comm) == 0 && options.flag("dry_run"))
     s.explanation = explain(request, all, job, s);

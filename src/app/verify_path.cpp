@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "repose/base/agreement.h"
-#include "repose/discrete/gather.h"
+#include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
 
 namespace repose::app {
@@ -15,22 +15,16 @@ void compare(MPI_Comm comm, const discrete::Part& part, const std::vector<Vec3>&
              const std::vector<Vec3>& other, PathCheck& check) {
   const discrete::NaturalRows natural(comm, part);
   const std::vector<Vec3> before = natural.owned(one), after = natural.owned(other);
-  struct {
-    double largest;
-    int rank;
-  } farthest{0, base::rank(comm)};
   std::vector<double> mine;
   for (size_t i = 0; i < before.size(); ++i) {
     if (part.model.points.set[i] != model::PointSet::soft_tissue) continue;
     mine.push_back((after[i] - before[i]).norm());
-    if (mine.back() < farthest.largest) continue;
-    farthest.largest = mine.back();
+    if (mine.back() < check.largest) continue;
+    check.largest = mine.back();
     check.place = part.model.points.position[i];
   }
-  MPI_Allreduce(MPI_IN_PLACE, &farthest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
-  check.largest = farthest.largest;
-  MPI_Bcast(check.place.data(), 3, MPI_DOUBLE, farthest.rank, comm);
-  std::vector<double> apart = discrete::gather(comm, mine.data(), mine.size());
+  check.largest = base::max_over_ranks_with(comm, check.largest, check.place);
+  std::vector<double> apart = base::gather(comm, std::move(mine));
   if (apart.empty()) return;
   const auto at =
       apart.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(apart.size() - 1));

@@ -3,7 +3,7 @@
 #include "report.h"
 #include "repose/adapt/discretization.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/gather.h"
+#include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/results/run_files.h"
 #include "repose/solve/reaction.h"
@@ -59,19 +59,16 @@ void Writer::on_iterate(double load, const solve::StateSnapshot& snapshot) {
   if (reached_ && news && due()) write_checkpoint(load == 1 ? snapshot : nullptr);
 }
 
-std::vector<Vec3> Writer::positions() const {
-  return discrete::gather_points(comm_, last_.rows.position);
-}
+std::vector<Vec3> Writer::positions() const { return base::gather(comm_, last_.rows.position); }
 
 std::vector<double> Writer::volume_ratios() const {
   const std::vector<double>& ratio = last_.rows.volume_ratio;
-  return discrete::gather(comm_, ratio.data(), ratio.size());
+  return base::gather(comm_, ratio);
 }
 
 std::vector<double> Writer::contact_pressures() const {
   for (const model::PointField& field : last_.rows.point_fields)
-    if (field.name == "contact_pressure")
-      return discrete::gather(comm_, field.values.data(), field.values.size());
+    if (field.name == "contact_pressure") return base::gather(comm_, field.values);
   return {};
 }
 
@@ -84,7 +81,7 @@ std::string Writer::reactions() const {
 void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
   rows.discretization_error.assign(rows.position.size(), 0.0);
   if (numbers.load < 1) return;
-  const std::vector<Vec3> position = discrete::gather_points(comm_, rows.position);
+  const std::vector<Vec3> position = base::gather(comm_, rows.position);
   std::vector<Vec3> at_point(position.size());
   base::on_root(comm_, [&] {
     const auto found = adapt::discretization_of(position, *coarser_.compared);
@@ -97,9 +94,9 @@ void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
 }
 
 bool Writer::due() const {
-  int due = MPI_Wtime() - last_saved_ > interval_;
-  MPI_Bcast(&due, 1, MPI_INT, 0, comm_);
-  return due != 0;
+  bool due = MPI_Wtime() - last_saved_ > interval_;
+  base::broadcast(comm_, due);
+  return due;
 }
 
 /// The last rest position reached and, of a search at load 1, the state it is at: with both a run

@@ -98,9 +98,7 @@ Interrupt::~Interrupt() {
 bool Interrupt::requested() {
   if (requested_) return true;
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
-  int any = received != 0 || elapsed > limit_;
-  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm_);
-  requested_ = any;
+  requested_ = on_any_rank(comm_, received != 0 || elapsed > limit_);
   return requested_;
 }
 

@@ -137,13 +137,11 @@ std::filesystem::path shipped_folder(const std::string& name) {
 }
 
 void Stages::end(const std::string& name) {
-  double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+  const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  double mebibytes = static_cast<double>(usage.ru_maxrss) / 1024;
-  MPI_Allreduce(MPI_IN_PLACE, &seconds, 1, MPI_DOUBLE, MPI_MAX, comm_);
-  MPI_Allreduce(MPI_IN_PLACE, &mebibytes, 1, MPI_DOUBLE, MPI_SUM, comm_);
-  stages_.push_back({name, seconds, mebibytes});
+  const double mebibytes = static_cast<double>(usage.ru_maxrss) / 1024;
+  stages_.push_back({name, max_over_ranks(comm_, seconds), sum_over_ranks(comm_, mebibytes)});
   begin_ = Clock::now();
 }
 

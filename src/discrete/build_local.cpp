@@ -2,7 +2,6 @@
 #include <map>
 
 #include "by_column.h"
-#include "message.h"
 #include "piece.h"
 #include "rank_columns.h"
 #include "repose/base/agreement.h"
@@ -66,7 +65,7 @@ double set_mean_moduli(MPI_Comm comm, const scene::Scene& scene, const RankColum
     effective_modulus = model::effective_modulus(sums);
     model.contact.stiffness = model::contact_stiffness(scene, sums);
   });
-  MPI_Bcast(&model.contact.stiffness, 1, MPI_DOUBLE, 0, comm);
+  base::broadcast(comm, model.contact.stiffness);
   return effective_modulus;
 }
 
@@ -258,7 +257,7 @@ model::CutFaces gather_cut_faces(MPI_Comm comm, const Part& part) {
   model::CutFaces faces = part.model.contact.cut_faces;
   for (int64_t& point : faces.point) point = part.point_row[point];
   const auto gather_to_root = [&](auto&... arrays) {
-    ((arrays = gather_arrays(comm, std::move(arrays))), ...);
+    ((arrays = base::gather(comm, std::move(arrays))), ...);
   };
   gather_to_root(faces.size, faces.begin, faces.point, faces.weight, faces.area);
   return faces;
@@ -277,8 +276,8 @@ std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part
   std::vector<model::TermElements> all = part.model.elements;
   for (model::TermElements& elements : all) {
     for (int64_t& point : elements.points) point = part.point_row[point];
-    elements.points = gather_arrays(comm, std::move(elements.points));
-    elements.numbers = gather_arrays(comm, std::move(elements.numbers));
+    elements.points = base::gather(comm, std::move(elements.points));
+    elements.numbers = base::gather(comm, std::move(elements.numbers));
     const model::TermElements unsorted = std::move(elements);
     elements = {unsorted.term, unsorted.points_each, unsorted.numbers_each, {}, {}};
     std::map<int64_t, size_t> by_point;

@@ -18,21 +18,16 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
   if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
   // Every rank requests the first rows of the columns that it knows.
   ColumnRows rows;
-  std::vector<int64_t> begin;
-  if (base::rank(comm) > 0) {
-    Sender(comm, 0)(known);
-    Receiver(comm, 0)(begin, rows.total);
-  } else {
-    rows.total = first.back();
-    std::vector<int64_t> theirs, answer;
-    for (int other = 1; other < base::size(comm); ++other) {
-      Receiver(comm, other)(theirs);
-      answer.clear();
-      for (const int64_t c : theirs) answer.push_back(first[c]);
-      Sender(comm, other)(answer, rows.total);
-    }
-    for (const int64_t c : known) begin.push_back(first[c]);
+  std::vector<int64_t> begin, theirs, answer;
+  for (int r = 0; r < base::size(comm); ++r) {
+    if (base::rank(comm) == r) theirs = known;
+    base::Message(comm, r, 0)(theirs);
+    if (base::rank(comm) == 0) answer = base::pick(first, theirs);
+    base::Message(comm, 0, r)(answer);
+    if (base::rank(comm) == r) begin = answer;
   }
+  if (base::rank(comm) == 0) rows.total = first.back();
+  base::broadcast(comm, rows.total);
   size_t k = 0;
   int64_t next = 0;
   for (const int64_t c : column) {

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "message.h"
-#include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 
 namespace repose::discrete {
 
@@ -25,8 +24,8 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
 template <class Value>
 std::vector<Value> gather_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& own,
                                     const std::vector<Value>& values) {
-  const std::vector<int64_t> column = gather_arrays(comm, own);
-  const std::vector<Value> value = gather_arrays(comm, values);
+  const std::vector<int64_t> column = base::gather(comm, own);
+  const std::vector<Value> value = base::gather(comm, values);
   std::vector<Value> all(base::rank(comm) == 0 ? columns : 0);
   for (size_t k = 0; k < column.size(); ++k) all[column[k]] = value[k];
   return all;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 
 namespace repose::discrete {
 
@@ -38,7 +38,7 @@ double ForceFunctional::largest_force(Vec displacement) {
   positions_.update(displacement);
   double largest = 0;
   for_each_force(elastic_, [&](int64_t, const Vec3& f) { largest = std::max(largest, f.norm()); });
-  return max_over_ranks(positions_.comm(), largest);
+  return base::max_over_ranks(positions_.comm(), largest);
 }
 
 std::span<const Vec3> ForceFunctional::directions() {
@@ -59,7 +59,7 @@ double ForceFunctional::value_and_gradient(Vec displacement, Vec gradient) {
     const double length = std::hypot(force.norm(), epsilon_);
     value += force.squaredNorm() / (length + epsilon_);  // √(|F|² + ε²) − ε without canceling
   });
-  value = weights_.elastic * sum_over_ranks(positions_.comm(), value);
+  value = weights_.elastic * base::sum_over_ranks(positions_.comm(), value);
   if (gradient) {
     elastic_.hessian_action(directions(), gradient);
     check(VecScale(gradient, -weights_.elastic));

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "exchange.h"
-#include "message.h"
 #include "repose/base/agreement.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/mechanics/spring_law.h"
@@ -27,10 +26,9 @@ template <class Work>
 void NaturalRows::for_each_chunk(const Rows& rows, const Work& work) const {
   const int ranks = base::size(comm_);
   std::vector<int64_t> end;
-  for (int r = 0; r < ranks; ++r) end.push_back(base::slab(rows.total, r, ranks).end);
+  for (int r = 0; r < ranks; ++r) end.push_back(slab(rows.total, r).end);
   const auto size = static_cast<int64_t>(rows.row.size());
-  int64_t longest = 0;
-  MPI_Allreduce(&size, &longest, 1, MPI_INT64_T, MPI_MAX, comm_);
+  const int64_t longest = base::max_over_ranks(comm_, size);
   for (int64_t begin = 0; begin < longest; begin += at_once_) {
     std::vector<std::vector<int64_t>> places(ranks);
     for (int64_t i = begin; i < std::min(begin + at_once_, size); ++i)
@@ -39,9 +37,15 @@ void NaturalRows::for_each_chunk(const Rows& rows, const Work& work) const {
   }
 }
 
-NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
+base::Slab NaturalRows::slab(int64_t total, int rank) const {
+  if (holders_ == Holders::slabs) return base::slab(total, rank, base::size(comm_));
+  return {rank == 0 ? 0 : total, total};
+}
+
+NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, Holders holders, int64_t at_once)
     : comm_(comm),
       part_(part),
+      holders_(holders),
       at_once_(at_once),
       points_{std::span(part.point_row).first(part.owned_points), part.total_points},
       springs_{part.spring_row, part.total_springs},
@@ -49,13 +53,13 @@ NaturalRows::NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once)
 
 template <class Value>
 std::vector<Value> NaturalRows::to_slab(const Rows& rows, std::span<const Value> owned) const {
-  const base::Slab slab = base::slab(rows.total, base::rank(comm_), base::size(comm_));
-  std::vector<Value> natural(slab.rows());
+  const base::Slab mine = slab(rows.total, base::rank(comm_));
+  std::vector<Value> natural(mine.rows());
   for_each_chunk(rows, [&](const std::vector<std::vector<int64_t>>& places) {
     const Exchange exchange(comm_, places);
     const std::vector<int64_t> row = exchange(rows.row);
     const std::vector<Value> values = exchange(owned);
-    for (size_t k = 0; k < row.size(); ++k) natural[row[k] - slab.begin] = values[k];
+    for (size_t k = 0; k < row.size(); ++k) natural[row[k] - mine.begin] = values[k];
   });
   return natural;
 }
@@ -88,9 +92,10 @@ std::vector<std::array<int64_t, n>> in_rows(const std::vector<std::array<int64_t
 
 }  // namespace
 
-model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_model) {
+model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_model,
+                                       Holders holders) {
   const Part& part = local_model.part;
-  const NaturalRows natural(comm, part);
+  const NaturalRows natural(comm, part, holders);
   model::ModelRows rows;
   rows.counts = local_model.counts;
   rows.solid = part.solid;
@@ -111,10 +116,9 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   model::Prisms prisms = part.model.prisms;
   prisms.points = in_rows(prisms.points, part.owned_prisms, part.point_row);
   // A rank without prisms takes part in all that others have: arrays of no row are not visited.
-  int averaged = !prisms.nodal_modulus.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &averaged, 1, MPI_INT, MPI_MAX, comm);
+  const bool averaged = base::on_any_rank(comm, !prisms.nodal_modulus.empty());
   if (part.solid && prisms.modulus.empty()) prisms.modulus.resize(1);
-  if (averaged != 0 && prisms.nodal_modulus.empty()) prisms.nodal_modulus.resize(1);
+  if (averaged && prisms.nodal_modulus.empty()) prisms.nodal_modulus.resize(1);
   rows.prisms = to_slabs(natural.prisms_, std::move(prisms));
   model::Edges edges = part.model.edges;
   edges.points = in_rows(edges.points, part.owned_edges, part.point_row);
@@ -218,35 +222,9 @@ void NaturalRows::set_unknowns(const std::vector<Vec3>& slab, const Positions& p
   positions.restrict_to_owned(rows, displacement);
 }
 
-namespace {
-
-/// Joins the slabs of all ranks on rank 0. The first ranks are those that have rows.
-template <class Group>
-void join_slabs(MPI_Comm comm, int64_t rows, Group& slabs) {
-  const int ranks = base::size(comm), rank = base::rank(comm);
-  const auto has_rows = [&](int of) { return base::slab(rows, of, ranks).rows() > 0; };
-  if (!has_rows(rank)) return;
-  model::for_each_array(slabs, [&](const char*, auto& array) {
-    if (rank > 0) return Sender(comm, 0)(array);
-    for (int from = 1; from < ranks && has_rows(from); ++from) {
-      std::decay_t<decltype(array)> theirs;
-      Receiver(comm, from)(theirs);
-      array.insert(array.end(), theirs.begin(), theirs.end());
-    }
-  });
-}
-
-}  // namespace
-
 model::Model gather_model(MPI_Comm comm, const LocalModel& local_model) {
-  model::ModelRows rows = NaturalRows::of_model(comm, local_model);
-  join_slabs(comm, rows.counts.points, rows.points);
-  join_slabs(comm, rows.counts.springs, rows.springs);
-  join_slabs(comm, rows.counts.prisms, rows.prisms);
-  join_slabs(comm, rows.counts.edges, rows.edges);
-  join_slabs(comm, rows.contact_pairs, rows.pairs);
+  model::ModelRows rows = NaturalRows::of_model(comm, local_model, NaturalRows::Holders::root);
   model::Model whole = local_model.global_metadata;
-  if (base::rank(comm) > 0) return whole;
   whole.points = std::move(rows.points);
   whole.springs = std::move(rows.springs);
   whole.prisms = std::move(rows.prisms);

@@ -2,35 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "flops.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
-#include "repose/discrete/reduction.h"
 #include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {
 
 namespace {
 
-bool anywhere(MPI_Comm comm, bool here) {
-  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_C_BOOL, MPI_LOR, comm);
-  return here;
-}
-
 /// Weight and external force of each local point; empty if there is none on any rank.
 std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& loaded) {
   std::vector<Vec3> force(model.points.position.size(), Vec3::Zero());
-  int any = 0;
+  bool any = false;
   for (size_t i = 0; i < force.size(); ++i) {
     if (model.points.set[i] != model::PointSet::soft_tissue) continue;
     force[i] = model.points.mass[i] * model.gravity + model.points.external_force[i];
-    if (!force[i].isZero(0)) any = 1;
+    any |= !force[i].isZero(0);
   }
-  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm);
-  if (!any) force.clear();
-  loaded = any;
+  loaded = base::on_any_rank(comm, any);
+  if (!loaded) force.clear();
   return force;
 }
 
@@ -39,10 +34,10 @@ std::vector<Vec3> load_forces(MPI_Comm comm, const model::Model& model, bool& lo
 /// Collective.
 double rounding_times(MPI_Comm comm, const model::Contact& contact) {
   constexpr double minimum = 2.5, of_an_edge = 0.75, square_of_edge = 1.155;  // over a point's area
-  double sums[2] = {0, static_cast<double>(contact.pairs.area.size())};
-  for (const double area : contact.pairs.area) sums[0] += area;
-  MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, comm);
-  const double edge = std::sqrt(square_of_edge * sums[0] / std::max(sums[1], 1.0));
+  const std::vector<double>& of = contact.pairs.area;
+  const double area = base::sum_over_ranks(comm, std::accumulate(of.begin(), of.end(), 0.0));
+  const auto points = static_cast<double>(base::sum_over_ranks(comm, of.size()));
+  const double edge = std::sqrt(square_of_edge * area / std::max(points, 1.0));
   return std::max(minimum, of_an_edge * edge / contact.spacing);
 }
 
@@ -95,9 +90,9 @@ Objective::Objective(Positions& positions, const mechanics::Weights& weights)
       loops_(mechanics::make_loops(positions.part().model, positions.part().owned_springs,
                                    positions.part().owned_prisms, positions.part().owned_edges,
                                    positions.part().owned_points)),
-      averages_volumes_(anywhere(positions.comm(), !loops_.nodal.empty())),
-      largest_bulk_(max_over_ranks(positions.comm(),
-                                   mechanics::largest_bulk(positions.part().model, loops_.prisms))),
+      averages_volumes_(base::on_any_rank(positions.comm(), !loops_.nodal.empty())),
+      largest_bulk_(base::max_over_ranks(
+          positions.comm(), mechanics::largest_bulk(positions.part().model, loops_.prisms))),
       body_contact_(positions.part().model.contact.pairs, positions.part().model.contact.stiffness,
                     positions.part().bodies),
       other_body_contact_(rounded_touches(positions.comm(), positions.part())),
@@ -156,7 +151,7 @@ double Objective::add_terms(double scale, std::span<Vec3> gradient) const {
 }
 
 double Objective::contact_value() {
-  return sum_over_ranks(positions_.comm(), add_contact(0.0, work_));
+  return base::sum_over_ranks(positions_.comm(), add_contact(0.0, work_));
 }
 
 std::vector<Vec3> Objective::contact_force() {
@@ -198,7 +193,7 @@ double Objective::potential() const {
   if (loaded_)
     for (int64_t i = 0; i < part.owned_points; ++i)
       w -= load_force_[i].dot(positions_.local()[i] - part.model.points.position[i]);
-  return sum_over_ranks(positions_.comm(), w);
+  return base::sum_over_ranks(positions_.comm(), w);
 }
 
 double Objective::value_and_gradient(Vec displacement, Vec gradient) {
@@ -217,7 +212,7 @@ double Objective::value_and_gradient(Vec displacement, Vec gradient) {
   value += weights_.elastic * (add_terms(weights_.elastic, work_) - initial_.term_energy);
   value += weights_.elastic * add_contact(weights_.elastic, work_);
   subtract_loads(weights_.elastic, work_);
-  value = sum_over_ranks(positions_.comm(), value);
+  value = base::sum_over_ranks(positions_.comm(), value);
   if (loaded_) value += weights_.elastic * potential();
   if (!std::isfinite(value) || value > overflown) {
     value = overflown;
@@ -265,14 +260,14 @@ std::vector<Vec3> Objective::residual_force() {
 mechanics::Totals Objective::totals() const {
   mechanics::Totals t = mechanics::totals(loops_, positions_.local());
   MPI_Comm comm = positions_.comm();
-  t.spring_energy = sum_over_ranks(comm, t.spring_energy);
-  t.solid_energy = sum_over_ranks(comm, t.solid_energy - initial_.solid_energy);
-  t.fixed_energy = sum_over_ranks(comm, t.fixed_energy - initial_.fixed_energy);
-  t.term_energy = sum_over_ranks(comm, t.term_energy - initial_.term_energy);
-  t.volume_squares = sum_over_ranks(comm, t.volume_squares);
-  t.penalty_unit = sum_over_ranks(comm, t.penalty_unit);
-  MPI_Allreduce(MPI_IN_PLACE, &t.volume_error_max, 1, MPI_DOUBLE, MPI_MAX, comm);
-  MPI_Allreduce(MPI_IN_PLACE, &t.inverted, 1, MPI_INT64_T, MPI_SUM, comm);
+  t.spring_energy = base::sum_over_ranks(comm, t.spring_energy);
+  t.solid_energy = base::sum_over_ranks(comm, t.solid_energy - initial_.solid_energy);
+  t.fixed_energy = base::sum_over_ranks(comm, t.fixed_energy - initial_.fixed_energy);
+  t.term_energy = base::sum_over_ranks(comm, t.term_energy - initial_.term_energy);
+  t.volume_squares = base::sum_over_ranks(comm, t.volume_squares);
+  t.penalty_unit = base::sum_over_ranks(comm, t.penalty_unit);
+  t.volume_error_max = base::max_over_ranks(comm, t.volume_error_max);
+  t.inverted = base::sum_over_ranks(comm, t.inverted);
   return t;
 }
 

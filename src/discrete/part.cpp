@@ -6,13 +6,11 @@
 
 #include "countable.h"
 #include "exchange.h"
-#include "message.h"
 #include "partition.h"
 #include "piece.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
 #include "repose/base/log.h"
-#include "repose/discrete/reduction.h"
 
 namespace repose::discrete {
 
@@ -131,7 +129,7 @@ ColumnRanks ranks_of_columns(const ColumnGraph& graph, const Numbers& numbers) {
 class HeldColumns {
  public:
   HeldColumns(MPI_Comm comm, const Model& held, const Numbers& numbers)
-      : index_(count_over_ranks(comm, held.points.position.size())) {
+      : index_(base::sum_over_ranks(comm, held.points.position.size())) {
     for_each_point(held, [&](int64_t point) { index_.add(point); });
     column_ = Exchange::fetch(comm, index_.sort(),
                               static_cast<int64_t>(numbers.column.size()))(numbers.column);
@@ -146,7 +144,7 @@ class HeldColumns {
 /// The graph of all columns, on rank 0. Collective.
 ColumnGraph gather_graph(MPI_Comm comm, const Model& held, const HeldColumns& column,
                          int64_t columns) {
-  MPI_Bcast(&columns, 1, MPI_INT64_T, 0, comm);
+  base::broadcast(comm, columns);
   const ColumnGraph mine = column_graph(columns, [&](const auto& link) {
     const auto join = [&](int64_t p, int64_t q) {
       const int64_t c = column.of(p), d = column.of(q);
@@ -162,7 +160,7 @@ ColumnGraph gather_graph(MPI_Comm comm, const Model& held, const HeldColumns& co
   for (int64_t c = 0; c < columns; ++c)
     for (int64_t k = mine.row_begin[c]; k < mine.row_begin[c + 1]; ++k)
       links.push_back({c, mine.neighbor[k]});
-  links = gather_arrays(comm, std::move(links));
+  links = base::gather(comm, std::move(links));
   return column_graph(base::rank(comm) == 0 ? columns : 0, [&](const auto& link) {
     for (const auto& [c, d] : links) link(c, d);
   });
@@ -183,7 +181,7 @@ class ElementExchange {
   std::vector<int64_t> operator()(const Points& points, Group& group) const {
     const Exchange exchange(comm_, rows(points));
     std::vector<int64_t> row(points.size());
-    std::iota(row.begin(), row.end(), count_before(comm_, row.size()));
+    std::iota(row.begin(), row.end(), base::count_before(comm_, row.size()));
     row = exchange(row);
     model::for_each_array(group, [&](const char*, auto& values) { values = exchange(values); });
     return row;
@@ -251,21 +249,20 @@ BoneMotions gather_motions(MPI_Comm comm, const Model& held) {
   Model carried;
   carried.bones = held.bones;
   carried.bone_transform = held.bone_transform;
-  carried.points.position = gather_arrays(comm, pick(held.points.position, rows));
-  carried.points.set = gather_arrays(comm, pick(held.points.set, rows));
-  carried.points.target = gather_arrays(comm, pick(held.points.target, rows));
-  carried.points.bone = gather_arrays(comm, pick(held.points.bone, rows));
+  carried.points.position = base::gather(comm, pick(held.points.position, rows));
+  carried.points.set = base::gather(comm, pick(held.points.set, rows));
+  carried.points.target = base::gather(comm, pick(held.points.target, rows));
+  carried.points.bone = base::gather(comm, pick(held.points.bone, rows));
   BoneMotions motions;
   base::on_root(comm, [&] { motions = bone_motions(carried); });
-  Broadcaster{comm}(motions.transform, motions.straight);
+  base::broadcast(comm, motions.transform, motions.straight);
   return motions;
 }
 
-/// Sends or receives bodies; their names stay behind.
-template <class Archive>
-void pass_bodies(Archive& archive, std::vector<model::Body>& bodies) {
-  auto count = static_cast<int64_t>(bodies.size());
-  archive(count);
+/// Copies bodies; their names stay behind.
+void copy_bodies(const base::Message& copy, std::vector<model::Body>& bodies) {
+  auto count = bodies.size();
+  copy(count);
   bodies.resize(count);
   const Vec3 zero = Vec3::Zero();
   const model::Body::Shape kinds[] = {scene::Sphere{zero, 0}, scene::Capsule{zero, zero, 0},
@@ -273,14 +270,14 @@ void pass_bodies(Archive& archive, std::vector<model::Body>& bodies) {
                                       surface::Surface{}};
   for (model::Body& body : bodies) {
     auto kind = static_cast<int64_t>(body.shape.index());
-    archive(body.bone, body.push, kind);
+    copy(body.bone, body.push, kind);
     if (kind != static_cast<int64_t>(body.shape.index())) body.shape = kinds[kind];
     std::visit(
         [&](auto& shape) {
           if constexpr (requires { shape.triangles; })
-            archive(shape.points, shape.triangles);
+            copy(shape.points, shape.triangles);
           else
-            archive(shape);
+            copy(shape);
         },
         body.shape);
   }
@@ -292,19 +289,18 @@ void share_globals(MPI_Comm comm, bool averaged, const Numbers& numbers, Piece& 
   Model& m = piece.model;
   model::CutFaces& faces = m.contact.cut_faces;
   int cut_owner = faces.empty() ? 0 : numbers.owner[faces.point.front()];
-  Broadcaster share(comm);
+  const base::Message share(comm, 0);
   auto bones = static_cast<int64_t>(m.bones.size()),
        terms = static_cast<int64_t>(m.elements.size());
   share(bones, terms, cut_owner, m.gravity, m.contact.stiffness, m.contact.spacing);
   m.bones.resize(bones);
   m.elements.resize(terms);
   for (model::TermElements& elements : m.elements) {
-    base::broadcast(comm, elements.term);
-    share(elements.points_each, elements.numbers_each);
+    share(elements.term, elements.points_each, elements.numbers_each);
   }
-  pass_bodies(share, m.contact.bodies);
+  copy_bodies(share, m.contact.bodies);
   if (m.contact.bodies.empty()) m.bone_surfaces.clear();
-  pass_surfaces(share, m.bone_surfaces);
+  copy_surfaces(share, m.bone_surfaces);
   share(faces.size, faces.begin, faces.point, faces.weight, faces.area);
   if (base::rank(comm) != cut_owner) faces = {};
   // Arrays of one row make ranks without prisms take part in all that others have.
@@ -358,7 +354,7 @@ void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet
     number_points(graph, set, base::size(comm), numbers);
     needing = ranks_of_columns(graph, numbers);
   });
-  Broadcaster{comm}(needing.begin, needing.rank, numbers.unknown_begin);
+  base::broadcast(comm, needing.begin, needing.rank, numbers.unknown_begin);
   const int rank = base::rank(comm);
   piece.total_unknowns = numbers.unknown_begin.back();
   piece.first_unknown = numbers.unknown_begin[rank];
@@ -367,20 +363,20 @@ void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet
 
 void count_rows(MPI_Comm comm, Piece& piece) {
   const Model& held = piece.model;
-  piece.counts.points = count_over_ranks(comm, held.points.position.size());
-  piece.counts.springs = count_over_ranks(comm, held.springs.points.size());
-  piece.counts.prisms = count_over_ranks(comm, held.prisms.points.size());
-  piece.counts.edges = count_over_ranks(comm, held.edges.points.size());
-  piece.solid = count_over_ranks(comm, held.prisms.modulus.size()) > 0;
+  piece.counts.points = base::sum_over_ranks(comm, held.points.position.size());
+  piece.counts.springs = base::sum_over_ranks(comm, held.springs.points.size());
+  piece.counts.prisms = base::sum_over_ranks(comm, held.prisms.points.size());
+  piece.counts.edges = base::sum_over_ranks(comm, held.edges.points.size());
+  piece.solid = base::sum_over_ranks(comm, held.prisms.modulus.size()) > 0;
 }
 
 /// Makes of the rows that this rank holds the piece that it needs. Returns the rows of contact's
 /// pairs, and the model's global metadata on rank 0. Collective.
 std::vector<int64_t> exchange_rows(MPI_Comm comm, Piece& piece, Model& global_metadata) {
   Model& held = piece.model;
-  const bool averaged = count_over_ranks(comm, held.prisms.nodal_modulus.size()) > 0;
-  const std::vector<int64_t> names = gather_arrays(comm, held.points.column);
-  const std::vector<PointSet> set = gather_arrays(comm, held.points.set);
+  const bool averaged = base::sum_over_ranks(comm, held.prisms.nodal_modulus.size()) > 0;
+  const std::vector<int64_t> names = base::gather(comm, held.points.column);
+  const std::vector<PointSet> set = base::gather(comm, held.points.set);
   Numbers numbers;
   base::on_root(comm, [&] {
     require_countable(piece.counts.points);
@@ -410,7 +406,7 @@ LocalModel build_local(MPI_Comm comm, Model&& rows) {
   const std::vector<int64_t> pair_row = exchange_rows(comm, piece, global_metadata);
   LocalModel local_model = build_part(comm, piece);
   local_model.part.pair_row = pick(pair_row, local_model.part.pair_row);
-  local_model.contact_pairs = count_over_ranks(comm, local_model.part.pair_row.size());
+  local_model.contact_pairs = base::sum_over_ranks(comm, local_model.part.pair_row.size());
   local_model.global_metadata = std::move(global_metadata);
   return local_model;
 }

@@ -217,9 +217,7 @@ std::vector<int64_t> own_points(const Piece& piece, int rank) {
 /// The bodies, where any rank has contact, and the constraints. Collective.
 void add_contact(MPI_Comm comm, const Piece& piece, LocalNumbers& local, Part& part) {
   const Model& model = piece.model;
-  int touching = !model.contact.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &touching, 1, MPI_INT, MPI_MAX, comm);
-  part.contact = touching != 0;
+  part.contact = base::on_any_rank(comm, !model.contact.empty());
   if (part.contact)
     base::collective_try(comm, [&] { part.bodies = mechanics::make_bodies(model); });
   part.model.contact = pick_contact(piece, mechanics::contact_offsets(model, part.bodies), local,
@@ -263,6 +261,13 @@ void count_points(MPI_Comm comm, const Part& part, model::Counts& counts) {
 }
 
 }  // namespace
+
+void copy_surfaces(const base::Message& copy, std::vector<surface::Surface>& surfaces) {
+  auto count = surfaces.size();
+  copy(count);
+  surfaces.resize(count);
+  for (surface::Surface& of : surfaces) copy(of.points, of.triangles);
+}
 
 LocalModel build_part(MPI_Comm comm, Piece& piece) {
   const std::vector<int64_t> own = own_points(piece, base::rank(comm));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "repose/base/collective.h"
 #include "repose/discrete/part.h"
 
 namespace repose::discrete {
@@ -31,6 +32,9 @@ struct Piece {
   model::Counts counts;  ///< of the whole model; kinds of points are counted by build_part()
   int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;  ///< blocks, of all and of this rank
 };
+
+/// Copies surfaces; their names stay behind.
+void copy_surfaces(const base::Message& copy, std::vector<surface::Surface>& surfaces);
 
 /// Builds this rank's part of a model from its piece, with the counts and normals of the whole.
 /// Rows of contact are those of the piece's pairs. Collective.

@@ -1,5 +1,5 @@
 #include "repose/discrete/positions.h"
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 
 #include <algorithm>
 
@@ -54,7 +54,7 @@ void Positions::set_motion(int32_t bone, const scene::RigidMotion& motion) {
 }
 
 double Positions::largest_travel() const {
-  return max_over_ranks(comm_, motion_.largest_travel(part_.model));
+  return base::max_over_ranks(comm_, motion_.largest_travel(part_.model));
 }
 
 void Positions::scatter_to_local(Vec in, std::span<Vec3> out) const {
@@ -90,7 +90,7 @@ double largest_block(Vec v) {
     largest = std::max(largest, Eigen::Map<const Vec3>(values + k).squaredNorm());
   check(VecRestoreArrayRead(v, &values));
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(static_cast<Vec>(v)));
-  return std::sqrt(max_over_ranks(comm, largest));
+  return std::sqrt(base::max_over_ranks(comm, largest));
 }
 
 }  // namespace repose::discrete

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "countable.h"
-#include "message.h"
 #include "partition.h"
+#include "piece.h"
 #include "repose/base/agreement.h"
 #include "repose/base/geometry.h"
 
@@ -17,19 +17,18 @@ namespace {
 
 using base::pick;
 
-template <class Archive>
-void pass(Archive& archive, RankColumns& d) {
+void copy_columns(const base::Message& copy, RankColumns& d) {
   model::Piece& p = d.piece;
-  archive(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
-          p.triangle, p.edge, p.slope, p.loads.instrument, p.loads.target, p.loads.force,
-          p.loads.layer_area);
-  archive(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.total_unknowns,
-          d.first_unknown, d.unknowns, d.spacing, d.moves, d.doubled);
-  auto count = static_cast<int64_t>(d.cuts.size());
-  archive(count);
+  copy(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
+       p.triangle, p.edge, p.slope, p.loads.instrument, p.loads.target, p.loads.force,
+       p.loads.layer_area);
+  copy(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.total_unknowns,
+       d.first_unknown, d.unknowns, d.spacing, d.moves, d.doubled);
+  auto count = d.cuts.size();
+  copy(count);
   d.cuts.resize(count);
   for (model::Cut& cut : d.cuts)
-    archive(cut.columns, cut.layers, cut.meets, cut.lips, cut.around, cut.edge);
+    copy(cut.columns, cut.layers, cut.meets, cut.lips, cut.around, cut.edge);
 }
 
 /// The graph of the skin, which is that of the model.
@@ -127,7 +126,7 @@ class Distributor {
 RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
                                const scene::Scene& scene, model::Model& global_metadata,
                                std::vector<surface::Surface>& bones) {
-  const int ranks = base::size(comm), rank = base::rank(comm);
+  const int ranks = base::size(comm);
   ColumnGraph graph;
   base::on_root(comm, [&] {
     int64_t points = static_cast<int64_t>(geometry->skin().points.size()) * geometry->layers();
@@ -147,17 +146,10 @@ RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geome
   for (int r = ranks - 1; r >= 0; --r) {
     base::on_root(
         comm, [&] { rank_columns = distributor->columns_of(r, global_metadata.contact.spacing); });
-    if (r == 0) break;
     base::collective_try(comm, [&] {
-      if (rank == 0) {
-        Sender sender(comm, r);
-        pass(sender, rank_columns);
-        pass_surfaces(sender, bones);
-      } else if (rank == r) {
-        Receiver receiver(comm, 0);
-        pass(receiver, rank_columns);
-        pass_surfaces(receiver, bones);
-      }
+      const base::Message copy(comm, 0, r);
+      copy_columns(copy, rank_columns);
+      copy_surfaces(copy, bones);
     });
   }
   return rank_columns;

@@ -91,8 +91,7 @@ void Tangent::assemble(Vec displacement) {
   check(MatAssemblyBegin(action_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(action_, MAT_FINAL_ASSEMBLY));
   const auto now = positions.local();
-  int same = at_.size() == now.size() && std::equal(now.begin(), now.end(), at_.begin());
-  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, positions.comm());
+  const bool same = base::on_all_ranks(positions.comm(), std::ranges::equal(now, at_));
   if (same && !contact_changed_) return;
   at_.assign(now.begin(), now.end());
   if (!same) {

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 
 namespace repose::linear {
 
@@ -178,7 +178,7 @@ std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& f
     std::array<int64_t, maximum> point;
     std::array<float, maximum> weight;
   };
-  const int64_t first = discrete::count_before(comm, own);
+  const int64_t first = base::count_before(comm, own);
   std::vector<Message> sent(fine.own()), received(fine.ghosts());
   for (int32_t i = 0; i < fine.own(); ++i)
     for (int m = 0; m < maximum; ++m) {

@@ -41,7 +41,7 @@ class Couplings {
     const auto [i, j] = std::minmax(number_[p], number_[q]);
     if (i < 0 || i >= own()) return;
     if (i == j) diagonal_[i] += block.trace();
-    if (std::abs(layer_[p] - layer_[q]) > 1) layered = 0;
+    if (std::abs(layer_[p] - layer_[q]) > 1) layered = false;
     auto& row = right_[i];
     if (std::find(row.begin(), row.end(), j) == row.end()) row.push_back(j);
   }
@@ -71,7 +71,7 @@ class Couplings {
     return pattern;
   }
 
-  int layered = 1;  // no coupling leaps over a layer
+  bool layered = true;  // no coupling leaps over a layer
 
  private:
   int32_t own() const { return static_cast<int32_t>(right_.size()); }
@@ -221,10 +221,8 @@ ColumnMultigrid::~ColumnMultigrid() = default;
 void ColumnMultigrid::make_fine(const discrete::Part& part, const BlockSource& blocks) {
   Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.owned_unknowns));
   blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.add(p, q, block); });
-  int layered = couplings.layered;
-  MPI_Allreduce(MPI_IN_PLACE, &layered, 1, MPI_INT, MPI_MIN, comm_);
-  double stiffest = couplings.stiffest();
-  MPI_Allreduce(MPI_IN_PLACE, &stiffest, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  const bool layered = base::on_all_ranks(comm_, couplings.layered);
+  const double stiffest = base::max_over_ranks(comm_, couplings.stiffest());
   if (stiffest > 0 && std::isfinite(stiffest)) scale_ = stiffest;
   fine_ = std::make_unique<ColumnLevel>(comm_, places(part, layered), ghosts(part, number_),
                                         couplings.pattern());

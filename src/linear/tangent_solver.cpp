@@ -276,12 +276,12 @@ PetscErrorCode TangentSolver::apply_columns(PC pc, Vec r, Vec z) {
 }
 
 void TangentSolver::throw_unsolvable() {
-  int finite = 1;
+  bool finite = true;
   hessian_.visit_spd_blocks([&](int32_t, int32_t, const Mat3& block) {
-    if (!block.allFinite()) finite = 0;
+    if (!block.allFinite()) finite = false;
   });
-  MPI_Allreduce(MPI_IN_PLACE, &finite, 1, MPI_INT, MPI_MIN, positions_.comm());
-  if (!finite) discrete::refuse_overflow("stiffnesses", positions_.load());
+  if (!base::on_all_ranks(positions_.comm(), finite))
+    discrete::refuse_overflow("stiffnesses", positions_.load());
   throw base::PetscError("the preconditioner of the stiffness matrix could not be made");
 }
 

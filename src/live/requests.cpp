@@ -100,13 +100,13 @@ std::optional<std::string> Requests::next() {
 }
 
 bool Requests::superseded(const std::function<bool(const std::string&)>& overtakes) {
-  int superseded = 0;
+  bool superseded = false;
   if (base::rank(comm_) == 0) {
     const std::lock_guard lock(mutex_);
     superseded = ended_ || std::ranges::any_of(lines_, overtakes);
   }
-  MPI_Bcast(&superseded, 1, MPI_INT, 0, comm_);
-  return superseded != 0;
+  base::broadcast(comm_, superseded);
+  return superseded;
 }
 
 }  // namespace repose::live

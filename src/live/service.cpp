@@ -89,15 +89,15 @@ bool Service::answer(const std::string& line, bool& quits) {
   } catch (const base::InputError& error) {
     reply.refuse(error.what());
   }
-  int sent = 1, ranks = 1;
-  MPI_Comm_size(comm_, &ranks);
+  bool sent = true;
   if (base::rank(comm_) == 0) {
     std::string bytes = reply.bytes();
-    if (ranks > 1 && bytes.back() != '\n') bytes += '\n';  // Open MPI 5 passes on whole lines
+    if (base::size(comm_) > 1 && bytes.back() != '\n')
+      bytes += '\n';  // Open MPI 5 passes on whole lines
     sent = send_all(output_, bytes);
   }
-  MPI_Bcast(&sent, 1, MPI_INT, 0, comm_);
-  return sent != 0;
+  base::broadcast(comm_, sent);
+  return sent;
 }
 
 void Service::dispatch(const Request& request, Reply& reply) {

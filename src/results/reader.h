@@ -8,7 +8,6 @@
 #include <type_traits>
 #include <vector>
 
-#include "repose/base/components.h"
 #include "repose/base/geometry.h"
 #include "repose/base/hdf5.h"
 

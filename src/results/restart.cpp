@@ -129,9 +129,7 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
     if (same && last && restart.load == 1) restart.end = found.step.numbers;
     all = std::move(found.step.rows.position);
   });
-  MPI_Bcast(&restart.guess, 1, MPI_C_BOOL, 0, comm);
-  MPI_Bcast(&restart.load, 1, MPI_DOUBLE, 0, comm);
-  MPI_Bcast(&restart.kept, 1, MPI_INT64_T, 0, comm);
+  base::broadcast(comm, restart.guess, restart.load, restart.kept);
   restart.position = base::scatter(comm, all);
   return restart;
 }

@@ -72,8 +72,7 @@ struct UnpackNumbers {
 model::StepNumbers of_first_rank(MPI_Comm comm, const model::StepNumbers& mine) {
   PackNumbers packed;
   model::for_each_number(mine, packed);
-  base::broadcast(comm, packed.text);
-  MPI_Bcast(packed.values.data(), static_cast<int>(packed.values.size()), MPI_DOUBLE, 0, comm);
+  base::broadcast(comm, packed.text, packed.values);
   model::StepNumbers numbers;
   model::for_each_number(numbers, UnpackNumbers{packed});
   return numbers;
@@ -290,9 +289,7 @@ void ResultFile::State::write_points(hid_t step, const model::StepRows& rows) {
   for (size_t i = 0; i < displacement.size(); ++i)
     advance.values[i] = displacement[i].dot(outward[i]);
   if (counts.skin > 0) write_field(group, advance);
-  int estimated = !rows.discretization_error.empty();
-  MPI_Allreduce(MPI_IN_PLACE, &estimated, 1, MPI_INT, MPI_MAX, comm);
-  if (estimated != 0)
+  if (base::on_any_rank(comm, !rows.discretization_error.empty()))
     write_field(group, {"discretisation_error", false, rows.discretization_error});
   for (const model::PointField& field : rows.point_fields) write_field(group, field);
 }
@@ -320,14 +317,14 @@ bool ResultFile::State::write_bones(hid_t step, double load) const {
   if (counts.bone_triangles == 0) return false;
   std::vector<Vec3> at_load;
   if (motion) at_load = moved_points(bones, *motion, load);
-  int moved = !at_load.empty();
-  MPI_Bcast(&moved, 1, MPI_INT, 0, comm);
+  bool moved = !at_load.empty();
+  base::broadcast(comm, moved);
   const base::Hdf5Group group = create_group(step, "bone_surface");
   const base::Slab mine{0, static_cast<int64_t>(bones.points.size())};
   const std::vector<Vec3> displacement = displacements(bones, at_load);
   write_dataset(group, "displacement", {counts.bone_points, 3}, mine, flat(displacement));
-  if (moved != 0) write_dataset(group, "points", {counts.bone_points, 3}, mine, flat(at_load));
-  return moved != 0;
+  if (moved) write_dataset(group, "points", {counts.bone_points, 3}, mine, flat(at_load));
+  return moved;
 }
 
 /// The first block with a cell and the bones, for readers that open the file itself.
@@ -506,8 +503,7 @@ ResultFile::ResultFile(MPI_Comm comm, const std::filesystem::path& name,
   // Absolute: MPI-IO takes what stands before a colon for the kind of file system.
   s.name = std::filesystem::absolute(name);
   base::on_root(comm, [&] { s.create(global_metadata, slabs, kind); });
-  base::broadcast(comm, s.part);
-  MPI_Bcast(&s.counts, sizeof s.counts, MPI_BYTE, 0, comm);
+  base::broadcast(comm, s.part, s.counts);
   s.on_disk([&] { s.file = base::open_hdf5(s.part, comm); });
   fill_model(comm, s.file, slabs, [&s](const auto& work) { s.on_disk(work); });
   s.close_part();
@@ -533,8 +529,7 @@ void ResultFile::keep(const std::filesystem::path& earlier, int64_t count) {
   State& s = *state_;
   const std::scoped_lock lock(s.mutex);
   base::on_root(s.comm, [&] { s.copy_steps(earlier, count); });
-  s.loads.resize(count);
-  MPI_Bcast(s.loads.data(), static_cast<int>(count), MPI_DOUBLE, 0, s.comm);
+  base::broadcast(s.comm, s.loads);
   s.moved.resize(count);
 }
 

@@ -140,8 +140,7 @@ void write_rows(MPI_Comm comm, const base::Hdf5Dataset& dataset, const base::Sla
   const auto row_bytes =
       static_cast<int64_t>(H5Tget_size(memory_type) * std::max<hsize_t>(shape[1], 1));
   const int64_t step = std::max<int64_t>(piece_bytes / row_bytes, 1);
-  int64_t longest = mine.rows();
-  MPI_Allreduce(MPI_IN_PLACE, &longest, 1, MPI_INT64_T, MPI_MAX, comm);
+  const int64_t longest = base::max_over_ranks(comm, mine.rows());
   static const double nothing = 0;
   std::exception_ptr failure;
   for (int64_t done = 0; done < longest; done += step) try {

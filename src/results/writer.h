@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "repose/base/agreement.h"
-#include "repose/base/components.h"
 #include "repose/base/geometry.h"
 #include "repose/base/hdf5.h"
 

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <limits>
 
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 
 namespace repose::solve {
 
@@ -162,7 +162,7 @@ double ContactQp::move_multipliers() {
     maximum = std::max(maximum, std::abs(now - multiplier_[k]));
     multiplier_[k] = now;
   }
-  return discrete::max_over_ranks(objective_.positions().comm(), maximum / stiffness_);
+  return base::max_over_ranks(objective_.positions().comm(), maximum / stiffness_);
 }
 
 /// Where the function is least along the direction: a piecewise quadratic one, `slope` and

@@ -7,7 +7,7 @@
 
 #include "leave_saddle.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 
 namespace repose::solve {
 
@@ -81,8 +81,8 @@ double ContactSearch::violation() {
   cut_faces.update_gaps(objective_.positions().local());
   for (size_t w = 0; w < cut_faces.size(); ++w)
     maximum = std::max(maximum, std::abs(cut_faces.pressure(w) - cut_faces.multipliers()[w]));
-  return discrete::max_over_ranks(objective_.positions().comm(),
-                                  maximum / objective_.body_contact().stiffness());
+  return base::max_over_ranks(objective_.positions().comm(),
+                              maximum / objective_.body_contact().stiffness());
 }
 
 void ContactSearch::move_multipliers() {
@@ -271,9 +271,7 @@ bool ContactSearch::presses_near_edge(Vec displacement) {
   positions.update(displacement);
   mechanics::BodyContact& contact = objective_.body_contact();
   contact.update_gaps(positions.local());
-  int found = !contact.other_sides(positions.local()).empty();
-  MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, positions.comm());
-  return found;
+  return base::on_any_rank(positions.comm(), !contact.other_sides(positions.local()).empty());
 }
 
 /// Takes displacements of this rank's points as another rest position of a state of the skin: finds
@@ -282,20 +280,14 @@ OtherRest ContactSearch::compare_skins(Vec displacement, std::vector<Vec3> other
   discrete::Positions& positions = objective_.positions();
   const model::Points& points = positions.part().model.points;
   positions.update(displacement);
-  struct {
-    double distance;
-    int rank;
-  } largest{0, base::rank(positions.comm())};
   OtherRest found;
   for (int64_t i = 0; i < positions.part().owned_points; ++i) {
     const double apart = (positions.local()[i] - points.position[i] - other[i]).norm();
-    if (points.layer[i] != 0 || apart <= largest.distance) continue;
-    largest.distance = apart;
+    if (points.layer[i] != 0 || apart <= found.distance) continue;
+    found.distance = apart;
     for (int a = 0; a < 3; ++a) found.place[a] = points.position[i][a];
   }
-  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, positions.comm());
-  MPI_Bcast(found.place, 3, MPI_DOUBLE, largest.rank, positions.comm());
-  found.distance = largest.distance;
+  found.distance = base::max_over_ranks_with(positions.comm(), found.distance, found.place);
   found.displacement = std::move(other);
   return found;
 }
@@ -367,7 +359,7 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
     work = -gap.gap * gap.area * objective_.body_contact().multipliers()[gap.constraint];
     qp_.replace(gap);
   }
-  work = discrete::max_over_ranks(objective_.positions().comm(), work);
+  work = base::max_over_ranks(objective_.positions().comm(), work);
   if (!qp_.solve(start_, slope_, predicted_to, step_)) return End::failed;
   check(VecAXPY(start_, 1.0, step_));
   if (energy(start_) > energy_here + promising * work) return End::failed;
@@ -392,12 +384,9 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
   bool changed = false;
   for (int n = 0; n < max_tried; ++n) {
     const ContactPressures here = pressures();
-    struct {
-      double softness;
-      int rank;
-    } first{next < sides.size() ? sides[next].softness : none, base::rank(positions.comm())};
-    MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, positions.comm());
-    if (first.softness == none) break;
+    const double softness = next < sides.size() ? sides[next].softness : none;
+    const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
+    if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
     const End end =
         change_side(mine ? &sides[next++] : nullptr, displacement, accuracy, energy_here);
@@ -517,7 +506,7 @@ double penetration(discrete::Objective& objective) {
   mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
   cut_faces.update_gaps(position);
   for (size_t w = 0; w < cut_faces.size(); ++w) deepest = std::max(deepest, -cut_faces.gap(w));
-  return discrete::max_over_ranks(objective.positions().comm(), deepest);
+  return base::max_over_ranks(objective.positions().comm(), deepest);
 }
 
 }  // namespace repose::solve

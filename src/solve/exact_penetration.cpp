@@ -9,14 +9,8 @@ namespace repose::solve {
 namespace {
 
 void combine_ranks(MPI_Comm comm, PenetrationDepth& on) {
-  MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
-  struct {
-    double depth;
-    int rank;
-  } deepest{on.deepest, base::rank(comm)};
-  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
-  on.deepest = deepest.depth;
-  MPI_Bcast(on.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+  on.points = base::sum_over_ranks(comm, on.points);
+  on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
 }
 
 }  // namespace

@@ -34,9 +34,9 @@ Sample deepest_between(const Vec3& from, const Vec3& to, const mechanics::RigidB
 /// Owned points above a deepest one of their column, which is the next row.
 std::vector<int64_t> second_deepest(MPI_Comm comm, const discrete::Part& part) {
   const model::Points& points = part.model.points;
-  int32_t last = 0;
-  for (const int32_t layer : points.layer) last = std::max(last, layer);
-  MPI_Allreduce(MPI_IN_PLACE, &last, 1, MPI_INT32_T, MPI_MAX, comm);
+  int32_t deepest = 0;
+  for (const int32_t layer : points.layer) deepest = std::max(deepest, layer);
+  const int64_t last = base::max_over_ranks(comm, deepest);
   std::vector<int64_t> rows;
   for (int64_t i = 0; i + 1 < part.owned_points; ++i)
     if (points.layer[i + 1] == last && points.layer[i] + 1 == last &&
@@ -47,15 +47,8 @@ std::vector<int64_t> second_deepest(MPI_Comm comm, const discrete::Part& part) {
 
 /// Sums the columns, and takes the deepest place of any rank.
 void combine(MPI_Comm comm, PiercedColumns& found) {
-  struct {
-    double depth;
-    int rank;
-  } deepest{found.depth, base::rank(comm)};
-  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
-  MPI_Allreduce(MPI_IN_PLACE, &found.columns, 1, MPI_INT64_T, MPI_SUM, comm);
-  found.depth = deepest.depth;
-  MPI_Bcast(&found.body, 1, MPI_INT32_T, deepest.rank, comm);
-  MPI_Bcast(found.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+  found.columns = base::sum_over_ranks(comm, found.columns);
+  found.depth = base::max_over_ranks_with(comm, found.depth, found.body, found.where);
 }
 
 }  // namespace

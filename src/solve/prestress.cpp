@@ -6,10 +6,10 @@
 #include <map>
 
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
-#include "repose/discrete/reduction.h"
 #include "repose/discrete/tangent.h"
 #include "repose/linear/tangent_solver.h"
 #include "repose/mechanics/prism_volume.h"
@@ -42,7 +42,7 @@ mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
 std::vector<char> skin_springs(MPI_Comm comm, const discrete::LocalModel& local_model) {
   const std::vector<std::string>& names = local_model.global_metadata.spring_sets;
   auto set = static_cast<int32_t>(std::ranges::find(names, "layer 0") - names.begin());
-  MPI_Bcast(&set, 1, MPI_INT32_T, 0, comm);
+  base::broadcast(comm, set);
   std::vector<char> skin;
   for (int32_t s : local_model.part.model.springs.set) skin.push_back(s == set);
   return skin;
@@ -228,7 +228,7 @@ double rounding_force(MPI_Comm comm, const discrete::Part& part) {
   double largest = 0;
   for (int64_t i = 0; i < part.owned_points; ++i)
     if (part.unknown[i] >= 0) largest = std::max(largest, force[i]);
-  return discrete::max_over_ranks(comm, largest);
+  return base::max_over_ranks(comm, largest);
 }
 
 /// Refuses on all ranks where an owned spring of a rank has no positive rest length. Collective.
@@ -236,26 +236,23 @@ void require_rest_lengths(MPI_Comm comm, const discrete::LocalModel& local_model
                           const std::vector<double>& tension) {
   const discrete::Part& part = local_model.part;
   const model::Springs& springs = part.model.springs;
-  struct {
-    double row;
-    int rank;
-  } first{std::numeric_limits<double>::infinity(), base::rank(comm)};
+  double first_row = std::numeric_limits<double>::infinity();
   int64_t spring = -1, impossible = 0;
   for (int64_t j = 0; j < part.owned_springs; ++j) {
     if (springs.rest_length[j] > 0) continue;
     ++impossible;
     const auto row = static_cast<double>(part.spring_row[j]);
-    if (row < first.row) first.row = row, spring = j;
+    if (row < first_row) first_row = row, spring = j;
   }
-  MPI_Allreduce(MPI_IN_PLACE, &impossible, 1, MPI_INT64_T, MPI_SUM, comm);
+  impossible = base::sum_over_ranks(comm, impossible);
   if (impossible == 0) return;
-  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, comm);
+  const int first_rank = base::extreme_over_ranks(comm, first_row, MPI_MINLOC).rank;
   int32_t set = spring < 0 ? 0 : springs.set[spring];
-  MPI_Bcast(&set, 1, MPI_INT32_T, first.rank, comm);
+  base::Message(comm, first_rank)(set);
   std::string name = base::rank(comm) == 0 ? local_model.global_metadata.spring_sets[set] : "";
   base::broadcast(comm, name);
   base::collective_try(comm, [&] {
-    if (base::rank(comm) != first.rank) return;
+    if (base::rank(comm) != first_rank) return;
     const auto& [p, q] = springs.points[spring];
     const Vec3& at = part.model.points.position[p];
     base::refuse(
@@ -291,10 +288,7 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
     at = part.model.points.position[i];
   }
   check(VecRestoreArrayRead(force, &values));
-  const int64_t mine = worst;
-  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT64_T, MPI_MAX, comm);
-  if (mine != worst) at.setZero();
-  MPI_Allreduce(MPI_IN_PLACE, at.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
+  base::max_over_ranks_with(comm, static_cast<double>(worst), worst, at);
   base::refuse(
       "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
       "{:.2f}) mm: the tissue there cannot hold it; {}",
@@ -347,7 +341,7 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
     stiffness.solve(force, result);
     result.largest_pressure += add_balance(stiffness, part.model);
   }
-  result.largest_pressure = discrete::max_over_ranks(comm, result.largest_pressure);
+  result.largest_pressure = base::max_over_ranks(comm, result.largest_pressure);
   return result;
 }
 
@@ -386,7 +380,7 @@ Prestress balance_springs(MPI_Comm comm, discrete::LocalModel& local_model, doub
 Prestress prestress(MPI_Comm comm, discrete::LocalModel& local_model, ReferenceState as) {
   static const PetscLogEvent event = base::log_event("RpPrestress");
   const base::Logged logged(event);
-  MPI_Bcast(&as, sizeof as, MPI_BYTE, 0, comm);
+  base::broadcast(comm, as);
   discrete::Part& part = local_model.part;
   const Vec3 gravity = std::exchange(part.model.gravity, as.gravity);
   std::vector<Vec3>& forces = part.model.points.external_force;

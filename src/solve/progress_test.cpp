@@ -31,10 +31,7 @@ bool ProgressTest::stalls(const State& now) {
 
 Vec3 place_of_largest(const discrete::Positions& positions, Vec vector) {
   const discrete::Part& part = positions.part();
-  struct {
-    double length;
-    int rank;
-  } largest{-1, base::rank(positions.comm())};
+  double largest = -1;
   Vec3 place = Vec3::Zero();
   const PetscScalar* values = nullptr;
   check(VecGetArrayRead(vector, &values));
@@ -42,13 +39,12 @@ Vec3 place_of_largest(const discrete::Positions& positions, Vec vector) {
     if (part.unknown[i] < 0) continue;
     const PetscScalar* block = values + 3 * (part.unknown[i] - part.first_unknown);
     const double length = Eigen::Map<const Vec3>(block).norm();
-    if (length <= largest.length) continue;
-    largest.length = length;
+    if (length <= largest) continue;
+    largest = length;
     place = positions.local()[i];
   }
   check(VecRestoreArrayRead(vector, &values));
-  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, positions.comm());
-  MPI_Bcast(place.data(), 3, MPI_DOUBLE, largest.rank, positions.comm());
+  base::max_over_ranks_with(positions.comm(), largest, place);
   return place;
 }
 

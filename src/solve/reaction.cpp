@@ -49,10 +49,7 @@ std::vector<int64_t> group_of_points(MPI_Comm comm, const discrete::Part& part,
   for (int64_t k = 0; k < count; ++k) {
     std::vector<int64_t> rows;
     if (base::rank(comm) == 0) rows = groups[k];
-    auto size = static_cast<int>(rows.size());
-    MPI_Bcast(&size, 1, MPI_INT, 0, comm);
-    rows.resize(size);
-    MPI_Bcast(rows.data(), size, MPI_INT64_T, 0, comm);
+    base::broadcast(comm, rows);
     for (const int64_t row : rows) group_of[row] = k;
   }
   std::vector<int64_t> group;
@@ -122,7 +119,7 @@ std::vector<Vec3> reactions(MPI_Comm comm, const discrete::Part& part,
                             const std::vector<std::vector<int64_t>>& held,
                             const model::StepNumbers& numbers, const std::vector<Vec3>& position) {
   auto requested = static_cast<int64_t>(held.size());
-  MPI_Bcast(&requested, 1, MPI_INT64_T, 0, comm);
+  base::broadcast(comm, requested);
   if (requested == 0) return {};
   discrete::Positions positions(comm, part);
   const base::VecHandle displacement = positions.make_vector();

@@ -14,9 +14,9 @@
 #include "exact_penetration.h"
 #include "pierced_columns.h"
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/log.h"
 #include "repose/discrete/natural_rows.h"
-#include "repose/discrete/reduction.h"
 #include "repose/solve/force_search.h"
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
@@ -40,7 +40,7 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   numbers.potential = objective.potential();
   double force = 0;
   for (const Vec3& f : objective.residual_force()) force += f.norm();
-  numbers.f_f = discrete::sum_over_ranks(objective.positions().comm(), force);
+  numbers.f_f = base::sum_over_ranks(objective.positions().comm(), force);
   numbers.f_v = totals.volume_squares;
   numbers.penalty = numbers.bulk_modulus * totals.penalty_unit;
   numbers.volume_error_max = totals.volume_error_max;
@@ -213,17 +213,11 @@ void add_inside(const discrete::Part& part, const model::ContactPairs& body_cont
   }
 }
 
-void sum_over_ranks(MPI_Comm comm, ContactSummary& on) {
-  MPI_Allreduce(MPI_IN_PLACE, &on.points, 1, MPI_INT64_T, MPI_SUM, comm);
-  MPI_Allreduce(MPI_IN_PLACE, on.force.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
-  MPI_Allreduce(MPI_IN_PLACE, &on.inside, 1, MPI_INT64_T, MPI_SUM, comm);
-  struct {
-    double depth;
-    int rank;
-  } deepest{on.deepest, base::rank(comm)};
-  MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, comm);
-  on.deepest = deepest.depth;
-  MPI_Bcast(on.where.data(), 3, MPI_DOUBLE, deepest.rank, comm);
+void combine_ranks(MPI_Comm comm, ContactSummary& on) {
+  on.points = base::sum_over_ranks(comm, on.points);
+  for (double& component : on.force) component = base::sum_over_ranks(comm, component);
+  on.inside = base::sum_over_ranks(comm, on.inside);
+  on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
 }
 
 /// At the objective's last update. Collective.
@@ -248,7 +242,7 @@ std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
     contacts.back().force -= cut_faces.pressure(w) * cut_faces.area(w) * cut_faces.normal(w);
   }
   add_inside(part, body_contact.pairs(), contacts);
-  for (ContactSummary& on : contacts) sum_over_ranks(objective.positions().comm(), on);
+  for (ContactSummary& on : contacts) combine_ranks(objective.positions().comm(), on);
   return contacts;
 }
 

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "repose/discrete/reduction.h"
+#include "repose/base/collective.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/model/material.h"
 
@@ -214,7 +214,7 @@ class Adjoint {
     double carried = 0;
     for (size_t i = 0; i < weight_.size() && !travel.empty(); ++i)
       carried += weight_[i].dot(travel[i]);
-    carried = discrete::sum_over_ranks(positions_.comm(), carried);
+    carried = base::sum_over_ranks(positions_.comm(), carried);
     PetscReal resisted = 0;
     check(VecDot(lambda_, slope, &resisted));
     return carried - resisted;

@@ -4,7 +4,7 @@
 
 #include "contact_pressures.h"
 #include "repose/base/agreement.h"
-#include "repose/discrete/gather.h"
+#include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/model/motion.h"
 #include "repose/solve/problem.h"
@@ -37,12 +37,6 @@ std::vector<Vec3> travel_of_fixed(const model::Model& model, const std::vector<V
   return travel;
 }
 
-/// Rank 0's rows, on all ranks.
-void share_rows(MPI_Comm comm, std::vector<Vec3>& rows, int64_t total) {
-  rows.resize(total);
-  MPI_Bcast(rows.data(), static_cast<int>(3 * total), MPI_DOUBLE, 0, comm);
-}
-
 /// Contact as it is at rest, at the positions' state. Collective.
 void bring_to_contact(const discrete::NaturalRows& natural, const RestState& rest,
                       Problem& problem) {
@@ -72,19 +66,19 @@ bool flip_contacts(Problem& problem, Vec displacement, Vec step) {
   const std::vector<double> after = gaps_at(moved), before = gaps_at(displacement);
   std::vector<double> multiplier(body_contact.multipliers().begin(),
                                  body_contact.multipliers().end());
-  int flipped = 0;
+  bool flipped = false;
   for (size_t c = 0; c < multiplier.size(); ++c) {
     if (body_contact.pairs().binding[c] == model::Binding::slides) continue;
     const bool pressed = multiplier[c] > stiffness * before[c],
                presses = multiplier[c] > stiffness * after[c];
     if (presses == pressed) continue;
     multiplier[c] = stiffness * before[c] + (presses ? slight : 0);
-    flipped = 1;
+    flipped = true;
   }
   body_contact.set_multipliers(multiplier);
-  MPI_Allreduce(MPI_IN_PLACE, &flipped, 1, MPI_INT, MPI_MAX, positions.comm());
+  flipped = base::on_any_rank(positions.comm(), flipped);
   if (flipped) problem.tangent().invalidate();
-  return flipped != 0;
+  return flipped;
 }
 
 /// −∇Φ − H_sb Δx_b, into `force`.
@@ -114,7 +108,7 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
   const discrete::Part part = discrete::build_local_from_root(comm, held).part;
   discrete::Positions positions(comm, part);
   const discrete::NaturalRows natural(comm, part);
-  share_rows(comm, travel, part.total_points);
+  base::broadcast(comm, travel);
   const base::VecHandle displacement = positions.make_vector(), force = positions.make_vector(),
                         step = positions.make_vector();
   natural.set_unknowns(base::scatter(comm, rest.position), positions, displacement);
@@ -131,7 +125,7 @@ std::vector<Vec3> first_order_change(MPI_Comm comm, const model::Model& other,
   std::vector<Vec3> change(part.point_row.size());
   for (size_t i = 0; i < change.size(); ++i) change[i] = travel[part.point_row[i]];
   positions.scatter_to_local(step, change);
-  return discrete::gather_points(comm, natural.natural(change));
+  return base::gather(comm, natural.natural(change));
 }
 
 }  // namespace repose::solve

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "repose/base/agreement.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
-#include "repose/discrete/gather.h"
 #include "repose/model/cut.h"
 
 namespace repose::solve {
@@ -65,7 +65,7 @@ class Rupture {
 Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& limit,
              const Settings& settings, const std::vector<Vec3>& start) {
   double newtons = limit.value_or(0);
-  MPI_Bcast(&newtons, 1, MPI_DOUBLE, 0, comm);
+  base::broadcast(comm, newtons);
   Tearing result;
   if (newtons == 0) return result;
   result.limit = newtons;
@@ -84,9 +84,9 @@ Tearing tear(MPI_Comm comm, model::Model& model, const std::optional<double>& li
     ++result.rounds;
     result.stopped = rest.path.last.stopped;
     if (result.stopped || !rest.path.complete()) break;
-    tension = discrete::gather(comm, tension.data(), tension.size());
+    tension = base::gather(comm, tension);
     base::on_root(comm, [&] { more = rupture.tear(tension); });
-    MPI_Bcast(&more, 1, MPI_C_BOOL, 0, comm);
+    base::broadcast(comm, more);
     if (more) {
       result.torn = true;
       result.position = position;

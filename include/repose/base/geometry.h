@@ -19,6 +19,14 @@ using Triangle =
 
 namespace repose::base {
 
+/// Numbers in a value: those of a vector or a tuple, else 1.
+template <class Value>
+constexpr size_t components = 1;
+template <>
+inline constexpr size_t components<Vec3> = 3;
+template <class T, size_t n>
+constexpr size_t components<std::array<T, n>> = n;
+
 /// The values at `rows`, in their order.
 template <class T>
 std::vector<T> pick(const std::vector<T>& values, std::span<const int64_t> rows) {

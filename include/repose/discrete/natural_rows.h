@@ -1,4 +1,5 @@
 #pragma once
+#include "repose/base/collective.h"
 #include "repose/base/petsc.h"
 #include "repose/discrete/objective.h"
 #include "repose/model/step.h"
@@ -10,14 +11,19 @@ namespace repose::discrete {
 /// collective.
 class NaturalRows {
  public:
+  /// Which ranks get rows: each its slab, or rank 0 all.
+  enum class Holders { slabs, root };
+
   /// `at_once` rows are carried at a time, in twice their memory.
-  NaturalRows(MPI_Comm comm, const Part& part, int64_t at_once = int64_t{1} << 20);
+  NaturalRows(MPI_Comm comm, const Part& part, Holders holders = Holders::slabs,
+              int64_t at_once = int64_t{1} << 20);
 
   /// The arrays of a step at the objective's last update.
   model::StepRows rows(Objective& objective) const;
 
   /// The arrays of a local model in its present state.
-  static model::ModelRows of_model(MPI_Comm comm, const LocalModel& local_model);
+  static model::ModelRows of_model(MPI_Comm comm, const LocalModel& local_model,
+                                   Holders holders = Holders::slabs);
 
   /// This rank's slab of values [at least owned points] at the points, in natural order.
   std::vector<Vec3> natural(std::span<const Vec3> values) const;
@@ -37,6 +43,8 @@ class NaturalRows {
     std::span<const int64_t> row;  // natural rows of what this rank owns
     int64_t total;
   };
+  /// Rows of `total` that a rank gets.
+  base::Slab slab(int64_t total, int rank) const;
   /// Calls work(places) for chunks of rows: of each rank places of those that lie in its slab.
   template <class Work>
   void for_each_chunk(const Rows& rows, const Work& work) const;
@@ -52,6 +60,7 @@ class NaturalRows {
 
   MPI_Comm comm_;
   const Part& part_;
+  Holders holders_;
   int64_t at_once_;
   Rows points_, springs_, prisms_;
 };

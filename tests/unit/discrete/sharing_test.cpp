@@ -7,8 +7,8 @@
 #include "discrete/exchange.h"
 #include "discrete/partition.h"
 #include "gathered.h"
+#include "repose/base/collective.h"
 #include "repose/base/error.h"
-#include "repose/discrete/gather.h"
 #include "repose/discrete/natural_rows.h"
 
 namespace repose {
@@ -70,7 +70,8 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
   discrete::Objective objective(positions, {});
   const base::VecHandle displacement = positions.make_vector();
   for (const int64_t at_once : {7, 1000000}) {
-    const discrete::NaturalRows natural(MPI_COMM_WORLD, part, at_once);
+    const discrete::NaturalRows natural(MPI_COMM_WORLD, part, discrete::NaturalRows::Holders::slabs,
+                                        at_once);
     natural.set_unknowns(base::scatter(MPI_COMM_WORLD, moved), positions, displacement);
     positions.update(displacement);
     const model::StepRows rows = natural.rows(objective);
@@ -109,7 +110,7 @@ TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
 TEST(Sharing, GathersSlabsOfDifferentLengthsInOrder) {
   const int rank = base::rank(PETSC_COMM_WORLD), ranks = base::size(PETSC_COMM_WORLD);
   const std::vector<double> mine(rank, 10.0 + rank);  // none on rank 0
-  const std::vector<double> all = discrete::gather(PETSC_COMM_WORLD, mine.data(), mine.size());
+  const std::vector<double> all = base::gather(PETSC_COMM_WORLD, mine);
   std::vector<double> expected;
   for (int r = 0; r < ranks && rank == 0; ++r) expected.insert(expected.end(), r, 10.0 + r);
   EXPECT_EQ(all, expected);
