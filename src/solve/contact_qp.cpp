@@ -141,7 +141,7 @@ void ContactQp::set_blocks() {
                               add_to(convex));
   }
   tangent_.set_contact(std::move(exact), std::move(convex));
-  solver_.update_contact();
+  solver_.preconditioner().update_contact();
 }
 
 void ContactQp::add_pushes(std::span<const double> pressure, Vec to) {

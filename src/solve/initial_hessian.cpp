@@ -80,7 +80,7 @@ PetscErrorCode InitialHessian::apply(Mat matrix, Vec vector, Vec product) {
 
 void InitialHessian::renew(Vec displacement) {
   solver_.renew(displacement);
-  renewals_ = solver_.renewals();
+  renewals_ = solver_.preconditioner().renewals();
   lag_.renew();
 }
 
@@ -90,8 +90,9 @@ void InitialHessian::refresh(Vec displacement) {
 }
 
 bool InitialHessian::needs_renewal(double force, double length) {
-  if (renewals_ != solver_.renewals()) lag_.renew();  // by an estimate of the distance from rest
-  renewals_ = solver_.renewals();
+  if (renewals_ != solver_.preconditioner().renewals())
+    lag_.renew();  // by an estimate of the distance from rest
+  renewals_ = solver_.preconditioner().renewals();
   return lag_.observe(force, length);
 }
 

@@ -137,6 +137,7 @@ Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver
     : function_(function),
       solver_(solver),
       estimate_(estimate),
+      newton_estimate_(estimate.solver),
       watch_(watch),
       progress_(std::make_unique<ProgressTest>()),
       gradient_(function.positions().make_vector()),
@@ -154,7 +155,7 @@ void Minimizer::make_tao() {
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
   check(TaoSetObjective(tao_, Callbacks::value, this));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
-  check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner_matrix(),
+  check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner().matrix(),
                       Callbacks::hessian, this));
   check(TaoSetTolerances(tao_, 0, 0, 0));
   check(TaoSetMaximumIterations(tao_, 5000));
@@ -168,7 +169,7 @@ void Minimizer::make_tao() {
   if (!newton_) return;
   KSP inner = nullptr;
   check(TaoGetKSP(tao_, &inner));
-  solver_.share_preconditioner(inner);
+  solver_.preconditioner().attach(inner);
   check(KSPSetNormType(inner, KSP_NORM_NATURAL));
   check(KSPSetTolerances(inner, coarsest_forcing, 0.0, PETSC_DEFAULT, 200));
   base::check_options(KSPSetFromOptions(inner));
@@ -202,11 +203,11 @@ double Minimizer::strict_estimate(Vec displacement, Vec gradient, bool last) {
     estimate_.function.evaluate(displacement, estimate_gradient_);
     gradient = estimate_gradient_;
   }
-  double step = estimate_.solver.newton_distance(displacement, gradient);
+  double step = newton_estimate_.distance(displacement, gradient);
   double unsure = 0;
   if (last || safety * step <= accuracy_) {
-    step = estimate_.solver.error_bound(displacement, gradient, sure_share * accuracy_);
-    unsure = estimate_.solver.error_slack();
+    step = newton_estimate_.bound(displacement, gradient, sure_share * accuracy_);
+    unsure = newton_estimate_.error_slack();
   }
   const double estimate = safety * step + unsure;
   const bool curved = estimate > linear && estimate <= accuracy_;
@@ -218,18 +219,18 @@ double Minimizer::strict_estimate(Vec displacement, Vec gradient, bool last) {
 }
 
 double Minimizer::contraction(Vec displacement) {
-  linear::TangentSolver& solver = estimate_.solver;
-  if (contracted_at_ == solver.hessian().assemblies()) return contraction_;
-  check(VecWAXPY(trial_, -1.0, solver.newton_step(), displacement));
+  const discrete::Hessian& hessian = estimate_.solver.hessian();
+  if (contracted_at_ == hessian.assemblies()) return contraction_;
+  check(VecWAXPY(trial_, -1.0, newton_estimate_.step(), displacement));
   estimate_.function.evaluate(trial_, estimate_gradient_);
-  const double found = solver.contraction(displacement, trial_, estimate_gradient_);
+  const double found = newton_estimate_.contraction(displacement, trial_, estimate_gradient_);
   contraction_ = found <= trusted_contraction ? found : max_contraction;
-  contracted_at_ = solver.hessian().assemblies();
+  contracted_at_ = hessian.assemblies();
   return contraction_;
 }
 
 double Minimizer::distance_without_force(Vec displacement) {
-  return estimate_.solver.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
+  return newton_estimate_.is_minimum(displacement) ? 0 : std::numeric_limits<double>::infinity();
 }
 
 /// An estimate costs the solution of a linear system: only where the force that went with a
@@ -248,7 +249,7 @@ bool Minimizer::worth_estimating(double largest_force) const {
 std::optional<bool> Minimizer::near_enough_at_a_step(Vec gradient) {
   const bool preconditioned = newton_ || initial_;
   if (!preconditioned || &estimate_.function != &function_) return {};
-  const double step = estimate_.solver.preconditioned_step(gradient);
+  const double step = newton_estimate_.preconditioned_distance(gradient);
   const double near = std::max(accuracy_, std::min(closing * accuracy_, farthest_closing));
   std::optional<bool> answer;
   if (presolving_)
@@ -304,8 +305,8 @@ int Minimizer::polish(Vec displacement) {
   while (corrections < maximum && error_ > accuracy_ && error_ <= farthest_correction()) {
     const double before = error_;
     check(VecCopy(displacement, saved_));
-    check(VecAXPY(displacement, -1.0, estimate_.solver.newton_step()));
-    taken_ = discrete::largest_block(estimate_.solver.newton_step());
+    check(VecAXPY(displacement, -1.0, newton_estimate_.step()));
+    taken_ = discrete::largest_block(newton_estimate_.step());
     measure(displacement, true);
     taken_ = 0;
     if (error_ > 0.5 * before) {
@@ -348,7 +349,7 @@ Outcome Minimizer::summary(Vec displacement) {
   outcome.objective = function_.evaluate(displacement, gradient_);
   outcome.gradient_max = discrete::largest_block(gradient_);
   outcome.displacement_error = error_;
-  outcome.stable = std::isfinite(error_) || !estimate_.solver.negative_curvature();
+  outcome.stable = std::isfinite(error_) || !newton_estimate_.negative_curvature();
   outcome.converged = error_ <= accuracy_;
   TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
   check(TaoGetConvergedReason(tao_, &reason));

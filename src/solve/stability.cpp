@@ -93,7 +93,7 @@ void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
   check(EPSSetWhichEigenpairs(eps, EPS_SMALLEST_REAL));
   check(EPSGetST(eps, &st));
   check(STSetType(st, STPRECOND));
-  check(STSetPreconditionerMat(st, solver.preconditioner_matrix()));
+  check(STSetPreconditionerMat(st, solver.preconditioner().matrix()));
   check(STGetKSP(st, &krylov));
   check(KSPSetType(krylov, KSPPREONLY));
   check(KSPSetPC(krylov, solver.preconditioner()));
@@ -172,7 +172,7 @@ double rough_smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement
     value = first_mode(eps, mode);
   }
   // SLEPc takes them away from the preconditioner that it was lent.
-  check(PCSetOperators(solver.preconditioner(), action, solver.preconditioner_matrix()));
+  check(PCSetOperators(solver.preconditioner(), action, solver.preconditioner().matrix()));
   return value;
 }
 

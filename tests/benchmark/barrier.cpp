@@ -119,7 +119,7 @@ class BarrierSearch {
     }
     problem_.tangent().assemble(displacement_);
     problem_.tangent().set_contact(blocks_, std::move(convex));
-    problem_.elastic_solver().update_contact();
+    problem_.elastic_solver().preconditioner().update_contact();
   }
 
   /// Solves H step_ = −slope to the relative residual `forcing`; sets moved_, too. Returns false

@@ -266,7 +266,7 @@ void measure_costs(const Task& task) {
   const double renewal = seconds_of([&] {
     positions.set_load(load += 1e-4);
     problem.tangent().assemble(at);
-    problem.solver().renew_preconditioner();
+    problem.solver().preconditioner().rebuild();
   });
   check(VecSet(at, 1e-3));
   const double action = seconds_of([&] {

@@ -70,7 +70,7 @@ void measure_solver(const model::Model& model, Cost& cost) {
   discrete::Tangent tangent(objective);
   linear::TangentSolver solver(positions, tangent);
   solver.prepare(at);
-  cost.preconditioner = seconds_of([&] { solver.renew_preconditioner(); });
+  cost.preconditioner = seconds_of([&] { solver.preconditioner().rebuild(); });
   cost.action = seconds_of([&] {
     check(MatMult(tangent.action(), gradient, at));
     check(PCApply(solver.preconditioner(), at, gradient));

@@ -100,7 +100,7 @@ BREAKS = [
     ),
     (
         "no margin for soft points",
-        "const double margin = positions_.part().solid ? 50 : 200;",
+        "const double margin = solver_.positions().part().solid ? 50 : 200;",
         "constexpr double margin = 0;",
         f"{SOLVE}|extremes",
     ),

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "repose/linear/tangent_solver.h"
+#include "repose/linear/newton_estimate.h"
 #include "repose/solve/rest_search.h"
 
 namespace repose::solve {
@@ -65,7 +65,7 @@ class Minimizer : public RestSearch {
   bool should_restart(int64_t iterations);
   /// `last`: the search is over, so the estimate is reported.
   double strict_estimate(Vec displacement, Vec gradient, bool last);
-  /// Returns θ (TangentSolver) of the latest Newton step δ, from `displacement`, and the next,
+  /// Returns θ (NewtonEstimate) of the latest Newton step δ, from `displacement`, and the next,
   /// where the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004,
   /// Newton Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic
   /// model misleads.
@@ -88,6 +88,7 @@ class Minimizer : public RestSearch {
   discrete::Function& function_;
   linear::TangentSolver& solver_;
   ErrorEstimate estimate_;
+  linear::NewtonEstimate newton_estimate_;  // by the same solver
   Watch watch_;
   std::unique_ptr<ProgressTest> progress_;
   TaoHandle tao_;

@@ -28,7 +28,7 @@ double largest_eigenvalue(Mat hessian);
 /// least. Its longest 3-vector has length 1, its largest entry is positive; zero where the
 /// eigenvalue is not a number.
 double smallest_eigenvalue(linear::TangentSolver& solver, Vec displacement, Vec mode,
-                           int64_t direct_limit = linear::TangentSolver::factors_limit);
+                           int64_t direct_limit = linear::HessianPreconditioner::factors_limit);
 
 /// The smallest eigenvalue of the exact Hessian, N/mm, to a relative error of 0.1, by generalized
 /// Davidson with products of the Hessian and the preconditioner of `solver`; not a number if that

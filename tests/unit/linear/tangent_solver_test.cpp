@@ -26,7 +26,7 @@ TEST_P(Preconditioner, MadeElsewhereChangesNoAnswer) {
   const base::VecHandle before = s.vector(1, 0.05), after = s.vector(2, 0.05);
   s.solve(before, 1e-12);
   ASSERT_TRUE(s.solve(after, 1e-12));
-  EXPECT_EQ(s.solver.renewals(), 1);
+  EXPECT_EQ(s.solver.preconditioner().renewals(), 1);
   EXPECT_LT(s.residual(after), 1e-9);
 }
 
@@ -36,9 +36,9 @@ TEST_P(Preconditioner, IsRenewedWhereItIsWornOut) {
   const base::VecHandle before = s.positions.make_vector(), after = s.drawn_out();
   s.solve(before, 1e-6);
   s.solve(after, 1e-6);
-  EXPECT_EQ(s.solver.renewals(), 1);
+  EXPECT_EQ(s.solver.preconditioner().renewals(), 1);
   s.solve(after, 1e-6);
-  EXPECT_EQ(s.solver.renewals(), 2);
+  EXPECT_EQ(s.solver.preconditioner().renewals(), 2);
 }
 
 TEST_P(Preconditioner, KnowsTheProductOfARoughSolution) {
@@ -63,10 +63,10 @@ TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
     linear::TangentSolver solver(s.positions, s.tangent);
     const base::VecHandle start = s.positions.make_vector(), next = s.vector(1, 1e-12);
     solver.solve(start, s.rhs, s.answer, 1e-6);
-    EXPECT_FALSE(solver.by_factors());
+    EXPECT_FALSE(solver.preconditioner().by_factors());
     EXPECT_TRUE(solver.solve(next, s.rhs, s.answer, 1e-10));
     EXPECT_LT(s.residual(next), 1e-6);
-    return solver.by_factors();
+    return solver.preconditioner().by_factors();
   };
   EXPECT_FALSE(by_factors_after(0.4));
   EXPECT_TRUE(by_factors_after(4e5));
@@ -80,7 +80,7 @@ TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
   solver.solve(s.positions.make_vector(), s.rhs, s.answer, 1e-6);
   EXPECT_FALSE(solver.finished());
   solver.solve(s.vector(1, 1e-12), s.rhs, s.answer, 1e-6);
-  EXPECT_FALSE(solver.by_factors());
+  EXPECT_FALSE(solver.preconditioner().by_factors());
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));

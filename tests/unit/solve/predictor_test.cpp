@@ -23,7 +23,7 @@ TEST(Predictor, RenewsThePreconditionerWhereIterationsRunOut) {
   s.positions.set_load(0);
   s.solve(s.positions.make_vector(), 1e-6);
   EXPECT_TRUE(predictor.predict(s.drawn_out(), 1, s.answer));
-  EXPECT_EQ(s.solver.renewals(), 2);
+  EXPECT_EQ(s.solver.preconditioner().renewals(), 2);
 }
 
 TEST(Predictor, PredictsNothingWhereIterationsRunOut) {
