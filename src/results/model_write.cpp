@@ -150,8 +150,8 @@ void write_merged(hid_t model, const MergedBones& bones) {
 
 }  // namespace
 
-void write_model(const base::Hdf5File& file, const model::Model& model,
-                 const model::ModelRows& slabs, const MergedBones& bones) {
+void write_model(hid_t file, const model::Model& model, const model::ModelRows& slabs,
+                 const MergedBones& bones) {
   const base::Hdf5Group root(H5Gopen2(file, "/", H5P_DEFAULT));
   write_attribute(root, "format", std::string("tissue-model"));
   write_attribute(root, "version", int64_t{1});

@@ -11,8 +11,8 @@ namespace repose::results {
 /// there are bone surfaces, /model/bone_surfaces (points f64 [P,3], triangles i64 [T,3], bone i32
 /// [T]), the same merged. Creates the arrays of points and elements that the first of the slabs
 /// has, for fill_model().
-void write_model(const base::Hdf5File& file, const model::Model& model,
-                 const model::ModelRows& slabs, const MergedBones& bones);
+void write_model(hid_t file, const model::Model& model, const model::ModelRows& slabs,
+                 const MergedBones& bones);
 
 /// Work on a file that all ranks do, and all fail if one does.
 using OnDisk = std::function<void(const std::function<void()>&)>;

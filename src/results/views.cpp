@@ -77,8 +77,8 @@ XdmfBlock tissue(const FileCounts& counts, size_t steps) {
                    point_integer("layer", "/model/point/layer", short_integer),
                    point_integer("column", "/model/point/column", long_integer),
                    {"volume_ratio", "step/prism/volume_ratio"}}};
-  if (counts.pressure) block.arrays.push_back({"pressure", "step/prism/pressure"});
-  if (counts.stress) {
+  if (counts.solid) {
+    block.arrays.push_back({"pressure", "step/prism/pressure"});
     block.arrays.push_back({"von_mises", "step/prism/von_mises"});
     block.arrays.push_back(
         {.name = "principal_stretch", .path = "step/prism/principal_stretch", .vector = true});

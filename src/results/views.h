@@ -10,8 +10,7 @@ namespace repose::results {
 struct FileCounts {
   int64_t points = 0, springs = 0, prisms = 0, skin = 0;
   int64_t bone_points = 0, bone_triangles = 0;  ///< of the merged bone surfaces
-  bool pressure = false;                        ///< every step has pressures, …
-  bool stress = false;                          ///< … and the other fields of a solid
+  bool solid = false;                           ///< every step has the fields of a solid
 };
 
 /// An array of the points that some steps have.

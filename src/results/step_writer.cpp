@@ -1,0 +1,124 @@
+#include "step_writer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace repose::results {
+
+std::string group_of(size_t step) { return fmt::format("step/{:04}", step); }
+
+void WriteAttribute::operator()(const char* name, double value) const {
+  if (!std::isnan(value) || !model::is_optional(name)) write_attribute(group, name, value);
+}
+
+StepWriter::StepWriter(const SharedPart& part, StepViews& views, const model::ModelRows& slabs,
+                       MergedBones bones, std::optional<model::PrescribedMotion> motion)
+    : part_(part),
+      views_(views),
+      bones_(std::move(bones)),
+      motion_(std::move(motion)),
+      initial_(slabs.points.position),
+      outward_(slabs.outward) {}
+
+int64_t StepWriter::bytes() const {
+  const FileCounts& counts = views_.counts();
+  return (88 + 24 * static_cast<int64_t>(views_.optional_fields())) * counts.points +
+         16 * counts.springs + 48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
+}
+
+void StepWriter::require_rows(const model::StepRows& rows) const {
+  const FileCounts& counts = views_.counts();
+  const auto agrees = [&](size_t given, int64_t all) {
+    return static_cast<int64_t>(given) == part_.slab(all).rows();
+  };
+  if (!agrees(rows.position.size(), counts.points) ||
+      !agrees(rows.residual_force.size(), counts.points) ||
+      !agrees(rows.volume_ratio.size(), counts.prisms) ||
+      (counts.solid && !agrees(rows.pressure.size(), counts.prisms)) ||
+      !(rows.discretization_error.empty() ||
+        agrees(rows.discretization_error.size(), counts.points)) ||
+      !std::all_of(rows.point_fields.begin(), rows.point_fields.end(),
+                   [&](const model::PointField& field) {
+                     return agrees(field.values.size() / (field.vector ? 3 : 1), counts.points);
+                   }) ||
+      (counts.solid && !agrees(rows.stretch.size(), counts.prisms)) ||
+      !agrees(rows.elongation.size(), counts.springs) ||
+      !agrees(rows.tension.size(), counts.springs))
+    throw base::InternalError("a step's rows are not this rank's slab");
+}
+
+void StepWriter::write_field(hid_t group, const model::PointField& field) {
+  const FileCounts& counts = views_.counts();
+  part_.write_dataset(group, field.name.c_str(), {counts.points, field.vector ? 3 : 0},
+                      part_.slab(counts.points), field.values.data());
+  part_.on_disk([&] {
+    if (field.texts.empty() && field.flags.empty()) return;
+    const base::Hdf5Dataset dataset(H5Dopen2(group, field.name.c_str(), H5P_DEFAULT));
+    for (const auto& [name, text] : field.texts) write_attribute(dataset, name.c_str(), text);
+    for (const auto& [name, flag] : field.flags)
+      write_attribute(dataset, name.c_str(), static_cast<int64_t>(flag));
+  });
+  views_.note_field(field.name, field.vector, views_.loads().size());
+}
+
+void StepWriter::write_points(hid_t step, const model::StepRows& rows) {
+  const FileCounts& counts = views_.counts();
+  const base::Hdf5Group group = part_.create_group(step, "point");
+  const base::Slab mine = part_.slab(counts.points);
+  std::vector<Vec3> displacement(rows.position.size());
+  for (size_t i = 0; i < displacement.size(); ++i) displacement[i] = rows.position[i] - initial_[i];
+  part_.write_dataset(group, "position", {counts.points, 3}, mine, flat(rows.position));
+  part_.write_dataset(group, "displacement", {counts.points, 3}, mine, flat(displacement));
+  part_.write_dataset(group, "residual_force", {counts.points, 3}, mine, flat(rows.residual_force));
+  model::PointField advance{"advance", false, std::vector<double>(displacement.size())};
+  for (size_t i = 0; i < displacement.size(); ++i)
+    advance.values[i] = displacement[i].dot(outward_[i]);
+  if (counts.skin > 0) write_field(group, advance);
+  if (base::on_any_rank(part_.comm(), !rows.discretization_error.empty()))
+    write_field(group, {"discretisation_error", false, rows.discretization_error});
+  for (const model::PointField& field : rows.point_fields) write_field(group, field);
+}
+
+void StepWriter::write_elements(hid_t step, const model::StepRows& rows) const {
+  const FileCounts& counts = views_.counts();
+  const base::Hdf5Group prism = part_.create_group(step, "prism");
+  const base::Slab prisms = part_.slab(counts.prisms);
+  part_.write_dataset(prism, "volume_ratio", {counts.prisms, 0}, prisms, rows.volume_ratio.data());
+  if (counts.solid) {
+    part_.write_dataset(prism, "pressure", {counts.prisms, 0}, prisms, rows.pressure.data());
+    part_.write_dataset(prism, "von_mises", {counts.prisms, 0}, prisms, rows.von_mises.data());
+    part_.write_dataset(prism, "principal_stretch", {counts.prisms, 3}, prisms, flat(rows.stretch));
+  }
+  if (counts.springs == 0) return;
+  const base::Hdf5Group spring = part_.create_group(step, "spring");
+  const base::Slab springs = part_.slab(counts.springs);
+  part_.write_dataset(spring, "elongation", {counts.springs, 0}, springs, rows.elongation.data());
+  part_.write_dataset(spring, "tension", {counts.springs, 0}, springs, rows.tension.data());
+}
+
+/// Writes the displacement of the bones and, if any has moved, where they are; returns whether any
+/// has.
+bool StepWriter::write_bones(hid_t step, double load) const {
+  const FileCounts& counts = views_.counts();
+  if (counts.bone_triangles == 0) return false;
+  std::vector<Vec3> at_load;
+  if (motion_) at_load = moved_points(bones_, *motion_, load);
+  bool moved = !at_load.empty();
+  base::broadcast(part_.comm(), moved);
+  const base::Hdf5Group group = part_.create_group(step, "bone_surface");
+  const base::Slab mine{0, static_cast<int64_t>(bones_.points.size())};
+  const std::vector<Vec3> displacement = displacements(bones_, at_load);
+  part_.write_dataset(group, "displacement", {counts.bone_points, 3}, mine, flat(displacement));
+  if (moved) part_.write_dataset(group, "points", {counts.bone_points, 3}, mine, flat(at_load));
+  return moved;
+}
+
+void StepWriter::write(const model::StepNumbers& numbers, const model::StepRows& rows) {
+  const base::Hdf5Group step = part_.create_group(part_.id(), group_of(views_.loads().size()));
+  part_.on_disk([&] { model::for_each_number(numbers, WriteAttribute{step}); });
+  write_points(step, rows);
+  write_elements(step, rows);
+  views_.add(numbers.load, write_bones(step, numbers.load));
+}
+
+}  // namespace repose::results
