@@ -7,6 +7,7 @@
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/base/hdf5.h"
 #include "repose/model/cut.h"
 #include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
@@ -127,7 +128,7 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
           const scene::SceneChanges& changes, Job& job) {
   model::Model stored;
   base::on_root(comm, [&] {
-    if (!results::is_hdf5(input)) {
+    if (!base::is_hdf5(input)) {
       read_scene(scene::read_scene(input, changes), job);
       if (watch) watch(share_of_surfaces);
       return;

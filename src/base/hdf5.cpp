@@ -39,6 +39,11 @@ void throw_hdf5_error() {
   throw Hdf5Error(single_line(text));
 }
 
+bool is_hdf5(const std::filesystem::path& file) {
+  silence();
+  return H5Fis_hdf5(file.c_str()) > 0;
+}
+
 Hdf5File open_hdf5(const std::filesystem::path& file) {
   silence();
   return Hdf5File(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));

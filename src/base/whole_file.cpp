@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <mutex>
 #include <set>
 
@@ -47,6 +48,22 @@ void record_input(const std::filesystem::path& file) {
   std::filesystem::path path = real_path(file);
   const std::lock_guard lock(files().mutex);
   if (!files().written.contains(path)) files().read.insert(std::move(path));
+}
+
+std::string read_text_input(const std::filesystem::path& file, const TextLimits& limits) {
+  const std::string name = file.string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    refuse("{}: {}; {}", name,
+           std::filesystem::is_directory(file, error) ? "is a folder" : "no such file",
+           limits.advice);
+  if (std::filesystem::file_size(file, error) > std::uintmax_t(limits.mebibytes) << 20)
+    refuse("{}: too large for {} ({} MiB allowed); {}", name, limits.what, limits.mebibytes,
+           limits.advice);
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) refuse("{}: cannot be read; check its permissions", name);
+  record_input(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 void require_name(const std::string& name) {

@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "reader.h"
 
@@ -171,7 +170,7 @@ std::vector<surface::Surface> read_bone_surfaces(const Reader& in,
 }  // namespace
 
 model::Model read_model(const std::filesystem::path& file) {
-  if (!std::filesystem::is_directory(file) && std::filesystem::exists(file) && !is_hdf5(file))
+  if (!std::filesystem::is_directory(file) && std::filesystem::exists(file) && !base::is_hdf5(file))
     base::refuse("{}: is not an HDF5 file; give a model or result file (.h5)", file.string());
   const Reader in(file);
   require_format(in);
@@ -193,19 +192,6 @@ model::Model read_model(const std::filesystem::path& file) {
   if (in.has("/model/contact")) model.contact = read_contact(in);
   model::validate(model, file.string());
   return model;
-}
-
-bool is_hdf5(const std::filesystem::path& file) {
-  const std::string signature = "\x89HDF\r\n\x1a\n";
-  std::ifstream in(file, std::ios::binary);
-  // The signature is at 0 or, after a user block, at 512, 1024, 2048, …
-  for (int64_t place = 0; in; place = place == 0 ? 512 : 2 * place) {
-    std::string found(signature.size(), '\0');
-    in.seekg(place);
-    if (in.read(found.data(), static_cast<std::streamsize>(found.size())) && found == signature)
-      return true;
-  }
-  return false;
 }
 
 bool is_checkpoint(const std::filesystem::path& file) {

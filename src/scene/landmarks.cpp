@@ -3,8 +3,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
 
@@ -35,20 +33,6 @@ double coordinate(const std::string& place, const std::string& name, const std::
     base::refuse("{}: landmark {}: {} is not a finite number of mm", place, base::quote(name),
                  base::quote(word));
   return *number;
-}
-
-std::string read_text(const std::filesystem::path& file) {
-  constexpr std::uintmax_t largest = 16 << 20;
-  const std::string name = file.string();
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
-    base::refuse("{}: no such file; give landmarks as .mrk.json, .fcsv or .csv", name);
-  if (std::filesystem::file_size(file, error) > largest)
-    base::refuse("{}: too large for a file of landmarks (16 MiB allowed)", name);
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) base::refuse("{}: cannot be read; check its permissions", name);
-  base::record_input(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 // --- .mrk.json
@@ -245,7 +229,9 @@ class Table {
 }  // namespace
 
 std::vector<Landmark> read_landmarks(const std::filesystem::path& file) {
-  const std::string name = file.string(), text = read_text(file);
+  const std::string name = file.string();
+  const std::string text = base::read_text_input(
+      file, {16, "a file of landmarks", "give landmarks as .mrk.json, .fcsv or .csv"});
   const std::string ending = file.extension().string();
   std::vector<Landmark> found;
   if (ending == ".json")

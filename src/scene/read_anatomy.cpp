@@ -1,4 +1,4 @@
-#include "read_anatomy.h"
+#include "readers.h"
 
 #include <fmt/format.h>
 

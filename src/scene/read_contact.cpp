@@ -1,6 +1,4 @@
-#include "read_contact.h"
-
-#include "read_region.h"
+#include "readers.h"
 
 namespace repose::scene {
 

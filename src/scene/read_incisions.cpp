@@ -1,4 +1,4 @@
-#include "read_incisions.h"
+#include "readers.h"
 
 #include <fmt/format.h>
 

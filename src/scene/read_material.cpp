@@ -1,9 +1,8 @@
-#include "read_material.h"
+#include "readers.h"
 
 #include <algorithm>
 
 #include "material_presets.h"
-#include "read_region.h"
 
 namespace repose::scene {
 

@@ -1,4 +1,4 @@
-#include "read_moves.h"
+#include "readers.h"
 
 #include <optional>
 

@@ -1,4 +1,4 @@
-#include "read_osteotomies.h"
+#include "readers.h"
 
 #include "bone_names.h"
 #include "osteotomy_templates.h"

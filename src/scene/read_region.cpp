@@ -1,10 +1,8 @@
-#include "read_region.h"
+#include "readers.h"
 
 #include <fmt/ranges.h>
 
 #include <limits>
-
-#include "read_incisions.h"
 
 namespace repose::scene {
 namespace {

@@ -2,15 +2,8 @@
 #include <map>
 
 #include "bone_names.h"
-#include "read_anatomy.h"
-#include "read_contact.h"
-#include "read_incisions.h"
-#include "read_instruments.h"
-#include "read_material.h"
-#include "read_moves.h"
-#include "read_osteotomies.h"
-#include "read_region.h"
 #include "read_yaml.h"
+#include "readers.h"
 #include "repose/base/text.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/scene.h"

@@ -2,9 +2,7 @@
 
 #include <yaml-cpp/eventhandler.h>
 #include <algorithm>
-#include <fstream>
 
-#include <iterator>
 #include <sstream>
 #include <string>
 
@@ -22,22 +20,11 @@ bool is_control(char c) {
 }
 
 std::string read_scene_text(const std::filesystem::path& file) {
-  constexpr std::uintmax_t largest = 1 << 20;
-  const std::string name = file.string();
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    base::refuse("{}: is a folder; give a scene file (.yaml)", name);
-  if (!std::filesystem::is_regular_file(file, error))
-    base::refuse("{}: no such file; give a scene file (.yaml)", name);
-  if (std::filesystem::file_size(file, error) > largest)
-    base::refuse("{}: too large for a scene file (1 MiB allowed); give a scene file (.yaml)", name);
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) base::refuse("{}: cannot be read; check its permissions", name);
-  base::record_input(file);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  const std::string text =
+      base::read_text_input(file, {1, "a scene file", "give a scene file (.yaml)"});
   const auto control = std::find_if(text.begin(), text.end(), is_control);
   if (control != text.end())
-    base::refuse("{}:{}: not a text file; give a scene file (.yaml)", name,
+    base::refuse("{}:{}: not a text file; give a scene file (.yaml)", file.string(),
                  1 + std::count(text.begin(), control, '\n'));
   return text;
 }

@@ -1,12 +1,12 @@
 #include "repose/scene/transform_file.h"
 
 #include <Eigen/LU>
-#include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "repose/base/error.h"
+#include "repose/base/hdf5.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "stored_transform.h"
@@ -64,13 +64,6 @@ Stored read_stored(const std::string& name, std::istream& stream) {
   return stored;
 }
 
-/// HDF5 files begin with this.
-bool is_hdf5(const std::filesystem::path& file) {
-  std::string start(8, ' ');
-  std::ifstream(file, std::ios::binary).read(start.data(), 8);
-  return start == "\x89HDF\r\n\x1a\n";
-}
-
 RigidMotion inverse_motion(const Mat4& matrix, const std::string& place) {
   try {
     return RigidMotion::from_matrix(matrix).inverse();
@@ -82,17 +75,13 @@ RigidMotion inverse_motion(const Mat4& matrix, const std::string& place) {
 }  // namespace
 
 RigidMotion read_transform(const std::filesystem::path& file) {
-  constexpr std::uintmax_t largest = 1 << 20;
   const std::string name = file.string();
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
-    base::refuse("{}: no such file; give an ITK transform (.tfm or .h5)", name);
-  base::record_input(file);
-  if (is_hdf5(file)) return inverse_motion(read_hdf5_transform(file), name);
-  if (std::filesystem::file_size(file, error) > largest)
-    base::refuse("{}: too large for an ITK text transform (1 MiB allowed)", name);
-  std::ifstream stream(file);
-  if (!stream) base::refuse("{}: cannot be read", name);
+  if (base::is_hdf5(file)) {
+    base::record_input(file);
+    return inverse_motion(read_hdf5_transform(file), name);
+  }
+  std::istringstream stream(base::read_text_input(
+      file, {1, "an ITK text transform", "give an ITK transform (.tfm or .h5)"}));
   const Stored stored = read_stored(name, stream);
   if (!stored.kind) base::refuse("{}: holds no transform (no line 'Transform:')", name);
   check_kind(*stored.kind);

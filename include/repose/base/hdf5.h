@@ -62,6 +62,9 @@ using Hdf5Space = Hdf5Handle<H5Sclose>;
 using Hdf5Type = Hdf5Handle<H5Tclose>;
 using Hdf5Properties = Hdf5Handle<H5Pclose>;
 
+/// Returns whether a file is HDF5 by its signature.
+bool is_hdf5(const std::filesystem::path& file);
+
 /// Opens, serially, for reading. HDF5's own error printing is switched off from here on.
 Hdf5File open_hdf5(const std::filesystem::path& file);
 

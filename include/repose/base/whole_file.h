@@ -29,4 +29,12 @@ void require_name(const std::string& name);
 /// collective.
 void record_input(const std::filesystem::path& file);
 
+/// Reads a text file as an input of this process. Refuses no file, one larger than allowed and one
+/// that cannot be read; the message says what it should be and ends with `advice`.
+struct TextLimits {
+  int mebibytes;
+  const char *what, *advice;
+};
+std::string read_text_input(const std::filesystem::path& file, const TextLimits& limits);
+
 }  // namespace repose::base

@@ -16,9 +16,6 @@ namespace repose::results {
 /// bone_surface and bone_transform (none).
 model::Model read_model(const std::filesystem::path& file);
 
-/// Returns whether the file is HDF5 by its signature (a scene is not).
-bool is_hdf5(const std::filesystem::path& file);
-
 /// One whole step of a result file, serially.
 struct StoredStep {
   model::StepNumbers numbers;

@@ -123,10 +123,10 @@ TEST(RoundTrip, IsHdf5BySignature) {
   std::ofstream(folder.path("scene.yaml")) << "skin: face.ply\n";
   std::ofstream(folder.path("block.h5"), std::ios::binary)
       << std::string(512, ' ') << std::ifstream(folder.path("a.h5"), std::ios::binary).rdbuf();
-  EXPECT_TRUE(is_hdf5(folder.path("a.h5")));
-  EXPECT_TRUE(is_hdf5(folder.path("block.h5"))) << "after a user block";
-  EXPECT_FALSE(is_hdf5(folder.path("scene.yaml")));
-  EXPECT_FALSE(is_hdf5(folder.path("none.h5")));
+  EXPECT_TRUE(base::is_hdf5(folder.path("a.h5")));
+  EXPECT_TRUE(base::is_hdf5(folder.path("block.h5"))) << "after a user block";
+  EXPECT_FALSE(base::is_hdf5(folder.path("scene.yaml")));
+  EXPECT_FALSE(base::is_hdf5(folder.path("none.h5")));
 }
 
 }  // namespace round_trip_test
