@@ -135,12 +135,10 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
   std::string text;
   for (size_t k = 0; k < held.size(); ++k)
     if (!held[k].empty())
-      text += report_row(
-          fmt::format("instrument {}", k),
-          fmt::format("holds {} points; the tissue pushes on it with ({:.4g}, {:.4g}, {:.4g}) "
-                      "N, {:.4g} N",
-                      held[k].size(), forces[k].x(), forces[k].y(), forces[k].z(),
-                      forces[k].norm()));
+      text +=
+          report_row(fmt::format("instrument {}", k),
+                     fmt::format("holds {} points; the tissue pushes on it with {:.4g} N, {:.4g} N",
+                                 held[k].size(), forces[k], forces[k].norm()));
   return text;
 }
 
@@ -149,11 +147,9 @@ std::string describe_pierced(const std::vector<std::string>& bodies,
   if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 has their names
   return report_row(
       "pierced by bone",
-      fmt::format(
-          "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
-          "by {} at ({:.1f}, {:.1f}, {:.1f}) mm; use a finer skin (tissue.edge) or move less",
-          pierced.columns, pierced.depth, bodies[pierced.body], pierced.where.x(),
-          pierced.where.y(), pierced.where.z()));
+      fmt::format("{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
+                  "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
+                  pierced.columns, pierced.depth, bodies[pierced.body], pierced.where));
 }
 
 namespace {
@@ -170,24 +166,23 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
   for (size_t k = 0; k < bodies.size() && k < s.contacts.size(); ++k) {
     const solve::PenetrationDepth& depth = s.contacts[k].exact;
     if (depth.points == 0) continue;
-    text += report_row(
-        "exact penetration",
-        fmt::format("{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at ({:.1f}, "
-                    "{:.1f}, {:.1f}) mm; a finer contact.grid follows its surface more closely",
-                    depth.points, solve::PenetrationDepth::reported, bodies[k], depth.deepest,
-                    depth.where.x(), depth.where.y(), depth.where.z()));
+    text +=
+        report_row("exact penetration",
+                   fmt::format("{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at "
+                               "{:.1f} mm; a finer contact.grid follows its surface more closely",
+                               depth.points, solve::PenetrationDepth::reported, bodies[k],
+                               depth.deepest, depth.where));
   }
   return text;
 }
 
 std::string describe_other_rest(const solve::Outcome& last) {
   if (!last.other) return "";
-  const auto& place = last.other->place;
-  return report_row("other rest position",
-                    fmt::format("the skin is up to {:.2g} mm away there, most at ({:.1f}, {:.1f}, "
-                                "{:.1f}) mm: tissue rests on either side of an edge of bone, and "
-                                "this result has less energy",
-                                last.other->distance, place[0], place[1], place[2]));
+  return report_row(
+      "other rest position",
+      fmt::format("the skin is up to {:.2g} mm away there, most at {:.1f} mm: tissue rests on "
+                  "either side of an edge of bone, and this result has less energy",
+                  last.other->distance, last.other->place));
 }
 
 }  // namespace
@@ -198,16 +193,13 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
     const solve::ContactSummary& on = s.contacts[k];
     const std::string name = k < bodies.size() ? bodies[k] : "the sides of cuts";
     if (on.inside > 0)
-      text += report_row(
-          "inside at the start",
-          fmt::format("{} points begin up to {:.2g} mm inside {}, the deepest at ({:.1f}, {:.1f}, "
-                      "{:.1f}) mm; they go no deeper",
-                      on.inside, on.deepest, name, on.where.x(), on.where.y(), on.where.z()));
+      text += report_row("inside at the start",
+                         fmt::format("{} points begin up to {:.2g} mm inside {}, the deepest at "
+                                     "{:.1f} mm; they go no deeper",
+                                     on.inside, on.deepest, name, on.where));
     if (on.points == 0) continue;
-    text += report_row(
-        "contact",
-        fmt::format("{} points press on {} with ({:.4g}, {:.4g}, {:.4g}) N, {:.4g} N", on.points,
-                    name, on.force.x(), on.force.y(), on.force.z(), on.force.norm()));
+    text += report_row("contact", fmt::format("{} points press on {} with {:.4g} N, {:.4g} N",
+                                              on.points, name, on.force, on.force.norm()));
   }
   return text + describe_penetration(bodies, s) + describe_other_rest(s.path.last);
 }
@@ -222,10 +214,9 @@ std::string describe_tearing(const solve::Tearing& t) {
                   t.largest));
   if (t.springs == 0) return text + report_row("torn", "nothing");
   return text +
-         report_row("torn", fmt::format("springs {}, with them prisms {} and triangles of the "
-                                        "skin {}; {:.4g} mm long about ({:.4g}, {:.4g}, {:.4g}) mm",
-                                        t.springs, t.prisms, t.triangles, t.length, t.middle.x(),
-                                        t.middle.y(), t.middle.z()));
+         report_row("torn", fmt::format("springs {}, with them prisms {} and triangles of the skin "
+                                        "{}; {:.4g} mm long about {:.4g} mm",
+                                        t.springs, t.prisms, t.triangles, t.length, t.middle));
 }
 
 std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio) {
@@ -236,11 +227,10 @@ std::string describe_folds(const model::Model& model, const std::vector<double>&
   const auto& points = model.prisms.points[worst - volume_ratio.begin()];
   const Vec3& at = model.points.position[points[0]];
   return fmt::format(
-      "FOLDED: {} prisms of tissue are inside out, the worst one about ({:.1f}, {:.1f}, {:.1f}) "
-      "mm: "
-      "release more of it there (tissue.release, tissue.unattached), let the rim be auto, or move "
-      "less; -allow_folded takes it as it is.\n",
-      count, at.x(), at.y(), at.z());
+      "FOLDED: {} prisms of tissue are inside out, the worst one about {:.1f} mm: release more of "
+      "it there (tissue.release, tissue.unattached), let the rim be auto, or move less; "
+      "-allow_folded takes it as it is.\n",
+      count, at);
 }
 
 std::string describe_path(const PathCheck& c) {
@@ -255,13 +245,12 @@ std::string describe_path(const PathCheck& c) {
       fmt::format("{:.2g} mm apart at most, 95 % within {:.2g} mm", c.largest, c.percentile_95);
   if (c.holds())
     return row(fmt::format("verified: {} the same rest position, {}", repetition, apart));
-  return row(fmt::format(
-      "THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about ({:.1f}, "
-      "{:.1f}, {:.1f}) mm; its objective is {:.6g}, that of the result {:.6g}: look "
-      "there before you trust it; springs buckle where they are pressed together "
-      "(raise the volume stiffness, or make the tissue a solid)",
-      repetition, apart, c.place.x(), c.place.y(), c.place.z(), c.again.last.objective,
-      c.objective));
+  return row(
+      fmt::format("THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about {:.1f} "
+                  "mm; its objective is {:.6g}, that of the result {:.6g}: look there before you "
+                  "trust it; springs buckle where they are pressed together (raise the volume "
+                  "stiffness, or make the tissue a solid)",
+                  repetition, apart, c.place, c.again.last.objective, c.objective));
 }
 
 std::string describe_stages(const base::Stages& stages) {

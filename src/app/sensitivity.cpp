@@ -120,13 +120,12 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
 std::string describe_sensitivities(const std::vector<Sensitivity>& found) {
   std::string text;
   for (const Sensitivity& s : found) {
-    const std::string report =
-        s.known ? fmt::format(
-                      "{} moves half of the skin by less than {:.2g} mm, 95 % by {:.2g} mm, "
-                      "all by {:.2g} mm, the most near ({:.0f}, {:.0f}, {:.0f})",
-                      s.name, s.median, s.percentile_95, s.largest, s.where.x(), s.where.y(),
-                      s.where.z())
-                : fmt::format("{}: not known to first order", s.name);
+    const std::string report = s.known
+                                   ? fmt::format(
+                                         "{} moves half of the skin by less than {:.2g} mm, 95 % "
+                                         "by {:.2g} mm, all by {:.2g} mm, the most near {:.0f}",
+                                         s.name, s.median, s.percentile_95, s.largest, s.where)
+                                   : fmt::format("{}: not known to first order", s.name);
     text += report_row("sensitivity", report);
   }
   return text;

@@ -63,8 +63,7 @@ Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
     begin[axis] = static_cast<int64_t>(std::clamp(std::floor(first[axis] + 1e-6), 0.0, maximum));
     end[axis] = static_cast<int64_t>(std::clamp(std::ceil(last[axis] - 1e-6), 0.0, maximum)) + 1;
     if (end[axis] - begin[axis] < 2)
-      base::refuse("{}: the box ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}) mm lies beside it",
-                   volume.name, low.x(), low.y(), low.z(), high.x(), high.y(), high.z());
+      base::refuse("{}: the box {:g} to {:g} mm lies beside it", volume.name, low, high);
   }
   Volume part{volume.name, {}, volume.axes, volume.origin, {}, volume.remarks};
   for (int axis = 0; axis < 3; ++axis) {

@@ -177,12 +177,11 @@ class Sorter {
     }
     const Vec3& seed = *plan_.seed;
     if (!chosen || !DistanceTree(bone_).contains(seed))
-      base::refuse(
-          "{}: the seed of piece '{}', ({:g}, {:g}, {:g}), is not inside the bone; move it",
-          bone_.name, plan_.piece, seed.x(), seed.y(), seed.z());
+      base::refuse("{}: the seed of piece '{}', {:g}, is not inside the bone; move it", bone_.name,
+                   plan_.piece, seed);
     if (parts_[*chosen] == CellPart::kerf)
-      base::refuse("{}: the seed of piece '{}', ({:g}, {:g}, {:g}), is in the kerf; move it",
-                   bone_.name, plan_.piece, seed.x(), seed.y(), seed.z());
+      base::refuse("{}: the seed of piece '{}', {:g}, is in the kerf; move it", bone_.name,
+                   plan_.piece, seed);
     parts_[*chosen] = CellPart::piece;
   }
 

@@ -96,9 +96,9 @@ std::string check_axes(const Anatomical& head) {
            "them and in the scene";
   if (forward.y() > -along_axis || head.frame->upward.z() < along_axis)
     return fmt::format(
-        "the face looks along ({:.2f}, {:.2f}, {:.2f}) and not along −y: turn all meshes to LPS "
-        "(+x left, +y back, +z up), or give moves along the head's own directions",
-        forward.x(), forward.y(), forward.z());
+        "the face looks along {:.2f} and not along −y: turn all meshes to LPS (+x left, +y back, "
+        "+z up), or give moves along the head's own directions",
+        forward);
   return "";
 }
 
@@ -174,10 +174,8 @@ std::string check_hinge(const Anatomical& head) {
     if (!reversed && head.frame->up.dot(by) < joint_up) continue;
     return fmt::format(
         "'{}' turns about an axis far from its joints: they move {:.1f} mm and the chin {:.1f} mm; "
-        "the hinge runs through both condyles, near ({:.0f}, {:.0f}, {:.0f}) and ({:.0f}, {:.0f}, "
-        "{:.0f})",
-        head.scene.bones[b].name, by.norm(), chin, jaw.right_joint.x(), jaw.right_joint.y(),
-        jaw.right_joint.z(), jaw.left_joint.x(), jaw.left_joint.y(), jaw.left_joint.z());
+        "the hinge runs through both condyles, near {:.0f} and {:.0f}",
+        head.scene.bones[b].name, by.norm(), chin, jaw.right_joint, jaw.left_joint);
   }
   return "";
 }

@@ -53,10 +53,10 @@ std::string describe_near_border(const scene::Scene& scene, const MotionRange& r
   const BorderPlace place = nearest_place(range, bones, mesh, field);
   if (!(place.distance <= near_border)) return "";
   return fmt::format(
-      "the skin ends {:.1f} mm from bone '{}', which moves, at ({:.1f}, {:.1f}, {:.1f}): {} (as "
-      "measured on one head); {}",
-      place.distance, scene.bones[place.bone].name, place.at.x(), place.at.y(), place.at.z(),
-      effect_of(scene.rim), remedy_of(scene));
+      "the skin ends {:.1f} mm from bone '{}', which moves, at {:.1f}: {} (as measured on one "
+      "head); {}",
+      place.distance, scene.bones[place.bone].name, place.at, effect_of(scene.rim),
+      remedy_of(scene));
 }
 
 }  // namespace repose::model

@@ -194,9 +194,8 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
       line += requested.clearance > 0 ? fmt::format("stay {} mm apart", requested.clearance)
                                       : std::string("do not come to touch");
     else
-      line += fmt::format("come within {} mm at load {:.4f}, at ({:.1f}, {:.1f}, {:.1f})",
-                          requested.clearance + requested.tolerance, pair.load, pair.at.x(),
-                          pair.at.y(), pair.at.z());
+      line += fmt::format("come within {} mm at load {:.4f}, at {:.1f}",
+                          requested.clearance + requested.tolerance, pair.load, pair.at);
     if (pair.crossings > 0)
       line += fmt::format("; at the end {} pairs of triangles cross, {:.2f} mm deep",
                           pair.crossings, pair.depth);

@@ -69,10 +69,8 @@ void ColumnGeometry::State::require_free_cuts() const {
     for (const int64_t column : layout.cuts[i].columns) {
       if (!is_held(column)) continue;
       const Vec3& at = layout.mesh.points[column];
-      base::refuse(
-          "{}: {}: an instrument holds the skin on the path near ({:.2f}, {:.2f}, "
-          "{:.2f}); move one of them",
-          scene.file.string(), scene.incisions[i].name, at.x(), at.y(), at.z());
+      base::refuse("{}: {}: an instrument holds the skin on the path near {:.2f}; move one of them",
+                   scene.file.string(), scene.incisions[i].name, at);
     }
 }
 

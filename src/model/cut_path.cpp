@@ -19,9 +19,7 @@ constexpr double spacing = 0.5;  // of an edge, between points of the path
 
 using Chain = std::vector<int64_t>;
 
-std::string format_point(const Vec3& x) {
-  return fmt::format("({:.2f}, {:.2f}, {:.2f})", x[0], x[1], x[2]);
-}
+std::string format_point(const Vec3& x) { return fmt::format("{:.2f}", x); }
 
 Vec3 unit_normal(const SplitMesh& mesh, int64_t row) {
   const auto& [a, b, c] = mesh.triangle(row);

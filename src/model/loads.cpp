@@ -52,9 +52,9 @@ std::vector<Vec3> distribute_forces(const scene::Scene& scene, const SkinMesh& m
     }
     if (within.empty())
       base::refuse(
-          "{}: forces[{}]: no free skin point within {} mm of ({}, {}, {}), the nearest is {:.2f} "
-          "mm away; move `at` to the skin or make `radius` larger",
-          scene.file.string(), k, force.radius, force.at.x(), force.at.y(), force.at.z(), nearest);
+          "{}: forces[{}]: no free skin point within {} mm of {}, the nearest is {:.2f} mm away; "
+          "move `at` to the skin or make `radius` larger",
+          scene.file.string(), k, force.radius, force.at, nearest);
     for (const int64_t v : within) at[v] += force.force * (mesh.vertex_area[v] / area);
   }
   return at;

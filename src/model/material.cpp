@@ -130,9 +130,9 @@ PairRows pair_rows(const std::string& file, const Model& model) {
     if (!weights) {
       const Vec3 at = middle_of(corners);
       base::refuse(
-          "{}: prism {} near ({:.2f}, {:.2f}, {:.2f}) mm is too distorted to be a solid: its map "
-          "folds; smooth or remesh the skin there",
-          file, m, at.x(), at.y(), at.z());
+          "{}: prism {} near {:.2f} mm is too distorted to be a solid: its map folds; smooth or "
+          "remesh the skin there",
+          file, m, at);
     }
     for (size_t k = 0; k < prism_pairs.size(); ++k) {
       const int64_t p = prisms.points[m][prism_pairs[k][0]],

@@ -18,8 +18,7 @@ Box box_of(const std::vector<Vec3>& points) {
 }
 
 std::string corner_text(const Box& box) {
-  return fmt::format("({:.0f}, {:.0f}, {:.0f}) to ({:.0f}, {:.0f}, {:.0f}) mm", box.min().x(),
-                     box.min().y(), box.min().z(), box.max().x(), box.max().y(), box.max().z());
+  return fmt::format("{:.0f} to {:.0f} mm", box.min(), box.max());
 }
 
 void refuse_far_apart(const std::string& skin_name, const surface::Surface& bone,

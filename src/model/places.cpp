@@ -45,8 +45,7 @@ void refuse_places(const std::string& skin_name, const SkinMesh& mesh,
   std::string list;
   for (const std::vector<int64_t>& group : groups) {
     const Vec3& at = mesh.points[group.front()];
-    list += fmt::format("{}vertex {} ({:.2f}, {:.2f}, {:.2f})", list.empty() ? "" : ", ",
-                        group.front(), at.x(), at.y(), at.z());
+    list += fmt::format("{}vertex {} {:.2f}", list.empty() ? "" : ", ", group.front(), at);
     if (group.size() > 1) list += fmt::format(" and {} more around it", group.size() - 1);
   }
   throw RefusedPlaces(fmt::format("{}: {} in {} place{}, skin {}; {}", skin_name, what,

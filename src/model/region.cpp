@@ -101,8 +101,7 @@ Contains painted(const scene::PaintedRegion& region) {
   if (std::count(marks->begin(), marks->end(), 1) == 0)
     base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), marks->size(),
                  region.property.empty()
-                     ? fmt::format("({:g}, {:g}, {:g})", region.color.x(), region.color.y(),
-                                   region.color.z())
+                     ? fmt::format("{:g}", region.color)
                      : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
   const auto tree = std::make_shared<surface::PointTree>(mesh.points);
   const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);

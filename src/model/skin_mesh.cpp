@@ -32,12 +32,10 @@ std::vector<Side> sorted_sides(const std::vector<Triangle>& triangles) {
 
 void refuse_bad_edge(const surface::Surface& skin, const Side& side, int64_t count) {
   const Vec3& at = skin.points[side.low];
-  base::refuse(
-      "{}: the edge between vertices {} and {} near ({:.2f}, {:.2f}, {:.2f}) {}; repair the skin "
-      "mesh there",
-      skin.name, side.low, side.high, at.x(), at.y(), at.z(),
-      count > 2 ? fmt::format("has {} triangles, at most 2 are possible", count)
-                : std::string("has two triangles that face opposite ways"));
+  base::refuse("{}: the edge between vertices {} and {} near {:.2f} {}; repair the skin mesh there",
+               skin.name, side.low, side.high, at,
+               count > 2 ? fmt::format("has {} triangles, at most 2 are possible", count)
+                         : std::string("has two triangles that face opposite ways"));
 }
 
 void collect_edges(SkinMesh& mesh, const surface::Surface& skin) {

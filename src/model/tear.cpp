@@ -55,9 +55,9 @@ void refuse_torn_off(const Model& model, const std::vector<char>& torn, const st
   const auto row = lost - joined.begin();
   const Vec3& x = model.points.position[row];
   base::refuse(
-      "{}: point {} at ({:.4g}, {:.4g}, {:.4g}) mm is torn off: no springs are left between it "
-      "and what holds the tissue; give a higher limit or less force",
-      what, row, x.x(), x.y(), x.z());
+      "{}: point {} at {:.4g} mm is torn off: no springs are left between it and what holds the "
+      "tissue; give a higher limit or less force",
+      what, row, x);
 }
 
 template <class T>

@@ -354,10 +354,9 @@ void refuse_floating(const Model& m, const std::string& file) {
   for (size_t i = 0; i < points; ++i)
     if (!held[parts.find(static_cast<int64_t>(i))])
       refuse(
-          "{}: /model/point: row {} at ({:.4g}, {:.4g}, {:.4g}) mm is soft tissue, and nothing "
-          "holds it or what it is joined to; make a point there a boundary point (set 1), or "
-          "remove the part",
-          file, i, m.points.position[i].x(), m.points.position[i].y(), m.points.position[i].z());
+          "{}: /model/point: row {} at {:.4g} mm is soft tissue, and nothing holds it or what it "
+          "is joined to; make a point there a boundary point (set 1), or remove the part",
+          file, i, m.points.position[i]);
 }
 
 }  // namespace

@@ -285,7 +285,7 @@ OtherRest ContactSearch::compare_skins(Vec displacement, std::vector<Vec3> other
     const double apart = (positions.local()[i] - points.position[i] - other[i]).norm();
     if (points.layer[i] != 0 || apart <= found.distance) continue;
     found.distance = apart;
-    for (int a = 0; a < 3; ++a) found.place[a] = points.position[i][a];
+    found.place = points.position[i];
   }
   found.distance = base::max_over_ranks_with(positions.comm(), found.distance, found.place);
   found.displacement = std::move(other);

@@ -336,9 +336,8 @@ std::string Minimizer::no_progress(Vec displacement) {
   function_.positions().update(displacement);
   const Vec3 at = place_of_largest(function_.positions(), gradient_);
   return fmt::format(
-      "no progress in {} evaluations: the largest force stays at {:.3g} N, now near ({:.1f}, "
-      "{:.1f}, {:.1f}) mm",
-      ProgressTest::patience, progress_->smallest_force(), at.x(), at.y(), at.z());
+      "no progress in {} evaluations: the largest force stays at {:.3g} N, now near {:.1f} mm",
+      ProgressTest::patience, progress_->smallest_force(), at);
 }
 
 Outcome Minimizer::summary(Vec displacement) {

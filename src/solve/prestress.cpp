@@ -256,12 +256,11 @@ void require_rest_lengths(MPI_Comm comm, const discrete::LocalModel& local_model
     const auto& [p, q] = springs.points[spring];
     const Vec3& at = part.model.points.position[p];
     base::refuse(
-        "the initial equilibrium requires negative rest lengths of {} springs; the first is "
-        "spring {} ({}, points {} and {} near ({:.2f}, {:.2f}, {:.2f}) mm): it would have to carry "
-        "{:.3g} N over {:.3g} mm; lower tissue.turgor or the mass, or raise the stiffness of that "
-        "set",
-        impossible, part.spring_row[spring], name, part.point_row[p], part.point_row[q], at.x(),
-        at.y(), at.z(), tension[spring], length(part.model, spring));
+        "the initial equilibrium requires negative rest lengths of {} springs; the first is spring "
+        "{} ({}, points {} and {} near {:.2f} mm): it would have to carry {:.3g} N over {:.3g} mm; "
+        "lower tissue.turgor or the mass, or raise the stiffness of that set",
+        impossible, part.spring_row[spring], name, part.point_row[p], part.point_row[q], at,
+        tension[spring], length(part.model, spring));
   });
 }
 
@@ -290,9 +289,9 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
   check(VecRestoreArrayRead(force, &values));
   base::max_over_ranks_with(comm, static_cast<double>(worst), worst, at);
   base::refuse(
-      "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at ({:.2f}, {:.2f}, "
-      "{:.2f}) mm: the tissue there cannot hold it; {}",
-      so_far.residual, so_far.largest_force, worst, at.x(), at.y(), at.z(),
+      "the initial equilibrium leaves {:.3g} N (of {:.3g} N) on point {} at {:.2f} mm: the tissue "
+      "there cannot hold it; {}",
+      so_far.residual, so_far.largest_force, worst, at,
       part.solid ? "change tissue.turgor or tissue.density"
                  : "give tissue.springs a stiffness there");
 }

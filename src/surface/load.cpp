@@ -14,7 +14,7 @@ const char* noun(Role role) {
 
 std::string position(const Surface& surface, int64_t vertex) {
   const Vec3& p = surface.points[vertex];
-  return fmt::format("({:.2f}, {:.2f}, {:.2f}) mm", p.x(), p.y(), p.z());
+  return fmt::format("{:.2f} mm", p);
 }
 
 void check_size(const Surface& surface) {

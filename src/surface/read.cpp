@@ -31,9 +31,9 @@ void check_points(const std::vector<Vec3>& points, const std::string& file) {
     const Vec3& p = points[i];
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > largest_coordinate)
       base::refuse(
-          "{}: vertex {} is at ({}, {}, {}) mm: coordinates must be finite and within "
-          "±{:g}; repair or remove it",
-          file, i, p.x(), p.y(), p.z(), largest_coordinate);
+          "{}: vertex {} is at {} mm: coordinates must be finite and within ±{:g}; repair or "
+          "remove it",
+          file, i, p, largest_coordinate);
   }
 }
 

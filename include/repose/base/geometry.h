@@ -1,4 +1,6 @@
 #pragma once
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
@@ -16,6 +18,19 @@ using Triangle =
     std::array<int64_t, 3>;  ///< three 0-based vertex numbers, counter-clockwise outside
 
 }  // namespace repose
+
+/// Formats a vector as (x, y, z), each number by the given format.
+template <>
+struct fmt::formatter<repose::Vec3> : fmt::formatter<double> {
+  template <class Context>
+  auto format(const repose::Vec3& vector, Context& context) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      context.advance_to(fmt::format_to(context.out(), "{}", axis == 0 ? "(" : ", "));
+      context.advance_to(fmt::formatter<double>::format(vector[axis], context));
+    }
+    return fmt::format_to(context.out(), ")");
+  }
+};
 
 namespace repose::base {
 

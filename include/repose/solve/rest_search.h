@@ -26,8 +26,8 @@ inline constexpr const char* stopped_reason =
 
 /// Another rest position of the same load, of more energy.
 struct OtherRest {
-  double distance = 0;   ///< mm, the largest of the skin from the one that was chosen
-  double place[3] = {};  ///< mm, where on the initial skin
+  double distance = 0;        ///< mm, the largest of the skin from the one that was chosen
+  Vec3 place = Vec3::Zero();  ///< mm, where on the initial skin
   std::vector<Vec3> displacement = {};  ///< mm, [owned points] of this rank
 };
 

@@ -102,10 +102,9 @@ Terminals terminals_of(const Bone& bone, const Volume& volume, double level,
     for (const Vec3& point : points[part])
       if (!bone.hold(point, part_hold[part], part + 1, terminals))
         base::refuse(
-            "{}: point ({:.1f}, {:.1f}, {:.1f}) of the {} bone has no value of {:g} or more within "
-            "{} mm; put it into the bone, in LPS",
-            volume.name, point.x(), point.y(), point.z(), part == 0 ? "first" : "second", level,
-            part_hold[part]);
+            "{}: point {:.1f} of the {} bone has no value of {:g} or more within {} mm; put it "
+            "into the bone, in LPS",
+            volume.name, point, part == 0 ? "first" : "second", level, part_hold[part]);
   if (std::find(terminals.begin(), terminals.end(), 1) == terminals.end())
     base::refuse("{}: the points of the first bone all lie beside those of the second",
                  volume.name);

@@ -338,10 +338,8 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
     if (!mesh || expected.isZero(0)) continue;
     oblique.offer(off - aside * std::abs(pressed), [&] {
       return fmt::format(
-          "contact_force of point {} on {}: stated ({:.4g}, {:.4g}, {:.4g}) N, by the "
-          "triangles' normal ({:.4g}, {:.4g}, {:.4g}) N",
-          i, name_of(point.pressing), stated.x(), stated.y(), stated.z(), expected.x(),
-          expected.y(), expected.z());
+          "contact_force of point {} on {}: stated {:.4g} N, by the triangles' normal {:.4g} N", i,
+          name_of(point.pressing), stated, expected);
     });
   }
   comparison_.array("point/contact_force", forces, again, largest);
