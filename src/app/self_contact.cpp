@@ -15,8 +15,7 @@ namespace repose::app {
 SolvedSkin::SolvedSkin(MPI_Comm comm, const Job& job) : comm_(comm) {
   const model::Model& model = job.local_model.global_metadata;
   for (const Triangle& t : model.skin) row_.insert(row_.end(), t.begin(), t.end());
-  std::sort(row_.begin(), row_.end());
-  row_.erase(std::unique(row_.begin(), row_.end()), row_.end());
+  base::sort_unique(row_);
   const auto number = [&](int64_t row) {
     return std::lower_bound(row_.begin(), row_.end(), row) - row_.begin();
   };

@@ -60,8 +60,7 @@ std::vector<std::array<int32_t, 2>> find_links(const mechanics::Loops& loops,
     loop.for_each_link([&](int32_t p, int32_t q) {
       if (p != q) links.push_back({p, q});
     });
-  std::ranges::sort(links);
-  links.erase(std::unique(links.begin(), links.end()), links.end());
+  base::sort_unique(links);
   return links;
 }
 

@@ -64,8 +64,7 @@ void TangentEntries::make_pattern() {
   const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
   for (BlockRows& rows : rows_) rows.begin.push_back(0);
   for (auto& row : neighbors) {
-    std::sort(row.begin(), row.end());
-    row.erase(std::unique(row.begin(), row.end()), row.end());
+    base::sort_unique(row);
     for (int32_t column : row)
       rows_[column >= first && column < last ? 0 : 1].column.push_back(column);
     for (BlockRows& rows : rows_) rows.begin.push_back(static_cast<int32_t>(rows.column.size()));

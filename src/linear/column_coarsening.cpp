@@ -190,8 +190,7 @@ std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& f
   std::vector<int64_t> ghost;
   for (const Message& message : received)
     for (int m = 0; m < maximum; ++m) ghost.push_back(message.point[m]);
-  std::sort(ghost.begin(), ghost.end());
-  ghost.erase(std::unique(ghost.begin(), ghost.end()), ghost.end());
+  base::sort_unique(ghost);
   for (size_t g = 0; g < received.size(); ++g)
     for (int m = 0; m < maximum; ++m) {
       const auto at = std::lower_bound(ghost.begin(), ghost.end(), received[g].point[m]);

@@ -118,8 +118,7 @@ void Service::find_visible() {
   if (!skin_.empty()) return;
   for (const auto& triangle : session_->model().skin)
     skin_.insert(skin_.end(), triangle.begin(), triangle.end());
-  std::ranges::sort(skin_);
-  skin_.erase(std::unique(skin_.begin(), skin_.end()), skin_.end());
+  base::sort_unique(skin_);
 }
 
 template <class Row>

@@ -93,8 +93,7 @@ CutFaceContact::CutFaceContact(const model::CutFaces& cut_faces, double stiffnes
     link(nets_[nets_.size() - 2], nets_.back());
     first += 2 * count;
   }
-  std::sort(links_.begin(), links_.end());
-  links_.erase(std::unique(links_.begin(), links_.end()), links_.end());
+  base::sort_unique(links_);
   multiplier_.assign(places_.size(), 0.0);
   feet_.resize(places_.size());
 }

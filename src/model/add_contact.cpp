@@ -6,6 +6,7 @@
 #include <map>
 #include <type_traits>
 
+#include "loads.h"
 #include "motion_range.h"
 #include "repose/base/error.h"
 #include "repose/model/build.h"
@@ -16,20 +17,6 @@ namespace repose::model {
 namespace {
 
 constexpr double margin = 2;  // mm, beyond what points and bones may come nearer
-
-/// mm², what each point of a layered model stands for in its layer.
-std::vector<double> layer_areas(const SkinMesh& mesh, const Model& model) {
-  const size_t layers = model.points.position.size() / std::max<size_t>(mesh.points.size(), 1);
-  std::vector<double> area(model.points.position.size(), 0.0);
-  const auto& x = model.points.position;
-  for (const Triangle& t : mesh.triangles)
-    for (size_t l = 0; l < layers; ++l) {
-      const size_t a = t[0] * layers + l, b = t[1] * layers + l, c = t[2] * layers + l;
-      const double share = (x[b] - x[a]).cross(x[c] - x[a]).norm() / 6;
-      for (const size_t p : {a, b, c}) area[p] += share;
-    }
-  return area;
-}
 
 void add(int64_t point, int32_t body, Binding binding, double area, ContactPairs& pairs) {
   pairs.point.push_back(point);
@@ -136,7 +123,7 @@ double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout) {
 
 void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
                  Model& model) {
-  const std::vector<double> area = layer_areas(mesh, model);
+  const std::vector<double> area = point_areas(mesh, model);
   ContactAdder adder(scene, attachment, model);
   for (size_t p = 0; p < area.size(); ++p)
     if (model.points.set[p] == PointSet::soft_tissue)

@@ -9,6 +9,7 @@
 #include "repose/base/error.h"
 #include "repose/surface/collision.h"
 #include "repose/surface/distance.h"
+#include "repose/surface/edges.h"
 
 namespace repose::model {
 namespace {
@@ -50,8 +51,7 @@ struct Mover {
   /// Depth of the deepest of `points`, placed by `pose`, inside this bone.
   double depth_of(const std::vector<Vec3>& points, const Mat4& pose) {
     if (!inside) inside = std::make_unique<surface::DistanceTree>(surface);
-    Eigen::AlignedBox3d box;
-    for (const Vec3& point : surface.points) box.extend(point);
+    const Eigen::AlignedBox3d box = surface::bounding_box(surface.points);
     double depth = 0;
     for (const Vec3& point : points) {
       const Vec3 p = placed(pose, point);
@@ -74,9 +74,7 @@ void check_end_state(Mover& a, Mover& b, BonePair& pair) {
 /// Length (mm) that triangles which touch from the start shall have at most: small, but not so that
 /// a cut through a large bone has too many.
 double small_side(const surface::Surface& surface) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : surface.points) box.extend(p);
-  return std::max(1.0, box.diagonal().norm() / 200);
+  return std::max(1.0, surface::bounding_diagonal(surface.points) / 200);
 }
 
 /// The trees of two bones, finer where they touch from the start.

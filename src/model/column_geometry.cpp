@@ -153,34 +153,6 @@ std::vector<std::vector<int64_t>> ColumnGeometry::held() const {
   return rows;
 }
 
-namespace {
-
-void make_unique(std::vector<int64_t>& rows) {
-  std::sort(rows.begin(), rows.end());
-  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-}
-
-/// The triangles at the given columns.
-std::vector<int64_t> triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& columns) {
-  std::vector<int64_t> triangles;
-  for (const int64_t c : columns) {
-    const auto around = mesh.triangles_of[c];
-    triangles.insert(triangles.end(), around.begin(), around.end());
-  }
-  make_unique(triangles);
-  return triangles;
-}
-
-std::vector<int64_t> columns_of(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
-  std::vector<int64_t> columns;
-  for (const int64_t t : triangles)
-    columns.insert(columns.end(), mesh.triangles[t].begin(), mesh.triangles[t].end());
-  make_unique(columns);
-  return columns;
-}
-
-}  // namespace
-
 Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   const ColumnLayout& layout = state_->layout;
   Piece piece;
@@ -188,13 +160,13 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   for (const AdheringJaw& jaw : state_->jaws)
     centers.insert(centers.end(), jaw.frame.begin(), jaw.frame.end());
   piece.triangle =
-      triangles_at(layout.mesh, columns_of(layout.mesh, triangles_at(layout.mesh, centers)));
-  piece.column = columns_of(layout.mesh, piece.triangle);
+      triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, centers)));
+  piece.column = vertices_of(layout.mesh, piece.triangle);
   piece.slope = state_->slope;
   for (const int64_t t : piece.triangle)
     piece.edge.insert(piece.edge.end(), layout.mesh.triangle_edges[t].begin(),
                       layout.mesh.triangle_edges[t].end());
-  make_unique(piece.edge);
+  base::sort_unique(piece.edge);
   for (const int64_t c : piece.column) {
     piece.skin.push_back(layout.mesh.points[c]);
     piece.deep.push_back(layout.columns.deep[c]);

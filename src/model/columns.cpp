@@ -33,12 +33,9 @@ int64_t bend_folded(const SkinMesh& mesh, const std::vector<Cone>& cones,
                     const std::vector<double>& thickness, std::vector<Vec3>& directions) {
   std::vector<char> bent(directions.size(), 0);
   for (int round = 0; round < bends; ++round) {
-    std::vector<int64_t> crossing;
-    for (const int64_t f : folded_triangles(mesh, directions, thickness))
-      for (const int64_t v : mesh.triangles[f]) crossing.push_back(v);
+    const std::vector<int64_t> crossing =
+        vertices_of(mesh, folded_triangles(mesh, directions, thickness));
     if (crossing.empty()) break;
-    std::sort(crossing.begin(), crossing.end());
-    crossing.erase(std::unique(crossing.begin(), crossing.end()), crossing.end());
     bend(mesh, cones, crossing, directions);
     for (const int64_t v : crossing) bent[v] = 1;
     lay(crossing);

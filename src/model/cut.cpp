@@ -41,23 +41,14 @@ class CutSplitter {
     return p.set[row] == PointSet::soft_tissue;
   }
 
-  template <class T>
-  static void repeat(std::vector<T>& values, int64_t row) {
-    const T value = values[row];
-    values.push_back(value);
-  }
   void add_double(int64_t row) {
     Points& p = model_.points;
     doubles_[row] = static_cast<int64_t>(p.position.size());
     pairs_.push_back({row, doubles_[row]});
-    repeat(p.position, row);
-    repeat(p.set, row);
-    repeat(p.target, row);
-    repeat(p.layer, row);
-    repeat(p.column, row);
-    repeat(p.bone, row);
-    repeat(p.mass, row);
-    repeat(p.external_force, row);
+    for_each_array(p, [row](const char*, auto& values) {
+      const auto value = values[row];
+      values.push_back(value);
+    });
   }
 
   bool doubled(int64_t row) const { return doubles_[row] >= 0; }

@@ -32,26 +32,6 @@ double margin_of(const SkinMesh& mesh, int64_t triangle, const std::vector<Vec3>
       {thickness[i] * directions[i], thickness[j] * directions[j], thickness[k] * directions[k]});
 }
 
-std::vector<int64_t> corners(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
-  std::vector<int64_t> vertices;
-  for (const int64_t f : triangles)
-    vertices.insert(vertices.end(), mesh.triangles[f].begin(), mesh.triangles[f].end());
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  return vertices;
-}
-
-std::vector<int64_t> triangles_around(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
-  std::vector<int64_t> triangles;
-  for (const int64_t v : vertices) {
-    const auto around = mesh.triangles_of[v];
-    triangles.insert(triangles.end(), around.begin(), around.end());
-  }
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  return triangles;
-}
-
 }  // namespace
 
 double fold_margin(const std::array<Vec3, 3>& skin, const std::array<Vec3, 3>& column) {
@@ -81,18 +61,18 @@ void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
   const auto too_thin = [&](int64_t v) { return !(shortening * thickness[v] > thinnest); };
   std::vector<int64_t> folded = folded_triangles(mesh, directions, thickness);
   while (!folded.empty()) {
-    std::vector<int64_t> changed = corners(mesh, folded);
+    std::vector<int64_t> changed = vertices_of(mesh, folded);
     std::copy_if(changed.begin(), changed.end(), std::back_inserter(stuck), too_thin);
     std::erase_if(changed, too_thin);
     for (const int64_t v : changed) thickness[v] *= shortening;
     const std::vector<int64_t> drawn = limit_slope(mesh, steepest_depth, changed, thickness);
     changed.insert(changed.end(), drawn.begin(), drawn.end());
-    folded = triangles_around(mesh, changed);
+    folded = triangles_at(mesh, changed);
     std::erase_if(
         folded, [&](int64_t f) { return margin_of(mesh, f, directions, thickness) >= min_margin; });
   }
   std::erase_if(stuck, [&](int64_t v) {
-    const auto around = triangles_around(mesh, {v});
+    const auto around = triangles_at(mesh, {v});
     return std::all_of(around.begin(), around.end(), [&](int64_t f) {
       return margin_of(mesh, f, directions, thickness) >= min_margin;
     });

@@ -7,6 +7,8 @@
 #include <limits>
 #include <string_view>
 
+#include "repose/surface/edges.h"
+
 namespace repose::model {
 namespace {
 
@@ -69,7 +71,7 @@ BoneGroup bones_of(BoneRole role, const std::vector<BoneRole>& roles,
     if (roles[b] != role) continue;
     group.points.insert(group.points.end(), bones[b].points.begin(), bones[b].points.end());
   }
-  for (const Vec3& x : group.points) group.box.extend(x);
+  group.box = surface::bounding_box(group.points);
   return group;
 }
 

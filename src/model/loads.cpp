@@ -11,10 +11,6 @@
 namespace repose::model {
 namespace {
 
-double third_of_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return (b - a).cross(c - a).norm() / 6;
-}
-
 /// [layers] mm².
 std::vector<double> layer_areas(const scene::Tissue& tissue, const SkinMesh& mesh,
                                 const std::vector<Vec3>& deep) {
@@ -28,7 +24,7 @@ std::vector<double> layer_areas(const scene::Tissue& tissue, const SkinMesh& mes
     for (int k = 0; k < 3; ++k)
       at[k] = column_points(mesh.points[t[k]], deep[t[k]], depths, tissue.depths_mm);
     for (size_t a = 0; a < total.size(); ++a)
-      total[a] += 3 * third_of_area(at[0][a], at[1][a], at[2][a]);
+      total[a] += 3 * ((at[1][a] - at[0][a]).cross(at[2][a] - at[0][a]).norm() / 6);
   }
   return total;
 }
@@ -62,16 +58,8 @@ std::vector<Vec3> distribute_forces(const scene::Scene& scene, const SkinMesh& m
 
 void set_layer_masses(const std::vector<double>& mass, const std::vector<double>& total,
                       const SkinMesh& mesh, Model& model) {
-  const auto layers = static_cast<int64_t>(mass.size());
-  const std::vector<Vec3>& x = model.points.position;
-  std::vector<double> area(x.size(), 0);
-  for (const Triangle& t : mesh.triangles)
-    for (int64_t a = 0; a < layers; ++a) {
-      const int64_t i = t[0] * layers + a, j = t[1] * layers + a, k = t[2] * layers + a;
-      const double third = third_of_area(x[i], x[j], x[k]);
-      for (const int64_t point : {i, j, k}) area[point] += third;
-    }
-  for (size_t i = 0; i < x.size(); ++i) {
+  const std::vector<double> area = point_areas(mesh, model);
+  for (size_t i = 0; i < area.size(); ++i) {
     const int32_t a = model.points.layer[i];
     model.points.mass[i] = mass[a] * area[i] / total[a];
   }
@@ -89,6 +77,19 @@ void set_masses(const scene::Tissue& tissue, const SkinMesh& mesh, const std::ve
 }
 
 }  // namespace
+
+std::vector<double> point_areas(const SkinMesh& mesh, const Model& model) {
+  const size_t layers = model.points.position.size() / std::max<size_t>(mesh.points.size(), 1);
+  std::vector<double> area(model.points.position.size(), 0.0);
+  const auto& x = model.points.position;
+  for (const Triangle& t : mesh.triangles)
+    for (size_t l = 0; l < layers; ++l) {
+      const size_t a = t[0] * layers + l, b = t[1] * layers + l, c = t[2] * layers + l;
+      const double share = (x[b] - x[a]).cross(x[c] - x[a]).norm() / 6;
+      for (const size_t p : {a, b, c}) area[p] += share;
+    }
+  return area;
+}
 
 ColumnLoads column_loads(const scene::Scene& scene, const SkinMesh& mesh, const Columns& columns,
                          const std::vector<char>& rim) {

@@ -22,4 +22,7 @@ ColumnLoads column_loads(const scene::Scene& scene, const SkinMesh& mesh, const 
 void set_loads(const scene::Tissue& tissue, const SkinMesh& mesh, const ColumnLoads& loads,
                Model& model);
 
+/// Returns the area, mm², that each point of a layered model stands for in its layer.
+std::vector<double> point_areas(const SkinMesh& mesh, const Model& model);
+
 }  // namespace repose::model

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 namespace repose::model {
 
@@ -24,12 +25,6 @@ std::vector<Carried> carried_points(const Model& model) {
     bones[points.bone[i]].to.push_back(points.target[i]);
   }
   return bones;
-}
-
-double extent(const std::vector<Vec3>& points) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : points) box.extend(p);
-  return box.isEmpty() ? 0 : box.diagonal().norm();
 }
 
 scene::RigidMotion whole_motion(const Model& model, std::size_t bone) {
@@ -69,7 +64,7 @@ PrescribedMotion::PrescribedMotion(const Model& model)
     straight_[b] = true;
     if (!scene::determines_rotation(bones[b].from)) continue;
     const scene::RigidFit fit = scene::fit_rigid_motion(bones[b].from, bones[b].to);
-    if (fit.residual > rigid_tolerance * extent(bones[b].from)) continue;
+    if (fit.residual > rigid_tolerance * surface::bounding_diagonal(bones[b].from)) continue;
     straight_[b] = false;
     motion_[b] = fit.motion;
   }

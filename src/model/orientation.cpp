@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "repose/model/skin_mesh.h"
+#include "repose/surface/edges.h"
 
 namespace repose::model {
 namespace {
@@ -10,12 +11,6 @@ namespace {
 constexpr double far_apart = 200, near = 50;  // mm
 
 using Box = Eigen::AlignedBox3d;
-
-Box box_of(const std::vector<Vec3>& points) {
-  Box box;
-  for (const Vec3& x : points) box.extend(x);
-  return box;
-}
 
 std::string corner_text(const Box& box) {
   return fmt::format("{:.0f} to {:.0f} mm", box.min(), box.max());
@@ -38,9 +33,10 @@ void refuse_far_apart(const std::string& skin_name, const surface::Surface& bone
 
 void require_same_place(const SkinMesh& mesh, const std::string& skin_name,
                         const std::vector<surface::Surface>& bones, const BoneField& field) {
-  const Box skin_box = box_of(mesh.points);
+  const Box skin_box = surface::bounding_box(mesh.points);
   for (const surface::Surface& bone : bones)
-    if (const Box box = box_of(bone.points); skin_box.exteriorDistance(box) > far_apart)
+    if (const Box box = surface::bounding_box(bone.points);
+        skin_box.exteriorDistance(box) > far_apart)
       refuse_far_apart(skin_name, bone, skin_box, box);
   std::vector<int64_t> inside;
   for (size_t v = 0; v < mesh.points.size(); ++v)

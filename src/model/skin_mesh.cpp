@@ -2,61 +2,38 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <map>
 #include <numeric>
 
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 
 namespace repose::model {
 namespace {
 
-/// A triangle's side, its vertices sorted; `forward` where it runs from the smaller to the larger.
-struct Side {
-  int64_t low, high, triangle;
-  bool forward;
-};
-
-std::vector<Side> sorted_sides(const std::vector<Triangle>& triangles) {
-  std::vector<Side> sides;
-  sides.reserve(3 * triangles.size());
-  for (size_t f = 0; f < triangles.size(); ++f)
-    for (int i = 0; i < 3; ++i) {
-      const int64_t a = triangles[f][i], b = triangles[f][(i + 1) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), static_cast<int64_t>(f), a < b});
-    }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  return sides;
-}
-
-void refuse_bad_edge(const surface::Surface& skin, const Side& side, int64_t count) {
-  const Vec3& at = skin.points[side.low];
+void refuse_bad_edge(const surface::Surface& skin, std::span<const surface::HalfEdge> edge) {
+  const surface::HalfEdge& side = edge.front();
   base::refuse("{}: the edge between vertices {} and {} near {:.2f} {}; repair the skin mesh there",
-               skin.name, side.low, side.high, at,
-               count > 2 ? fmt::format("has {} triangles, at most 2 are possible", count)
-                         : std::string("has two triangles that face opposite ways"));
+               skin.name, side.low, side.high, skin.points[side.low],
+               edge.size() > 2
+                   ? fmt::format("has {} triangles, at most 2 are possible", edge.size())
+                   : std::string("has two triangles that face opposite ways"));
 }
 
 void collect_edges(SkinMesh& mesh, const surface::Surface& skin) {
-  const std::vector<Side> sides = sorted_sides(mesh.triangles);
+  const surface::EdgeTable edges(mesh.triangles);
   std::vector<int> found(mesh.triangles.size(), 0);
   mesh.triangle_edges.resize(mesh.triangles.size());
-  for (size_t begin = 0, end; begin < sides.size(); begin = end) {
-    const Side& side = sides[begin];
-    for (end = begin; end < sides.size(); ++end)
-      if (sides[end].low != side.low || sides[end].high != side.high) break;
-    const auto count = static_cast<int64_t>(end - begin);
-    if (count > 2 || (count == 2 && side.forward == sides[begin + 1].forward))
-      refuse_bad_edge(skin, side, count);
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    const auto edge = edges[e];
+    if (edge.size() > 2 || (edge.size() == 2 && edge[0].rising == edge[1].rising))
+      refuse_bad_edge(skin, edge);
     double area = 0;
-    for (size_t k = begin; k < end; ++k) {
-      const int64_t f = sides[k].triangle;
+    for (const auto& [low, high, f, corner, rising] : edge) {
       area += mesh.triangle_normal[f].norm();
-      mesh.triangle_edges[f][found[f]++] = static_cast<int64_t>(mesh.edges.size());
+      mesh.triangle_edges[f][found[f]++] = e;
     }
-    mesh.edges.push_back({side.low, side.high});
-    mesh.edge_triangles.push_back(static_cast<int32_t>(count));
+    mesh.edges.push_back({edge[0].low, edge[0].high});
+    mesh.edge_triangles.push_back(static_cast<int32_t>(edge.size()));
     mesh.edge_area.push_back(area);
   }
 }
@@ -151,6 +128,24 @@ SkinMesh make_skin_mesh(const surface::Surface& skin) {
       base::refuse("{}: vertex {} is in no triangle; remove it from the skin mesh", skin.name, v);
   collect_border_loops(mesh);
   return mesh;
+}
+
+std::vector<int64_t> triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices) {
+  std::vector<int64_t> triangles;
+  for (const int64_t v : vertices) {
+    const auto around = mesh.triangles_of[v];
+    triangles.insert(triangles.end(), around.begin(), around.end());
+  }
+  base::sort_unique(triangles);
+  return triangles;
+}
+
+std::vector<int64_t> vertices_of(const SkinMesh& mesh, const std::vector<int64_t>& triangles) {
+  std::vector<int64_t> vertices;
+  for (const int64_t t : triangles)
+    vertices.insert(vertices.end(), mesh.triangles[t].begin(), mesh.triangles[t].end());
+  base::sort_unique(vertices);
+  return vertices;
 }
 
 void flip(SkinMesh& mesh) {

@@ -60,12 +60,13 @@ void refuse_torn_off(const Model& model, const std::vector<char>& torn, const st
       what, row, x);
 }
 
-template <class T>
-void keep(std::vector<T>& values, const std::vector<char>& gone) {
-  size_t kept = 0;
-  for (size_t i = 0; i < values.size(); ++i)
-    if (!gone[i]) values[kept++] = values[i];
-  values.resize(kept);
+/// Removes the rows of a group of arrays that are gone.
+template <class Group>
+void keep(Group& group, const std::vector<char>& gone) {
+  for_each_array(group, [&](const char*, auto& values) {
+    size_t row = 0;
+    std::erase_if(values, [&](const auto&) { return gone[row++] != 0; });
+  });
 }
 
 bool has_torn_edge(const std::array<int64_t, 6>& p, const std::set<Edge>& edges) {
@@ -86,8 +87,7 @@ bool has_torn_edge(const Triangle& t, const std::set<Edge>& edges) {
 int64_t remove_prisms(const std::set<Edge>& edges, Prisms& prisms) {
   std::vector<char> gone;
   for (const auto& prism : prisms.points) gone.push_back(has_torn_edge(prism, edges));
-  keep(prisms.points, gone);
-  keep(prisms.rest_volume, gone);
+  keep(prisms, gone);
   return std::count(gone.begin(), gone.end(), 1);
 }
 
@@ -96,13 +96,7 @@ int64_t remove_prisms(const std::set<Edge>& edges, Prisms& prisms) {
 Tear remove_springs(const std::vector<char>& torn, const std::string& what, Model& model) {
   refuse_torn_off(model, torn, what);
   const std::set<Edge> edges = torn_edges(torn, model.springs);
-  Springs& s = model.springs;
-  keep(s.points, torn);
-  keep(s.set, torn);
-  keep(s.rest_length, torn);
-  keep(s.stiffness, torn);
-  keep(s.exponent, torn);
-  keep(s.reference, torn);
+  keep(model.springs, torn);
   Tear tear;
   tear.prisms = remove_prisms(edges, model.prisms);
   tear.triangles = static_cast<int64_t>(

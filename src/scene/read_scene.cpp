@@ -253,8 +253,7 @@ Plan read_plan(const Value& value, const Scene& scene) {
   Plan plan;
   for (const auto& [name, place] : map.at("pieces").texts())
     plan.pieces.push_back(find_bone(name, place, scene.bones));
-  std::ranges::sort(plan.pieces);
-  plan.pieces.erase(std::unique(plan.pieces.begin(), plan.pieces.end()), plan.pieces.end());
+  base::sort_unique(plan.pieces);
   if (plan.pieces.empty()) map.at("pieces").refuse("is an empty list; name a bone, or remove plan");
   for (std::size_t b = 0; b < scene.bones.size(); ++b)
     if (!scene.moves[b].is_identity() && !std::ranges::binary_search(plan.pieces, b))

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -41,6 +42,13 @@ template <>
 inline constexpr size_t components<Vec3> = 3;
 template <class T, size_t n>
 constexpr size_t components<std::array<T, n>> = n;
+
+/// Sorts values and keeps one of each.
+template <class T>
+void sort_unique(std::vector<T>& values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+}
 
 /// The values at `rows`, in their order.
 template <class T>

@@ -48,6 +48,10 @@ struct SkinMesh {
 /// of an edge disagree about which side is outside.
 SkinMesh make_skin_mesh(const surface::Surface& skin);
 
+/// The triangles at any of the vertices, and the vertices of the triangles; ascending.
+std::vector<int64_t> triangles_at(const SkinMesh& mesh, const std::vector<int64_t>& vertices);
+std::vector<int64_t> vertices_of(const SkinMesh& mesh, const std::vector<int64_t>& triangles);
+
 /// Reverses every triangle and normal.
 void flip(SkinMesh& mesh);
 

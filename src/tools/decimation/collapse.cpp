@@ -102,8 +102,7 @@ std::vector<int64_t> Collapser::neighbors(int64_t vertex) const {
   for (const int64_t t : star_[vertex])
     for (const int64_t other : surface_.triangles[t])
       if (other != vertex) found.push_back(other);
-  std::sort(found.begin(), found.end());
-  found.erase(std::unique(found.begin(), found.end()), found.end());
+  base::sort_unique(found);
   return found;
 }
 
