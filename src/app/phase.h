@@ -16,8 +16,7 @@ class Phase {
  public:
   Phase(MPI_Comm comm, std::string text);
   ~Phase();
-  Phase(const Phase&) = delete;
-  Phase& operator=(const Phase&) = delete;
+  Phase(Phase&&) = delete;
 
   void at(double done);  ///< the share that is done, in (0, 1)
   void end();            ///< before the end of the scope

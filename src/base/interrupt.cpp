@@ -57,8 +57,7 @@ class Interrupt::Listener {
     thread_.join();
     for (const int end : ends_) close(end);
   }
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
+  Listener(Listener&&) = delete;
 
  private:
   void listen() {

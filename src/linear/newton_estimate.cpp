@@ -31,8 +31,7 @@ class CgInPlaceOfPreonly {
   ~CgInPlaceOfPreonly() {
     if (replaced_) static_cast<void>(KSPSetType(krylov_, KSPPREONLY));
   }
-  CgInPlaceOfPreonly(const CgInPlaceOfPreonly&) = delete;
-  CgInPlaceOfPreonly& operator=(const CgInPlaceOfPreonly&) = delete;
+  CgInPlaceOfPreonly(CgInPlaceOfPreonly&&) = delete;
   bool replaced() const { return replaced_ == PETSC_TRUE; }
 
  private:

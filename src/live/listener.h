@@ -11,8 +11,7 @@ class Listener {
   /// `port` 0: a free one. Throws InputError where the port is taken.
   explicit Listener(int port);
   ~Listener();
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
+  Listener(Listener&&) = delete;
 
   int port() const { return port_; }
   const std::string& token() const { return token_; }

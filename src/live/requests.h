@@ -16,8 +16,7 @@ class Requests {
  public:
   Requests(MPI_Comm comm, int input);
   ~Requests();
-  Requests(const Requests&) = delete;
-  Requests& operator=(const Requests&) = delete;
+  Requests(Requests&&) = delete;
 
   /// The next line, the same on all ranks; nothing once the input has ended. Waits without load.
   /// Collective.

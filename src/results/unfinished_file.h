@@ -11,8 +11,7 @@ class UnfinishedFile {
  public:
   explicit UnfinishedFile(std::filesystem::path file);  ///< InputError where it cannot be made
   ~UnfinishedFile();
-  UnfinishedFile(const UnfinishedFile&) = delete;
-  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
+  UnfinishedFile(UnfinishedFile&&) = delete;
 
   const std::filesystem::path& file() const { return file_; }
   const std::filesystem::path& part() const { return part_; }

@@ -32,8 +32,7 @@ class InitialHessian {
  public:
   /// Makes `tao`, of type TAOLMVM, use it. `solver` and this must outlive the solves. Collective.
   InitialHessian(Tao tao, linear::TangentSolver& solver);
-  InitialHessian(const InitialHessian&) = delete;
-  InitialHessian& operator=(const InitialHessian&) = delete;
+  InitialHessian(InitialHessian&&) = delete;
 
   /// Makes it at `displacement`, unless it was made there. Collective.
   void renew(Vec displacement);

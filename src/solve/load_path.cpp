@@ -34,8 +34,7 @@ class BulkLimit {
     set(max_bulk);
   }
   ~BulkLimit() { set(std::numeric_limits<double>::infinity()); }
-  BulkLimit(const BulkLimit&) = delete;
-  BulkLimit& operator=(const BulkLimit&) = delete;
+  BulkLimit(BulkLimit&&) = delete;
 
  private:
   void set(double max_bulk) {

@@ -50,8 +50,7 @@ class PlanSession {
   PlanSession(MPI_Comm comm, const std::filesystem::path& input,
               const scene::SceneChanges& changes = {});
   ~PlanSession();
-  PlanSession(const PlanSession&) = delete;
-  PlanSession& operator=(const PlanSession&) = delete;
+  PlanSession(PlanSession&&) = delete;
 
   const std::vector<Piece>& pieces() const;
   const scene::Plan& box() const;

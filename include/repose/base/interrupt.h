@@ -15,8 +15,7 @@ class Interrupt {
   /// `limit` in s of wall-clock time from now; without `signals` the limit alone counts.
   Interrupt(MPI_Comm comm, double limit, bool signals);
   ~Interrupt();  ///< signals do again what they did before
-  Interrupt(const Interrupt&) = delete;
-  Interrupt& operator=(const Interrupt&) = delete;
+  Interrupt(Interrupt&&) = delete;
 
   bool requested();  ///< the same on all ranks; stays true. Collective.
 

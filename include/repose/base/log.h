@@ -17,8 +17,7 @@ class Logged {
  public:
   explicit Logged(PetscLogEvent event, double flops = 0);
   ~Logged();
-  Logged(const Logged&) = delete;
-  Logged& operator=(const Logged&) = delete;
+  Logged(Logged&&) = delete;
 
  private:
   PetscLogEvent event_;
@@ -29,8 +28,7 @@ class LogStage {
  public:
   explicit LogStage(const char* name);
   ~LogStage();
-  LogStage(const LogStage&) = delete;
-  LogStage& operator=(const LogStage&) = delete;
+  LogStage(LogStage&&) = delete;
 };
 
 /// One line on a terminal that is written over as work continues, with the time it will still take;

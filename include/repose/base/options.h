@@ -52,8 +52,7 @@ class Options {
   /// Sorts the command line into the program's own options, PETSc's and arguments. Never throws.
   Options(int argc, char* const* argv, std::string description, std::vector<Argument> arguments,
           std::vector<Option> table);
-  Options(const Options&) = delete;
-  Options& operator=(const Options&) = delete;
+  Options(Options&&) = delete;
 
   /// -help was given. With `-help petsc` or `-help intro` it goes to PETSc instead, and this is
   /// false.
@@ -121,8 +120,7 @@ class ScopedOption {
  public:
   ScopedOption(const char* name, const std::string& value);  ///< `name` with its dash, a literal
   ~ScopedOption();
-  ScopedOption(const ScopedOption&) = delete;
-  ScopedOption& operator=(const ScopedOption&) = delete;
+  ScopedOption(ScopedOption&&) = delete;
 
  private:
   const char* name_;

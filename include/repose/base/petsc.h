@@ -61,8 +61,7 @@ class Session {
  public:
   Session(int argc, char** argv, const char* help);
   ~Session();
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  Session(Session&&) = delete;
 };
 
 }  // namespace repose::base

@@ -14,8 +14,7 @@ constexpr double overflown = 1e100;  ///< stands for a value that is more, or no
 class Function {
  public:
   explicit Function(Positions& positions) : positions_(positions) {}
-  Function(const Function&) = delete;
-  Function& operator=(const Function&) = delete;
+  Function(Function&&) = delete;
   virtual ~Function() = default;
 
   /// Φ at `displacement` and, if `gradient` is not null, ∇Φ. A value that overflows comes back as
@@ -45,8 +44,7 @@ using BlockVisitor = std::function<void(int32_t p, int32_t q, const Mat3& block)
 class Hessian {
  public:
   Hessian() = default;
-  Hessian(const Hessian&) = delete;
-  Hessian& operator=(const Hessian&) = delete;
+  Hessian(Hessian&&) = delete;
   virtual ~Hessian() = default;
 
   /// Goes to `displacement`; may do nothing where it is already. Collective.

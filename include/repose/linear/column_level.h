@@ -21,8 +21,7 @@ class FloatsType {
  public:
   explicit FloatsType(int count);
   ~FloatsType() { MPI_Type_free(&type_); }
-  FloatsType(const FloatsType&) = delete;
-  FloatsType& operator=(const FloatsType&) = delete;
+  FloatsType(FloatsType&&) = delete;
   operator MPI_Datatype() const { return type_; }
 
  private:

@@ -28,8 +28,7 @@ class HessianPreconditioner {
   static constexpr int64_t factors_limit = 600000;  ///< scalar unknowns
 
   HessianPreconditioner(discrete::Positions& positions, discrete::Hessian& hessian);
-  HessianPreconditioner(const HessianPreconditioner&) = delete;
-  HessianPreconditioner& operator=(const HessianPreconditioner&) = delete;
+  HessianPreconditioner(HessianPreconditioner&&) = delete;
 
   operator PC() const { return pc_; }
   /// Returns the matrix that it is made from.

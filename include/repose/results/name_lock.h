@@ -19,8 +19,7 @@ class NameLock {
   /// run, and where the folder is missing or not writable.
   explicit NameLock(const std::filesystem::path& name);
   ~NameLock();  ///< removes NAME.lock
-  NameLock(const NameLock&) = delete;
-  NameLock& operator=(const NameLock&) = delete;
+  NameLock(NameLock&&) = delete;
 
  private:
   bool acquire();

@@ -29,8 +29,7 @@ class ResultFile {
   ResultFile(MPI_Comm comm, const std::filesystem::path& name, const model::Model& global_metadata,
              const model::ModelRows& slabs, Kind kind = Kind::result);
   ~ResultFile();
-  ResultFile(const ResultFile&) = delete;
-  ResultFile& operator=(const ResultFile&) = delete;
+  ResultFile(ResultFile&&) = delete;
 
   /// Appends one /step/NNNN. Each rank gives its slabs; the numbers are
   /// rank 0's. bone_surface/displacement f64 [P,3] holds how far the points of all bone surfaces in

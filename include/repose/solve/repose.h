@@ -142,8 +142,7 @@ class RestSolver {
   /// InputError where nothing is free to move.
   RestSolver(MPI_Comm comm, const discrete::Part& part, const Settings& settings);
   ~RestSolver();
-  RestSolver(const RestSolver&) = delete;
-  RestSolver& operator=(const RestSolver&) = delete;
+  RestSolver(RestSolver&&) = delete;
 
   /// Gives a bone another whole motion.
   void set_motion(int32_t bone, const scene::RigidMotion& motion);

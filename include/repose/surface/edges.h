@@ -77,6 +77,9 @@ class VertexNeighbors {
   std::vector<int64_t> begin_, vertex_;
 };
 
+/// The triangles united that are connected by edges.
+UnionFind connected(const std::vector<Triangle>& triangles, const EdgeTable& edges);
+
 /// The number of triangles of each part connected by edges, largest first; triangles that name a
 /// vertex twice are not counted.
 std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <numeric>
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
