@@ -68,8 +68,7 @@ void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
   if (!adhesion.empty()) report.remarks.push_back(adhesion);
   report.effective_modulus = job.local_model.effective_modulus;
   job.building = describe_build(report);
-  if (ranks > 1)
-    job.building += report_row("built", fmt::format("by {} ranks, each its part", ranks));
+  if (ranks > 1) job.building += report_row("built", "by {} ranks, each its part", ranks);
   job.warnings = std::move(report.warnings);
 }
 

@@ -70,10 +70,9 @@ std::string describe_tangents(const std::vector<model::PointField>& fields) {
   if (columns == 0) return "";
   const std::string missing =
       found == columns ? "" : "; the others are 0, and their flags finished and convex say why";
-  return report_row(
-      "tangents",
-      fmt::format("{} of {} derivatives by motions of pieces and stiffnesses of strata{}", found,
-                  columns, missing));
+  return report_row("tangents",
+                    "{} of {} derivatives by motions of pieces and stiffnesses of strata{}", found,
+                    columns, missing);
 }
 
 }  // namespace repose::app

@@ -30,8 +30,7 @@ std::string describe_halvings(const solve::Halvings& h) {
             "(tissue.release); springs: raise the volume stiffness, or make the tissue a solid"
           : "a hard way: tissue buckles on it, or has several rest positions, and -verify_path "
             "says whether they matter; move the bones less; springs: raise the volume stiffness, "
-            "or make "
-            "the tissue a solid");
+            "or make the tissue a solid");
 }
 
 std::string halved(const solve::Halvings& h) {
@@ -45,11 +44,10 @@ std::string work_rows(const solve::Summary& s) {
       s.evaluations_for_other > 0
           ? fmt::format("; {} of value to find another rest position", s.evaluations_for_other)
           : "";
-  return report_row("load steps", fmt::format("{} ({})", s.path.steps, halved(s.path.halvings))) +
-         describe_halvings(s.path.halvings) +
-         report_row("iterations", fmt::format("{}", s.path.iterations)) +
-         report_row("evaluations", fmt::format("{} of value and gradient, {} of the Hessian{}",
-                                               s.evaluations, s.assemblies, other));
+  return report_row("load steps", "{} ({})", s.path.steps, halved(s.path.halvings)) +
+         describe_halvings(s.path.halvings) + report_row("iterations", "{}", s.path.iterations) +
+         report_row("evaluations", "{} of value and gradient, {} of the Hessian{}", s.evaluations,
+                    s.assemblies, other);
 }
 
 std::string stability(const solve::Spectrum& s) {
@@ -66,8 +64,7 @@ std::string remedy(const solve::Summary& s, bool stretched) {
   if (!s.path.last.stable && stretched)
     return " The tissue buckles there, or is between several rest positions: move the bones less, "
            "or lower tissue.turgor: what the skin's tension presses together beneath it may have "
-           "no "
-           "balance, or none any more where it is cut.";
+           "no balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
   if (!s.path.last.stable)
     return std::string(
@@ -87,22 +84,22 @@ std::string remedy(const solve::Summary& s, bool stretched) {
 }  // namespace
 
 std::string describe_model(const model::Counts& c) {
-  return report_row("points", fmt::format("{} ({} soft tissue, {} boundary, {} bone, {} held)",
-                                          c.points, c.soft, c.boundary, c.bone, c.held)) +
-         (c.edges > 0 ? report_row("edges", fmt::format("{}", c.edges))
-                      : report_row("springs", fmt::format("{}", c.springs))) +
-         report_row("prisms", fmt::format("{}", c.prisms));
+  return report_row("points", "{} ({} soft tissue, {} boundary, {} bone, {} held)", c.points,
+                    c.soft, c.boundary, c.bone, c.held) +
+         (c.edges > 0 ? report_row("edges", "{}", c.edges)
+                      : report_row("springs", "{}", c.springs)) +
+         report_row("prisms", "{}", c.prisms);
 }
 
 std::string describe_build(const model::BuildReport& r) {
   std::string text =
-      report_row("skin", fmt::format("{} vertices, {} edges, {} triangles", r.skin_vertices,
-                                     r.skin_edges, r.skin_triangles)) +
-      report_row("columns", fmt::format("{} end in bone, {} end free ({} released), {} shortened",
-                                        r.attached, r.free_deep, r.released, r.shortened)) +
-      report_row("thickness", fmt::format("{:.3g} … {:.3g} mm, median {:.3g} mm", r.thickness_min,
-                                          r.thickness_max, r.thickness_median)) +
-      report_row("effective modulus", fmt::format("{:.4g} N/mm²", r.effective_modulus));
+      report_row("skin", "{} vertices, {} edges, {} triangles", r.skin_vertices, r.skin_edges,
+                 r.skin_triangles) +
+      report_row("columns", "{} end in bone, {} end free ({} released), {} shortened", r.attached,
+                 r.free_deep, r.released, r.shortened) +
+      report_row("thickness", "{:.3g} … {:.3g} mm, median {:.3g} mm", r.thickness_min,
+                 r.thickness_max, r.thickness_median) +
+      report_row("effective modulus", "{:.4g} N/mm²", r.effective_modulus);
   for (const std::string& remark : r.remarks) text += report_row("remark", remark);
   return text;
 }
@@ -114,20 +111,18 @@ std::string describe_warnings(const std::vector<std::string>& warnings) {
 }
 
 std::string describe_cut(const model::Cut& cut, int64_t doubled) {
-  return report_row("incision",
-                    fmt::format("along {} edges of the skin, {} points doubled in {} layers",
-                                cut.columns.size() - 1, doubled, cut.layers));
+  return report_row("incision", "along {} edges of the skin, {} points doubled in {} layers",
+                    cut.columns.size() - 1, doubled, cut.layers);
 }
 
 std::string describe_prestress(const solve::Prestress& p) {
   if (p.solid)
     return report_row("initial equilibrium",
-                      fmt::format("{:.3g} N left of {:.3g} N; pressures up to {:.3g} N/mm²",
-                                  p.residual, p.largest_force, p.largest_pressure));
-  return report_row(
-      "initial equilibrium",
-      fmt::format("{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
-                  p.residual, p.largest_force, p.min_rest_ratio));
+                      "{:.3g} N left of {:.3g} N; pressures up to {:.3g} N/mm²", p.residual,
+                      p.largest_force, p.largest_pressure);
+  return report_row("initial equilibrium",
+                    "{:.3g} N left of {:.3g} N; rest lengths from {:.3g} of the initial ones",
+                    p.residual, p.largest_force, p.min_rest_ratio);
 }
 
 std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
@@ -135,10 +130,9 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
   std::string text;
   for (size_t k = 0; k < held.size(); ++k)
     if (!held[k].empty())
-      text +=
-          report_row(fmt::format("instrument {}", k),
-                     fmt::format("holds {} points; the tissue pushes on it with {:.4g} N, {:.4g} N",
-                                 held[k].size(), forces[k], forces[k].norm()));
+      text += report_row(fmt::format("instrument {}", k),
+                         "holds {} points; the tissue pushes on it with {:.4g} N, {:.4g} N",
+                         held[k].size(), forces[k], forces[k].norm());
   return text;
 }
 
@@ -147,9 +141,9 @@ std::string describe_pierced(const std::vector<std::string>& bodies,
   if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 has their names
   return report_row(
       "pierced by bone",
-      fmt::format("{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
-                  "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
-                  pierced.columns, pierced.depth, bodies[pierced.body], pierced.where));
+      "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
+      "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
+      pierced.columns, pierced.depth, bodies[pierced.body], pierced.where);
 }
 
 namespace {
@@ -157,32 +151,29 @@ namespace {
 /// Depths as the search sees them, then as they are.
 std::string describe_penetration(const std::vector<std::string>& bodies, const solve::Summary& s) {
   if (!std::isfinite(s.last.penetration)) return "";
-  std::string text = report_row(
-      "penetration", fmt::format("{:.2g} mm at most, into smoothed surfaces", s.last.penetration));
+  std::string text =
+      report_row("penetration", "{:.2g} mm at most, into smoothed surfaces", s.last.penetration);
   if (!std::isfinite(s.last.penetration_exact)) return text;
-  text += report_row(
-      "exact penetration",
-      fmt::format("{:.2g} mm at most, into the bodies' own triangles", s.last.penetration_exact));
+  text += report_row("exact penetration", "{:.2g} mm at most, into the bodies' own triangles",
+                     s.last.penetration_exact);
   for (size_t k = 0; k < bodies.size() && k < s.contacts.size(); ++k) {
     const solve::PenetrationDepth& depth = s.contacts[k].exact;
     if (depth.points == 0) continue;
-    text +=
-        report_row("exact penetration",
-                   fmt::format("{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at "
-                               "{:.1f} mm; a finer contact.grid follows its surface more closely",
-                               depth.points, solve::PenetrationDepth::reported, bodies[k],
-                               depth.deepest, depth.where));
+    text += report_row("exact penetration",
+                       "{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at "
+                       "{:.1f} mm; a finer contact.grid follows its surface more closely",
+                       depth.points, solve::PenetrationDepth::reported, bodies[k], depth.deepest,
+                       depth.where);
   }
   return text;
 }
 
 std::string describe_other_rest(const solve::Outcome& last) {
   if (!last.other) return "";
-  return report_row(
-      "other rest position",
-      fmt::format("the skin is up to {:.2g} mm away there, most at {:.1f} mm: tissue rests on "
-                  "either side of an edge of bone, and this result has less energy",
-                  last.other->distance, last.other->place));
+  return report_row("other rest position",
+                    "the skin is up to {:.2g} mm away there, most at {:.1f} mm: tissue rests on "
+                    "either side of an edge of bone, and this result has less energy",
+                    last.other->distance, last.other->place);
 }
 
 }  // namespace
@@ -194,12 +185,12 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
     const std::string name = k < bodies.size() ? bodies[k] : "the sides of cuts";
     if (on.inside > 0)
       text += report_row("inside at the start",
-                         fmt::format("{} points begin up to {:.2g} mm inside {}, the deepest at "
-                                     "{:.1f} mm; they go no deeper",
-                                     on.inside, on.deepest, name, on.where));
+                         "{} points begin up to {:.2g} mm inside {}, the deepest at "
+                         "{:.1f} mm; they go no deeper",
+                         on.inside, on.deepest, name, on.where);
     if (on.points == 0) continue;
-    text += report_row("contact", fmt::format("{} points press on {} with {:.4g} N, {:.4g} N",
-                                              on.points, name, on.force, on.force.norm()));
+    text += report_row("contact", "{} points press on {} with {:.4g} N, {:.4g} N", on.points, name,
+                       on.force, on.force.norm());
   }
   return text + describe_penetration(bodies, s) + describe_other_rest(s.path.last);
 }
@@ -208,15 +199,14 @@ std::string describe_tearing(const solve::Tearing& t) {
   if (!t.limit) return "";
   std::string text = report_row(
       "tearing",
-      fmt::format("{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
-                  "{:.4g} N",
-                  ending(t.settled, t.stopped, "NOT SETTLED, MORE MAY TEAR"), t.rounds, *t.limit,
-                  t.largest));
+      "{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
+      "{:.4g} N",
+      ending(t.settled, t.stopped, "NOT SETTLED, MORE MAY TEAR"), t.rounds, *t.limit, t.largest);
   if (t.springs == 0) return text + report_row("torn", "nothing");
-  return text +
-         report_row("torn", fmt::format("springs {}, with them prisms {} and triangles of the skin "
-                                        "{}; {:.4g} mm long about {:.4g} mm",
-                                        t.springs, t.prisms, t.triangles, t.length, t.middle));
+  return text + report_row("torn",
+                           "springs {}, with them prisms {} and triangles of the skin "
+                           "{}; {:.4g} mm long about {:.4g} mm",
+                           t.springs, t.prisms, t.triangles, t.length, t.middle);
 }
 
 std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio) {
@@ -256,27 +246,25 @@ std::string describe_path(const PathCheck& c) {
 std::string describe_stages(const base::Stages& stages) {
   std::string text;
   for (const auto& stage : stages.list())
-    text += report_row("time, memory", fmt::format("{:<12} {:>9.3f} s {:>9.0f} MiB so far",
-                                                   stage.name, stage.seconds, stage.mebibytes));
+    text += report_row("time, memory", "{:<12} {:>9.3f} s {:>9.0f} MiB so far", stage.name,
+                       stage.seconds, stage.mebibytes);
   return text;
 }
 
 std::string describe_saved(const std::string& name) {
-  return report_row(
-      "told to end",
-      fmt::format("{}.h5 holds the last state saved; -restart {}.h5 resumes from it", name, name));
+  return report_row("told to end",
+                    "{}.h5 holds the last state saved; -restart {}.h5 resumes from it", name, name);
 }
 
 std::string describe_finished(const std::string& file, const model::StepNumbers& end,
                               double accuracy, bool folded) {
-  return report_row(
-      "finished",
-      fmt::format("{}: at rest at load 1, {:.3g} mm reached, {:.3g} mm requested{}; nothing is "
-                  "left to do",
-                  file, end.displacement_error, accuracy,
-                  folded ? fmt::format(", {} prisms inside out (-allow_folded accepts them)",
-                                       end.inverted_prisms)
-                         : ""));
+  return report_row("finished",
+                    "{}: at rest at load 1, {:.3g} mm reached, {:.3g} mm requested{}; nothing is "
+                    "left to do",
+                    file, end.displacement_error, accuracy,
+                    folded ? fmt::format(", {} prisms inside out (-allow_folded accepts them)",
+                                         end.inverted_prisms)
+                           : "");
 }
 
 std::string describe_failure(const solve::Summary& s, bool stretched, bool adheres) {
@@ -296,56 +284,45 @@ std::string describe_failure(const solve::Summary& s, bool stretched, bool adher
 
 std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,
                          const base::Stages& stages) {
-  std::string text =
-      report_row("ended", fmt::format("load {:.4g}: {}", s.path.load, s.last.reason));
+  std::string text = report_row("ended", "load {:.4g}: {}", s.path.load, s.last.reason);
   const double error = s.last.displacement_error;
-  text += report_row(
-      "accuracy",
-      fmt::format("{}, {:.3g} mm requested",
-                  std::isfinite(error) ? fmt::format("{:.3g} mm reached", error) : "not known",
-                  settings.path.accuracy));
+  text += report_row("accuracy", "{}, {:.3g} mm requested",
+                     std::isfinite(error) ? fmt::format("{:.3g} mm reached", error) : "not known",
+                     settings.path.accuracy);
   text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
                                                          : "NOT A MINIMUM: negative curvature");
   if (s.initial_spectrum) text += report_row("at the start", stability(*s.initial_spectrum));
   if (s.final_spectrum) text += report_row("where it ended", stability(*s.final_spectrum));
-  text += report_row("objective",
-                     fmt::format("{:.12g} {}", s.last.objective,
-                                 settings.functional == model::Functional::force ? "N" : "N mm"));
-  text += report_row("inverted prisms",
-                     fmt::format("{}{}", s.last.inverted_prisms,
-                                 s.last.inverted_prisms ? ": TISSUE IS FOLDED" : ""));
-  text += report_row("volume error", fmt::format("{:.3g} at most", s.last.volume_error_max));
-  text += report_row("unknowns",
-                     fmt::format("{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s"));
+  text += report_row("objective", "{:.12g} {}", s.last.objective,
+                     settings.functional == model::Functional::force ? "N" : "N mm");
+  text += report_row("inverted prisms", "{}{}", s.last.inverted_prisms,
+                     s.last.inverted_prisms ? ": TISSUE IS FOLDED" : "");
+  text += report_row("volume error", "{:.3g} at most", s.last.volume_error_max);
+  text += report_row("unknowns", "{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s");
   text += work_rows(s);
   return text + describe_stages(stages);
 }
 
 std::string describe_choice(const adapt::GridSequence& sequence, double requested) {
-  const adapt::Level& chosen = sequence.levels.back();
-  return fmt::format(
-      "  {:<22} of these, the last; its skin is {:.2g} mm from the scene's own at most, by its "
-      "distance from the one before{}\n",
-      "solved model", chosen.discretization_error,
-      chosen.discretization_error > requested
-          ? fmt::format(": MORE THAN THE {:g} mm REQUESTED", requested)
-          : "");
+  const double error = sequence.levels.back().discretization_error;
+  return report_row(
+      "solved model",
+      "of these, the last; its skin is {:.2g} mm from the scene's own at most, by its distance "
+      "from the one before{}",
+      error, error > requested ? fmt::format(": MORE THAN THE {:g} mm REQUESTED", requested) : "");
 }
 
 std::string describe_sequence(const adapt::GridSequence& sequence) {
   std::string text;
-  for (const adapt::Level& r : sequence.levels) {
-    text += fmt::format(
-        "  {:<22} {} points, edges {:.3g} mm, {} layers: {} evaluations, {} of the "
-        "Hessian, {:.2f} s",
-        "coarse model", r.points, r.resolution.edge, r.resolution.layers, r.evaluations,
-        r.assemblies, r.seconds);
-    if (std::isfinite(r.skin_change))
-      text += fmt::format("; skin {:.2g} mm from the one before", r.skin_change);
-    text += "\n";
-  }
-  if (!sequence.refusal.empty())
-    text += fmt::format("  {:<22} {}\n", "no finer coarse model", sequence.refusal);
+  for (const adapt::Level& r : sequence.levels)
+    text += report_row(
+        "coarse model",
+        "{} points, edges {:.3g} mm, {} layers: {} evaluations, {} of the Hessian, {:.2f} s{}",
+        r.points, r.resolution.edge, r.resolution.layers, r.evaluations, r.assemblies, r.seconds,
+        std::isfinite(r.skin_change)
+            ? fmt::format("; skin {:.2g} mm from the one before", r.skin_change)
+            : "");
+  if (!sequence.refusal.empty()) text += report_row("no finer coarse model", sequence.refusal);
   return text;
 }
 

@@ -1,5 +1,8 @@
 #pragma once
+#include <fmt/format.h>
+
 #include <string>
+#include <utility>
 
 #include "repose/adapt/grid_sequence.h"
 #include "repose/model/build.h"
@@ -12,6 +15,11 @@ namespace repose::app {
 
 /// Formats a name and its text as one row.
 std::string report_row(const std::string& name, const std::string& value);
+template <class... Values>
+std::string report_row(const std::string& name, fmt::format_string<Values...> format,
+                       Values&&... values) {
+  return report_row(name, fmt::format(format, std::forward<Values>(values)...));
+}
 
 /// Points, springs and prisms of a model, by set. Lines ending in a newline.
 std::string describe_model(const model::Counts& counts);

@@ -75,8 +75,7 @@ class Saving {
     });
   }
   ~Saving() { interrupt_.on_signal({}); }
-  Saving(const Saving&) = delete;
-  Saving& operator=(const Saving&) = delete;
+  Saving(Saving&&) = delete;
 
  private:
   base::Interrupt& interrupt_;
@@ -329,7 +328,7 @@ base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
   print(writer.reactions() + describe_contact(job_.bodies, summary) +
         describe_pierced(job_.bodies, summary.pierced));
   print(self_contact);
-  print(report_row("result", fmt::format("{}.h5, {}_*.xdmf (ParaView)", name_, name_)));
+  print(report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_));
   print(given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;

@@ -55,10 +55,10 @@ std::string SolvedSkin::describe_self_contact(const std::vector<Vec3>& points) c
   const surface::Corners first = surface::corners(now, now.triangles[*triangles.begin()]);
   const Vec3 at = (first[0] + first[1] + first[2]) / 3;
   return report_row("self-contact",
-                    fmt::format("SKIN PASSES THROUGH SKIN: {} of its triangles, one at {:.1f} mm; "
-                                "skin is kept apart only along incisions and mouth.path, so "
-                                "distrust the result there, or move the bones less",
-                                triangles.size(), at));
+                    "SKIN PASSES THROUGH SKIN: {} of its triangles, one at {:.1f} mm; "
+                    "skin is kept apart only along incisions and mouth.path, so "
+                    "distrust the result there, or move the bones less",
+                    triangles.size(), at);
 }
 
 }  // namespace repose::app

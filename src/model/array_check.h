@@ -39,13 +39,11 @@ class ArrayCheck {
   explicit ArrayCheck(const std::string& file) : file_(file) {}
 
   void rows(const std::string& name, size_t rows, size_t expected) const {
-    if (rows != expected)
-      refuse(name, fmt::format("has {} rows, expected {}, one for each", rows, expected));
+    if (rows != expected) refuse(name, "has {} rows, expected {}, one for each", rows, expected);
   }
   void number(const std::string& name, size_t row, double value, const Limits& limits) const {
     if (!limits.contains(value))
-      refuse(name,
-             fmt::format("row {} is {} {}, expected {}", row, value, limits.unit, limits.text()));
+      refuse(name, "row {} is {} {}, expected {}", row, value, limits.unit, limits.text());
   }
   void numbers(const std::string& name, const std::vector<double>& values, size_t expected,
                const Limits& limits) const {
@@ -61,7 +59,7 @@ class ArrayCheck {
   void integer(const std::string& name, size_t row, int64_t value, int64_t first,
                int64_t last) const {
     if (value < first || value > last)
-      refuse(name, fmt::format("row {} is {}, expected {} to {}", row, value, first, last));
+      refuse(name, "row {} is {}, expected {} to {}", row, value, first, last);
   }
   template <class Int>
   void integers(const std::string& name, const std::vector<Int>& values, size_t expected,
@@ -84,11 +82,13 @@ class ArrayCheck {
     constexpr const char* number = K == 2 ? "two" : K == 3 ? "three" : "six";
     for (size_t i = 0; i < values.size(); ++i)
       if (std::set<int64_t>(values[i].begin(), values[i].end()).size() < K)
-        refuse(name, fmt::format("row {} is ({}), expected {} different points; remove it", i,
-                                 fmt::join(values[i], ", "), number));
+        refuse(name, "row {} is ({}), expected {} different points; remove it", i,
+               fmt::join(values[i], ", "), number);
   }
-  [[noreturn]] void refuse(const std::string& name, const std::string& what) const {
-    base::refuse("{}: /model/{}: {}", file_, name, what);
+  template <class... Args>
+  [[noreturn]] void refuse(const std::string& name, fmt::format_string<Args...> what,
+                           Args&&... args) const {
+    base::refuse("{}: /model/{}: {}", file_, name, fmt::format(what, std::forward<Args>(args)...));
   }
 
  private:

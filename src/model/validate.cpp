@@ -133,8 +133,8 @@ void check_adhesion(const Model& m, const ArrayCheck& check) {
       for (const double value : corner) check.number("adhesion/box", k, value, place);
     check.number("adhesion/reach", k, jaw.reach, {0, max_coordinate, "mm", true, ""});
     if (m.bone_surfaces.empty() || m.bone_surfaces[jaw.bone].triangles.empty())
-      check.refuse("adhesion/bone", fmt::format("row {} names bone {}, which has no bone_surface",
-                                                k, m.bones[jaw.bone]));
+      check.refuse("adhesion/bone", "row {} names bone {}, which has no bone_surface", k,
+                   m.bones[jaw.bone]);
   }
   check.integers("adhesion/cut_column", rule.cut_columns, rule.cut_columns.size(), 0, INT64_MAX);
 }
@@ -164,9 +164,8 @@ void check_cut_faces(const CutFaces& cut_faces, size_t point_count, const ArrayC
     const auto end = cut_faces.weight.begin() + cut_faces.begin[c];
     const double sum = std::accumulate(begin, end, 0.0);
     if (std::abs(sum - 1) > 1e-9)
-      check.refuse("contact/wall/weight",
-                   fmt::format("rows {} to {} have a sum of {}, expected 1", cut_faces.begin[c - 1],
-                               cut_faces.begin[c] - 1, sum));
+      check.refuse("contact/wall/weight", "rows {} to {} have a sum of {}, expected 1",
+                   cut_faces.begin[c - 1], cut_faces.begin[c] - 1, sum);
   }
   check.numbers("contact/wall/area", cut_faces.area, static_cast<size_t>(places),
                 at_least_zero("mm²"));
@@ -195,17 +194,15 @@ void check_arrays(const Model& m, const ArrayCheck& check) {
 void require_bones(const Points& p, const ArrayCheck& check) {
   for (size_t i = 0; i < p.set.size(); ++i)
     if (p.set[i] == PointSet::bone && p.bone[i] < 0)
-      check.refuse(
-          "point/bone",
-          fmt::format("row {} is -1, but point/set makes it a bone point; name its bone", i));
+      check.refuse("point/bone", "row {} is -1, but point/set makes it a bone point; name its bone",
+                   i);
 }
 
 void require_rigid(const Model& m, const ArrayCheck& check) {
   for (size_t b = 0; b < m.bone_transform.size(); ++b) try {
       scene::RigidMotion::from_matrix(m.bone_transform[b]);
     } catch (const base::InputError& error) {
-      check.refuse("bone_transform",
-                   fmt::format("row {} (bone {}): {}", b, m.bones[b], error.what()));
+      check.refuse("bone_transform", "row {} (bone {}): {}", b, m.bones[b], error.what());
     }
 }
 
@@ -225,27 +222,24 @@ void require_volumes(const Model& m, const ArrayCheck& check) {
     for (int j = 0; j < 6; ++j) corners[j] = m.points.position[m.prisms.points[i][j]];
     const double volume = prism_volume(corners), stored = m.prisms.rest_volume[i];
     if (!(std::abs(volume - stored) <= volume_tolerance(corners)))
-      check.refuse(
-          "prism/rest_volume",
-          fmt::format("row {} is {} mm³, but the prism's volume at point/position is {} mm³; write "
-                      "that volume, order prism/points so that it is above 0",
-                      i, stored, volume));
+      check.refuse("prism/rest_volume",
+                   "row {} is {} mm³, but the prism's volume at point/position is {} mm³; write "
+                   "that volume, order prism/points so that it is above 0",
+                   i, stored, volume);
   }
 }
 
 void require_parts_of_moduli(const Prisms& p, const ArrayCheck& check) {
   for (size_t m = 0; m < p.nodal_modulus.size(); ++m)
     if (!(p.nodal_modulus[m] < p.modulus[m]))
-      check.refuse("prism/nodal_modulus",
-                   fmt::format("row {} is {} N/mm²; must be below prism/modulus, {}", m,
-                               p.nodal_modulus[m], p.modulus[m]));
+      check.refuse("prism/nodal_modulus", "row {} is {} N/mm²; must be below prism/modulus, {}", m,
+                   p.nodal_modulus[m], p.modulus[m]);
 }
 
 void require_one_tissue(const Model& m, const ArrayCheck& check) {
   if (!m.springs.points.empty() && (is_solid(m) || !m.edges.points.empty()))
-    check.refuse("spring",
-                 fmt::format("has {} rows beside /model/edge; a model is of springs or a solid",
-                             m.springs.points.size()));
+    check.refuse("spring", "has {} rows beside /model/edge; a model is of springs or a solid",
+                 m.springs.points.size());
 }
 
 void require_different_points(const Model& m, const ArrayCheck& check) {
@@ -256,8 +250,7 @@ void require_different_points(const Model& m, const ArrayCheck& check) {
     for (size_t e = 0; e < m.elements[k].size(); ++e) {
       const auto points = m.elements[k].points_of(e);
       if (std::set<int64_t>(points.begin(), points.end()).size() != points.size())
-        check.refuse(fmt::format("element/{}", k),
-                     fmt::format("element {} has one of its points twice", e));
+        check.refuse(fmt::format("element/{}", k), "element {} has one of its points twice", e);
     }
 }
 
@@ -266,8 +259,8 @@ void require_closed(const std::string& name, const surface::Surface& mesh,
   if (mesh.triangles.empty())
     check.refuse(name, "has no triangles; tissue can only touch a closed surface");
   if (const surface::Defects defects = surface::inspect(mesh, false); !defects.outward)
-    check.refuse(name, fmt::format("must be a closed surface that faces outward; it has {}",
-                                   surface::describe(defects)));
+    check.refuse(name, "must be a closed surface that faces outward; it has {}",
+                 surface::describe(defects));
 }
 
 /// Shapes of bodies, in rows of contact/body_shape or as a mesh.
@@ -320,9 +313,8 @@ void require_bodies(const Model& m, const ArrayCheck& check) {
     if (body.bone < 0)
       std::visit(ShapeCheck(k, check), body.shape);
     else if (m.bone_surfaces.empty())
-      check.refuse("bone_surface",
-                   fmt::format("is missing, but contact/body_bone row {} is bone {}", k,
-                               m.bones[body.bone]));
+      check.refuse("bone_surface", "is missing, but contact/body_bone row {} is bone {}", k,
+                   m.bones[body.bone]);
     else
       require_closed(fmt::format("bone_surface/{}", body.bone), m.bone_surfaces[body.bone], check);
   }

@@ -13,10 +13,10 @@ namespace {
 void require_format(const Reader& in) {
   const std::string format = in.text("/", "format");
   if (format != "tissue-model")
-    in.refuse("/ attribute format", fmt::format("is \"{}\", expected \"tissue-model\"", format));
+    in.refuse("/ attribute format", "is \"{}\", expected \"tissue-model\"", format);
   const int64_t version = in.integer("/", "version");
   if (version != 1)
-    in.refuse("/ attribute version", fmt::format("is {}, this program reads version 1", version));
+    in.refuse("/ attribute version", "is {}, this program reads version 1", version);
 }
 
 /// Reads the arrays of a group, all of as many rows as the first. The `optional` ones may be
@@ -72,13 +72,13 @@ constexpr int8_t bone_kind = 0, mesh_kind = 5;
 
 void require_kind(const Reader& in, int64_t k, int8_t kind, int32_t bone) {
   if (kind < bone_kind || kind > mesh_kind)
-    in.refuse("/model/contact/body_kind",
-              fmt::format("row {} is {}, expected {} to {}", k, kind, bone_kind, mesh_kind));
+    in.refuse("/model/contact/body_kind", "row {} is {}, expected {} to {}", k, kind, bone_kind,
+              mesh_kind);
   if ((kind == bone_kind) != (bone >= 0))
     in.refuse("/model/contact/body_kind",
-              fmt::format("row {} is {}, but body_bone is {}; a body of kind 0 names its bone, "
-                          "another has -1",
-                          k, kind, bone));
+              "row {} is {}, but body_bone is {}; a body of kind 0 names its bone, "
+              "another has -1",
+              k, kind, bone);
 }
 
 model::Body::Shape read_shape(const Reader& in, int64_t k, int8_t kind, const double* of) {
@@ -138,7 +138,7 @@ model::AdhesionRule read_adhesion(const Reader& in) {
   const auto reach = in.numbers(group + "/reach", {jaws, {}});
   for (int64_t k = 0; k < jaws; ++k)
     if (upper[k] != 0 && upper[k] != 1)
-      in.refuse(group + "/upper", fmt::format("row {} is {}, expected 0 or 1", k, upper[k]));
+      in.refuse(group + "/upper", "row {} is {}, expected 0 or 1", k, upper[k]);
   for (int64_t k = 0; k < jaws; ++k)
     rule.jaws.push_back({bone[k], upper[k] != 0, Vec3::Map(box.data() + 6 * k),
                          Vec3::Map(box.data() + 6 * k + 3), reach[k]});
@@ -205,7 +205,7 @@ int64_t step_count(const std::filesystem::path& file) {
   const int64_t count = in.links("/step");
   for (int64_t step = 0; step < count; ++step)
     if (!in.has(fmt::format("/step/{:04}", step)))
-      in.refuse("/step", fmt::format("has {} groups, but {:04} is missing", count, step));
+      in.refuse("/step", "has {} groups, but {:04} is missing", count, step);
   return count;
 }
 
@@ -237,8 +237,8 @@ struct ReadAttribute {
     const std::string text = in.text(group, name);
     const auto found = std::find(known.begin(), known.end(), text);
     if (found == known.end())
-      in.refuse(fmt::format("{} attribute {}", group, name),
-                fmt::format("is \"{}\", expected one of {}", text, fmt::join(known, ", ")));
+      in.refuse(fmt::format("{} attribute {}", group, name), "is \"{}\", expected one of {}", text,
+                fmt::join(known, ", "));
     value = static_cast<Choice>(found - known.begin());
   }
   void operator()(const char* name, bool& value) const { value = in.integer(group, name) != 0; }

@@ -39,10 +39,6 @@ base::Hdf5File open_result(const std::filesystem::path& file) {
 Reader::Reader(const std::filesystem::path& file)
     : name_(file.string()), file_(open_result(file)) {}
 
-void Reader::refuse(const std::string& path, const std::string& what) const {
-  base::refuse("{}: {}: {}", name_, path, what);
-}
-
 bool Reader::has(const std::string& path) const {
   try {
     return link_resolves(file_, path);
@@ -57,7 +53,7 @@ int64_t Reader::links(const std::string& group) const {
     check_hdf5(H5Gget_info_by_name(file_, group.c_str(), &info, H5P_DEFAULT));
     return static_cast<int64_t>(info.nlinks);
   } catch (const base::Hdf5Error& reason) {
-    refuse(group, fmt::format("cannot be read as a group: {}", reason.what()));
+    refuse(group, "cannot be read as a group: {}", reason.what());
   }
 }
 
@@ -69,7 +65,7 @@ auto named(const Reader& reader, const std::string& path, Read&& read) {
   try {
     return read();
   } catch (const base::Hdf5Error& reason) {
-    reader.refuse(path, fmt::format("cannot be read: {}", reason.what()));
+    reader.refuse(path, "cannot be read: {}", reason.what());
   } catch (const std::bad_alloc&) {
     reader.refuse(path, "is larger than the memory");
   } catch (const std::length_error&) {
@@ -94,8 +90,7 @@ void require_shape(const Reader& reader, const std::string& path, const StoredAr
   if (array.shape() == expected) return;
   std::string words = describe_shape(expected);
   if (shape.rows == Shape::any) words.replace(1, words.find_first_of(",]") - 1, "rows");
-  reader.refuse(path,
-                fmt::format("has shape {}, expected {}", describe_shape(array.shape()), words));
+  reader.refuse(path, "has shape {}, expected {}", describe_shape(array.shape()), words);
 }
 
 template <class Numbers>
@@ -103,8 +98,8 @@ void require_finite(const Reader& reader, const std::string& path, const Numbers
                     int64_t per_row) {
   for (size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i]))
-      reader.refuse(path, fmt::format("row {} holds {}, expected finite numbers",
-                                      static_cast<int64_t>(i) / per_row, values[i]));
+      reader.refuse(path, "row {} holds {}, expected finite numbers",
+                    static_cast<int64_t>(i) / per_row, values[i]);
 }
 
 std::string attribute_place(const std::string& object, const char* name) {
@@ -122,15 +117,16 @@ StoredArray open_attribute(hid_t file, const Reader& reader, const std::string& 
 }
 
 /// Opens attribute `name` of `object`, requires `count` values and reads them with `read`.
-template <class Read>
-auto attribute_values(hid_t file, const Reader& reader, const std::string& object, const char* name,
-                      int64_t count, Read&& read) {
+template <class Value>
+std::vector<Value> attribute_values(hid_t file, const Reader& reader, const std::string& object,
+                                    const char* name, int64_t count,
+                                    std::vector<Value> (StoredArray::*read)() const) {
   const std::string place = attribute_place(object, name);
   return named(reader, place, [&] {
     const StoredArray array = open_attribute(file, reader, object, name, place);
     if (array.size() != count)
-      reader.refuse(place, fmt::format("has {} values, expected {}", array.size(), count));
-    return read(array);
+      reader.refuse(place, "has {} values, expected {}", array.size(), count);
+    return (array.*read)();
   });
 }
 
@@ -184,25 +180,22 @@ double Reader::number(const std::string& object, const char* attribute) const {
 
 double Reader::number_or_infinity(const std::string& object, const char* attribute) const {
   const double value =
-      attribute_values(file_, *this, object, attribute, 1,
-                       [](const StoredArray& array) { return array.numbers(); })[0];
+      attribute_values(file_, *this, object, attribute, 1, &StoredArray::numbers)[0];
   if (std::isnan(value)) refuse(attribute_place(object, attribute), "is not a number");
   return value;
 }
 
 int64_t Reader::integer(const std::string& object, const char* attribute) const {
-  return attribute_values(file_, *this, object, attribute, 1,
-                          [](const StoredArray& array) { return array.whole_numbers(); })[0];
+  return attribute_values(file_, *this, object, attribute, 1, &StoredArray::whole_numbers)[0];
 }
 
 std::string Reader::text(const std::string& object, const char* attribute) const {
-  return attribute_values(file_, *this, object, attribute, 1,
-                          [](const StoredArray& array) { return array.strings(); })[0];
+  return attribute_values(file_, *this, object, attribute, 1, &StoredArray::strings)[0];
 }
 
 Vec3 Reader::vector(const std::string& object, const char* attribute) const {
-  const std::vector<double> values = attribute_values(
-      file_, *this, object, attribute, 3, [](const StoredArray& array) { return array.numbers(); });
+  const std::vector<double> values =
+      attribute_values(file_, *this, object, attribute, 3, &StoredArray::numbers);
   require_finite(*this, attribute_place(object, attribute), values, 3);
   return Vec3::Map(values.data());
 }

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "repose/base/error.h"
 #include "repose/base/geometry.h"
 #include "repose/base/hdf5.h"
 
@@ -34,7 +35,11 @@ class Reader {
   bool has(const std::string& path) const;
   /// Returns the number of links of a group.
   int64_t links(const std::string& group) const;
-  [[noreturn]] void refuse(const std::string& path, const std::string& what) const;
+  template <class... Args>
+  [[noreturn]] void refuse(const std::string& path, fmt::format_string<Args...> what,
+                           Args&&... args) const {
+    base::refuse("{}: {}: {}", name_, path, fmt::format(what, std::forward<Args>(args)...));
+  }
 
   std::vector<double> numbers(const std::string& path, const Shape& shape) const;
   std::vector<Vec3> vectors(const std::string& path, int64_t rows) const;
@@ -88,9 +93,9 @@ class Reader {
     std::vector<Int> result(wide.size());
     for (size_t i = 0; i < wide.size(); ++i) {
       if (wide[i] < std::numeric_limits<Int>::min() || wide[i] > std::numeric_limits<Int>::max())
-        refuse(path, fmt::format("row {} is {}, expected {} to {}", i, wide[i],
-                                 static_cast<int64_t>(std::numeric_limits<Int>::min()),
-                                 static_cast<int64_t>(std::numeric_limits<Int>::max())));
+        refuse(path, "row {} is {}, expected {} to {}", i, wide[i],
+               static_cast<int64_t>(std::numeric_limits<Int>::min()),
+               static_cast<int64_t>(std::numeric_limits<Int>::max()));
       result[i] = static_cast<Int>(wide[i]);
     }
     return result;

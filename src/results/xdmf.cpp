@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <boost/algorithm/string/replace.hpp>
+#include <utility>
 
 namespace repose::results {
 
@@ -11,25 +13,11 @@ namespace {
 constexpr const char* integer = "NumberType=\"Int\" Precision=\"8\"";
 constexpr const char* real = "NumberType=\"Float\" Precision=\"8\"";
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  return result;
+std::string escaped(std::string text) {
+  for (const auto& [plain, entity] : {std::pair("&", "&amp;"), std::pair("<", "&lt;"),
+                                      std::pair(">", "&gt;"), std::pair("\"", "&quot;")})
+    boost::replace_all(text, plain, entity);
+  return text;
 }
 
 std::string data_item(const std::string& h5, const std::string& path, int64_t rows, int columns,
