@@ -25,7 +25,7 @@ FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame, doub
   columns_ = static_cast<int64_t>((high.x() - low.x()) / spacing) + 3;
   rows_ = static_cast<int64_t>((high.z() - low.z()) / spacing) + 3;
   depth_.assign(columns_ * rows_, nothing);
-  for (const Triangle& t : surface.triangles) draw({points[t[0]], points[t[1]], points[t[2]]});
+  for (const Triangle& t : surface.triangles) draw(base::pick(points, t));
 }
 
 void FrontMap::draw(const std::array<Vec3, 3>& corner) {

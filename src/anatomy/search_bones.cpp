@@ -107,8 +107,7 @@ std::optional<double> nasal_floor(const FrontMap& map, const ProfilePoint& edge)
         break;
       }
   if (heights.empty()) return std::nullopt;
-  std::nth_element(heights.begin(), heights.begin() + heights.size() / 2, heights.end());
-  return heights[heights.size() / 2];
+  return base::median(std::move(heights));
 }
 
 /// Nasal spine, point A and nasion, by the skull's profile above the incisors.

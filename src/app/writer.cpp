@@ -62,8 +62,7 @@ void Writer::on_iterate(double load, const solve::StateSnapshot& snapshot) {
 std::vector<Vec3> Writer::positions() const { return base::gather(comm_, last_.rows.position); }
 
 std::vector<double> Writer::volume_ratios() const {
-  const std::vector<double>& ratio = last_.rows.volume_ratio;
-  return base::gather(comm_, ratio);
+  return base::gather(comm_, last_.rows.volume_ratio);
 }
 
 std::vector<double> Writer::contact_pressures() const {
@@ -82,15 +81,14 @@ void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
   rows.discretization_error.assign(rows.position.size(), 0.0);
   if (numbers.load < 1) return;
   const std::vector<Vec3> position = base::gather(comm_, rows.position);
-  std::vector<Vec3> at_point(position.size());
+  std::vector<double> at_point;
   base::on_root(comm_, [&] {
     const auto found = adapt::discretization_of(position, *coarser_.compared);
     numbers.discretization_error = found.largest;
     comparison_ = adapt::describe_discretization(found);
-    for (size_t i = 0; i < at_point.size(); ++i) at_point[i].x() = found.at_point[i];
+    at_point = found.at_point;
   });
-  const std::vector<Vec3> mine = base::scatter(comm_, at_point);
-  for (size_t i = 0; i < mine.size(); ++i) rows.discretization_error[i] = mine[i].x();
+  rows.discretization_error = base::scatter(comm_, at_point);
 }
 
 bool Writer::due() const {

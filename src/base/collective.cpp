@@ -68,16 +68,4 @@ void Message::copy_bytes(void* data, size_t size) const {
   }
 }
 
-std::vector<Vec3> scatter(MPI_Comm comm, const std::vector<Vec3>& all) {
-  auto total = static_cast<int64_t>(all.size());
-  broadcast(comm, total);
-  std::vector<Vec3> rows;
-  for (int to = size(comm) - 1; to >= 0; --to) {
-    const Slab theirs = slab(total, to, size(comm));
-    if (rank(comm) == 0) rows.assign(all.begin() + theirs.begin, all.begin() + theirs.end);
-    Message(comm, 0, to)(rows);
-  }
-  return rows;
-}
-
 }  // namespace repose::base

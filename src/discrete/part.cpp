@@ -62,8 +62,7 @@ void number_columns(const std::vector<int64_t>& names, Numbers& numbers) {
 void number_points(const ColumnGraph& graph, const std::vector<PointSet>& set, int ranks,
                    Numbers& numbers) {
   const auto n = static_cast<int64_t>(set.size());
-  numbers.order.resize(n);
-  std::iota(numbers.order.begin(), numbers.order.end(), 0);
+  numbers.order = base::all_rows(n);
   const std::vector<int64_t> column = pick(memory_order(graph), numbers.column);
   std::stable_sort(numbers.order.begin(), numbers.order.end(), [&](int64_t a, int64_t b) {
     return std::pair(numbers.owner[a], column[a]) < std::pair(numbers.owner[b], column[b]);

@@ -68,8 +68,7 @@ class Distributor {
       : geometry_(geometry), scene_(scene), owner_(owner), own_(ranks), first_unknown_(ranks + 1) {
     const auto columns = static_cast<int64_t>(owner.size());
     const std::vector<int64_t> memory = memory_order(graph);
-    std::vector<int64_t> order(columns);
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<int64_t> order = base::all_rows(columns);
     std::sort(order.begin(), order.end(), [&](int64_t a, int64_t b) {
       return std::pair(owner[a], memory[a]) < std::pair(owner[b], memory[b]);
     });

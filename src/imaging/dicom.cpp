@@ -77,18 +77,12 @@ void check_alike(const std::vector<DicomSlice>& slices) {
   }
 }
 
-double median(std::vector<double> numbers) {
-  const auto middle = numbers.begin() + static_cast<int64_t>(numbers.size() / 2);
-  std::nth_element(numbers.begin(), middle, numbers.end());
-  return *middle;
-}
-
 /// Slices must be as far apart as most are, to a hundredth of that or of a millimeter.
 void check_steps(const std::vector<DicomSlice>& slices, const Vec3& normal) {
   std::vector<double> steps;
   for (size_t s = 1; s < slices.size(); ++s)
     steps.push_back((slices[s].origin - slices[s - 1].origin).dot(normal));
-  const double usual = median(steps), allowed = std::max(0.01 * usual, 0.01);
+  const double usual = base::median(steps), allowed = std::max(0.01 * usual, 0.01);
   for (size_t s = 0; s < steps.size(); ++s) {
     const std::string from = slices[s].file.string(), to = slices[s + 1].file.filename().string();
     if (steps[s] < allowed)

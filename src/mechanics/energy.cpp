@@ -12,12 +12,6 @@ namespace repose::mechanics {
 
 namespace {
 
-std::array<Vec3, 6> corners_of(const PrismLoop& loop, int64_t e, std::span<const Vec3> position) {
-  std::array<Vec3, 6> corners;
-  for (int c = 0; c < 6; ++c) corners[c] = position[loop.points[e][c]];
-  return corners;
-}
-
 /// Rows of a loop.
 struct Section {
   int64_t begin, end;
@@ -253,9 +247,8 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
                                         std::span<const Vec3> position) {
   std::vector<double> slopes(loop.size(), 0.0);
   for (size_t e = 0; e < loop.shear_modulus.size(); ++e) {
-    const auto row = static_cast<int64_t>(e);
-    const Mat3 f = model::deformation_gradient(corners_of(loop, row, initial),
-                                               corners_of(loop, row, position));
+    const Mat3 f = model::deformation_gradient(base::pick(initial, loop.points[e]),
+                                               base::pick(position, loop.points[e]));
     Eigen::SelfAdjointEigenSolver<Mat3> squares;
     squares.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
     slopes[e] = loop.shear_modulus[e] / std::sqrt(squares.eigenvalues()[2]);
@@ -265,9 +258,7 @@ std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const V
 
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
                          const Weights& weights, double max_slope) {
-  PrismTriples<double> x;
-  for (int c = 0; c < 6; ++c) x[c] = triple(corners[c]);
-  const PrismEdges<double> edges(x);
+  const PrismEdges<double> edges(triples(corners));
   const PrismSlope<double> v(edges);
   const VolumeLaw law = volume_law(weights, v.volume, term.compliance, term.target_volume);
   const double slope = law.slope + weights.volume_weight * term.nodal_slope;
@@ -294,7 +285,7 @@ double solid_energy(const EdgeLoop& edges, const PrismLoop& prisms,
     energy += 0.5 * edges.weight[e] * (position[j] - position[i]).squaredNorm();
   }
   for (int64_t e = 0; e < prisms.counted; ++e) {
-    const double v = prism_volume(corners_of(prisms, e, position).data());
+    const double v = prism_volume(base::pick(position, prisms.points[e]).data());
     const double beyond = v - prisms.target_volume[e];
     energy += 0.5 * beyond * beyond / prisms.compliance[e];
   }
@@ -320,7 +311,7 @@ Totals totals(const Loops& loops, std::span<const Vec3> position) {
   }
   for (const TermLoop& loop : loops.terms) sum.term_energy += loop.value(position);
   for (int64_t e = 0; e < loops.prisms.counted; ++e) {
-    const double v = prism_volume(corners_of(loops.prisms, e, position).data());
+    const double v = prism_volume(base::pick(position, loops.prisms.points[e]).data());
     const double v0 = loops.prisms.rest_volume[e], change = v - v0;
     sum.volume_squares += change * change;
     sum.penalty_unit += 0.5 * change * change / v0;

@@ -285,9 +285,7 @@ std::vector<NodalGradient> nodal_gradients(const NodalVolumes& nodal, int64_t ow
                                            std::span<const Vec3> position) {
   std::vector<NodalGradient> result(nodal.stiffness.size());
   nodal.for_each_prism([&](int64_t, const std::array<int32_t, 6>& points) {
-    PrismTriples<double> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = triple(position[points[c]]);
-    const PrismSlope<double> v{PrismEdges<double>(corners)};
+    const PrismSlope<double> v{PrismEdges<double>(triples(base::pick(position, points)))};
     for (const int32_t p : points)
       if (p < owned) add_gradient(points, v, result[p]);
   });
@@ -300,10 +298,9 @@ std::vector<double> volume_slopes(const model::Model& model, std::span<const Vec
   const std::vector<double> averaged = nodal_slopes(nodal, position);
   std::vector<double> slopes(prisms.points.size(), 0.0);
   for (size_t m = 0; m < slopes.size(); ++m) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[m][c]];
     const double own = prisms.modulus[m] - (nodal.empty() ? 0 : prisms.nodal_modulus[m]);
-    const double v0 = prisms.rest_volume[m], change = prism_volume(corners.data()) - v0;
+    const double volume = prism_volume(base::pick(position, prisms.points[m]).data());
+    const double v0 = prisms.rest_volume[m], change = volume - v0;
     slopes[m] = (own * change - prisms.modulus[m] * (prisms.target_volume[m] - v0)) / v0;
     if (!nodal.empty()) slopes[m] += averaged[nodal.place[m]];
   }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <numeric>
 
 #include "add_adhesion.h"
 #include "add_contact.h"
@@ -252,8 +251,8 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
 BuiltModel ColumnGeometry::build_whole() const {
   const scene::Scene& scene = state_->scene;
   BuiltModel built;
-  std::vector<int64_t> columns(skin().points.size()), found;
-  std::iota(columns.begin(), columns.end(), 0);
+  const std::vector<int64_t> columns = base::all_rows(skin().points.size());
+  std::vector<int64_t> found;
   built.model = build_local(scene, state_->bones, piece(columns), found);
   require_regions(found, scene.file.string());
   Contact& contact = built.model.contact;

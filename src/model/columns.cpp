@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <numeric>
 
 #include "directions.h"
 #include "fold.h"
@@ -60,9 +59,7 @@ Columns compute_columns(const SkinMesh& mesh, const BoneField& bones,
     trace_columns(mesh, skin, changed, directions, nearest, bones, tissue, reach);
     laid = column_thickness(mesh, reach, tissue.free_thickness);
   };
-  std::vector<int64_t> all(vertices);
-  std::iota(all.begin(), all.end(), 0);
-  lay(all);
+  lay(base::all_rows(vertices));
 
   Columns columns;
   if (tissue.edge) columns.bent = bend_folded(mesh, cones, lay, laid, directions);

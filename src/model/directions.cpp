@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "repose/model/skin_mesh.h"
 #include "smoothing.h"
@@ -104,8 +103,7 @@ std::vector<Vec3> column_directions(const SkinMesh& mesh, const std::vector<Cone
   std::vector<Vec3> directions(vertices);
   for (int64_t v = 0; v < vertices; ++v)
     directions[v] = into_cone(mesh, v, cones[v], smoothed.row(v).transpose().normalized());
-  std::vector<int64_t> all(directions.size());
-  std::iota(all.begin(), all.end(), 0);
+  const std::vector<int64_t> all = base::all_rows(directions.size());
   for (int round = 0; round < local_rounds; ++round) bend(mesh, cones, all, directions);
   return directions;
 }

@@ -176,9 +176,7 @@ Moduli moduli(const scene::Elasticity& e) {
 }
 
 std::array<Vec3, 6> corners_of(const Model& model, size_t prism) {
-  std::array<Vec3, 6> corners;
-  for (int c = 0; c < 6; ++c) corners[c] = model.points.position[model.prisms.points[prism][c]];
-  return corners;
+  return base::pick(model.points.position, model.prisms.points[prism]);
 }
 
 std::vector<double> strata_shares(const std::vector<double>& thickness,

@@ -75,9 +75,8 @@ RingMuscle ring_muscle(const scene::Scene& scene) {
 }
 
 void add_tone(const RingMuscle& muscle, Model& model) {
-  std::vector<int64_t> row(model.points.position.size());
-  std::iota(row.begin(), row.end(), 0);
-  add_tone(muscle, row, static_cast<int64_t>(row.size()), model);
+  const size_t points = model.points.position.size();
+  add_tone(muscle, base::all_rows(points), static_cast<int64_t>(points), model);
 }
 
 void add_tone(const RingMuscle& muscle, const std::vector<int64_t>& row, int64_t owned,

@@ -211,10 +211,9 @@ double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums
     thickness.push_back(column.thickness);
     volume += column.volume, length += column.thickness;
   }
-  const auto middle = thickness.begin() + static_cast<std::ptrdiff_t>(thickness.size() / 2);
-  std::nth_element(thickness.begin(), middle, thickness.end());
   const double modulus = effective_modulus(columns), width = std::sqrt(volume / length);
-  return std::max(times * modulus / *middle, times_at_width * modulus / width);
+  return std::max(times * modulus / base::median(std::move(thickness)),
+                  times_at_width * modulus / width);
 }
 
 }  // namespace repose::model

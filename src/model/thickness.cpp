@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 
 #include "smoothing.h"
 
@@ -22,9 +21,7 @@ double to_other_side(const surface::DistanceTree& skin, const Vec3& from, const 
 }
 
 void flatten(const SkinMesh& mesh, std::vector<double>& thickness) {
-  std::vector<int64_t> all(thickness.size());
-  std::iota(all.begin(), all.end(), 0);
-  limit_slope(mesh, steepest_depth, all, thickness);
+  limit_slope(mesh, steepest_depth, base::all_rows(thickness.size()), thickness);
 }
 
 /// Cuts off what stands out by more than spike_height from the field smoothed over spike_width:

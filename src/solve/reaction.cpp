@@ -102,9 +102,8 @@ void add_prisms(const discrete::Part& part, std::span<const Vec3> x, const model
   if (part.solid) of_solid = mechanics::volume_slopes(part.model, x);
   for (int64_t m = 0; m < part.owned_prisms; ++m) {
     if (!groups.touch(prisms.points[m])) continue;
-    mechanics::PrismTriples<double> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = mechanics::triple(x[prisms.points[m][c]]);
-    const mechanics::PrismSlope<double> v{mechanics::PrismEdges<double>(corners)};
+    const mechanics::PrismSlope v(
+        mechanics::PrismEdges<double>(mechanics::triples(base::pick(x, prisms.points[m]))));
     const double by = part.solid
                           ? of_solid[m]
                           : slope(n, v.volume - prisms.rest_volume[m], prisms.rest_volume[m]);

@@ -46,8 +46,7 @@ class FrozenContact {
     set(stiff, pressing, parting);
   }
   ~FrozenContact() { set(stiffness_, touch_multipliers_, wall_multipliers_); }
-  FrozenContact(const FrozenContact&) = delete;
-  FrozenContact& operator=(const FrozenContact&) = delete;
+  FrozenContact(FrozenContact&&) = delete;
 
  private:
   mechanics::BodyContact& body_contact() { return problem_.objective().body_contact(); }
@@ -142,26 +141,18 @@ class StrataForces {
   void add(size_t m, double share, size_t stratum, std::vector<Vec3>& force) const {
     const model::Model& model = positions_.part().model;
     const auto& corners = model.prisms.points[m];
-    std::array<Vec3, 6> before, now;
-    mechanics::PrismTriples<double> triples;
-    for (int c = 0; c < 6; ++c) {
-      before[c] = model.points.position[corners[c]];
-      now[c] = positions_.local()[corners[c]];
-      triples[c] = {now[c].x(), now[c].y(), now[c].z()};
-    }
+    const std::array<Vec3, 6> now = base::pick(positions_.local(), corners);
     const double shear = share * strata_[stratum].shear, bulk = share * strata_[stratum].bulk;
-    const auto weights = model::pair_weights(before).value();
+    const auto weights = model::pair_weights(model::corners_of(model, m)).value();
     for (size_t k = 0; k < weights.size(); ++k) {
       const auto [i, j] = model::prism_pairs[k];
       const Vec3 pull = shear * weights[k] * (now[i] - now[j]);
       force[corners[i]] += pull;
       force[corners[j]] -= pull;
     }
-    const mechanics::PrismSlope<double> volume{mechanics::PrismEdges<double>(triples)};
+    const mechanics::PrismSlope volume(mechanics::PrismEdges<double>(mechanics::triples(now)));
     const double pressure = bulk * (volume.volume / model.prisms.rest_volume[m] - 1) - shear;
-    for (int c = 0; c < 6; ++c)
-      force[corners[c]] +=
-          pressure * Vec3(volume.gradient[c].x, volume.gradient[c].y, volume.gradient[c].z);
+    for (int c = 0; c < 6; ++c) force[corners[c]] += pressure * mechanics::vec3(volume.gradient[c]);
   }
 
   const discrete::Positions& positions_;

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "repose/base/error.h"
@@ -95,10 +94,8 @@ CollisionTree::CollisionTree(const Surface& surface) {
   require_sound(surface);
   if (surface.triangles.empty())
     base::refuse("{}: no triangle to collide with; check the mesh", surface.name);
-  for (const Triangle& t : surface.triangles)
-    corners_.push_back({surface.points[t[0]], surface.points[t[1]], surface.points[t[2]]});
-  std::vector<int64_t> rows(corners_.size());
-  std::iota(rows.begin(), rows.end(), 0);
+  for (const Triangle& t : surface.triangles) corners_.push_back(base::pick(surface.points, t));
+  std::vector<int64_t> rows = base::all_rows(corners_.size());
   nodes_.reserve(2 * rows.size());
   build(rows, 0, rows.size());
 }

@@ -94,7 +94,8 @@ struct DistanceTree::Tree {
 
   explicit Tree(const Surface& surface) : Tree(surface, with_area(surface)) {}
   Tree(const Surface& surface, std::vector<int64_t> kept)
-      : numbers(std::move(kept)), nearest({surface.name, surface.points, pick(surface, numbers)}) {
+      : numbers(std::move(kept)),
+        nearest({surface.name, surface.points, base::pick(surface.triangles, numbers)}) {
     for (const int64_t t : numbers) triangles.push_back(to_cgal(surface, surface.triangles[t]));
     aabb.insert(triangles.cbegin(), triangles.cend());  // built by the first query
     for (const Triangle3& triangle : triangles) box += triangle.bbox();
@@ -110,12 +111,6 @@ struct DistanceTree::Tree {
       base::refuse("{}: no triangle with an area, so nothing to measure to; check the mesh",
                    surface.name);
     return kept;
-  }
-
-  static std::vector<Triangle> pick(const Surface& surface, const std::vector<int64_t>& rows) {
-    std::vector<Triangle> picked;
-    for (const int64_t row : rows) picked.push_back(surface.triangles[row]);
-    return picked;
   }
 
   int64_t number(Leaf::Id id) const { return numbers[id - triangles.data()]; }

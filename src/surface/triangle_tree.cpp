@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace repose::surface {
 namespace {
@@ -69,14 +68,15 @@ TriangleTree::Box TriangleTree::box_of(const Corners& corners) {
 }
 
 TriangleTree::TriangleTree(const Surface& surface)
-    : order_(surface.triangles.size()), row_(order_.size()), leaf_of_(order_.size()) {
+    : order_(base::all_rows(surface.triangles.size())),
+      row_(order_.size()),
+      leaf_of_(order_.size()) {
   std::vector<Vec3> centers;
   centers.reserve(order_.size());
   for (const auto& triangle : surface.triangles) {
     const auto [a, b, c] = corners(surface, triangle);
     centers.push_back((a + b + c) / 3);
   }
-  std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
   build(0, static_cast<int64_t>(order_.size()), -1, centers);
   sorted_.reserve(order_.size());

@@ -108,6 +108,17 @@ std::vector<T> gather(MPI_Comm comm, std::vector<T> mine) {
 }
 
 /// Rows that rank 0 holds, as a slab on every rank.
-std::vector<Vec3> scatter(MPI_Comm comm, const std::vector<Vec3>& all);
+template <class T>
+std::vector<T> scatter(MPI_Comm comm, const std::vector<T>& all) {
+  auto total = static_cast<int64_t>(all.size());
+  broadcast(comm, total);
+  std::vector<T> rows;
+  for (int to = size(comm) - 1; to >= 0; --to) {
+    const Slab theirs = slab(total, to, size(comm));
+    if (rank(comm) == 0) rows.assign(all.begin() + theirs.begin, all.begin() + theirs.end);
+    Message(comm, 0, to)(rows);
+  }
+  return rows;
+}
 
 }  // namespace repose::base

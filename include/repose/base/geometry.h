@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 /// Fixed-size vectors that every room uses, rows of arrays, and the fit of one point set to
@@ -50,12 +52,34 @@ void sort_unique(std::vector<T>& values) {
   values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
+/// 0, 1, … up to `count`.
+inline std::vector<int64_t> all_rows(size_t count) {
+  std::vector<int64_t> rows(count);
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
+}
+
+/// The middle one of at least one value in order, of an even number the upper.
+inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /// The values at `rows`, in their order.
 template <class T>
 std::vector<T> pick(const std::vector<T>& values, std::span<const int64_t> rows) {
   std::vector<T> picked;
   picked.reserve(rows.size());
   for (const int64_t row : rows) picked.push_back(values[row]);
+  return picked;
+}
+
+/// The values at a fixed number of rows, as of a triangle or a prism.
+template <class Values, class Row, size_t n>
+auto pick(const Values& values, const std::array<Row, n>& rows) {
+  std::array<std::remove_cvref_t<decltype(values[0])>, n> picked;
+  for (size_t k = 0; k < n; ++k) picked[k] = values[rows[k]];
   return picked;
 }
 

@@ -126,15 +126,13 @@ void for_each_prism_block(const Loops& loops, std::span<const Vec3> position,
   const PrismLoop& prisms = loops.prisms;
   const std::vector<double> nodal = nodal_slopes(loops.nodal, position);
   for (int64_t e = 0; e < prisms.size(); ++e) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
     PrismTerm term{prisms.compliance[e], prisms.target_volume[e]};
     if (!nodal.empty()) term.nodal_slope = nodal[loops.nodal.place[prisms.row[e]]];
     if (!nodal.empty() && !max_slope.empty())
       term.nodal_curvature = std::min(prisms.nodal_modulus[e], max_bulk * prisms.shear_modulus[e]) /
                              prisms.rest_volume[e];
     const double maximum = max_slope.empty() ? std::numeric_limits<double>::max() : max_slope[e];
-    visit(e, prism_blocks(corners, term, weights, maximum));
+    visit(e, prism_blocks(base::pick(position, prisms.points[e]), term, weights, maximum));
   }
 }
 

@@ -15,6 +15,12 @@ using model::prism_volume;
 template <class S>
 using PrismTriples = std::array<Triple<S>, 6>;
 
+inline PrismTriples<double> triples(const std::array<Vec3, 6>& corners) {
+  PrismTriples<double> triples;
+  for (int c = 0; c < 6; ++c) triples[c] = triple(corners[c]);
+  return triples;
+}
+
 /// The edge vectors of which v is a cubic form, and the sums of them that its derivatives need.
 /// Coordinates are subtracted first of all, so that nothing is lost far from the origin.
 template <class S>

@@ -12,7 +12,7 @@ namespace repose::surface {
 using Corners = std::array<Vec3, 3>;  ///< of a triangle, mm
 
 inline Corners corners(const Surface& surface, const Triangle& triangle) {
-  return {surface.points[triangle[0]], surface.points[triangle[1]], surface.points[triangle[2]]};
+  return base::pick(surface.points, triangle);
 }
 
 /// Weights of a triangle's corners at the foot of a point in its plane; their sum is 1.

@@ -114,9 +114,7 @@ class Head {
   void find_middle() {
     std::vector<double> across;
     for (const int64_t voxel : bone_) across.push_back(center(voxel).x());
-    const auto half = across.begin() + static_cast<int64_t>(across.size() / 2);
-    std::nth_element(across.begin(), half, across.end());
-    middle_ = *half;
+    middle_ = base::median(std::move(across));
   }
 
   void find_chin() {

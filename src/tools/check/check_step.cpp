@@ -92,9 +92,7 @@ void check_model(const model::Model& model, Comparison& comparison) {
   std::vector<double> volume;
   double largest = 0;
   for (const auto& prism : prisms.points) {
-    Vec3 corners[6];
-    for (int c = 0; c < 6; ++c) corners[c] = model.points.position[prism[c]];
-    volume.push_back(model::prism_volume(corners));
+    volume.push_back(model::prism_volume(base::pick(model.points.position, prism).data()));
     largest = std::max(largest, volume.back());
   }
   comparison.array("prism/rest_volume", prisms.rest_volume, volume, largest);

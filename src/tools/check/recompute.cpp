@@ -28,6 +28,12 @@ struct SpringState {
   double noise() const { return std::abs(tension) + tangent * length; }
 };
 
+double extent_of(const std::array<Vec3, 6>& corners) {
+  double extent = 0;
+  for (const Vec3& corner : corners) extent = std::max(extent, (corner - corners[0]).norm());
+  return extent;
+}
+
 // v is affine in each corner, so its difference quotients are its derivatives, whatever the step.
 std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
   std::array<Vec3, 6> gradient;
@@ -89,7 +95,7 @@ class Recomputation {
   void forces();
   void nodal_volumes();
   double volume_slope(int64_t j, double volume) const;
-  void solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent);
+  void solid_prism(int64_t j);
   void stress(int64_t j, const std::array<Vec3, 6>& corners);
   void prisms();
   void prism(int64_t j);
@@ -188,15 +194,7 @@ void Recomputation::edges() {
   }
   step_.f_e.scale += uncertain / tolerance;
   if (!model_.prisms.nodal_modulus.empty()) nodal_volumes();
-  for (size_t j = 0; j < model_.prisms.modulus.size(); ++j) {
-    std::array<Vec3, 6> corners;
-    double extent = 0;
-    for (int c = 0; c < 6; ++c) {
-      corners[c] = x_[model_.prisms.points[j][c]];
-      extent = std::max(extent, (corners[c] - corners[0]).norm());
-    }
-    solid_prism(static_cast<int64_t>(j), corners, extent);
-  }
+  for (size_t j = 0; j < model_.prisms.modulus.size(); ++j) solid_prism(static_cast<int64_t>(j));
   step_.f_e.scale += std::abs(step_.f_e.value);
 }
 
@@ -216,8 +214,7 @@ void Recomputation::nodal_volumes() {
   const model::Prisms& prisms = model_.prisms;
   std::vector<double> change(x_.size(), 0.0), compliance(x_.size(), 0.0);
   for (size_t j = 0; j < prisms.points.size(); ++j) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = x_[prisms.points[j][c]];
+    const std::array<Vec3, 6> corners = base::pick(x_, prisms.points[j]);
     const double v0 = prisms.rest_volume[j];
     for (const int64_t point : prisms.points[j]) {
       change[point] += (model::prism_volume(corners.data()) - v0) / 6;
@@ -230,8 +227,10 @@ void Recomputation::nodal_volumes() {
   }
 }
 
-void Recomputation::solid_prism(int64_t j, const std::array<Vec3, 6>& corners, double extent) {
+void Recomputation::solid_prism(int64_t j) {
   const model::Prisms& prisms = model_.prisms;
+  const std::array<Vec3, 6> corners = base::pick(x_, prisms.points[j]);
+  const double extent = extent_of(corners);
   stress(j, corners);
   const double stiffness = prisms.modulus[j] / prisms.rest_volume[j];
   const double own = nodal_pressure_.empty() ? 1 : 1 - prisms.nodal_modulus[j] / prisms.modulus[j];
@@ -253,8 +252,7 @@ void Recomputation::solid_prism(int64_t j, const std::array<Vec3, 6>& corners, d
 
 void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
   const model::Prisms& prisms = model_.prisms;
-  std::array<Vec3, 6> before;
-  for (int c = 0; c < 6; ++c) before[c] = model_.points.position[prisms.points[j][c]];
+  const std::array<Vec3, 6> before = base::pick(model_.points.position, prisms.points[j]);
   const mechanics::PrismState state =
       mechanics::prism_state(prisms.shear_modulus[j],
                              volume_slope(j, model::prism_volume(corners.data())), before, corners);
@@ -345,10 +343,8 @@ void Recomputation::forces() {
 
 void Recomputation::prism(int64_t j) {
   const model::Prisms& prisms = model_.prisms;
-  std::array<Vec3, 6> corners;
-  for (int c = 0; c < 6; ++c) corners[c] = x_[prisms.points[j][c]];
-  double extent = 0;
-  for (const Vec3& corner : corners) extent = std::max(extent, (corner - corners[0]).norm());
+  const std::array<Vec3, 6> corners = base::pick(x_, prisms.points[j]);
+  const double extent = extent_of(corners);
   const double v = model::prism_volume(corners.data()), v0 = prisms.rest_volume[j];
   const double change = v - v0, uncertain = rounding * (extent * extent * extent + v0);
   step_.rows.volume_ratio.push_back(v / v0);

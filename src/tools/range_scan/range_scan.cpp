@@ -42,9 +42,7 @@ double median_step(const RangeGrid& grid, const std::vector<Vec3>& points, bool 
   });
   if (steps.empty())
     base::refuse("{}: no two neighboring cells hold points; the scan is empty", grid.name);
-  std::nth_element(steps.begin(), steps.begin() + static_cast<int64_t>(steps.size() / 2),
-                   steps.end());
-  return steps[steps.size() / 2];
+  return base::median(std::move(steps));
 }
 
 std::vector<Triangle> all_triangles(const RangeGrid& grid, const std::vector<Vec3>& points,

@@ -181,9 +181,7 @@ class Icp {
     std::vector<double> distances;
     for (const Vec3& point : points_)
       distances.push_back(tree_.nearest(result.transform.apply(point)).squared);
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    result.median = std::sqrt(*middle);
+    result.median = std::sqrt(base::median(std::move(distances)));
     return result;
   }
 
