@@ -6,7 +6,6 @@
 #include <CGAL/intersections.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "../surface/cgal.h"
 #include "repose/base/error.h"
@@ -86,8 +85,7 @@ class Joined {
  private:
   /// Fills `points`; returns the row there of each of `all`.
   std::vector<int64_t> join(const std::vector<ExactPoint>& all) {
-    std::vector<int64_t> order(all.size()), number(all.size());
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<int64_t> order = base::all_rows(all.size()), number(all.size());
     std::sort(order.begin(), order.end(), [&](int64_t a, int64_t b) {
       return CGAL::compare_xyz(all[a], all[b]) == CGAL::SMALLER;
     });
@@ -162,9 +160,7 @@ UnionFind unite_sides(const Joined& all, const EdgeTable& edges, const std::stri
 /// For each triangle whether it hangs together with the bone over edges.
 std::vector<bool> on_the_bone(const Joined& all, const EdgeTable& edges) {
   const auto count = static_cast<int64_t>(all.triangles.size());
-  UnionFind parts(count);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    for (const HalfEdge& h : edges[e]) parts.unite(edges[e].front().triangle, h.triangle);
+  UnionFind parts = connected(all.triangles, edges);
   std::vector<bool> with_bone(count, false), result(count, false);
   for (int64_t t = 0; t < count; ++t)
     if (all.mesh_of[t] == 0) with_bone[parts.find(t)] = true;

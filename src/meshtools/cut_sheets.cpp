@@ -39,8 +39,7 @@ Surface plane_sheet(const CutPlane& plane, const Surface& bone, double offset) {
   const Vec3 normal = plane.normal.normalized();
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   if (std::isfinite(plane.radius)) return disc(plane.point + offset * normal, u, v, plane.radius);
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : bone.points) box.extend(p);
+  const Eigen::AlignedBox3d box = bounding_box(bone.points);
   const Vec3 from = box.center() - plane.point;
   const Vec3 middle = plane.point + from - from.dot(normal) * normal;
   return wide_triangle(middle + offset * normal, u, v, 1.1 * box.diagonal().norm() + 1);

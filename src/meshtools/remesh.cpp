@@ -8,6 +8,7 @@
 
 #include "../surface/cgal.h"
 #include "repose/base/error.h"
+#include "repose/surface/component.h"
 
 namespace repose::meshtools {
 using namespace surface;
@@ -41,13 +42,7 @@ Surface surface_of(Mesh& mesh, const std::string& name) {
 }  // namespace
 
 double even_edge(const Surface& surface) {
-  double area = 0;
-  for (const auto& [a, b, c] : surface.triangles) {
-    const Vec3 ab = surface.points[b] - surface.points[a],
-               ac = surface.points[c] - surface.points[a];
-    area += 0.5 * ab.cross(ac).norm();
-  }
-  const double triangle = area / static_cast<double>(surface.triangles.size());
+  const double triangle = area_of(surface) / static_cast<double>(surface.triangles.size());
   return std::sqrt(4 * triangle / std::sqrt(3.0));
 }
 

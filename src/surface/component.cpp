@@ -18,9 +18,7 @@ bool is_open(const EdgeTable& edges) {
 
 /// Which part each triangle belongs to, numbered in the order of their first triangle.
 std::vector<int64_t> parts_of(const Surface& surface, const EdgeTable& edges, int64_t& count) {
-  UnionFind sets(static_cast<int64_t>(surface.triangles.size()));
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    for (const HalfEdge& half : edges[e]) sets.unite(edges[e].front().triangle, half.triangle);
+  UnionFind sets = connected(surface.triangles, edges);
   std::vector<int64_t> part(surface.triangles.size());
   count = 0;
   for (int64_t t = 0; t < static_cast<int64_t>(part.size()); ++t)

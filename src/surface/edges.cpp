@@ -124,17 +124,20 @@ VertexNeighbors::VertexNeighbors(const EdgeTable& edges, size_t vertices)
   }
 }
 
+UnionFind connected(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  UnionFind parts(static_cast<int64_t>(triangles.size()));
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    for (const auto& half : edges[e]) parts.unite(edges[e].front().triangle, half.triangle);
+  return parts;
+}
+
 std::vector<int64_t> component_sizes(const std::vector<Triangle>& triangles,
                                      const EdgeTable& edges) {
-  const auto count = static_cast<int64_t>(triangles.size());
-  UnionFind sets(count);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    for (const auto& half : edges[e]) sets.unite(edges[e].front().triangle, half.triangle);
-  std::vector<int64_t> members(triangles.size(), 0), sizes;
-  for (int64_t t = 0; t < count; ++t)
-    if (!repeats_vertex(triangles[t])) ++members[sets.find(t)];
-  std::copy_if(members.begin(), members.end(), std::back_inserter(sizes),
-               [](int64_t size) { return size > 0; });
+  UnionFind parts = connected(triangles, edges);
+  std::vector<int64_t> sizes(triangles.size(), 0);
+  for (size_t t = 0; t < triangles.size(); ++t)
+    if (!repeats_vertex(triangles[t])) ++sizes[parts.find(static_cast<int64_t>(t))];
+  std::erase(sizes, 0);
   std::sort(sizes.begin(), sizes.end(), std::greater<>());
   return sizes;
 }

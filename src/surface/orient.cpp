@@ -3,8 +3,10 @@
 #include <Eigen/Geometry>
 #include <map>
 
+#include "repose/surface/component.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::surface {
 namespace {
@@ -81,32 +83,20 @@ class Orienter {
     parts_.push_back(std::move(part));
   }
 
-  Surface of(const Part& part) const {
-    Surface surface{surface_.name, {}, {}};
-    for (const int64_t t : part.triangles) {
-      const auto first = static_cast<int64_t>(surface.points.size());
-      for (const int64_t vertex : surface_.triangles[t])
-        surface.points.push_back(surface_.points[vertex]);
-      surface.triangles.push_back({first, first + 1, first + 2});
-    }
-    return surface;
-  }
-
   bool outward(const Part& part) const {
-    const Surface alone = of(part);
-    return six_volumes(alone.points, alone.triangles) > 0;
+    return six_volumes(surface_.points, base::pick(surface_.triangles, part.triangles)) > 0;
   }
 
   /// Returns the number of other closed parts that contain part `p`.
   int64_t depth(size_t p) {
-    const auto& triangle = surface_.triangles[parts_[p].triangles.front()];
-    const Vec3 inside = (surface_.points[triangle[0]] + surface_.points[triangle[1]] +
-                         surface_.points[triangle[2]]) /
-                        3;
+    const auto [a, b, c] = corners(surface_, surface_.triangles[parts_[p].triangles.front()]);
+    const Vec3 inside = (a + b + c) / 3;
     int64_t around = 0;
     for (size_t q = 0; q < parts_.size(); ++q) {
       if (q == p || !parts_[q].closed || !parts_[q].box.contains(parts_[p].box)) continue;
-      if (!trees_.contains(q)) trees_.emplace(q, DistanceTree(of(parts_[q])));
+      if (!trees_.contains(q))
+        trees_.emplace(q, compact(surface_.name, surface_.points,
+                                  base::pick(surface_.triangles, parts_[q].triangles)));
       if (trees_.at(q).contains(inside)) ++around;
     }
     return around;
