@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 
@@ -32,10 +33,8 @@ double length(const Model& model, size_t spring) {
 
 /// A prism's volume at the initial position and its derivatives.
 mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
-  mechanics::PrismTriples<double> corners;
-  for (int c = 0; c < 6; ++c)
-    corners[c] = mechanics::triple(model.points.position[model.prisms.points[prism][c]]);
-  return mechanics::PrismSlope<double>{mechanics::PrismEdges<double>(corners)};
+  return mechanics::PrismSlope(
+      mechanics::PrismEdges<double>(mechanics::triples(model::corners_of(model, prism))));
 }
 
 /// Which local springs are skin, whose tension is given. The names are known on rank 0.
@@ -322,11 +321,11 @@ double add_balance(const Stiffness& stiffness, Model& model) {
   return largest;
 }
 
-/// `part` is without its external forces, under the gravity of the recording.
-Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
-  Prestress result;
-  result.solid = true;
-  Stiffness stiffness(comm, solid_stiffness_part(part));
+/// Solves for what balances the initial forces until they are rounding; `take_up` puts each
+/// solution into the part's model. `part` is without its external forces, under the gravity of the
+/// recording.
+void balance(MPI_Comm comm, const discrete::Part& part, Stiffness&& stiffness, Prestress& result,
+             const std::function<void(const Stiffness&)>& take_up) {
   constexpr int max_refinements = 6;
   for (int pass = 0; pass <= max_refinements; ++pass) {
     const base::VecHandle force = initial_forces(comm, part);
@@ -338,39 +337,36 @@ Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
       refuse_unbalanced(comm, part, force, result);
     }
     stiffness.solve(force, result);
-    result.largest_pressure += add_balance(stiffness, part.model);
+    take_up(stiffness);
   }
+}
+
+Prestress balance_solid(MPI_Comm comm, discrete::Part& part) {
+  Prestress result;
+  result.solid = true;
+  balance(comm, part, Stiffness(comm, solid_stiffness_part(part)), result,
+          [&](const Stiffness& stiffness) {
+            result.largest_pressure += add_balance(stiffness, part.model);
+          });
   result.largest_pressure = base::max_over_ranks(comm, result.largest_pressure);
   return result;
 }
 
-/// Without external forces, under the gravity of the recording.
 Prestress balance_springs(MPI_Comm comm, discrete::LocalModel& local_model, double turgor) {
-  discrete::Part& part = local_model.part;
+  Model& model = local_model.part.model;
   const std::vector<char> skin = skin_springs(comm, local_model);
   for (size_t j = 0; j < skin.size(); ++j)
-    part.model.springs.rest_length[j] = length(part.model, j) / (skin[j] ? 1 + turgor : 1.0);
-  Prestress result;
-  Stiffness stiffness(comm, stiffness_part(part, skin));
+    model.springs.rest_length[j] = length(model, j) / (skin[j] ? 1 + turgor : 1.0);
   std::vector<double> tension(skin.size(), 0.0);
-  constexpr int max_refinements = 6;
-  for (int pass = 0; pass <= max_refinements; ++pass) {
-    const base::VecHandle force = initial_forces(comm, part);
-    result.residual = discrete::largest_block(force);
-    if (pass == 0) result.largest_force = result.residual;
-    if (result.residual <= balanced * result.largest_force) break;
-    if (pass == max_refinements) {
-      if (result.residual <= rounding_force(comm, part)) break;
-      refuse_unbalanced(comm, part, force, result);
-    }
-    stiffness.solve(force, result);
-    for (size_t j = 0; j < skin.size(); ++j)
-      if (!skin[j]) tension[j] += stiffness.tension(j);
-    set_rest_lengths(skin, tension, part.model);
-    require_rest_lengths(comm, local_model, tension);
-  }
-  result.min_rest_ratio = min_rest_ratio(part.model);
-  MPI_Allreduce(MPI_IN_PLACE, &result.min_rest_ratio, 1, MPI_DOUBLE, MPI_MIN, comm);
+  Prestress result;
+  balance(comm, local_model.part, Stiffness(comm, stiffness_part(local_model.part, skin)), result,
+          [&](const Stiffness& stiffness) {
+            for (size_t j = 0; j < skin.size(); ++j)
+              if (!skin[j]) tension[j] += stiffness.tension(j);
+            set_rest_lengths(skin, tension, model);
+            require_rest_lengths(comm, local_model, tension);
+          });
+  result.min_rest_ratio = -base::max_over_ranks(comm, -min_rest_ratio(model));
   return result;
 }
 
