@@ -90,6 +90,17 @@ std::vector<std::array<int64_t, n>> in_rows(const std::vector<std::array<int64_t
   return whole;
 }
 
+/// The owned prisms with the rows of their points. Collective.
+model::Prisms prisms_in_rows(MPI_Comm comm, const Part& part) {
+  model::Prisms prisms = part.model.prisms;
+  prisms.points = in_rows(prisms.points, part.owned_prisms, part.point_row);
+  // A rank without prisms takes part in all that others have: arrays of no row are not visited.
+  const bool averaged = base::on_any_rank(comm, !prisms.nodal_modulus.empty());
+  if (part.solid && prisms.modulus.empty()) prisms.modulus.resize(1);
+  if (averaged && prisms.nodal_modulus.empty()) prisms.nodal_modulus.resize(1);
+  return prisms;
+}
+
 }  // namespace
 
 model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_model,
@@ -113,13 +124,7 @@ model::ModelRows NaturalRows::of_model(MPI_Comm comm, const LocalModel& local_mo
   model::Springs springs = part.model.springs;
   springs.points = in_rows(springs.points, part.owned_springs, part.point_row);
   rows.springs = to_slabs(natural.springs_, std::move(springs));
-  model::Prisms prisms = part.model.prisms;
-  prisms.points = in_rows(prisms.points, part.owned_prisms, part.point_row);
-  // A rank without prisms takes part in all that others have: arrays of no row are not visited.
-  const bool averaged = base::on_any_rank(comm, !prisms.nodal_modulus.empty());
-  if (part.solid && prisms.modulus.empty()) prisms.modulus.resize(1);
-  if (averaged && prisms.nodal_modulus.empty()) prisms.nodal_modulus.resize(1);
-  rows.prisms = to_slabs(natural.prisms_, std::move(prisms));
+  rows.prisms = to_slabs(natural.prisms_, prisms_in_rows(comm, part));
   model::Edges edges = part.model.edges;
   edges.points = in_rows(edges.points, part.owned_edges, part.point_row);
   rows.edges = to_slabs({part.edge_row, local_model.counts.edges}, std::move(edges));
@@ -145,11 +150,9 @@ void NaturalRows::add_springs(std::span<const Vec3> position, model::StepRows& r
 void NaturalRows::add_prisms(std::span<const Vec3> position, model::StepRows& rows) const {
   const model::Prisms& prisms = part_.model.prisms;
   std::vector<double> ratio(part_.owned_prisms);
-  for (int64_t e = 0; e < part_.owned_prisms; ++e) {
-    std::array<Vec3, 6> corners;
-    for (int c = 0; c < 6; ++c) corners[c] = position[prisms.points[e][c]];
-    ratio[e] = mechanics::prism_volume(corners.data()) / prisms.rest_volume[e];
-  }
+  for (int64_t e = 0; e < part_.owned_prisms; ++e)
+    ratio[e] = mechanics::prism_volume(base::pick(position, prisms.points[e]).data()) /
+               prisms.rest_volume[e];
   rows.volume_ratio = to_slab<double>(prisms_, ratio);
 }
 
@@ -159,13 +162,10 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
   std::vector<double> pressure(part_.owned_prisms), von_mises(part_.owned_prisms);
   std::vector<Vec3> stretch(part_.owned_prisms);
   for (int64_t e = 0; e < part_.owned_prisms; ++e) {
-    std::array<Vec3, 6> before, now;
-    for (int c = 0; c < 6; ++c) {
-      before[c] = part_.model.points.position[prisms.points[e][c]];
-      now[c] = position[prisms.points[e][c]];
-    }
     const mechanics::PrismState state =
-        mechanics::prism_state(prisms.shear_modulus[e], slopes[e], before, now);
+        mechanics::prism_state(prisms.shear_modulus[e], slopes[e],
+                               base::pick(part_.model.points.position, prisms.points[e]),
+                               base::pick(position, prisms.points[e]));
     pressure[e] = state.pressure;
     von_mises[e] = state.von_mises;
     stretch[e] = state.stretch;

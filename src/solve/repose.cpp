@@ -383,15 +383,13 @@ std::shared_ptr<const linear::KeptPreconditioner> RestSolver::make_preconditione
 Summary RestSolver::find(const Settings& settings, const Start& start, const Receiver& receive) {
   discrete::Positions& positions = state_->positions;
   const discrete::NaturalRows& natural = state_->natural;
-  const discrete::Part& part = positions.part();
   const base::LogStage stage("Search");
   base::VecHandle displacement = positions.make_vector();
   positions.set_load(0);
   positions.update(displacement);
   state_->problem.reset();
   if (start.preconditioner) state_->problem.elastic_solver().restore(*start.preconditioner);
-  base::VecHandle guess;
-  if (start.guess) guess = positions.make_vector();
+  const base::VecHandle guess = start.guess ? positions.make_vector() : base::VecHandle();
   if (start.guess || settings.path.start_load > 0)
     natural.set_unknowns(start.position, positions, start.guess ? guess : displacement);
 
@@ -410,7 +408,7 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
-  summary.unknowns = 3 * part.total_unknowns;
+  summary.unknowns = 3 * positions.part().total_unknowns;
   summary.evaluations = searcher.evaluations();
   summary.evaluations_for_other = searcher.evaluations_for_other();
   summary.assemblies = searcher.assemblies();
