@@ -131,14 +131,14 @@ BREAKS = [
     ),
     (
         "rest lengths below 0",
-        "if (part.model.springs.rest_length[j] > 0) continue;",
+        "if (springs.rest_length[j] > 0) continue;",
         "continue;",
         f"{SOLVE}prestress|equilibrium|bad_input",
     ),
     (
         "turgor",
-        "(skin[j] ? 1 + as.turgor : 1.0)",
-        "(skin[j] ? 1 + 2 * as.turgor : 1.0)",
+        "(skin[j] ? 1 + turgor : 1.0)",
+        "(skin[j] ? 1 + 2 * turgor : 1.0)",
         f"{SOLVE}prestress|equilibrium",
     ),
     (
@@ -169,8 +169,8 @@ BREAKS = [
     ),
     (
         "averaged pressure is counted twice",
-        "(nodal.empty() ? 0 : prisms.nodal_modulus[m]);\n    const double v0",
-        "0;\n    const double v0",
+        "(nodal.empty() ? 0 : prisms.nodal_modulus[m]);\n    const double volume",
+        "0;\n    const double volume",
         f"{MECHANICS}solid|{SOLVE}solid|program.continuum|program.check",
     ),
     (
@@ -179,7 +179,7 @@ BREAKS = [
         "((1 + e.poisson) * (1 - 2 * e.poisson))}",
         MECHANICS + "solid",
     ),
-    ("strata lie upon each other", "    top = bottom;\n", "", f"{MODEL}|program.material"),
+    ("strata lie upon each other", "    top += thick;\n", "", f"{MODEL}|program.material"),
     # contact
     (
         "contact found too late",
@@ -225,13 +225,13 @@ BREAKS = [
     ),
     (
         "a body's normals do not turn with it",
-        "d.gradient = rotation_ * d.gradient;",
-        "",
+        "d.gradient = rotation_ * d.gradient;\n  d.curvature",
+        "d.curvature",
         r"^mechanics\.contact",
     ),
     (
         "a body pushes with its first guess for ever",
-        "touches.set_multipliers(pressure);",
+        "body_contact.set_multipliers(pressure);",
         "",
         r"^solve\.contact",
     ),
@@ -249,7 +249,7 @@ BREAKS = [
     ),
     (
         "the penetration is not told",
-        "for (const double gap : touches.gaps()) deepest = std::max(deepest, -gap);",
+        "for (const double gap : body_contact.gaps()) deepest = std::max(deepest, -gap);",
         "",
         r"^solve\.contact|^program\.(contact|instruments)",
     ),
@@ -304,7 +304,7 @@ BREAKS = [
     ),
     (
         "both sides of a cut have the whole area",
-        "touches.area[c] /= 2;",
+        "pairs.area[c] /= 2;",
         "",
         r"^model\.cut|^program\.(contact|incisions)",
     ),
@@ -425,8 +425,8 @@ BREAKS = [
     # parts that ranks make themselves
     (
         "a piece lacks its second ring",
-        "triangles_at(on.mesh, columns_of(on.mesh, triangles_at(on.mesh, columns)))",
-        "triangles_at(on.mesh, columns)",
+        "triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, centers)))",
+        "triangles_at(layout.mesh, centers)",
         f"{SOLVE}on_",
     ),
     ("a column's rows are all its first", "begin[k] + next++", "begin[k] + 0 * next++", f"{SOLVE}on_"),
