@@ -187,7 +187,9 @@ TEST(TransformFile, RefusesInOneLine) {
     EXPECT_NE(refused(text).find(expected), std::string::npos)
         << refused(text) << "\nwanted " << expected;
   const Folder folder;
-  EXPECT_NE(refusal([&] { read_transform(folder.path("sub")); }).find("no such file"),
+  EXPECT_NE(refusal([&] { read_transform(folder.path("sub")); }).find("sub: is a folder"),
+            std::string::npos);
+  EXPECT_NE(refusal([&] { read_transform(folder.path("none")); }).find("none: no such file"),
             std::string::npos);
 }
 
