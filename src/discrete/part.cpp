@@ -387,6 +387,8 @@ std::vector<int64_t> exchange_rows(MPI_Comm comm, Piece& piece, Model& global_me
   assign(comm, column, set, numbers, needing, piece);
   piece.bones = gather_motions(comm, held);
   global_metadata = copy_metadata(held);
+  if (held.bone_transform.empty() && !std::ranges::count(piece.bones.straight, true))
+    global_metadata.bone_transform = piece.bones.transform;  // there are no points to find it by
   share_globals(comm, averaged, numbers, piece);
   std::vector<int64_t> pair_row = exchange_elements(ElementExchange(comm, needing, column), piece);
   fetch_points(comm, numbers, piece);

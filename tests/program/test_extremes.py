@@ -202,15 +202,6 @@ def test_a_pendulum_of_one_spring_hangs_down(run, tmp_path):
     assert step["point/position"][1] == pytest.approx([0, 0, -19.80665], abs=1e-6)
 
 
-def test_no_bone_at_all(solve):
-    """Without bones everything beneath the skin is free, and nothing moves."""
-    step = solve(ADVANCE, ((MESHES / ADVANCE).read_text().split("bones:")[1].split("tissue:")[0],
-                           " []\n"),
-                 ("  - {bone: mandible, translate: [0, -6, 0]}   # forward is −y\n", ""),
-                 ("moves:\n", ""))
-    assert np.abs(step["point/displacement"]).max() < 1e-9
-
-
 def test_steps_of_an_extreme_are_one_path(solve, tmp_path):
     solve(ADVANCE, (JAW, "-15, 0]"), TWO)
     path = steps(tmp_path / "out.h5")
