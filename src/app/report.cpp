@@ -188,11 +188,6 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
                          "{} points begin up to {:.2g} mm inside {}, the deepest at "
                          "{:.1f} mm; they go no deeper",
                          on.inside, on.deepest, name, on.where);
-    if (on.squeezed > 0)
-      text += report_row("overlapping bodies",
-                         "{} points are between {} and another body, which overlap there: they "
-                         "rest on the other alone; repose-collide says where bones meet",
-                         on.squeezed, name);
     if (on.points == 0) continue;
     text += report_row("contact", "{} points press on {} with {:.4g} N, {:.4g} N", on.points, name,
                        on.force, on.force.norm());

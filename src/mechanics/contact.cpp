@@ -32,41 +32,12 @@ void BodyContact::reset(double stiffness) {
   const size_t count = pairs_.point.size();
   stiffness_ = stiffness;
   multiplier_.assign(count, 0.0);
-  gone_.assign(count, 0);
   seen_.assign(count, Vec3::Zero());
   distance_.assign(count, -infinite);
   gap_.assign(count, infinite);
   normal_.assign(count, Vec3::Zero());
   curvature_.assign(count, Mat3::Zero());
   acting_.clear();
-}
-
-void BodyContact::set_multipliers(std::span<const double> p) {
-  multiplier_.assign(p.begin(), p.end());
-  for (size_t c = 0; c < multiplier_.size(); ++c)
-    if (gone(c)) multiplier_[c] = 0;
-}
-
-int64_t BodyContact::let_squeezed_go(double overlap) {
-  constexpr double facing = -0.9;  // cosine of the angle of normals
-  const auto is_inside = [this](size_t c) { return !slides(c) && !gone(c) && gap_[c] < 0; };
-  std::vector<size_t> inside;
-  for (size_t c = 0; c < gap_.size(); ++c)
-    if (is_inside(c)) inside.push_back(c);
-  std::ranges::stable_sort(inside, {}, [this](size_t c) { return pairs_.point[c]; });
-  int64_t count = 0;
-  for (size_t i = 0; i < inside.size(); ++i)
-    for (size_t j = i + 1; j < inside.size() && !gone(inside[i]); ++j) {
-      const size_t c = inside[i], other = inside[j];
-      if (pairs_.point[other] != pairs_.point[c]) break;
-      if (gone(other) || gap_[c] + gap_[other] > -overlap ||
-          normal_[c].dot(normal_[other]) > facing * normal_[c].norm() * normal_[other].norm())
-        continue;
-      gone_[std::max(c, other)] = 1;
-      multiplier_[c] = multiplier_[other] = 0;
-      ++count;
-    }
-  return count;
 }
 
 double BodyContact::min_gap(size_t c, const Vec3& beside) const {
@@ -131,7 +102,6 @@ std::vector<LinearGap> BodyContact::linear_gaps(std::span<const Vec3> position, 
                                                 double smoothed_to) {
   std::vector<LinearGap> gaps;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
-    if (gone(c)) continue;
     const Vec3 beside = bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]);
     if (slides(c))
       measure(c, beside);

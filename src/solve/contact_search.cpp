@@ -97,7 +97,6 @@ void ContactSearch::move_multipliers() {
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
-  objective_.body_contact().let_none_go();
   const ContactPressures before = pressures();
   predicted_ = true;
   discrete::Positions& positions = objective_.positions();
@@ -257,17 +256,6 @@ Outcome ContactSearch::finish_reached(Vec displacement, double accuracy, int64_t
   return outcome;
 }
 
-/// Where bodies overlap, a point between them keeps to one of them. Returns whether one begins to.
-/// Collective.
-bool ContactSearch::let_squeezed_go(double accuracy) {
-  discrete::Positions& positions = objective_.positions();
-  mechanics::BodyContact& contact = objective_.body_contact();
-  contact.update_gaps(positions.local());
-  const bool found = base::sum_over_ranks(positions.comm(), contact.let_squeezed_go(accuracy)) > 0;
-  if (found) tangent_.forget_contact();
-  return found;
-}
-
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   outcome.converged = false;
   outcome.stopped = true;
@@ -388,15 +376,10 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
 /// one. Collective.
 bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_tried = 8;
-  constexpr double still_tried = 0.9;  // of the softness with which a point was tried before
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   double energy_here = energy(displacement);
-  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
-  std::erase_if(sides, [this](const OtherSide& side) {
-    const auto before = tried_.find(side.gap.constraint);
-    return before != tried_.end() && side.softness > still_tried * before->second;
-  });
+  const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
   size_t next = 0;
   bool changed = false;
   for (int n = 0; n < max_tried; ++n) {
@@ -405,7 +388,6 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
-    if (mine) tried_[sides[next].gap.constraint] = softness;
     const End end =
         change_side(mine ? &sides[next++] : nullptr, displacement, accuracy, energy_here);
     Outcome there;
@@ -428,7 +410,6 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
 void ContactSearch::find_other(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_passes = 3;  // after a change, points that were left before may follow
   const int64_t evaluated = objective_.evaluations();
-  tried_.clear();
   consider_other(displacement, accuracy, outcome);
   for (int pass = 0; pass < max_passes; ++pass)
     if (!change_sides(displacement, accuracy, outcome)) break;
@@ -484,11 +465,6 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome = end == End::reached ? finish_reached(displacement, accuracy, iterations)
                                   : finish(displacement, accuracy);
     if (outcome.converged) break;
-    if (let_squeezed_go(accuracy)) {
-      needs_presolve = true;
-      ++round;
-      continue;
-    }
     if (!outcome.stable && leaves()) continue;
     needs_presolve = end != End::reached;
     stiffen(std::min(2 * times_, stiffest));
@@ -505,7 +481,6 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
-  objective_.body_contact().let_none_go();
   stiffen(1);
   int64_t iterations = 0;
   const End end = newton(displacement, accuracy, iterations);

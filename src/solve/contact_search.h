@@ -1,6 +1,4 @@
 #pragma once
-#include <map>
-
 #include "contact_qp.h"
 #include "contact_sides.h"
 #include "repose/solve/minimizer.h"
@@ -50,7 +48,6 @@ class ContactSearch : public RestSearch {
   Outcome stopped(Vec displacement, Outcome outcome);
   Outcome finish(Vec displacement, double accuracy);
   Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
-  bool let_squeezed_go(double accuracy);
   bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
@@ -71,10 +68,8 @@ class ContactSearch : public RestSearch {
   int times_ = 1;     // it is so many times the model's
   bool finds_other_ = true;
   int64_t evaluations_for_other_ = 0;
-  std::map<size_t, double>
-      tried_;               // constraint of this rank and its softness when it changed sides
-  double taken_ = 0;        // mm, the full step that the latest newton() ended with, or 0
-  bool predicted_ = false;  // the next search begins with a prediction
+  double taken_ = 0;                // mm, the full step that the latest newton() ended with, or 0
+  bool predicted_ = false;          // the next search begins with a prediction
   ContactPressures at_prediction_;  // of the latest search
   base::VecHandle gradient_, slope_, step_, trial_, start_;
 };

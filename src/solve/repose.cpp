@@ -217,7 +217,6 @@ void combine_ranks(MPI_Comm comm, ContactSummary& on) {
   on.points = base::sum_over_ranks(comm, on.points);
   for (double& component : on.force) component = base::sum_over_ranks(comm, component);
   on.inside = base::sum_over_ranks(comm, on.inside);
-  on.squeezed = base::sum_over_ranks(comm, on.squeezed);
   on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
 }
 
@@ -230,9 +229,8 @@ std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
   body_contact.update_gaps(objective.positions().local());
   for (size_t c = 0; c < body_contact.gaps().size(); ++c) {
     const double pressure = body_contact.pressure(c);
-    ContactSummary& on = contacts[body_contact.pairs().body[c]];
-    if (body_contact.gone(c)) ++on.squeezed;
     if (pressure == 0) continue;
+    ContactSummary& on = contacts[body_contact.pairs().body[c]];
     ++on.points;
     on.force -= pressure * body_contact.pairs().area[c] * body_contact.normal(c);
   }

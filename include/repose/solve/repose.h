@@ -92,7 +92,6 @@ struct ContactSummary {
   int64_t inside = 0;         ///< points that were inside the body at the start, and stay so
   double deepest = 0;         ///< mm, of these
   Vec3 where = Vec3::Zero();  ///< mm, the deepest one at the start
-  int64_t squeezed = 0;       ///< points that it does not keep out: it overlaps another body there
   PenetrationDepth exact;     ///< into a rigid body's own triangles, at the last step
 };
 
