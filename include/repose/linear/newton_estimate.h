@@ -16,11 +16,11 @@ class NewtonEstimate {
   /// H⁻¹ ∇Φ of the latest distance().
   Vec step() const { return step_; }
 
-  /// distance() that holds wherever stiffnesses lie far apart: conjugate gradients bound the error
-  /// e of the step in the energy norm, in which soft points hardly count; no point is off by more
-  /// than √(c eᵀHe), c its compliance. So the step is solved for until that is little of it, or
-  /// below `slack`, mm. Infinite where that is out of reach, or a random load meets negative
-  /// curvature.
+  /// Returns a distance() that also holds where stiffnesses lie far apart, mm: conjugate gradients
+  /// bound the error e of the step in the energy norm, in which soft points hardly count; no point
+  /// is off by more than √(c eᵀHe), c its compliance. So the step is solved for until that is
+  /// little of it, or below `slack`, mm. Infinite where that is out of reach, or a random load
+  /// meets negative curvature.
   double bound(Vec displacement, Vec gradient, double slack);
   double error_slack() const { return error_slack_; }  ///< mm, of bound(), where not little of it
 

@@ -47,7 +47,7 @@ class HessianPreconditioner {
 
   /// Goes back to the state after construction.
   void reset();
-  /// What restore() goes back to; null where it is not multigrid.
+  /// Returns the present state for restore(); null where it is not multigrid.
   std::shared_ptr<const KeptPreconditioner> keep() const;
   void restore(const KeptPreconditioner& kept);  ///< right after construction or reset()
 

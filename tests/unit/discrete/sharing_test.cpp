@@ -107,6 +107,20 @@ TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
   EXPECT_EQ(next, many);
 }
 
+TEST(Sharing, KeepsAMotionThatIsRecoveredFromThePoints) {
+  model::Model m = patch();
+  ASSERT_TRUE(m.bone_transform.empty());
+  const Vec3 way(1, -3, 0.5);
+  for (Vec3& target : m.points.target) target += way;
+  const model::Model metadata =
+      discrete::build_local_from_root(PETSC_COMM_WORLD, m).global_metadata;
+  if (base::rank(PETSC_COMM_WORLD) > 0) return;
+  ASSERT_EQ(metadata.bone_transform.size(), 1U);
+  Mat4 expected = Mat4::Identity();
+  expected.topRightCorner<3, 1>() = way;
+  EXPECT_LT((metadata.bone_transform[0] - expected).norm(), 1e-12);
+}
+
 TEST(Sharing, GathersSlabsOfDifferentLengthsInOrder) {
   const int rank = base::rank(PETSC_COMM_WORLD), ranks = base::size(PETSC_COMM_WORLD);
   const std::vector<double> mine(rank, 10.0 + rank);  // none on rank 0

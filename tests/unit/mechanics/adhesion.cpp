@@ -13,7 +13,7 @@ namespace adhesion_test {
 
 constexpr double offset = 2, force = 3, range = 2;  // mm, N, mm
 
-/// Places of the tissue's point, so far from where the film begins to open, and of a bone in z = 0.
+/// Places of the tissue's point, so far from where the tension begins, and of a bone in z = 0.
 std::vector<Vec3> places(double opened) {
   return {{5, 4, offset + opened}, {1, 2, 0}, {11, 2, 0}, {1, 7, 0}};
 }
