@@ -40,11 +40,10 @@ void require_same_head(const scene::AnatomyPlan& plan, const surface::Surface& s
   }
 }
 
-/// The frame of the condyles, or that of the scan.
+/// The frame of the head at the mouth.
 HeadFrame frame_of(const scene::AnatomyPlan& plan) {
   HeadFrame frame;
-  const Vec3 *right = find(plan.landmarks, "condyle_right_center"),
-             *left = find(plan.landmarks, "condyle_left_center");
+  frame.axes = plan.axes;
   const Vec3 *mouth_right = find(plan.landmarks, "mouth_right"),
              *mouth_left = find(plan.landmarks, "mouth_left");
   const Vec3* edge = find(plan.landmarks, "upper_incisor_edge");
@@ -52,12 +51,6 @@ HeadFrame frame_of(const scene::AnatomyPlan& plan) {
     frame.origin = (*mouth_right + *mouth_left) / 2;
   else if (edge)
     frame.origin = *edge;
-  if (!right || !left) return frame;
-  const Vec3 side = (*left - *right).normalized();
-  const Vec3 back = (Vec3::UnitY() - side.y() * side).normalized();
-  frame.axes.row(0) = side.transpose();
-  frame.axes.row(1) = back.transpose();
-  frame.axes.row(2) = side.cross(back).transpose();
   return frame;
 }
 
@@ -95,15 +88,16 @@ void part_lips(const surface::Surface& skin, scene::Scene& scene,
       path.back().y(), path.back().z()));
 }
 
-/// Lowest and highest z of the vestibule: between B and the nasal spine on bone, and no farther
-/// than the lips reach, which end at B' and subnasale.
+/// Lowest and highest z of the vestibule along the axes of the head: between B and the nasal spine
+/// on bone, and no farther than the lips reach, which end at B' and subnasale.
 std::array<double, 2> vestibule_height(const scene::AnatomyPlan& plan) {
   const Vec3 *b_soft = find(plan.landmarks, "b_soft"),
              *subnasale = find(plan.landmarks, "subnasale");
-  const double low = find(plan.landmarks, "b_point")->z(),
-               high = find(plan.landmarks, "nasal_spine")->z();
-  return {b_soft ? std::max(low, b_soft->z()) : low,
-          subnasale ? std::min(high, subnasale->z()) : high};
+  const auto height = [&](const Vec3* at) { return plan.axes.row(2).dot(*at); };
+  const double low = height(find(plan.landmarks, "b_point")),
+               high = height(find(plan.landmarks, "nasal_spine"));
+  return {b_soft ? std::max(low, height(b_soft)) : low,
+          subnasale ? std::min(high, height(subnasale)) : high};
 }
 
 void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
@@ -126,16 +120,18 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
   std::vector<scene::AttachRegion>& regions = scene.tissue.attach_regions;
   const auto put = [&](size_t number, const Vec3& to, double gap) {
     const scene::Box box{(low + to) / 2, to - low};
-    regions.insert(regions.begin() + static_cast<std::ptrdiff_t>(number),
-                   scene::AttachRegion{box, scene::Attach::contact, gap});
+    regions.insert(
+        regions.begin() + static_cast<std::ptrdiff_t>(number),
+        scene::AttachRegion{scene::TurnedBox{box, plan.axes}, scene::Attach::contact, gap});
   };
   put(0, high, plan.gap);
-  if (lower_gap != plan.gap) put(1, {high.x(), high.y(), stomion->z()}, lower_gap);
-  remarks.push_back(
-      fmt::format("vestibule by landmarks: x {:.0f} … {:.0f}, y {:.0f} … {:.0f}, z {:.0f} … {:.0f} "
-                  "mm, {:.2g} mm "
-                  "in front of upper and {:.2g} mm of lower teeth (first attach regions)",
-                  low.x(), high.x(), low.y(), high.y(), low.z(), high.z(), plan.gap, lower_gap));
+  if (lower_gap != plan.gap)
+    put(1, {high.x(), high.y(), plan.axes.row(2).dot(*stomion)}, lower_gap);
+  remarks.push_back(fmt::format(
+      "vestibule by landmarks: {:.0f} … {:.0f}, {:.0f} … {:.0f}, {:.0f} … {:.0f} mm along "
+      "left, back and up of the head, {:.2g} mm in front of upper and {:.2g} mm of "
+      "lower teeth (first attach regions)",
+      low.x(), high.x(), low.y(), high.y(), low.z(), high.z(), plan.gap, lower_gap));
 }
 
 /// Without the landmarks that tell the lips and the teeth apart lips do not adhere.
@@ -164,27 +160,22 @@ void remark_tone(const scene::Scene& scene, std::vector<std::string>& remarks) {
       "ring muscle by landmarks: a tone of up to {:g} N/mm² between subnasale and B′", plan.tone));
 }
 
-/// Reports a head that is pitched in the scan, by the angles of nasion and the upper incisors above
-/// the condyles: proportions change one as much as the other, the other way round.
+/// Reports a head that is pitched in the scan, or whose level is not known.
 void remark_pitch(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
-  constexpr double upright = 14, most = 6;  // degrees, the sum of both angles, and of pitch
-  const Vec3 *right = find(plan.landmarks, "condyle_right_center"),
-             *left = find(plan.landmarks, "condyle_left_center"),
-             *nasion = find(plan.landmarks, "nasion_bone"),
-             *edge = find(plan.landmarks, "upper_incisor_edge");
-  if (!right || !left || !nasion || !edge) return;
-  const HeadFrame frame = frame_of(plan);
-  const Vec3 hinge = frame.to_frame((*right + *left) / 2);
-  const auto angle = [&](const Vec3& at) {
-    const Vec3 way = frame.to_frame(at) - hinge;
-    return std::atan2(way.z(), -way.y()) * 180 / M_PI;
-  };
-  const double pitch = (angle(*nasion) + angle(*edge) - upright) / 2;
+  constexpr double most = 6;  // degrees
+  for (const char* name :
+       {"condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"})
+    if (!find(plan.landmarks, name)) {
+      remarks.push_back(
+          fmt::format("{}: landmark {} is missing, so the level of the head is that of the scan",
+                      plan.file.string(), name));
+      return;
+    }
+  const double pitch = std::asin(-plan.axes(1, 2)) * 180 / M_PI;
   if (std::abs(pitch) < most) return;
   remarks.push_back(fmt::format(
       "the head lies about {:.0f} degrees chin {} in the scan, by its condyles, nasion and upper "
-      "incisors: forward and up of clinical moves and the planes of le_fort_1 and genioplasty are "
-      "those of the scan; turn surfaces and landmarks upright if they are to be the head's",
+      "incisors: templates, clinical moves and lips by landmarks follow the head",
       std::abs(pitch), pitch > 0 ? "up" : "down"));
 }
 
@@ -201,8 +192,9 @@ void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
           "edentulous, and lips without support of teeth are predicted with a larger error",
           jaw, height, minimum));
   };
-  if (spine && upper) remark("upper", spine->z() - upper->z(), upper_height);
-  if (lower && menton) remark("lower", lower->z() - menton->z(), lower_height);
+  const Vec3 up = plan.axes.row(2);
+  if (spine && upper) remark("upper", up.dot(*spine - *upper), upper_height);
+  if (lower && menton) remark("lower", up.dot(*lower - *menton), lower_height);
 }
 
 }  // namespace

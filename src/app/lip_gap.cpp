@@ -30,8 +30,8 @@ std::optional<Pair> parted_vertex(const Vec3& stomion, const std::vector<Vec3>& 
 
 }  // namespace
 
-std::string describe_lips(const scene::Landmarks& landmarks, const std::vector<Vec3>& initial,
-                          const std::vector<Vec3>& moved) {
+std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
+                          const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
   for (const char* name : {"stomion", "upper_lip", "lower_lip"})
     if (!landmarks.contains(name)) return "";
   const auto pair = parted_vertex(landmarks.at("stomion"), initial);
@@ -41,8 +41,9 @@ std::string describe_lips(const scene::Landmarks& landmarks, const std::vector<V
              lower = way(nearest_point(landmarks.at("lower_lip"), initial));
   Vec3 apart = way(pair->first) - way(pair->second);
   if (apart.dot(upper - lower) < 0) apart = -apart;  // the first one is of the lower lip
-  if (apart.z() < closed) return "Lips closed. ";
-  return fmt::format("Lips {:.1f} mm apart at stomion, together before. ", apart.z());
+  const double gap = apart.dot(up);
+  if (gap < closed) return "Lips closed. ";
+  return fmt::format("Lips {:.1f} mm apart at stomion, together before. ", gap);
 }
 
 }  // namespace repose::app

@@ -56,7 +56,7 @@ size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
   return nearest;
 }
 
-std::string describe_movement(const std::vector<model::FacePlace>& places,
+std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
   size_t farthest = 0;
   const auto moved_by = [&](size_t i) { return Vec3(moved[i] - initial[i]); };
@@ -69,7 +69,7 @@ std::string describe_movement(const std::vector<model::FacePlace>& places,
   for (const model::FacePlace& place : places) {
     movement.push_back(moved_by(nearest_point(place.at, initial)));
     if (movement.back().norm() >= unmoved)
-      text += fmt::format("{} {}; ", place.name, describe_shift(movement.back()));
+      text += fmt::format("{} {}; ", place.name, describe_shift(axes * movement.back()));
   }
   text += fmt::format("largest movement {:.1f} mm ({})", largest,
                       place_of(initial[farthest], largest, places, movement));

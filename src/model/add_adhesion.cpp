@@ -34,7 +34,8 @@ std::optional<std::array<int64_t, 3>> frame_of(const ColumnLayout& layout, int32
   return std::array{a, b, c};
 }
 
-/// z of the line between the lips at x: through stomion and the corners of the mouth.
+/// z of the line between the lips at x, along the head's axes: through stomion and the corners of
+/// the mouth.
 double lip_line(const AdhesionRule& rule, double x) {
   const auto& [right, middle, left] = rule.lip_line;
   const Vec3& corner = x < middle.x() ? right : left;
@@ -42,7 +43,7 @@ double lip_line(const AdhesionRule& rule, double x) {
   return middle.z() + share * (corner.z() - middle.z());
 }
 
-const Vec3& incisor_edge(const scene::AnatomyPlan& plan, bool upper) {
+Vec3 incisor_edge(const scene::AnatomyPlan& plan, bool upper) {
   return plan.landmarks.at(upper ? "upper_incisor_edge" : "lower_incisor_edge");
 }
 
@@ -59,9 +60,9 @@ class JawAdhesion {
     if (pairs.body[pair] != jaw_.bone) return;
     const int64_t point = pairs.point[pair];
     const auto& x = model.points.position;
-    if ((skin.z() > lip_line(rule_, skin.x())) != jaw_.upper) return;
-    if ((x[point].array() < jaw_.low.array()).any() || (x[point].array() > jaw_.high.array()).any())
-      return;
+    const Vec3 above = rule_.axes * skin, at = rule_.axes * x[point];
+    if ((above.z() > lip_line(rule_, above.x())) != jaw_.upper) return;
+    if ((at.array() < jaw_.low.array()).any() || (at.array() > jaw_.high.array()).any()) return;
     const auto tooth = tree_.nearest(x[point], jaw_.reach * jaw_.reach);
     if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();
@@ -98,11 +99,13 @@ AdhesionRule adhesion_rule(const scene::AnatomyPlan& plan, const std::vector<Adh
   const scene::Landmarks& marks = plan.landmarks;
   AdhesionRule rule{plan.adhesion,
                     range,
-                    {marks.at("mouth_right"), marks.at("stomion"), marks.at("mouth_left")},
+                    plan.axes,
+                    {plan.axes * marks.at("mouth_right"), plan.axes * marks.at("stomion"),
+                     plan.axes * marks.at("mouth_left")},
                     {},
                     {}};
   for (const AdheringJaw& jaw : jaws) {
-    const double z = incisor_edge(plan, jaw.upper).z();
+    const double z = plan.axes.row(2).dot(incisor_edge(plan, jaw.upper));
     const double gap = jaw.upper ? plan.gap : scene::gap_of_lower_teeth(plan);
     rule.jaws.push_back({jaw.bone,
                          jaw.upper,

@@ -24,6 +24,12 @@ Contains inside(const scene::Box& box, double near) {
   };
 }
 
+Contains inside(const scene::TurnedBox& turned, double near) {
+  return [along = inside(turned.box, near), axes = turned.axes](const Vec3& x) {
+    return along(axes * x);
+  };
+}
+
 Contains inside(const scene::CurveRegion& curve, double near) {
   return [=](const Vec3& x) {
     for (size_t k = 0; k + 1 < curve.path.size(); ++k) {

@@ -21,7 +21,8 @@ struct Fibers {
 /// beyond the corners of the mouth. Fibers run along the lips and turn round their corners,
 /// parallel to the skin. The tone falls as 1 − ρ², ρ = 1 on the ellipse.
 Fibers fibers_of(const RingMuscle& muscle, const std::array<Vec3, 6>& corners) {
-  const Vec3 middle = std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
+  const Vec3 middle =
+      muscle.axes * std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
   const double half = (muscle.left.x() - muscle.right.x()) / 2, end = half + beyond;
   const double x = middle.x() - (muscle.left.x() + muscle.right.x()) / 2;
   const Vec3& corner = x < 0 ? muscle.right : muscle.left;
@@ -35,7 +36,8 @@ Fibers fibers_of(const RingMuscle& muscle, const std::array<Vec3, 6>& corners) {
   const double straight = 0.8 * half;  // up to where fibers do not turn
   const double turn = std::copysign(std::max(std::abs(x) - straight, 0.0), x) /
                       ((end - straight) * (end - straight));
-  const Vec3 ring = turn == 0 ? Vec3(1, 0, 0) : Vec3(-z / (height * height), 0, turn);
+  const Vec3 ring =
+      muscle.axes.transpose() * (turn == 0 ? Vec3(1, 0, 0) : Vec3(-z / (height * height), 0, turn));
   const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
   return {muscle.tone * share, (ring - ring.dot(normal) * normal).normalized()};
 }
@@ -71,7 +73,10 @@ RingMuscle ring_muscle(const scene::Scene& scene) {
              *stomion = find(landmarks, "stomion"), *top = find(landmarks, "subnasale"),
              *bottom = find(landmarks, "b_soft");
   if (!right || !left || !stomion || !top || !bottom) return {};
-  return {scene.anatomy->tone, *right, *left, *stomion, top->z(), bottom->z()};
+  const Mat3& axes = scene.anatomy->axes;
+  return {
+      scene.anatomy->tone,      axes * *right, axes * *left, axes * *stomion, axes.row(2).dot(*top),
+      axes.row(2).dot(*bottom), axes};
 }
 
 void add_tone(const RingMuscle& muscle, Model& model) {

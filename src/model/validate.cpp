@@ -125,6 +125,8 @@ void check_adhesion(const Model& m, const ArrayCheck& check) {
   const AdhesionRule& rule = *m.adhesion;
   check.number("adhesion attribute tension", 0, rule.tension, at_least_zero("N/mm²"));
   check.number("adhesion attribute range", 0, rule.range, positive("mm", ""));
+  if (!((rule.axes * rule.axes.transpose() - Mat3::Identity()).norm() < 1e-9))
+    check.refuse("adhesion/axes", "rows are not unit vectors at right angles to each other");
   check.vectors("adhesion/lip_line", {rule.lip_line.begin(), rule.lip_line.end()}, 3, place);
   for (size_t k = 0; k < rule.jaws.size(); ++k) {
     const AdhesionRule::Jaw& jaw = rule.jaws[k];

@@ -129,6 +129,8 @@ model::AdhesionRule read_adhesion(const Reader& in) {
   model::AdhesionRule rule;
   rule.tension = in.number(group, "tension");
   rule.range = in.number(group, "range");
+  const std::vector<Vec3> axes = in.vectors(group + "/axes", 3);
+  for (int k = 0; k < 3; ++k) rule.axes.row(k) = axes[k];
   const std::vector<Vec3> line = in.vectors(group + "/lip_line", 3);
   std::ranges::copy(line, rule.lip_line.begin());
   const auto bone = in.integers<int32_t>(group + "/bone", Shape::any);

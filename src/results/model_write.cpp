@@ -98,6 +98,8 @@ void write_adhesion(hid_t model, const model::AdhesionRule& rule) {
   const base::Hdf5Group group = base::create_hdf5_group(model, "adhesion");
   write_attribute(group, "tension", rule.tension);
   write_attribute(group, "range", rule.range);
+  write_array(group, "axes",
+              std::vector<Vec3>{rule.axes.row(0), rule.axes.row(1), rule.axes.row(2)});
   std::vector<int32_t> bone;
   std::vector<int8_t> upper;
   std::vector<double> box, reach;

@@ -40,7 +40,7 @@ class ClinicalMove {
     if (!scene.anatomy)
       value.refuse("needs the axes of the head; give anatomy: {{landmarks: FILE}}");
     try {
-      axes_ = head_axes(scene.anatomy->landmarks, scene.anatomy->file.string());
+      axes_ = require_axes(*scene.anatomy);
     } catch (const base::InputError& error) {
       value.refuse("needs the axes of the head: {}", error.what());
     }

@@ -14,7 +14,7 @@ namespace {
 class TemplatePlacement {
  public:
   explicit TemplatePlacement(const AnatomyPlan& anatomy)
-      : anatomy_(anatomy), axes_(head_axes(anatomy.landmarks, anatomy.file.string())) {}
+      : anatomy_(anatomy), axes_(require_axes(anatomy)) {}
 
   Vec3 at(const char* name) const {
     return require_landmark(anatomy_.landmarks, name, anatomy_.file.string());

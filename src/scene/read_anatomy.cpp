@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "head_axes.h"
 #include "repose/scene/landmarks.h"
 
 namespace repose::scene {
@@ -68,6 +69,7 @@ AnatomyPlan read_anatomy(const Value& value) {
   check_front(file, plan.landmarks);
   check_sides(file, plan.landmarks);
   check_order(file, plan.landmarks);
+  plan.axes = head_axes(plan.landmarks);
   if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;
   if (const auto vestibule = map.find("vestibule")) plan.vestibule = vestibule->choice() == 0;
   if (const auto gap = map.find("gap")) plan.gap = gap->number();
@@ -84,13 +86,14 @@ double gap_of_lower_teeth(const AnatomyPlan& plan) {
   const Vec3 *upper = find(plan.landmarks, "upper_incisor_edge"),
              *lower = find(plan.landmarks, "lower_incisor_edge");
   if (!upper || !lower) return plan.gap;
-  return std::max(plan.gap, std::min((lower->y() - upper->y()) / 2, largest));
+  return std::max(plan.gap, std::min(plan.axes.row(1).dot(*lower - *upper) / 2, largest));
 }
 
 std::array<Eigen::Vector2d, 2> vestibule_sides(const AnatomyPlan& plan) {
   constexpr double beside = 12, before = 16, behind = 38;  // mm
-  const Vec3 &edge = plan.landmarks.at("upper_incisor_edge"),
-             &right = plan.landmarks.at("mouth_right"), &left = plan.landmarks.at("mouth_left");
+  const Vec3 edge = plan.axes * plan.landmarks.at("upper_incisor_edge"),
+             right = plan.axes * plan.landmarks.at("mouth_right"),
+             left = plan.axes * plan.landmarks.at("mouth_left");
   return {Eigen::Vector2d(right.x() - beside, edge.y() - before),
           Eigen::Vector2d(left.x() + beside, edge.y() + behind)};
 }

@@ -65,7 +65,7 @@ WAYS = {"default": ("", ""), "bonded lips": (", vestibule: off", ""),
         "lower gap 1": (", lower_gap: 1", ""), "lower gap 2": (", lower_gap: 2", ""),
         "lower gap 4": (", lower_gap: 4", ""),
         "no tone, lower gap 1": (", tone: 0, lower_gap: 1", "")}
-LIMIT = 60  # s, of a search
+LIMIT = 240  # s, of a search
 
 
 def turned(*rotation):

@@ -341,7 +341,8 @@ def adhering(file):
     right, middle, left = model["adhesion/lip_line"]
     point, touches = model["contact/point"], model["contact/binding"] == 0
     bones = np.where(model["contact/body_kind"] == 0, model["contact/body_bone"], -1)
-    at, above = x[point], skin[column[point]]
+    axes = model["adhesion/axes"].T
+    at, above = x[point] @ axes, skin[column[point]] @ axes
     line = np.interp(above[:, 0], [right[0], middle[0], left[0]], [right[2], middle[2], left[2]])
     found = []
     for bone, upper, box, reach in zip(*(model[f"adhesion/{name}"] for name in
@@ -352,7 +353,7 @@ def adhering(file):
         rows = np.flatnonzero(rows & ((above[:, 2] > line) == bool(upper)))
         corners = (model[f"bone_surface/{bone}/points"][corner]
                    for corner in model[f"bone_surface/{bone}/triangles"].T)
-        off = at[rows] - nearest_places(at[rows], *corners)
+        off = x[point[rows]] - nearest_places(x[point[rows]], *corners)
         away = np.linalg.norm(off, axis=1)
         rows, off, away = (values[away <= reach] for values in (rows, off, away))
         found += zip(point[rows], np.full(len(rows), bone), off / away[:, None],

@@ -7,6 +7,8 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from conftest import PROJECT
 from tissue import apart, last, model_of
@@ -15,6 +17,7 @@ MESHES = PROJECT / "meshes"
 DATA = PROJECT.parent / "shared/data/head"
 REAL = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
 HEADS = [pytest.param("head"), pytest.param("real_head", marks=REAL)]
+MARKS = ("pronasale", "subnasale", "upper_lip", "lower_lip", "b_soft", "pogonion_soft")
 TEMPLATES = {"le_fort_1": "skull", "genioplasty": "mandible", "sagittal_split": "mandible"}
 
 
@@ -55,6 +58,51 @@ def test_templates_cut_any_head(run, tmp_path, head, template):
     if template == "sagittal_split":
         condyles = np.array([head["condyle_left_center"], head["condyle_right_center"]])
         assert np.linalg.norm(piece[:, None] - condyles, axis=2).min() > 5
+
+
+def turn_head(folder, turn):
+    """Puts skin, bones and landmarks of the head in a folder, turned, into its folder turned."""
+    (folder / "turned").mkdir()
+    for part in ("skin", "skull", "mandible"):
+        mesh = meshio.read(folder / f"{part}.ply")
+        mesh.points = mesh.points @ turn.T
+        mesh.write(folder / "turned" / f"{part}.ply")
+    text = json.loads((folder / "head.mrk.json").read_text())
+    for point in text["markups"][0]["controlPoints"]:
+        point["position"] = list(turn @ point["position"])
+    (folder / "turned/head.mrk.json").write_text(json.dumps(text))
+
+
+@pytest.mark.parametrize("template, move", [("le_fort_1", "advance: 4, impaction: 2, yaw: 2"),
+                                            ("genioplasty", "advance: 6"),
+                                            ("sagittal_split", "set_back: 5")])
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_plan_and_face_turn_with_the_head(run, tmp_path, head, template, move):
+    """On the given mesh, which turns with the head: a remeshed skin is another one in another pose."""
+    turn = Rotation.from_euler("xyz", [-10, 5, -6], degrees=True).as_matrix()
+    turn_head(tmp_path, turn)
+    ways, pieces, motions = [], [], []
+    for folder, axes in ((".", np.eye(3)), ("turned", turn)):
+        write_scene(tmp_path / folder, f"osteotomies: [{{bone: {TEMPLATES[template]}, piece: part, "
+                                       f"template: {template}, kerf: 2.5}}]\n"
+                                       f"moves: [{{bone: part, clinical: {{{move}}}}}]\n",
+                    tissue="layers: 4, edge: given")
+        for program, *more in (("repose-osteotomy",), ("repose-solve", "-skip_other_rest")):
+            result = run(program, f"{folder}/scene.yaml", "-output", f"{folder}/face", *more)
+            assert (result.returncode, result.stderr) == (0, ""), result
+        pieces.append(meshio.read(tmp_path / folder / "face_part.ply").points @ axes)
+        model, rest = (of(tmp_path / folder / "face.h5") for of in (model_of, last))
+        motions.append(axes.T @ model["bone_transform"][-1, :3] @ np.block(
+            [[axes, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
+        skin = np.flatnonzero(model["point/layer"] == 0)
+        at, now = (points[skin] @ axes for points in (model["point/position"], rest["point/position"]))
+        nearest = cKDTree(at).query([head[name] for name in MARKS], 3)[1]
+        ways.append((now - at)[nearest].mean(axis=1))
+    assert cKDTree(pieces[0]).query(pieces[1])[0].max() < 0.01
+    assert cKDTree(pieces[1]).query(pieces[0])[0].max() < 0.01
+    assert np.abs(motions[0] - motions[1]).max() < 1e-3
+    assert np.linalg.norm(ways[0], axis=1).max() > 1.5
+    assert np.linalg.norm(ways[0] - ways[1], axis=1).max() < 0.1, "mm, the accuracy"
 
 
 def lip_gap(initial, rest, head):

@@ -85,10 +85,18 @@ def test_adhesion_follows_from_the_page(lips):
 
 
 def test_the_rule_of_adhesion_is_that_of_the_landmarks(lips):
-    """11 mm above and below the edge of the incisors; 12 mm beside the corners of the mouth, from 16
-    mm in front of the upper incisors to 38 mm behind; the gap of the vestibule and 0.6 mm."""
+    """Along the head's axes 11 mm above and below the edge of the incisors; 12 mm beside the corners
+    of the mouth, from 16 mm in front of the upper incisors to 38 mm behind; the gap of the vestibule
+    and 0.6 mm."""
     markup, = json.loads((lips.folder / "head.mrk.json").read_text())["markups"]
-    mark = {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
+    axes = lips.model["adhesion/axes"]
+    assert np.allclose(axes @ axes.T, np.eye(3), rtol=0, atol=1e-12) and np.linalg.det(axes) > 0
+    mark = {point["label"]: axes @ point["position"] for point in markup["controlPoints"]}
+    across = mark["condyle_left_center"] - mark["condyle_right_center"]
+    hinge = (mark["condyle_left_center"] + mark["condyle_right_center"]) / 2
+    rise = sum(np.degrees(np.arctan2(way[2], -way[1])) for way in
+               (mark["nasion_bone"] - hinge, mark["upper_incisor_edge"] - hinge))
+    assert np.abs(across[1:]).max() < 1e-9 and across[0] > 0 and abs(rise - 14) < 1e-9
     right, left = mark["mouth_right"], mark["mouth_left"]
     upper, lower = mark["upper_incisor_edge"], mark["lower_incisor_edge"]
     line = lips.model["adhesion/lip_line"]

@@ -52,6 +52,7 @@ def springs(file):
     adhesion.attrs["tension"], adhesion.attrs["range"] = 5e-4, 2.0
     adhesion["bone"], adhesion["upper"] = np.zeros(1, np.int32), np.ones(1, np.int8)
     adhesion["box"], adhesion["reach"] = np.array([[0, 0, 0, 9, 9, 9.0]]), np.ones(1)
+    adhesion["axes"] = np.eye(3)
     adhesion["lip_line"], adhesion["cut_column"] = np.eye(3), np.array([1, 2])
 
 

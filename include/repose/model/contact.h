@@ -60,12 +60,13 @@ struct AdhesionRule {
   struct Jaw {
     int32_t bone = -1;   ///< row of Model::bones
     bool upper = false;  ///< of points below the skin above the line between the lips, or below it
-    Vec3 low, high;      ///< mm, corners of the box that they lie in
+    Vec3 low, high;      ///< mm, corners of the box that they lie in, along the axes
     double reach = 0;    ///< mm, largest distance to the bone
   };
   double tension = 0;            ///< N/mm², the largest
   double range = 0;              ///< mm off the plane, at which tension is 1/√2 of the largest
-  std::array<Vec3, 3> lip_line;  ///< mm, right corner of the mouth, stomion, left corner
+  Mat3 axes = Mat3::Identity();  ///< rows: left, back and up of the head
+  std::array<Vec3, 3> lip_line;  ///< mm along the axes, right corner of the mouth, stomion, left
   std::vector<Jaw> jaws;         ///< the upper one first
   std::vector<int64_t> cut_columns;  ///< on the path of a cut: none of their points adheres
 };

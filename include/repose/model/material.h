@@ -75,8 +75,9 @@ void assemble_edges(const std::string& file, Model& model);
 struct RingMuscle {
   double tone = 0;  ///< N/mm², stress along the fibers at the line between the lips; 0: no muscle
   Vec3 right = Vec3::Zero(), left = right,
-       stomion = right;        ///< corners and middle of that line, mm
-  double top = 0, bottom = 0;  ///< z, mm, where the tone is 0
+       stomion = right;          ///< corners and middle of that line, mm
+  double top = 0, bottom = 0;    ///< z, mm, where the tone is 0
+  Mat3 axes = Mat3::Identity();  ///< rows left, back and up, along which all coordinates are
 };
 
 /// The ring muscle of a scene: of no tone where the scene has no anatomy, no solid, or lacks one of

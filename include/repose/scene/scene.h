@@ -86,6 +86,12 @@ struct Box {
   Vec3 center, size;  ///< mm
 };
 
+/// A box along axes of its own.
+struct TurnedBox {
+  Box box;    ///< of axes · x
+  Mat3 axes;  ///< rows, unit vectors at right angles
+};
+
 /// A place that a label of a volume marks.
 struct LabelRegion {
   std::filesystem::path volume;  ///< absolute
@@ -124,7 +130,7 @@ struct CurveRegion {
   double radius;           ///< mm
 };
 
-using Region = std::variant<SphereRegion, Box, MeshRegion, LabelRegion, CurveRegion>;
+using Region = std::variant<SphereRegion, Box, TurnedBox, MeshRegion, LabelRegion, CurveRegion>;
 using SkinRegion = std::variant<Region, PaintedRegion>;
 
 /// Attachment of tissue that ends at bone: it moves with it; it keeps its distance and slides
@@ -275,6 +281,7 @@ struct Collision {
 struct AnatomyPlan {
   std::filesystem::path file;  ///< absolute, of the landmarks
   Landmarks landmarks;
+  Mat3 axes = Mat3::Identity();     ///< rows: left, back and up of the head in the scan
   bool part_lips = true;            ///< where the scene has no mouth of its own
   bool vestibule = true;            ///< tissue in front of teeth touches them and is not attached
   double gap = 1;                   ///< mm, of the vestibule, between mucosa and teeth
@@ -288,9 +295,9 @@ struct AnatomyPlan {
 /// at most 4 mm. The lower lip lies on the upper incisors, and a wedge is left to its sulcus.
 double gap_of_lower_teeth(const AnatomyPlan& plan);
 
-/// Lowest and highest x and y of the vestibule, mm: 12 mm beyond the corners of the mouth, from 16
-/// mm in front of the upper incisal edge to 38 mm behind it. Throws std::out_of_range without these
-/// landmarks.
+/// Lowest and highest x and y of the vestibule along the axes of the head, mm: 12 mm beyond the
+/// corners of the mouth, from 16 mm in front of the upper incisal edge to 38 mm behind it. Throws
+/// std::out_of_range without these landmarks.
 std::array<Eigen::Vector2d, 2> vestibule_sides(const AnatomyPlan& plan);
 
 struct Scene {

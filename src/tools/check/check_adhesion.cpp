@@ -136,8 +136,9 @@ std::vector<Film> find_films(const Model& model) {
       if (points.layer[i] != deepest || cut.contains(points.column[i])) continue;
       const auto top = skin.find(points.column[i]);
       if (top == skin.end()) continue;
-      const Vec3 &at = points.position[i], &above = points.position[top->second];
-      if (!is_inside(at, jaw)) continue;
+      const Vec3& at = points.position[i];
+      const Vec3 above = rule.axes * points.position[top->second];
+      if (!is_inside(rule.axes * at, jaw)) continue;
       if ((above.z() > lip_height(rule.lip_line, above.x())) != jaw.upper) continue;
       const std::optional<Vec3> tooth = teeth.closest_point(at, jaw.reach);
       if (!tooth || teeth.contains(at)) continue;

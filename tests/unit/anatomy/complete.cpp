@@ -10,6 +10,7 @@
 #include "repose/anatomy/propose.h"
 #include "repose/surface/read.h"
 #include "repose/surface/triangle_tree.h"
+#include "scene/head_axes.h"
 
 namespace repose::anatomy {
 namespace {
@@ -65,6 +66,7 @@ Completed complete_turned(double degrees) {
   plan.landmarks = propose_landmarks(skin, skull, mandible, {}).found;
   const Mat3 turn = Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::UnitX()).toRotationMatrix();
   for (auto& [name, place] : plan.landmarks) place = turn * place;
+  plan.axes = scene::head_axes(plan.landmarks);
   for (surface::Surface* surface : {&skin, &skull, &mandible})
     for (Vec3& place : surface->points) place = turn * place;
   plan.part_lips = plan.vestibule = false;
@@ -97,7 +99,8 @@ TEST(CompleteScene, LowerTeethHaveAGapOfTheirOwnBelowStomion) {
   const Completed done = complete_shipped();
   const scene::AttachRegion &whole = done.scene.tissue.attach_regions.at(0),
                             &lower = done.scene.tissue.attach_regions.at(1);
-  const auto &outer = std::get<scene::Box>(whole.where), &inner = std::get<scene::Box>(lower.where);
+  const auto &outer = std::get<scene::TurnedBox>(whole.where).box,
+             &inner = std::get<scene::TurnedBox>(lower.where).box;
   const double stomion = done.scene.anatomy->landmarks.at("stomion").z();
   EXPECT_NEAR(inner.center.z() + inner.size.z() / 2, stomion, 1e-9);
   EXPECT_NEAR(inner.center.z() - inner.size.z() / 2, outer.center.z() - outer.size.z() / 2, 1e-9);
@@ -108,7 +111,7 @@ TEST(CompleteScene, LowerTeethHaveAGapOfTheirOwnBelowStomion) {
 
 /// The first region of a scene, a box, lies between the heights of two of its landmarks.
 void expect_between(const Completed& done, const char* low, const char* high) {
-  const auto& box = std::get<scene::Box>(done.scene.tissue.attach_regions.at(0).where);
+  const auto& box = std::get<scene::TurnedBox>(done.scene.tissue.attach_regions.at(0).where).box;
   const scene::Landmarks& marks = done.scene.anatomy->landmarks;
   EXPECT_NEAR(box.center.z() + box.size.z() / 2, marks.at(high).z(), 1e-9);
   EXPECT_NEAR(box.center.z() - box.size.z() / 2, marks.at(low).z(), 1e-9);

@@ -13,18 +13,20 @@ const std::vector<Vec3> skin = {{0, -90, 10}, {0, -90, -10}, {1, -90, 0}, {1, -9
 const scene::Landmarks marks = {
     {"upper_lip", {0, -90, 10}}, {"lower_lip", {0, -90, -10}}, {"stomion", {0, -90, 0}}};
 
+const Vec3 up(0, 0, 1);
+
 /// The sentence for lips that move so, with either one's point at stomion first.
 std::string after(const Vec3& upper, const Vec3& lower) {
   const std::vector<Vec3> upper_first = {skin[0] + upper, skin[1] + lower, skin[2] + upper,
                                          skin[3] + lower};
   std::vector<Vec3> lower_first = upper_first;
   std::swap(lower_first[2], lower_first[3]);
-  const std::string text = describe_lips(marks, skin, upper_first);
-  EXPECT_EQ(describe_lips(marks, skin, lower_first), text);
+  const std::string text = describe_lips(marks, up, skin, upper_first);
+  EXPECT_EQ(describe_lips(marks, up, skin, lower_first), text);
   return text;
 }
 
-TEST(LipGap, IsMeasuredAlongZ) {
+TEST(LipGap, IsMeasuredUpwards) {
   EXPECT_EQ(after({0, -1, 2.5}, {0, 3, 0}), "Lips 2.5 mm apart at stomion, together before. ");
   EXPECT_EQ(after({0, 0, 0}, {0, 0, -1}), "Lips 1.0 mm apart at stomion, together before. ");
 }
@@ -35,8 +37,8 @@ TEST(LipGap, LipsThatSlideAlongEachOtherAreClosed) {
 }
 
 TEST(LipGap, NeedsPartedLipsAndTheirLandmarks) {
-  EXPECT_EQ(describe_lips({}, skin, skin), "");
-  EXPECT_EQ(describe_lips(marks, {skin[0], skin[1], skin[2]}, {skin[0], skin[1], skin[2]}), "");
+  EXPECT_EQ(describe_lips({}, up, skin, skin), "");
+  EXPECT_EQ(describe_lips(marks, up, {skin[0], skin[1], skin[2]}, {skin[0], skin[1], skin[2]}), "");
 }
 
 }  // namespace

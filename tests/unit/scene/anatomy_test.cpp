@@ -10,20 +10,14 @@
 namespace repose::scene::by_landmarks {
 namespace {
 
-/// A head whose axes are those of the scan: upper incisors 5 mm in front of the lower and 2 mm
-/// below their edge.
+/// A head whose axes are those of the scan, for it has no nasion: upper incisors 5 mm in front of
+/// the lower and 2 mm below their edge.
 Landmarks head() {
-  return {{"nasion_bone", {0, -85, 50}},
-          {"nasal_spine", {0, -88, 0}},
-          {"upper_incisor_edge", {0, -90, -26}},
-          {"lower_incisor_edge", {0, -85, -24}},
-          {"b_point", {0, -84, -44}},
-          {"pogonion_bone", {0, -86, -60}},
-          {"menton_bone", {0, -80, -66}},
-          {"condyle_right_center", {-50, 0, 0}},
-          {"condyle_left_center", {50, 0, 0}},
-          {"mouth_right", {-25, -90, -24}},
-          {"mouth_left", {25, -90, -24}}};
+  return {{"nasal_spine", {0, -88, 0}},          {"upper_incisor_edge", {0, -90, -26}},
+          {"lower_incisor_edge", {0, -85, -24}}, {"b_point", {0, -84, -44}},
+          {"pogonion_bone", {0, -86, -60}},      {"menton_bone", {0, -80, -66}},
+          {"condyle_right_center", {-50, 0, 0}}, {"condyle_left_center", {50, 0, 0}},
+          {"mouth_right", {-25, -90, -24}},      {"mouth_left", {25, -90, -24}}};
 }
 
 Scene read(const Landmarks& landmarks, const std::string& more, const std::string& anatomy = "",
@@ -107,6 +101,7 @@ TEST(Septum, StiffensTheNoseBelowTheScenesOwnRegions) {
             }).find("anatomy.septum needs the landmark pronasale, which"),
             std::string::npos);
   marks["pronasale"] = {0, -112, 15};
+  marks["nasion_bone"] = {0, -85, 50};
   const Scene scene = read(marks, "", ", septum: 0.8",
                            "layers: 4, material: {poisson: 0.4, regions: [{sphere: {center: [0, 0, "
                            "0], radius: 1}, young: 2}]}");
@@ -150,16 +145,77 @@ TEST(OsteotomyTemplate, SplitIsAlikeOnBothSides) {
     expect_near(sheet.points[i + 8], sheet.points[i].cwiseProduct(Vec3(-1, 1, 1)));
 }
 
-TEST(OsteotomyTemplate, SplitGoesWithTheMandibleWhateverTheScansPitch) {
-  const CutSheet level = *read(head(), split).osteotomies[0].sheet;
-  for (const double degrees : {-15, 10}) {
-    const Mat3 turn = Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::UnitX()).toRotationMatrix();
-    Landmarks turned = head();
-    for (auto& [name, place] : turned) place = turn * place;
-    const CutSheet sheet = *read(turned, split).osteotomies[0].sheet;
-    for (size_t i = 0; i < 16; ++i)  // of landmarks with six digits
-      EXPECT_LT((sheet.points[i] - turn * level.points[i]).norm(), 1e-3) << i;
+/// Rotations of a scan about x, y and z, degrees.
+std::vector<Mat3> scans() {
+  constexpr double degree = M_PI / 180;
+  std::vector<Mat3> turns;
+  for (const Vec3& by : {Vec3(-15, 0, 0), Vec3(10, 0, 0), Vec3(-10, 5, -8)})
+    turns.push_back((Eigen::AngleAxisd(by.z() * degree, Vec3::UnitZ()) *
+                     Eigen::AngleAxisd(by.y() * degree, Vec3::UnitY()) *
+                     Eigen::AngleAxisd(by.x() * degree, Vec3::UnitX()))
+                        .toRotationMatrix());
+  return turns;
+}
+
+/// The head with a nasion, by which its level is known.
+Landmarks level_head(const Mat3& turn = Mat3::Identity()) {
+  Landmarks turned = head();
+  turned["nasion_bone"] = {0, -85, 50};
+  for (auto& [name, place] : turned) place = turn * place;
+  return turned;
+}
+
+constexpr double digits = 1e-3;  // mm, to which landmarks with six digits place what follows
+
+TEST(OsteotomyTemplate, TurnsWithTheHead) {
+  const CutSheet sheet = *read(level_head(), split).osteotomies[0].sheet;
+  for (const Mat3& turn : scans()) {
+    const CutSheet turned = *read(level_head(turn), split).osteotomies[0].sheet;
+    for (size_t i = 0; i < 16; ++i)
+      EXPECT_LT((turned.points[i] - turn * sheet.points[i]).norm(), digits) << i;
   }
+  for (const std::string& cut : {le_fort, chin}) {
+    const std::vector<CutPlane> planes = read(level_head(), cut).osteotomies[0].planes;
+    for (const Mat3& turn : scans()) {
+      const std::vector<CutPlane> turned = read(level_head(turn), cut).osteotomies[0].planes;
+      ASSERT_EQ(turned.size(), planes.size());
+      for (size_t k = 0; k < planes.size(); ++k) {
+        EXPECT_LT((turned[k].point - turn * planes[k].point).norm(), digits) << cut;
+        EXPECT_LT((turned[k].normal - turn * planes[k].normal).norm(), 1e-5) << cut;
+      }
+    }
+  }
+}
+
+TEST(HeadAxes, TurnWithTheHeadAndNeedCondylesAndALevel) {
+  const Mat3 axes = read(level_head(), "").anatomy->axes;
+  EXPECT_LT((axes * axes.transpose() - Mat3::Identity()).norm(), 1e-12);
+  for (const Mat3& turn : scans())
+    EXPECT_LT((read(level_head(turn), "").anatomy->axes * turn - axes).norm(), 1e-5);
+  // Both directions from the condyles rise by 14° together.
+  const auto rise = [&](const char* name) {
+    const Vec3 way = axes * level_head().at(name);
+    return std::atan2(way.z(), -way.y());
+  };
+  EXPECT_NEAR((rise("nasion_bone") + rise("upper_incisor_edge")) * 180 / M_PI, 14, 1e-9);
+  EXPECT_EQ(read(head(), "").anatomy->axes, Mat3(Mat3::Identity()));
+  Landmarks bare = level_head(scans()[0]);
+  bare.erase("condyle_left_center");
+  bare.erase("condyle_right_center");
+  EXPECT_EQ(read(bare, "").anatomy->axes, Mat3(Mat3::Identity()));
+}
+
+TEST(ClinicalMove, TurnsWithTheHead) {
+  const std::string more = le_fort +
+                           "moves: [{bone: maxilla, clinical: {advance: 5, impaction: 2, left: 1, "
+                           "yaw: 3, roll: -2, pitch: 4}}]\n";
+  const RigidMotion level = read(level_head(), more).moves[2];
+  const Vec3 place(10, -80, -20);
+  for (const Mat3& turn : scans())
+    EXPECT_LT(
+        (read(level_head(turn), more).moves[2].apply(turn * place) - turn * level.apply(place))
+            .norm(),
+        digits);
 }
 
 TEST(OsteotomyTemplate, ExcludesCutsOfOnesOwn) {
