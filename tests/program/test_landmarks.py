@@ -4,7 +4,10 @@ import json
 import re
 import sys
 
+import meshio
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from conftest import PROJECT, finish, programs
 
@@ -27,6 +30,22 @@ def test_writes_landmarks_and_a_picture(run, tmp_path):
     assert found["mouth_left"][0] > 10 > -10 > found["mouth_right"][0]
     assert (tmp_path / "head.svg").read_text().startswith("<svg")
     assert "remark: the mouth is open in SKIN" in result.stdout
+
+
+@pytest.mark.parametrize("degrees", [-20, 20])
+def test_a_pitched_scan_has_the_same_landmarks(run, tmp_path, degrees):
+    turn = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+    surfaces = []
+    for part in ("skin", "skull", "mandible"):
+        mesh = meshio.read(MESHES / f"head_{part}.ply")
+        mesh.points = mesh.points @ turn.T
+        mesh.write(tmp_path / f"{part}.ply")
+        surfaces += [f"-{part}", f"{part}.ply"] if surfaces else [f"{part}.ply"]
+    for name, given in (("upright", SURFACES), ("pitched", surfaces)):
+        assert run("repose-landmarks", *given, "-output", name).returncode == 0
+    upright, pitched = (points(tmp_path / f"{name}.mrk.json") for name in ("upright", "pitched"))
+    assert pitched.keys() == upright.keys()
+    assert max(np.linalg.norm(turn.T @ place - upright[name]) for name, place in pitched.items()) < 0.5
 
 
 def test_known_landmarks_are_kept(run, tmp_path):
