@@ -10,9 +10,9 @@ namespace repose::app {
 /// Row of the point nearest to a place; 0 without points.
 size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points);
 
-/// Returns how the face moved, in one line for a person: places of the face along `axes`, the rows
-/// left, back and up, the largest movement and where it is. `initial` and `moved` [points] of the
-/// skin, mm.
+/// Returns one sentence on how the face moved: each place's components along `axes` (rows left,
+/// back and up, unit vectors), the largest movement and where it is. `initial` and `moved` [points]
+/// of the skin, mm.
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
 

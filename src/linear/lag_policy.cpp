@@ -21,11 +21,13 @@ void LagPolicy::observe(KSP krylov) {
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov, &reason));
   constexpr double endless = std::numeric_limits<double>::infinity();
-  const bool failed = reason == KSP_DIVERGED_INDEFINITE_PC || reason == KSP_DIVERGED_ITS;
+  const bool indefinite = reason == KSP_DIVERGED_INDEFINITE_PC;
+  const bool failed = indefinite || reason == KSP_DIVERGED_ITS;
   // Cut short by the trust region or negative curvature, whose measure is the preconditioner's: an
   // old one then leads astray, in a number of Newton steps that no count of iterations tells.
   const bool cut = reason > 0 && reason != KSP_CONVERGED_RTOL && reason != KSP_CONVERGED_ATOL;
   if ((failed || cut) && !new_) spent_ = endless;
+  if (indefinite && new_) new_iterations_ = endless;
   const PetscReal* norm = nullptr;
   PetscInt norms = 0;
   check(KSPGetResidualHistory(krylov, &norm, &norms));

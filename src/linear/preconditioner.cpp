@@ -15,6 +15,11 @@ namespace {
 
 constexpr const char* columns_type = "columns";
 
+void choose_factors(PC pc) {
+  check(PCSetType(pc, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
 /// MUMPS sets too little memory aside for factors on many ranks.
 void give_room(PC pc) {
   constexpr int more_memory = 14, percent = 100;  // ICNTL
@@ -46,6 +51,10 @@ bool is_columns(PC pc) {
   return same;
 }
 
+int64_t unknowns(const discrete::Positions& positions) {
+  return 3 * positions.part().total_unknowns;  // scalar, of all ranks
+}
+
 }  // namespace
 
 HessianPreconditioner::HessianPreconditioner(discrete::Positions& positions,
@@ -61,9 +70,8 @@ void HessianPreconditioner::make() {
     check(PCSetType(pc_, columns_type));
     check(PCSetApplicationContext(pc_, this));
     check(PCShellSetApply(pc_, apply_columns));
-  } else if (3 * positions_.part().total_unknowns <= factors_limit) {
-    check(PCSetType(pc_, PCCHOLESKY));
-    check(PCFactorSetMatSolverType(pc_, MATSOLVERMUMPS));
+  } else if (unknowns(positions_) <= factors_limit) {
+    choose_factors(pc_);
   } else {
     check(PCSetType(pc_, PCGAMG));
   }
@@ -73,6 +81,7 @@ void HessianPreconditioner::make() {
 
 void HessianPreconditioner::reset() {
   columns_.reset();
+  factors_ = {};
   pc_ = {};
   make();
   renewals_ = 0;
@@ -114,7 +123,7 @@ PetscErrorCode HessianPreconditioner::after_solve(KSP krylov, Vec, Vec, void* me
 void HessianPreconditioner::renew_if_worn() {
   const bool moved = hessian_.assemblies() != made_at_;
   if (moved) lag_.move();
-  const bool renew = renewals_ == 0 || (moved && lag_.should_rebuild());
+  const bool renew = renewals_ == 0 || use_direct_fallback() || (moved && lag_.should_rebuild());
   check(PCSetReusePreconditioner(pc_, renew ? PETSC_FALSE : PETSC_TRUE));
   if (renew) rebuild();
 }
@@ -124,6 +133,10 @@ void HessianPreconditioner::renew() {
   if (columns_ && hessian_.states() == made_at_state_) return update_contact();
   check(PCSetReusePreconditioner(pc_, PETSC_FALSE));
   rebuild();
+}
+
+bool HessianPreconditioner::use_direct_fallback() const {
+  return columns_ && lag_.stagnates() && !factors_ && unknowns(positions_) <= factors_limit;
 }
 
 void HessianPreconditioner::rebuild() {
@@ -146,10 +159,22 @@ void HessianPreconditioner::rebuild_columns() {
   const BlockSource blocks = [this](const discrete::BlockVisitor& visit) {
     hessian_.visit_spd_blocks(visit);
   };
-  if (columns_)
+  if (use_direct_fallback()) {
+    columns_.reset();
+    check(PCCreate(positions_.comm(), factors_.out()));
+    choose_factors(factors_);
+    lag_ = LagPolicy(price_of_renewal(price_of_factors));
+  }
+  if (factors_) {
+    hessian_.renew();
+    check(PCSetOperators(factors_, hessian_.spd_approximation(), hessian_.spd_approximation()));
+    give_room(factors_);
+    check(PCSetUp(factors_));
+  } else if (columns_) {
     columns_->refill(blocks);
-  else
+  } else {
     columns_ = std::make_shared<ColumnMultigrid>(positions_.comm(), positions_.part(), blocks);
+  }
   update_contact();
 }
 
@@ -162,6 +187,7 @@ void HessianPreconditioner::update_contact() {
 PetscErrorCode HessianPreconditioner::apply_columns(PC pc, Vec r, Vec z) {
   HessianPreconditioner* self = nullptr;
   if (const PetscErrorCode code = PCGetApplicationContext(pc, &self)) return code;
+  if (self->factors_) return PCApply(self->factors_, r, z);
   try {
     static const PetscLogEvent event = base::log_event("RpColumns");
     const base::Logged logged(event);

@@ -171,7 +171,7 @@ class LinearResponse {
   /// Solves H response = load; 0 where that fails. Collective.
   void solve(Vec load, Vec response) {
     convex_ = solver_.solve(displacement_, load, response, close);
-    // Where iterations ran out, the next solve renews the preconditioner.
+    // Where iterations ran out, the next solve renews the preconditioner or takes factors.
     if (convex_ && !solver_.finished())
       convex_ = solver_.solve(displacement_, load, response, close);
     finished_ = solver_.finished();

@@ -16,6 +16,13 @@ class LagPolicy {
 
   /// Returns whether a new one is worth its price.
   bool should_rebuild() const { return spent_ > price_; }
+  /// Returns whether a new one was too slow, given enough iterations: a solve near a state where
+  /// the stiffness is singular is slow with any preconditioner.
+  bool stagnates() const {
+    constexpr double slowest = 15;  // iterations per e-fold
+    constexpr double proof = 300;   // iterations
+    return new_iterations_ > proof && new_rate() > slowest;
+  }
   void renew();  ///< a new one is made at the state
   void move();   ///< the state changes
   /// Takes in a solve just ended, whose residual history was recorded. The same on all ranks.

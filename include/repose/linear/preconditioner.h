@@ -18,10 +18,11 @@ struct KeptPreconditioner {
 };
 
 /// Preconditioner of a Hessian, made from its convex relative: by default multigrid on columns
-/// (`-pc_type columns`, column_multigrid.h); where that does not work, MUMPS' Cholesky factors, up
-/// to `factors_limit` unknowns. One made at one state serves the next ones until it is worn out
-/// (lag_policy.h). `-pc_…` options apply, and `-pc_renewal_price`: the iterations that it may cost
-/// before it is renewed. The Hessian is assembled by the caller. All members collective.
+/// (`-pc_type columns`, column_multigrid.h); falls back to MUMPS' Cholesky factors when that
+/// stagnates; these also serve where multigrid does not work, up to `factors_limit` unknowns. One
+/// made at one state serves the next ones until it is worn out (lag_policy.h). `-pc_…` options
+/// apply, and `-pc_renewal_price`: the iterations that it may cost before it is renewed. The
+/// Hessian is assembled by the caller. All members collective.
 class HessianPreconditioner {
  public:
   static constexpr int64_t factors_limit = 600000;  ///< scalar unknowns
@@ -50,18 +51,21 @@ class HessianPreconditioner {
   std::shared_ptr<const KeptPreconditioner> keep() const;
   void restore(const KeptPreconditioner& kept);  ///< right after construction or reset()
 
+  bool by_factors() const { return factors_ != nullptr; }  ///< the direct fallback is in use
   int64_t renewals() const { return renewals_; }
 
  private:
   static PetscErrorCode after_solve(KSP krylov, Vec rhs, Vec solution, void* me);
   static PetscErrorCode apply_columns(PC pc, Vec r, Vec z);
   void make();
+  bool use_direct_fallback() const;
   void rebuild_columns();
 
   discrete::Positions& positions_;
   discrete::Hessian& hessian_;
   PcHandle pc_;
   std::shared_ptr<ColumnMultigrid> columns_;
+  PcHandle factors_;  // in the place of columns_
   LagPolicy lag_;
   int64_t renewals_ = 0;
   int64_t made_at_ = -1, made_at_state_ = -1;  // assemblies and states at the last renewal

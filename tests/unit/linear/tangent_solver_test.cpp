@@ -56,6 +56,33 @@ TEST_P(Preconditioner, KnowsTheProductOfARoughSolution) {
   EXPECT_LT(apart, 1e-10 * length);
 }
 
+TEST(TangentSolver, GivesHopelessMultigridUpForFactors) {
+  const auto by_factors_after = [](double bulk_modulus) {
+    Solved s;
+    s.objective.set_volume_weight(bulk_modulus);
+    linear::TangentSolver solver(s.positions, s.tangent);
+    const base::VecHandle start = s.positions.make_vector(), next = s.vector(1, 1e-12);
+    solver.solve(start, s.rhs, s.answer, 1e-6);
+    EXPECT_FALSE(solver.preconditioner().by_factors());
+    EXPECT_TRUE(solver.solve(next, s.rhs, s.answer, 1e-10));
+    EXPECT_LT(s.residual(next), 1e-6);
+    return solver.preconditioner().by_factors();
+  };
+  EXPECT_FALSE(by_factors_after(0.4));
+  EXPECT_TRUE(by_factors_after(4e5));
+}
+
+TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
+  const base::ScopedOption few("-ksp_max_it", "200");
+  Solved s;
+  s.objective.set_volume_weight(1e3);
+  linear::TangentSolver solver(s.positions, s.tangent);
+  solver.solve(s.positions.make_vector(), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.finished());
+  solver.solve(s.vector(1, 1e-12), s.rhs, s.answer, 1e-6);
+  EXPECT_FALSE(solver.preconditioner().by_factors());
+}
+
 INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));
 
 }  // namespace tangent_solver_test
