@@ -8,6 +8,7 @@
 #include "flops.h"
 #include "repose/base/log.h"
 #include "repose/base/petsc.h"
+#include "repose/mechanics/prism_volume.h"
 
 namespace repose::discrete {
 
@@ -51,7 +52,8 @@ PetscErrorCode Tangent::multiply(Mat matrix, Vec direction, Vec product) {
     objective.positions().scatter_to_local(direction, self->direction_);
     std::fill(self->work_.begin(), self->work_.end(), Vec3::Zero());
     mechanics::add_hessian_action(objective.loops(), self->at_, objective.weights(),
-                                  self->direction_, self->work_, self->nodal_slopes_);
+                                  self->direction_, self->work_, self->nodal_slopes_,
+                                  self->max_slope_);
     Objective::add_blocks(self->blocks_, self->direction_, self->work_);
     objective.positions().restrict_to_owned(self->work_, product);
   } catch (const std::exception&) {
@@ -96,15 +98,40 @@ void Tangent::assemble(Vec displacement) {
   at_.assign(now.begin(), now.end());
   if (!same) {
     ++states_;
-    nodal_slopes_ = mechanics::nodal_slopes(objective_.loops().nodal, at_);
+    take_slopes();
   }
   set_contact(objective_.contact_blocks(true), objective_.contact_blocks(false));
+}
+
+void Tangent::take_slopes() {
+  const mechanics::Loops& loops = objective_.loops();
+  nodal_slopes_ = mechanics::nodal_slopes(loops.nodal, at_);
+  max_slope_.clear();
+  if (!limited_) return;
+  max_slope_ = mechanics::semidefinite_slopes(
+      loops.prisms, objective_.positions().part().model.points.position, at_);
+  if (nodal_slopes_.empty()) return;
+  for (size_t m = 0; m < max_slope_.size(); ++m) {
+    const auto corners = base::pick(at_, loops.prisms.points[m]);
+    const int64_t place = loops.nodal.place[loops.prisms.row[m]];
+    const double own =
+        mechanics::own_slope(loops.nodal, place, mechanics::prism_volume(corners.data()));
+    double& slope = nodal_slopes_[place];
+    slope = std::clamp(own + slope, -max_slope_[m], max_slope_[m]) - own;
+  }
+}
+
+bool Tangent::limit_slopes(bool limited) {
+  if (!objective_.loops().solid()) return false;
+  limited_ = limited;
+  if (!at_.empty()) take_slopes();
+  return true;
 }
 
 void Tangent::set_contact(std::vector<Objective::Block> exact,
                           std::vector<Objective::Block> convex) {
   blocks_ = std::move(exact);
-  std::ranges::copy(objective_.term_blocks(true), std::back_inserter(blocks_));
+  std::ranges::copy(objective_.term_blocks(!limited_), std::back_inserter(blocks_));
   convex_contact_ = std::move(convex);
   convex_terms_ = objective_.term_blocks(false);
   contact_changed_ = false;

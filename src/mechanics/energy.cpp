@@ -105,7 +105,8 @@ double edge_gradient(const EdgeLoop& loop, const Section& rows, std::span<const 
 /// The prisms e and e + 1 of a range that ends at `end`: two, or the last one twice.
 class TwoPrisms {
  public:
-  TwoPrisms(const PrismLoop& loop, int64_t e, int64_t end) : count_(e + 1 < end ? 2 : 1) {
+  TwoPrisms(const PrismLoop& loop, int64_t e, int64_t end)
+      : first_(e), count_(e + 1 < end ? 2 : 1) {
     const int64_t second = e + count_ - 1;
     corner_ = {&loop.points[e], &loop.points[second]};
     compliance = Pair{loop.compliance[e], loop.compliance[second]};
@@ -128,11 +129,17 @@ class TwoPrisms {
         sum[2] += corners[c].z[k];
       }
   }
+  Pair clamp(Pair values, std::span<const double> largest) const {
+    for (int k = 0; k < count_; ++k)
+      values[k] = std::clamp(values[k], -largest[first_ + k], largest[first_ + k]);
+    return values;
+  }
   double sum(Pair values) const { return count_ == 2 ? values[0] + values[1] : values[0]; }
 
   Pair compliance, target_volume;
 
  private:
+  int64_t first_;
   int count_;
   std::array<const std::array<int32_t, 6>*, 2> corner_;
 };
@@ -161,7 +168,8 @@ double prism_gradient(const PrismLoop& loop, const Section& rows, std::span<cons
 }
 
 void prism_action(const PrismLoop& loop, std::span<const Vec3> position, const Weights& weights,
-                  std::span<const Vec3> direction, std::span<Vec3> product) {
+                  std::span<const double> max_slope, std::span<const Vec3> direction,
+                  std::span<Vec3> product) {
   for (int64_t e = 0; e < loop.size(); e += 2) {
     const TwoPrisms prisms(loop, e, loop.size());
     const PrismEdges<Pair> edges(prisms.gather(position));
@@ -169,7 +177,8 @@ void prism_action(const PrismLoop& loop, std::span<const Vec3> position, const W
     const PrismSlope<Pair> v(edges);
     const PrismTriples<Pair> turned = prism_slope_change(edges, PrismEdges<Pair>(moves));
     const Pair stiffness = volume_stiffness(weights, prisms.compliance);
-    const Pair slope = stiffness * (v.volume - prisms.target_volume);
+    Pair slope = stiffness * (v.volume - prisms.target_volume);
+    if (!max_slope.empty()) slope = prisms.clamp(slope, max_slope);
     Pair change{};
     for (int c = 0; c < 6; ++c) change += v.gradient[c].dot(moves[c]);
     const Pair bend = stiffness * change;
@@ -229,7 +238,7 @@ double add_volume_gradient(const Loops& loops, std::span<const Vec3> position,
 
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
                         std::span<const Vec3> direction, std::span<Vec3> product,
-                        std::span<const double> nodal_slopes) {
+                        std::span<const double> nodal_slopes, std::span<const double> max_slope) {
   for (const SpringLoop& loop : loops.springs)
     with_exponent(loop.exponent, [&]<int p>() {
       spring_action<p>(loop, position, weights.elastic, direction, product);
@@ -237,7 +246,7 @@ void add_hessian_action(const Loops& loops, std::span<const Vec3> position, cons
   if (loops.edges.size() > 0) add_edge_gradient(loops.edges, direction, weights.elastic, product);
   if (weights.volume == VolumeTerm::none) return;
   if (loops.nodal.empty())
-    prism_action(loops.prisms, position, weights, direction, product);
+    prism_action(loops.prisms, position, weights, max_slope, direction, product);
   else
     add_nodal_action(loops.nodal, position, nodal_slopes, weights.volume_weight, direction,
                      product);

@@ -259,6 +259,11 @@ bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
     curvature_ = convex_curvature_;
     found = search(displacement, slope, tolerance, step);
   }
+  if (!found && tangent_.limit_slopes(true)) {
+    multiplier_ = multiplier;
+    found = search(displacement, slope, tolerance, step);
+    tangent_.limit_slopes(false);
+  }
   if (found) give_multipliers();
   return found;
 }

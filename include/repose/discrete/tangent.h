@@ -24,6 +24,11 @@ class Tangent : public Hessian {
   /// contact until the state changes.
   void set_contact(std::vector<Objective::Block> exact, std::vector<Objective::Block> convex);
 
+  /// Lets averaged volumes turn tissue by no more than its shear stiffness outweighs, so that the
+  /// action is positive semidefinite but for contact, or takes that back. Returns false where no
+  /// volumes are averaged.
+  bool limit_slopes(bool limited);
+
   base::MatHandle make_third();  ///< a matrix for third(); collective
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
   /// update, into `matrix` of make_third(). Collective.
@@ -39,6 +44,7 @@ class Tangent : public Hessian {
  private:
   static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
   void make_action();
+  void take_slopes();
   const TangentEntries& entries();
   base::MatHandle nodal_coupling() const;
   void lift_diagonal();
@@ -53,8 +59,9 @@ class Tangent : public Hessian {
   std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative
   std::vector<Vec3> at_;                // [local points] positions of the last assembly
   std::vector<double> nodal_slopes_;    // there, where volumes are averaged
+  std::vector<double> max_slope_;       // [prisms] there, or empty: no limit
   std::vector<Vec3> direction_, work_;  // [local points]
-  bool contact_changed_ = true;
+  bool contact_changed_ = true, limited_ = false;
   int64_t filled_at_ = -1;  // assemblies() when exact_ was filled
 };
 

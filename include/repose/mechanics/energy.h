@@ -38,7 +38,8 @@ VolumeLaw volume_law(const Weights& weights, double volume, double compliance,
 /// `nodal_slopes`: those at `position` (nodal_volumes.h); empty where volumes are not averaged.
 void add_hessian_action(const Loops& loops, std::span<const Vec3> position, const Weights& weights,
                         std::span<const Vec3> direction, std::span<Vec3> product,
-                        std::span<const double> nodal_slopes);
+                        std::span<const double> nodal_slopes,
+                        std::span<const double> max_slope = {});
 
 /// Totals of a state of the tissue over the counted elements (to be summed over ranks).
 struct Totals {

@@ -70,6 +70,11 @@ NodalVolumes make_nodal_volumes(const model::Model& part, int64_t owned, int64_t
 /// places.
 std::vector<double> nodal_slopes(const NodalVolumes& nodal, std::span<const Vec3> position);
 
+/// Returns the derivative of a prism's energy that is not averaged by its volume, N/mm².
+inline double own_slope(const NodalVolumes& nodal, int64_t place, double volume) {
+  return nodal.own_stiffness[place] * (volume - nodal.own_target[place]);
+}
+
 double nodal_energy(const NodalVolumes& nodal, std::span<const Vec3> position);  ///< counted, N·mm
 
 /// Adds weight · the gradient of the averaged energy and of the prisms' own one; returns both as

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "moved_block.h"
 #include "repose/base/agreement.h"
 
@@ -97,6 +99,56 @@ INSTANTIATE_TEST_SUITE_P(Volume, Terms,
                                            Case{mechanics::VolumeTerm::paper},
                                            Case{mechanics::VolumeTerm::penalty},
                                            Case{mechanics::VolumeTerm::penalty, true}));
+
+/// Eigenvalues of the action at random displacements of 0.6 mm, in ascending order.
+Eigen::VectorXd eigenvalues(const model::Model& block, bool limited) {
+  const discrete::Part part = discrete::build_local_from_root(MPI_COMM_SELF, block).part;
+  discrete::Positions positions(MPI_COMM_SELF, part);
+  discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 1});
+  discrete::Tangent tangent(objective);
+  EXPECT_TRUE(tangent.limit_slopes(limited));
+  tangent.assemble(testing::random_vector(positions, 1, 0.6));
+  base::MatHandle dense;
+  check(MatComputeOperator(tangent.action(), MATSEQDENSE, dense.out()));
+  const double* entries = nullptr;
+  PetscInt size = 0;
+  check(MatGetSize(dense, &size, nullptr));
+  check(MatDenseGetArrayRead(dense, &entries));
+  const Eigen::MatrixXd matrix = Eigen::Map<const Eigen::MatrixXd>(entries, size, size);
+  check(MatDenseRestoreArrayRead(dense, &entries));
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
+TEST(Tangent, LimitedSlopesLeaveNoNegativeCurvature) {
+  if (base::rank(MPI_COMM_WORLD) != 0) return;
+  const model::Model averaged = testing::averaged_block();
+  model::Model by_prism = averaged;
+  by_prism.prisms.nodal_modulus.clear();
+  for (const model::Model& block : {averaged, by_prism}) {
+    EXPECT_LT(eigenvalues(block, false).minCoeff(), 0);
+    EXPECT_GT(eigenvalues(block, true).minCoeff(), 0);
+  }
+}
+
+TEST(Tangent, LimitsAreTakenBack) {
+  const testing::MovedBlock m(testing::averaged_block());
+  discrete::Positions positions(MPI_COMM_WORLD, m.part);
+  discrete::Objective objective(positions, {1, mechanics::VolumeTerm::penalty, 1});
+  discrete::Tangent tangent(objective);
+  base::VecHandle direction = m.vector(2, 1.0), product[3];
+  tangent.assemble(m.vector(1, 0.6));
+  for (int n = 0; n < 3; ++n) {
+    tangent.limit_slopes(n == 1);
+    product[n] = positions.make_vector();
+    check(MatMult(tangent.action(), direction, product[n]));
+  }
+  PetscBool same = PETSC_FALSE, limited = PETSC_FALSE;
+  check(VecEqual(product[0], product[2], &same));
+  check(VecEqual(product[0], product[1], &limited));
+  EXPECT_TRUE(same);
+  EXPECT_FALSE(limited);
+}
 
 TEST(Part, EveryRowHasOneOwner) {
   Moved m({mechanics::VolumeTerm::none});
