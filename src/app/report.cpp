@@ -66,6 +66,9 @@ std::string remedy(const solve::Summary& s, bool stretched) {
            "or lower tissue.turgor: what the skin's tension presses together beneath it may have "
            "no balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
+  if (s.path.last.overlapped > 0)
+    return " Move these bones less, or trim them: repose-collide says where they meet. The tissue "
+           "there rests on one of the two alone.";
   if (!s.path.last.stable)
     return std::string(
                " The tissue buckles there, or is between several rest positions: move the bones "

@@ -32,12 +32,44 @@ void BodyContact::reset(double stiffness) {
   const size_t count = pairs_.point.size();
   stiffness_ = stiffness;
   multiplier_.assign(count, 0.0);
+  released_.assign(count, 0);
   seen_.assign(count, Vec3::Zero());
   distance_.assign(count, -infinite);
   gap_.assign(count, infinite);
   normal_.assign(count, Vec3::Zero());
   curvature_.assign(count, Mat3::Zero());
   acting_.clear();
+}
+
+void BodyContact::set_multipliers(std::span<const double> p) {
+  multiplier_.assign(p.begin(), p.end());
+  for (size_t c = 0; c < multiplier_.size(); ++c)
+    if (released(c)) multiplier_[c] = 0;
+}
+
+std::vector<size_t> BodyContact::overlapped(double overlap) const {
+  constexpr double facing = -0.9;  // cosine of the angle of normals
+  std::vector<size_t> inside, found;
+  for (size_t c = 0; c < gap_.size(); ++c)
+    if (!slides(c) && !released(c) && gap_[c] < 0) inside.push_back(c);
+  std::ranges::stable_sort(inside, {}, [this](size_t c) { return pairs_.point[c]; });
+  const auto faces = [&](size_t c, size_t d) {
+    return gap_[c] + gap_[d] < -overlap &&
+           normal_[c].dot(normal_[d]) < facing * normal_[c].norm() * normal_[d].norm();
+  };
+  for (auto c = inside.begin(); c != inside.end(); ++c)
+    for (auto d = c + 1; d != inside.end() && pairs_.point[*d] == pairs_.point[*c]; ++d)
+      if (faces(*c, *d)) found.push_back(std::max(*c, *d));
+  return found;
+}
+
+int64_t BodyContact::release_overlapped(double overlap) {
+  const std::vector<size_t> constraints = overlapped(overlap);
+  for (const size_t c : constraints) {
+    released_[c] = 1;
+    multiplier_[c] = 0;
+  }
+  return static_cast<int64_t>(constraints.size());
 }
 
 double BodyContact::min_gap(size_t c, const Vec3& beside) const {
@@ -102,6 +134,7 @@ std::vector<LinearGap> BodyContact::linear_gaps(std::span<const Vec3> position, 
                                                 double smoothed_to) {
   std::vector<LinearGap> gaps;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    if (released(c)) continue;
     const Vec3 beside = bodies_[pairs_.body[c]].beside(position[pairs_.point[c]]);
     if (slides(c))
       measure(c, beside);

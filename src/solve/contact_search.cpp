@@ -97,6 +97,7 @@ void ContactSearch::move_multipliers() {
 }
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
+  objective_.body_contact().restore_released();
   const ContactPressures before = pressures();
   predicted_ = true;
   discrete::Positions& positions = objective_.positions();
@@ -254,6 +255,26 @@ Outcome ContactSearch::finish_reached(Vec displacement, double accuracy, int64_t
     outcome = finish(displacement, accuracy);
   }
   return outcome;
+}
+
+bool ContactSearch::has_overlapped(double accuracy) {
+  discrete::Positions& positions = objective_.positions();
+  mechanics::BodyContact& contact = objective_.body_contact();
+  contact.update_gaps(positions.local());
+  return base::on_any_rank(positions.comm(), !contact.overlapped(accuracy).empty());
+}
+
+/// Lets points between bodies that overlap rest on one of them alone, where that is allowed.
+/// Returns true if one begins to. Collective.
+bool ContactSearch::release_overlapped(double accuracy) {
+  if (!may_release_) return false;
+  discrete::Positions& positions = objective_.positions();
+  mechanics::BodyContact& contact = objective_.body_contact();
+  contact.update_gaps(positions.local());
+  const int64_t count =
+      base::sum_over_ranks(positions.comm(), contact.release_overlapped(accuracy));
+  if (count > 0) tangent_.forget_contact();
+  return count > 0;
 }
 
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
@@ -465,6 +486,11 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome = end == End::reached ? finish_reached(displacement, accuracy, iterations)
                                   : finish(displacement, accuracy);
     if (outcome.converged) break;
+    if (release_overlapped(accuracy)) {
+      needs_presolve = true;
+      ++round;
+      continue;
+    }
     if (!outcome.stable && leaves()) continue;
     needs_presolve = end != End::reached;
     stiffen(std::min(2 * times_, stiffest));
@@ -473,7 +499,11 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
-  if (outcome.converged && may_have_other && presses_near_edge(displacement))
+  outcome.overlapped =
+      base::sum_over_ranks(objective_.positions().comm(),
+                           std::ranges::count(objective_.body_contact().released(), char{1}));
+  if (outcome.converged && outcome.overlapped == 0 && may_have_other &&
+      presses_near_edge(displacement))
     find_other(displacement, accuracy, outcome);
   return outcome;
 }
@@ -481,6 +511,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
+  objective_.body_contact().restore_released();
   stiffen(1);
   int64_t iterations = 0;
   const End end = newton(displacement, accuracy, iterations);

@@ -173,6 +173,7 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   require_value(outcome, load);
   result_.last = outcome;
   result_.load = load;
+  if (load == 1) state_overlap();
   ++result_.steps;
   check(VecCopy(trial_, displacement));
   objective_.positions().update(displacement);
@@ -216,15 +217,27 @@ bool LoadPath::in_vain(const Attempt& tried) const {
 
 /// Explains the step that ends the path without rest.
 void LoadPath::explain_failure() {
-  if (result_.last.converged || result_.last.stopped || result_.halvings.count() == 0) return;
+  const Outcome& last = result_.last;
+  if (last.converged || last.stopped || last.overlapped > 0 || result_.halvings.count() == 0)
+    return;
   result_.last.reason += fmt::format("; {} load steps have been halved, which took {} evaluations",
                                      result_.halvings.count(), refused_);
+}
+
+/// Lets a rest position that bodies leave no room for count as none.
+void LoadPath::state_overlap() {
+  Outcome& last = result_.last;
+  if (!last.converged || last.overlapped == 0) return;
+  last.converged = false;
+  last.reason = fmt::format("points of tissue between bodies that overlap: {}", last.overlapped);
 }
 
 PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   discrete::Positions& positions = objective_.positions();
   result_ = {};
   refused_ = 0;
+  overlap_released_ = false;
+  search_.allow_release(false);
   begun_ = function_.evaluations();
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   if (guess && settings_.near_guess && result_.load < 1) {
@@ -249,9 +262,23 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   return result_;
 }
 
+/// Where points are between bodies that overlap at the end of a step that failed, lets them rest
+/// on one of the bodies alone from now on, and rejects the step. Returns false elsewhere, and where
+/// they do so already.
+bool LoadPath::releases_overlapped(const Attempt& tried) {
+  if (tried.outcome.converged || tried.outcome.stopped || overlap_released_) return false;
+  overlap_released_ = search_.has_overlapped(settings_.accuracy);
+  if (!overlap_released_) return false;
+  search_.allow_release(true);
+  reject_step(tried);
+  refused_ = 0;
+  return true;
+}
+
 /// Takes steps of at most `longest` until the load is `end`.
 void LoadPath::follow(Vec displacement, double longest, double end, const OnStep& on_step) {
   const double nearly = 1e-3 * longest;
+  constexpr int overlap_halvings = 4;
   double step = longest;
   int halvings = 0;
   std::optional<Attempt> coarser;
@@ -261,6 +288,12 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
     const double load = target > 1 - nearly ? 1 : target;
     const Attempt tried = attempt(displacement, load);
     const bool last = halvings == max_halvings || in_vain(tried);
+    if ((last || halvings >= overlap_halvings) && releases_overlapped(tried)) {
+      step = longest;
+      halvings = 0;
+      coarser.reset();
+      continue;
+    }
     if (tried.outcome.stopped || last || follows(tried, coarser)) {
       accept(tried.outcome, load, displacement);
       explain_failure();
@@ -291,7 +324,7 @@ void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec dis
   positions.update(start);
   search_.set_pressures(at_start);
   follow(start, automatic_step(), 1, [](const Outcome&, double, double) {});
-  if (result_.complete()) {
+  if (result_.complete() || (result_.load == 1 && result_.last.overlapped > 0)) {
     check(VecCopy(start, displacement));
     result_.steps = reached.steps + 1;
     on_step(result_.last, result_.load, watch.seconds());

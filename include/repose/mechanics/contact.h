@@ -15,7 +15,7 @@ namespace repose::mechanics {
 /// State of a constraint, per area: value (N/mm), pressure p − k g where it acts, and
 /// −d(pressure)/dg.
 struct Pressing {
-  double value, pressure, stiffness;
+  double value = 0, pressure = 0, stiffness = 0;
 };
 inline Pressing press(double gap, double multiplier, double stiffness, bool slides) {
   const double pressure = multiplier - stiffness * gap;
@@ -58,7 +58,7 @@ class BodyContact {
   bool empty() const { return pairs_.point.empty(); }
   const model::ContactPairs& pairs() const { return pairs_; }
   std::span<const double> multipliers() const { return multiplier_; }
-  void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }
+  void set_multipliers(std::span<const double> p);
   std::vector<RigidBody>& bodies() { return bodies_; }
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
@@ -100,13 +100,26 @@ class BodyContact {
   /// update, [C].
   std::span<const double> gaps() const { return gap_; }
   double pressure(size_t c) const { return now(c).pressure; }
+
+  /// Returns a constraint of each point that is inside two bodies whose surfaces face each other,
+  /// by more than `overlap` mm in all, so that it cannot leave one without going deeper into the
+  /// other: that on the latter body in the model. Of this rank, at the latest update.
+  std::vector<size_t> overlapped(double overlap) const;
+  /// Releases these constraints: they do not act until restore_released(). Returns how many.
+  int64_t release_overlapped(double overlap);
+  void restore_released() { released_.assign(released_.size(), 0); }
+  /// [C] nonzero where the constraint is released.
+  std::span<const char> released() const { return released_; }
+  bool released(size_t c) const { return released_[c] != 0; }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
  private:
   bool slides(size_t c) const { return pairs_.binding[c] == model::Binding::slides; }
   double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
   bool stays_above(double gap, size_t c, const Vec3& beside);
-  Pressing now(size_t c) const { return press(gap_[c], multiplier_[c], stiffness_, slides(c)); }
+  Pressing now(size_t c) const {
+    return released(c) ? Pressing{} : press(gap_[c], multiplier_[c], stiffness_, slides(c));
+  }
   void measure(size_t c, const Vec3& beside);
   bool measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside);
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);
@@ -116,6 +129,7 @@ class BodyContact {
   double stiffness_ = 1;
   std::vector<RigidBody> bodies_;
   std::vector<double> multiplier_;  // [C] N/mm²
+  std::vector<char> released_;      // [C] does not act
   std::vector<Vec3> seen_;          // [C] where the point was beside its body when last evaluated
   std::vector<double> distance_;    // [C] mm, then, or a lower bound
   std::vector<double> gap_;         // [C] at the latest update

@@ -45,6 +45,7 @@ struct Outcome {
   double objective = 0;
   double gradient_max = 0;  ///< N
   int64_t iterations = 0;
+  int64_t overlapped = 0;  ///< points between bodies that overlap, which rest on one of them alone
   std::string reason;
   std::optional<OtherRest> other;
 };
@@ -72,6 +73,12 @@ class RestSearch {
   virtual ContactPressures pressures() const { return {}; }
   /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
   virtual void set_pressures(const ContactPressures& /*to*/) {}
+  /// True if points of the latest search's end are between bodies that overlap, so that no place is
+  /// outside both. Collective.
+  virtual bool has_overlapped(double /*accuracy*/) { return false; }
+  /// Sets whether searches that would fail let such points rest on one of the bodies alone (false
+  /// by default).
+  virtual void allow_release(bool /*requested*/) {}
 };
 
 }  // namespace repose::solve
