@@ -84,21 +84,27 @@ class Saving {
 /// One run of a job by a strategy, under one deadline.
 class Run {
  public:
-  Run(Job& job, Strategy strategy, std::string name, base::Stages& stages, double deadline)
-      : job_(job),
+  Run(const base::Options& options, Job& job, Strategy strategy, std::string name,
+      base::Stages& stages)
+      : options_(options),
+        job_(job),
         strategy_(std::move(strategy)),
         name_(std::move(name)),
         stages_(stages),
-        interrupt_(comm, deadline, true) {
+        interrupt_(comm, number("time_limit", std::numeric_limits<double>::infinity()), true),
+        folds_allowed_(options.flag("allow_folded")) {
     strategy_.settings.interrupt = &interrupt_;
     strategy_.settings.stages = &stages_;
   }
 
   /// Begins where another run left off. Returns how that ended, if nothing is left to do.
-  std::optional<base::Exit> restart(const std::filesystem::path& file, bool folds_allowed);
-  base::Exit solve(double checkpoint_interval, bool folds_allowed);
+  std::optional<base::Exit> restart(const std::filesystem::path& file);
+  base::Exit solve();
 
  private:
+  double number(const char* option, double otherwise) const {
+    return options_.has(option) ? options_.number(option) : otherwise;
+  }
   bool is_done(const model::StepNumbers& end) const;
   void copy_result(const std::filesystem::path& file) const;
   solve::Tearing tear();
@@ -113,11 +119,13 @@ class Run {
 
   const discrete::Part& part() const { return job_.local_model.part; }
 
+  const base::Options& options_;
   Job& job_;
   Strategy strategy_;
   std::string name_;
   base::Stages& stages_;
   base::Interrupt interrupt_;
+  bool folds_allowed_;
   solve::Start start_;
   std::filesystem::path earlier_;  // the result it resumes from, …
   int64_t kept_ = 0;               // … and of its steps how many
@@ -149,7 +157,7 @@ void Run::copy_result(const std::filesystem::path& file) const {
   copy.commit();
 }
 
-std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool folds_allowed) {
+std::optional<base::Exit> Run::restart(const std::filesystem::path& file) {
   const results::Restart from =
       results::read_restart(comm, file, discrete::gather_model(comm, job_.local_model));
   start_ = {from.position, from.guess};
@@ -160,7 +168,7 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file, bool f
   base::on_root(comm, [&] {
     if (!from.end || !is_done(*from.end)) return;
     done = true;
-    folded = from.end->inverted_prisms > 0 && !folds_allowed;
+    folded = from.end->inverted_prisms > 0 && !folds_allowed_;
     print(describe_finished(file.string(), *from.end, strategy_.settings.path.accuracy, folded));
   });
   base::broadcast(comm, done, folded);
@@ -300,16 +308,16 @@ std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>
          describe_warnings(job_.warnings);
 }
 
-base::Exit Run::solve(double checkpoint_interval, bool folds_allowed) {
+base::Exit Run::solve() {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
-  Writer writer(comm, name_, job_, coarser, checkpoint_interval, unsettled(tearing));
+  Writer writer(comm, name_, job_, coarser, number("checkpoint_interval", 0), unsettled(tearing));
   if (kept_ > 0) writer.keep(earlier_, kept_);
   const Saving saving(interrupt_, writer, name_);
   const SolvedSkin skin(comm, job_);
   const solve::Summary summary = search(writer);
   writer.commit();
-  const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed;
+  const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed_;
   const std::string folds = folded ? describe_folds(summary.last, writer) : "";
   const std::vector<Vec3> now = skin.points_at(writer.slab());
   const std::string given = write_given_skin(skin, now);
@@ -347,14 +355,9 @@ std::string write_solved_skin(const Job& job, const std::string& name) {
   return report_row("solved skin", file);
 }
 
-base::Exit run_input(const base::Options& options, const std::filesystem::path& input) {
-  base::Stages stages(comm);
-  const bool dry = options.flag("dry_run");
-  const std::string name = dry ? "" : result_name(options, input);
-  std::optional<results::NameLock> lock;
-  base::on_root(comm, [&] {
-    if (!dry) lock.emplace(name);
-  });
+/// Reads and builds the job, chooses its strategy and prints both. Collective.
+std::pair<Job, Strategy> prepare(const base::Options& options, const std::filesystem::path& input,
+                                 base::Stages& stages) {
   Phase building(comm, "building the model");
   Job job = read_job(comm, input, [&](double done) { building.at(done); });
   Strategy strategy = make_strategy(comm, options, job);
@@ -363,20 +366,17 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
   if (base::rank(comm) == 0)
     print(job.building + describe_model(job.local_model.counts) + describe_warnings(job.warnings) +
           strategy.explanation);
-  if (dry) {
-    if (options.has("output")) print(write_solved_skin(job, options.text("output")));
-    print(describe_stages(stages));
-    return base::Exit::done;
-  }
-  const auto number = [&](const char* name, double otherwise) {
-    return options.has(name) ? options.number(name) : otherwise;
-  };
-  Run run(job, std::move(strategy), name, stages,
-          number("time_limit", std::numeric_limits<double>::infinity()));
-  const bool folds_allowed = options.flag("allow_folded");
-  if (options.has("restart"))
-    if (const auto ended = run.restart(options.text("restart"), folds_allowed)) return *ended;
-  return run.solve(number("checkpoint_interval", 0), folds_allowed);
+  return {std::move(job), std::move(strategy)};
+}
+
+/// Returns a message with the name of the input, unless it has that of the file or option at fault:
+/// messages about a model or a state lack it.
+std::string name_input(const std::filesystem::path& input, const std::string& message) {
+  const bool named = message.find(input.filename().string()) != std::string::npos;
+  const bool of_another = message.substr(0, message.find(' ')).ends_with(':');
+  const bool of_options = message.starts_with('-') || message.starts_with("PETSc");
+  if (named || of_another || of_options) return message;
+  return fmt::format("{}: {}", input.string(), message);
 }
 
 }  // namespace
@@ -384,16 +384,26 @@ base::Exit run_input(const base::Options& options, const std::filesystem::path& 
 base::Exit run(const base::Options& options) {
   solve::require_supported_types();
   const std::filesystem::path input = options.arguments()[0];
+  const bool dry = options.flag("dry_run");
   try {
-    return run_input(options, input);
+    base::Stages stages(comm);
+    const std::string name = dry ? "" : result_name(options, input);
+    std::optional<results::NameLock> lock;
+    base::on_root(comm, [&] {
+      if (!dry) lock.emplace(name);
+    });
+    auto [job, strategy] = prepare(options, input, stages);
+    if (dry) {
+      if (options.has("output")) print(write_solved_skin(job, options.text("output")));
+      print(describe_stages(stages));
+      return base::Exit::done;
+    }
+    Run run(options, job, std::move(strategy), name, stages);
+    if (options.has("restart"))
+      if (const auto ended = run.restart(options.text("restart"))) return *ended;
+    return run.solve();
   } catch (const base::InputError& error) {
-    // Messages about a model or a state lack the file's name.
-    const std::string text = error.what();
-    const bool named = text.find(input.filename().string()) != std::string::npos;
-    const bool of_another = text.substr(0, text.find(' ')).ends_with(':');  // a file or an option
-    const bool of_options = text.starts_with('-') || text.starts_with("PETSc");
-    if (named || of_another || of_options) throw;
-    throw base::InputError(fmt::format("{}: {}", input.string(), text));
+    throw base::InputError(name_input(input, error.what()));
   }
 }
 

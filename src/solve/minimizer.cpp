@@ -376,10 +376,15 @@ bool Minimizer::should_restart(int64_t iterations) {
   return slowed_ || (reason == TAO_DIVERGED_LS_FAILURE && iterations > 1);
 }
 
-void Minimizer::search(Vec displacement, bool near) {
-  PetscInt iterations = 0;
+Outcome Minimizer::search(Vec displacement, double accuracy, Test test, bool near) {
+  accuracy_ = accuracy;
+  presolving_ = test == Test::gradient;
+  thrown_ = nullptr;
+  stopped_ = false;
   iterations_ = 0;
+  check(TaoSetSolution(tao_, displacement));
   progress_->begin();
+  PetscInt iterations = 0;
   do {
     if (initial_ && near && !slowed_)
       initial_->refresh(displacement);
@@ -392,26 +397,15 @@ void Minimizer::search(Vec displacement, bool near) {
     check(TaoGetIterationNumber(tao_, &iterations));
     iterations_ += iterations;
   } while (should_restart(iterations));
+  Outcome outcome;
+  outcome.stopped = stopped_;
+  outcome.iterations = iterations_;
+  return outcome;
 }
 
 Outcome Minimizer::presolve(Vec displacement, double distance, bool near) {
   if (!initial_) return run(displacement, distance);
-  accuracy_ = distance;
-  thrown_ = nullptr;
-  stopped_ = false;
-  check(TaoSetSolution(tao_, displacement));
-  presolving_ = true;
-  search(displacement, near);
-  presolving_ = false;
-  Outcome outcome;
-  outcome.iterations = iterations_;
-  outcome.stopped = stopped_;
-  outcome.converged = !stopped_;
-  outcome.displacement_error = std::numeric_limits<double>::infinity();
-  TaoConvergedReason reason = TAO_CONTINUE_ITERATING;
-  check(TaoGetConvergedReason(tao_, &reason));
-  outcome.reason = reason_of(outcome, reason);
-  return outcome;
+  return search(displacement, distance, Test::gradient, near);
 }
 
 Outcome Minimizer::finish(Vec displacement, double accuracy, double taken) {
@@ -439,19 +433,15 @@ Outcome Minimizer::run(Vec displacement, double accuracy) {
 }
 
 Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
-  accuracy_ = accuracy;
-  thrown_ = nullptr;
-  stopped_ = false;
-  check(TaoSetSolution(tao_, displacement));
   newton_finish_allowed_ = newton_finish_enabled_;
   newton_finish_ = false;
-  search(displacement);
+  search(displacement, accuracy, Test::distance);
   Outcome outcome = summary(displacement);
   if (!newton_finish_ || outcome.converged || outcome.stopped) return outcome;
-  newton_finish_allowed_ = newton_finish_ =
-      false;  // Newton steps do not end it: it goes on where they led
+  // Newton steps do not end it: it continues where they led.
+  newton_finish_allowed_ = newton_finish_ = false;
   const int64_t iterations = outcome.iterations;
-  search(displacement);
+  search(displacement, accuracy, Test::distance);
   outcome = summary(displacement);
   outcome.iterations += iterations;
   return outcome;

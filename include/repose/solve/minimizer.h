@@ -39,8 +39,8 @@ class Minimizer : public RestSearch {
             const ErrorEstimate& estimate, const Watch& watch);
   ~Minimizer() override;
 
-  /// Goes on until the preconditioned gradient, where there is one, is about so short (mm): no
-  /// estimate of the distance is made sure. Returns the iterations and whether it was stopped.
+  /// Searches until the preconditioned gradient, where there is one, is about `distance` mm long:
+  /// no estimate of the distance is made sure. Returns the iterations and whether it was stopped.
   /// `near`: the search begins where the last one ended, but for contact.
   Outcome presolve(Vec displacement, double distance, bool near);
   int64_t presolve_within(Vec displacement, double distance) override {
@@ -59,7 +59,10 @@ class Minimizer : public RestSearch {
   struct Callbacks;
   void make_tao();
   void set_forcing();
-  void search(Vec displacement, bool near = false);
+  /// What ends a search: the estimated distance to rest, or the preconditioned gradient alone.
+  enum class Test { distance, gradient };
+  /// Calls TAO. Returns the iterations and whether it was stopped; `near` as presolve().
+  Outcome search(Vec displacement, double accuracy, Test test, bool near = false);
   Outcome search_and_finish(Vec displacement, double accuracy);
   /// Returns whether the search that ended after `iterations` begins again where it ended.
   bool should_restart(int64_t iterations);
