@@ -49,17 +49,17 @@ void BodyContact::set_multipliers(std::span<const double> p) {
 
 std::vector<size_t> BodyContact::overlapped(double overlap) const {
   constexpr double facing = -0.9;  // cosine of the angle of normals
-  std::vector<size_t> inside, found;
+  std::vector<size_t> near, found;
   for (size_t c = 0; c < gap_.size(); ++c)
-    if (!slides(c) && !released(c) && gap_[c] < 0) inside.push_back(c);
-  std::ranges::stable_sort(inside, {}, [this](size_t c) { return pairs_.point[c]; });
+    if (!released(c) && std::isfinite(gap_[c])) near.push_back(c);
+  std::ranges::stable_sort(near, {}, [this](size_t c) { return pairs_.point[c]; });
   const auto faces = [&](size_t c, size_t d) {
     return gap_[c] + gap_[d] < -overlap &&
            normal_[c].dot(normal_[d]) < facing * normal_[c].norm() * normal_[d].norm();
   };
-  for (auto c = inside.begin(); c != inside.end(); ++c)
-    for (auto d = c + 1; d != inside.end() && pairs_.point[*d] == pairs_.point[*c]; ++d)
-      if (faces(*c, *d)) found.push_back(std::max(*c, *d));
+  for (auto c = near.begin(); c != near.end(); ++c)
+    for (auto d = c + 1; d != near.end() && pairs_.point[*d] == pairs_.point[*c]; ++d)
+      if (faces(*c, *d)) found.push_back(slides(*d) && !slides(*c) ? *c : *d);
   return found;
 }
 

@@ -257,17 +257,9 @@ Outcome ContactSearch::finish_reached(Vec displacement, double accuracy, int64_t
   return outcome;
 }
 
-bool ContactSearch::has_overlapped(double accuracy) {
-  discrete::Positions& positions = objective_.positions();
-  mechanics::BodyContact& contact = objective_.body_contact();
-  contact.update_gaps(positions.local());
-  return base::on_any_rank(positions.comm(), !contact.overlapped(accuracy).empty());
-}
-
-/// Lets points between bodies that overlap rest on one of them alone, where that is allowed.
-/// Returns true if one begins to. Collective.
+/// Releases points between bodies that overlap from one of them. Returns true if there are any.
+/// Collective.
 bool ContactSearch::release_overlapped(double accuracy) {
-  if (!may_release_) return false;
   discrete::Positions& positions = objective_.positions();
   mechanics::BodyContact& contact = objective_.body_contact();
   contact.update_gaps(positions.local());
@@ -454,6 +446,7 @@ void ContactSearch::take_other(Vec displacement, double accuracy, Outcome there,
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
+  constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
   Outcome outcome;
   if (!predicted_) {
     outcome = finish(displacement, accuracy);
@@ -467,6 +460,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   int64_t iterations = 0;
   int left = 0;  // saddles
   bool needs_presolve = false;
+  double missing = std::numeric_limits<double>::infinity();  // mm of gaps
   const auto leaves = [&] {
     tangent_.forget_contact();
     needs_presolve = true;
@@ -486,12 +480,13 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome = end == End::reached ? finish_reached(displacement, accuracy, iterations)
                                   : finish(displacement, accuracy);
     if (outcome.converged) break;
-    if (release_overlapped(accuracy)) {
+    if (!outcome.stable && leaves()) continue;
+    const double before = std::exchange(missing, violation());
+    if (missing > steady * before && release_overlapped(accuracy)) {
+      missing = std::numeric_limits<double>::infinity();
       needs_presolve = true;
-      ++round;
       continue;
     }
-    if (!outcome.stable && leaves()) continue;
     needs_presolve = end != End::reached;
     stiffen(std::min(2 * times_, stiffest));
     ++round;

@@ -31,8 +31,6 @@ class ContactSearch : public RestSearch {
   Outcome run_near(Vec displacement, double accuracy) override;
   ContactPressures pressures() const override;
   void set_pressures(const ContactPressures& to) override;
-  bool has_overlapped(double accuracy) override;
-  void allow_release(bool requested) override { may_release_ = requested; }
 
  private:
   void set_stiffness(double stiffness);
@@ -69,7 +67,7 @@ class ContactSearch : public RestSearch {
   ContactQp qp_;
   double stiffness_;  // N/mm³, of the penalty
   int times_ = 1;     // it is so many times the model's
-  bool finds_other_ = true, may_release_ = false;
+  bool finds_other_ = true;
   int64_t evaluations_for_other_ = 0;
   double taken_ = 0;                // mm, the full step that the latest newton() ended with, or 0
   bool predicted_ = false;          // the next search begins with a prediction

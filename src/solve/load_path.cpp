@@ -173,7 +173,7 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   require_value(outcome, load);
   result_.last = outcome;
   result_.load = load;
-  if (load == 1) state_overlap();
+  if (load == 1) refuse_overlap();
   ++result_.steps;
   check(VecCopy(trial_, displacement));
   objective_.positions().update(displacement);
@@ -224,8 +224,8 @@ void LoadPath::explain_failure() {
                                      result_.halvings.count(), refused_);
 }
 
-/// Lets a rest position that bodies leave no room for count as none.
-void LoadPath::state_overlap() {
+/// A state where points had to be released from bodies that overlap is no rest position.
+void LoadPath::refuse_overlap() {
   Outcome& last = result_.last;
   if (!last.converged || last.overlapped == 0) return;
   last.converged = false;
@@ -236,8 +236,6 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   discrete::Positions& positions = objective_.positions();
   result_ = {};
   refused_ = 0;
-  overlap_released_ = false;
-  search_.allow_release(false);
   begun_ = function_.evaluations();
   result_.load = positions.largest_travel() > 0 ? settings_.start_load : 1.0;
   if (guess && settings_.near_guess && result_.load < 1) {
@@ -262,23 +260,9 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   return result_;
 }
 
-/// Where points are between bodies that overlap at the end of a step that failed, lets them rest
-/// on one of the bodies alone from now on, and rejects the step. Returns false elsewhere, and where
-/// they do so already.
-bool LoadPath::releases_overlapped(const Attempt& tried) {
-  if (tried.outcome.converged || tried.outcome.stopped || overlap_released_) return false;
-  overlap_released_ = search_.has_overlapped(settings_.accuracy);
-  if (!overlap_released_) return false;
-  search_.allow_release(true);
-  reject_step(tried);
-  refused_ = 0;
-  return true;
-}
-
 /// Takes steps of at most `longest` until the load is `end`.
 void LoadPath::follow(Vec displacement, double longest, double end, const OnStep& on_step) {
   const double nearly = 1e-3 * longest;
-  constexpr int overlap_halvings = 4;
   double step = longest;
   int halvings = 0;
   std::optional<Attempt> coarser;
@@ -288,12 +272,6 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
     const double load = target > 1 - nearly ? 1 : target;
     const Attempt tried = attempt(displacement, load);
     const bool last = halvings == max_halvings || in_vain(tried);
-    if ((last || halvings >= overlap_halvings) && releases_overlapped(tried)) {
-      step = longest;
-      halvings = 0;
-      coarser.reset();
-      continue;
-    }
     if (tried.outcome.stopped || last || follows(tried, coarser)) {
       accept(tried.outcome, load, displacement);
       explain_failure();

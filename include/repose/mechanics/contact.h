@@ -101,9 +101,9 @@ class BodyContact {
   std::span<const double> gaps() const { return gap_; }
   double pressure(size_t c) const { return now(c).pressure; }
 
-  /// Returns a constraint of each point that is inside two bodies whose surfaces face each other,
-  /// by more than `overlap` mm in all, so that it cannot leave one without going deeper into the
-  /// other: that on the latter body in the model. Of this rank, at the latest update.
+  /// Returns a constraint of each point between two bodies whose surfaces face each other and
+  /// overlap by more than `overlap` mm, so that no place is outside both: that on the latter body
+  /// in the model, or the one that does not slide. Of this rank, at the latest update.
   std::vector<size_t> overlapped(double overlap) const;
   /// Releases these constraints: they do not act until restore_released(). Returns how many.
   int64_t release_overlapped(double overlap);

@@ -97,9 +97,8 @@ class LoadPath {
   void try_guess(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
   void reject_step(const Attempt& tried);
-  bool releases_overlapped(const Attempt& tried);
   bool in_vain(const Attempt& tried) const;
-  void state_overlap();
+  void refuse_overlap();
   void explain_failure();
 
   discrete::Objective& objective_;
@@ -110,9 +109,8 @@ class LoadPath {
   PathSettings settings_;
   base::VecHandle trial_, increment_;
   PathOutcome result_;
-  int64_t begun_ = 0;              // evaluations before this path
-  int64_t refused_ = 0;            // evaluations of steps that were made again
-  bool overlap_released_ = false;  // points between bodies that overlap may rest on one alone
+  int64_t begun_ = 0;    // evaluations before this path
+  int64_t refused_ = 0;  // evaluations of steps that were made again
 };
 
 }  // namespace repose::solve

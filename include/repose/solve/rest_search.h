@@ -73,12 +73,6 @@ class RestSearch {
   virtual ContactPressures pressures() const { return {}; }
   /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
   virtual void set_pressures(const ContactPressures& /*to*/) {}
-  /// True if points of the latest search's end are between bodies that overlap, so that no place is
-  /// outside both. Collective.
-  virtual bool has_overlapped(double /*accuracy*/) { return false; }
-  /// Sets whether searches that would fail let such points rest on one of the bodies alone (false
-  /// by default).
-  virtual void allow_release(bool /*requested*/) {}
 };
 
 }  // namespace repose::solve
