@@ -159,14 +159,17 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
   if (!std::isfinite(s.last.penetration_exact)) return text;
   text += report_row("exact penetration", "{:.2g} mm at most, into the bodies' own triangles",
                      s.last.penetration_exact);
+  const char* advice = s.path.last.overlapped > 0
+                           ? "bodies overlap there"
+                           : "a finer contact.grid follows its surface more closely";
   for (size_t k = 0; k < bodies.size() && k < s.contacts.size(); ++k) {
     const solve::PenetrationDepth& depth = s.contacts[k].exact;
     if (depth.points == 0) continue;
     text += report_row("exact penetration",
                        "{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at "
-                       "{:.1f} mm; a finer contact.grid follows its surface more closely",
+                       "{:.1f} mm; {}",
                        depth.points, solve::PenetrationDepth::reported, bodies[k], depth.deepest,
-                       depth.where);
+                       depth.where, advice);
   }
   return text;
 }
