@@ -39,7 +39,7 @@ std::vector<Pair> nearest_pairs(const Plane& plane, const std::vector<Vec3>& cho
   std::vector<Pair> pairs;
   for (const Vec3& p : chosen) {
     const Vec3 image = plane.mirrored(p);
-    const Vec3& partner = points[tree.nearest(image, 1).front()];
+    const Vec3& partner = points[tree.nearest(image)];
     pairs.push_back({p, partner, (partner - image).norm()});
   }
   std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.off < b.off; });

@@ -113,7 +113,7 @@ Contains painted(const scene::PaintedRegion& region) {
   const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);
   return [=](const Vec3& skin) {
     constexpr double beside = 10;  // mm, where the painted mesh is another one
-    const int64_t nearest = tree->nearest(skin, 1).front();
+    const int64_t nearest = tree->nearest(skin);
     return (*marks)[nearest] && (skin - (*points)[nearest]).norm() <= beside;
   };
 }

@@ -224,11 +224,8 @@ PointTree::PointTree(const std::vector<Vec3>& points) : tree_(std::make_unique<T
 
 PointTree::~PointTree() = default;
 
-std::vector<int64_t> PointTree::nearest(const Vec3& query, int count) const {
-  std::vector<int64_t> rows;
-  for (const auto& [row, squared] : Search(tree_->rows, to_cgal(query), count))
-    rows.push_back(row.second);
-  return rows;
+int64_t PointTree::nearest(const Vec3& query) const {
+  return Search(tree_->rows, to_cgal(query), 1).begin()->first.second;
 }
 
 }  // namespace repose::surface

@@ -48,14 +48,14 @@ class DistanceTree {
   std::unique_ptr<Tree> tree_;
 };
 
-/// Answers which of many points are near. Construction O(P log P), each question O(log P).
+/// Answers which of many points is nearest. Construction O(P log P), each question O(log P).
 class PointTree {
  public:
   explicit PointTree(const std::vector<Vec3>& points);
   ~PointTree();
 
-  /// Rows of the `count` points closest to `query` (all where there are fewer), nearest first.
-  std::vector<int64_t> nearest(const Vec3& query, int count) const;
+  /// Returns the row of the point closest to `query`.
+  int64_t nearest(const Vec3& query) const;
 
  private:
   struct Tree;

@@ -87,7 +87,7 @@ Paint::Paint(const std::filesystem::path& file) {
 
 int Paint::at(const Vec3& point) const {
   constexpr double beside = 10;  // mm
-  const int64_t nearest = tree_->nearest(point, 1).front();
+  const int64_t nearest = tree_->nearest(point);
   return (points_[nearest] - point).norm() <= beside ? paint_[nearest] : -1;
 }
 
