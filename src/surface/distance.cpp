@@ -1,6 +1,5 @@
 #include "repose/surface/distance.h"
 
-#include <CGAL/AABB_tree.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>
 #include <CGAL/Search_traits_3.h>
 #include <CGAL/Search_traits_adapter.h>
@@ -17,11 +16,7 @@
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 
-#if CGAL_VERSION_NR >= 1060000000
-#include <CGAL/AABB_traits_3.h>
-#else
-#include <CGAL/AABB_traits.h>
-
+#if CGAL_VERSION_NR < 1060000000
 #include <boost/variant/get.hpp>
 #endif
 
@@ -29,37 +24,38 @@ namespace repose::surface {
 
 namespace {
 
+template <class Part, class Variant>
+const Part* part_of(const Variant& variant) {
 #if CGAL_VERSION_NR >= 1060000000
-template <class Primitive>
-using TreeTraits = CGAL::AABB_traits_3<Kernel, Primitive>;
-template <class Part, class Variant>
-const Part* part_of(const Variant& variant) {
   return std::get_if<Part>(&variant);
-}
 #else
-template <class Primitive>
-using TreeTraits = CGAL::AABB_traits<Kernel, Primitive>;
-template <class Part, class Variant>
-const Part* part_of(const Variant& variant) {
   return boost::get<Part>(&variant);
-}
 #endif
+}
 
-/// A triangle of the tree, kept by address (CGAL's AABBPrimitive).
-class Leaf {
+/// A segment as a region of a tree of boxes (Ericson, Real-Time Collision Detection, 5.3.3). Boxes
+/// are taken larger by more than rounding, so that none that it meets is missed.
+class Line {
  public:
-  using Id = const Triangle3*;
-  using Point = Point3;
-  using Datum = Triangle3;
-  using Datum_reference = const Triangle3&;
-
-  explicit Leaf(std::vector<Triangle3>::const_iterator triangle) : triangle_(&*triangle) {}
-  Id id() const { return triangle_; }
-  Datum_reference datum() const { return *triangle_; }
-  Point reference_point() const { return triangle_->vertex(0); }
+  Line(const Vec3& start, const Vec3& end)
+      : middle_((start + end) / 2),
+        half_((end - start) / 2),
+        size_(half_.cwiseAbs()),
+        margin_(relative_margin * start.cwiseAbs().cwiseMax(end.cwiseAbs()).maxCoeff()) {}
+  bool overlaps(const TriangleTree::Box& box) const {
+    const Vec3 from = middle_ - (box.low + box.high) / 2;
+    const Vec3 extent = ((box.high - box.low) / 2 * (1 + relative_margin)).array() + margin_;
+    if (!(from.cwiseAbs().array() <= (extent + size_).array()).all()) return false;
+    const Vec3 across(extent.y() * size_.z() + extent.z() * size_.y(),
+                      extent.z() * size_.x() + extent.x() * size_.z(),
+                      extent.x() * size_.y() + extent.y() * size_.x());
+    return (from.cross(half_).cwiseAbs().array() <= across.array()).all();
+  }
 
  private:
-  Id triangle_;
+  static constexpr double relative_margin = 1e-12;
+  Vec3 middle_, half_, size_;
+  double margin_;
 };
 
 enum class Crossing { through, beside_edge, at_start };
@@ -74,8 +70,8 @@ Crossing crossing(const Triangle3& t, const Point3& start, const Point3& end) {
   return Crossing::through;
 }
 
-/// Directions to look along, one after the other: x, for which boxes are quickest, then others
-/// spread over the sphere (a golden-angle spiral), none along an axis.
+/// Directions of rays, one after the other: x, which meets the fewest boxes, then others spread
+/// over the sphere (a golden-angle spiral), none along an axis.
 Vec3 ray_direction(int i) {
   if (i == 0) return Vec3::UnitX();
   const double z = 2 * std::fmod(0.37 + i * (std::numbers::phi - 1), 1.0) - 1;
@@ -90,15 +86,14 @@ void require_finite(const Vec3& query) {
 }  // namespace
 
 struct DistanceTree::Tree {
-  using Aabb = CGAL::AABB_tree<TreeTraits<Leaf>>;
-
   explicit Tree(const Surface& surface) : Tree(surface, with_area(surface)) {}
   Tree(const Surface& surface, std::vector<int64_t> kept)
       : numbers(std::move(kept)),
-        nearest({surface.name, surface.points, base::pick(surface.triangles, numbers)}) {
-    for (const int64_t t : numbers) triangles.push_back(to_cgal(surface, surface.triangles[t]));
-    aabb.insert(triangles.cbegin(), triangles.cend());  // built by the first query
-    for (const Triangle3& triangle : triangles) box += triangle.bbox();
+        boxes({surface.name, surface.points, base::pick(surface.triangles, numbers)}) {
+    for (const int64_t t : numbers) {
+      triangles.push_back(to_cgal(surface, surface.triangles[t]));
+      box.extend(TriangleTree::box_of(corners(surface, surface.triangles[t])));
+    }
   }
 
   static std::vector<int64_t> with_area(const Surface& surface) {
@@ -113,38 +108,26 @@ struct DistanceTree::Tree {
     return kept;
   }
 
-  int64_t number(Leaf::Id id) const { return numbers[id - triangles.data()]; }
-
   /// From `point` in any direction, the whole surface lies nearer than half of this.
   double reach(const Vec3& point) const {
-    const Vec3 low(box.xmin(), box.ymin(), box.zmin()), high(box.xmax(), box.ymax(), box.zmax());
-    return 2 * (point - low).cwiseAbs().cwiseMax((point - high).cwiseAbs()).norm();
+    return 2 * (point - box.low).cwiseAbs().cwiseMax((point - box.high).cwiseAbs()).norm();
   }
 
-  std::vector<Leaf::Id> meeting(const Segment3& segment) const {
-    std::vector<Leaf::Id> ids;
-    aabb.all_intersected_primitives(segment, std::back_inserter(ids));
-    return ids;
-  }
-
-  /// Triangles that a segment along an axis meets; its box is a line, so no tree for rays is built.
-  std::vector<Leaf::Id> meeting_along_axis(const Segment3& segment) const {
-    std::vector<Leaf::Id> ids;
-    TriangleTree::Box line;
-    line.extend(from_cgal(segment.source()));
-    line.extend(from_cgal(segment.target()));
-    nearest.overlapping(line, [&](int64_t t) {
-      if (CGAL::do_intersect(segment, triangles[t])) ids.push_back(&triangles[t]);
+  /// Rows of the triangles that a segment meets.
+  std::vector<int64_t> meeting(const Vec3& start, const Vec3& end) const {
+    const Segment3 segment(to_cgal(start), to_cgal(end));
+    std::vector<int64_t> rows;
+    boxes.overlapping(Line(start, end), [&](int64_t row) {
+      if (CGAL::do_intersect(segment, triangles[row])) rows.push_back(row);
       return false;
     });
-    return ids;
+    return rows;
   }
 
   std::vector<int64_t> numbers;      ///< in the surface, of the triangles with an area
-  TriangleTree nearest;              ///< of these
+  TriangleTree boxes;                ///< of these
   std::vector<Triangle3> triangles;  ///< these
-  Aabb aabb;
-  CGAL::Bbox_3 box;
+  TriangleTree::Box box;             ///< around them
 };
 
 DistanceTree::DistanceTree(const Surface& surface) : tree_(std::make_unique<Tree>(surface)) {}
@@ -154,7 +137,7 @@ DistanceTree& DistanceTree::operator=(DistanceTree&&) noexcept = default;
 
 DistanceTree::Nearest DistanceTree::nearest(const Vec3& query) const {
   require_finite(query);
-  const TriangleTree::Nearest found = tree_->nearest.nearest(query);
+  const TriangleTree::Nearest found = tree_->boxes.nearest(query);
   return {found.point, tree_->numbers[found.triangle], std::sqrt(found.squared)};
 }
 
@@ -162,22 +145,23 @@ std::optional<DistanceTree::Hit> DistanceTree::first_hit(const Vec3& origin, con
                                                          double reach) const {
   require_finite(origin);
   require_finite(direction);
-  const double end = std::min(reach, tree_->reach(origin));
-  const Segment3 segment(to_cgal(origin), to_cgal(origin + end * direction));
+  const double length = std::min(reach, tree_->reach(origin));
   std::optional<Hit> first;
-  const auto offer = [&](const Point3& at, Leaf::Id id) {
+  if (!(length > 0)) return first;
+  const Vec3 end = origin + length * direction;
+  const Segment3 segment(to_cgal(origin), to_cgal(end));
+  const auto offer = [&](const Point3& at, int64_t row) {
     const double distance = std::max(0.0, (from_cgal(at) - origin).dot(direction));
     if (first && distance >= first->distance) return;
-    first = Hit{from_cgal(at), tree_->number(id), distance};
+    first = Hit{from_cgal(at), tree_->numbers[row], distance};
   };
-  if (!(end > 0)) return first;
-  for (const auto id : tree_->meeting(segment)) {
-    const auto common = CGAL::intersection(segment, *id);
+  for (const int64_t row : tree_->meeting(origin, end)) {
+    const auto common = CGAL::intersection(segment, tree_->triangles[row]);
     if (!common) continue;
-    if (const auto* point = part_of<Point3>(*common)) offer(*point, id);
+    if (const auto* point = part_of<Point3>(*common)) offer(*point, row);
     if (const auto* along = part_of<Segment3>(*common)) {
-      offer(along->source(), id);
-      offer(along->target(), id);
+      offer(along->source(), row);
+      offer(along->target(), row);
     }
   }
   return first;
@@ -185,15 +169,14 @@ std::optional<DistanceTree::Hit> DistanceTree::first_hit(const Vec3& origin, con
 
 bool DistanceTree::contains(const Vec3& query) const {
   require_finite(query);
+  if (tree_->box.squared_distance(query) > 0) return false;
   const Point3 start = to_cgal(query);
-  if (!CGAL::do_overlap(start.bbox(), tree_->box)) return false;
   constexpr int max_directions = 64;
   for (int i = 0; i < max_directions; ++i) {
-    const Point3 end = to_cgal(query + tree_->reach(query) * ray_direction(i));
+    const Vec3 end = query + tree_->reach(query) * ray_direction(i);
     bool odd = false, sure = true;
-    const Segment3 ray(start, end);
-    for (const auto id : i == 0 ? tree_->meeting_along_axis(ray) : tree_->meeting(ray)) {
-      const Crossing how = crossing(*id, start, end);
+    for (const int64_t row : tree_->meeting(query, end)) {
+      const Crossing how = crossing(tree_->triangles[row], start, to_cgal(end));
       if (how == Crossing::at_start) return true;
       sure = sure && how == Crossing::through;
       odd = !odd;

@@ -36,7 +36,7 @@ int triangle_winding(const Corners& corners, double y, double z) {
 std::vector<LineCrossing> line_crossings(const TriangleTree& tree, double y, double z) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   std::vector<LineCrossing> crossings;
-  tree.overlapping({{-infinite, y, z}, {infinite, y, z}}, [&](int64_t triangle) {
+  tree.overlapping(TriangleTree::Box{{-infinite, y, z}, {infinite, y, z}}, [&](int64_t triangle) {
     const int winding = triangle_winding(tree.corners_of(triangle), y, z);
     if (winding != 0) crossings.push_back({triangle, winding});
     return false;

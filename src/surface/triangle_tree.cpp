@@ -149,21 +149,13 @@ TriangleTree::Nearest TriangleTree::nearest(const Vec3& query, double limit, int
 
 int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) const {
   if (hint >= 0 && squared_distance(query, corners_of(hint)) <= limit) return hint;
-  int64_t stack[max_depth], depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const int64_t number = stack[--depth];
-    const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i)
-      if (squared_distance(query, sorted_[i]) <= limit) return order_[i];
-    if (node.count > 0) continue;
-    const double left = nodes_[number + 1].box.squared_distance(query);
-    const double right = nodes_[node.right].box.squared_distance(query);
-    const bool left_first = left <= right;
-    if ((left_first ? right : left) <= limit) stack[depth++] = left_first ? node.right : number + 1;
-    if ((left_first ? left : right) <= limit) stack[depth++] = left_first ? number + 1 : node.right;
-  }
-  return -1;
+  int64_t found = -1;
+  const auto offer = [&](int64_t row) {
+    if (found < 0 && squared_distance(query, sorted_[row]) <= limit) found = order_[row];
+  };
+  walk([&](const Node& node) { return node.box.squared_distance(query); },
+       [&](double least) { return found < 0 && least <= limit; }, offer);
+  return found;
 }
 
 double TriangleTree::min_max(std::span<const Vec3> points, double limit, double enough) const {
@@ -193,26 +185,17 @@ bool TriangleTree::one_covers(std::span<const Vec3> points, double limit, int64_
     return true;
   };
   if (hint >= 0 && covers(hint)) return true;
+  struct Reaching {  // a box that serves reaches as far as all points, but for the margin
+    Vec3 low, high;
+    bool overlaps(const Box& box) const {
+      return (box.low.array() <= low.array()).all() && (box.high.array() >= high.array()).all();
+    }
+  };
   Box box;
   for (const Vec3& point : points) box.extend(point);
-  const double margin = std::sqrt(limit);  // a box that serves reaches as far as all corners
-  const Vec3 low = box.low.array() + margin, high = box.high.array() - margin;
-  const auto reaches = [&](const Box& b) {
-    return b.low.x() <= low.x() && b.low.y() <= low.y() && b.low.z() <= low.z() &&
-           b.high.x() >= high.x() && b.high.y() >= high.y() && b.high.z() >= high.z();
-  };
-  int64_t stack[max_depth], depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const int64_t number = stack[--depth];
-    const Node& node = nodes_[number];
-    for (int64_t i = node.first; i < node.first + node.count; ++i)
-      if (order_[i] != hint && covers(order_[i])) return true;
-    if (node.count > 0) continue;
-    if (reaches(nodes_[node.right].box)) stack[depth++] = node.right;
-    if (reaches(nodes_[number + 1].box)) stack[depth++] = number + 1;
-  }
-  return false;
+  const double margin = std::sqrt(limit);
+  const Reaching region{box.low.array() + margin, box.high.array() - margin};
+  return overlapping(region, [&](int64_t t) { return t != hint && covers(t); });
 }
 
 void TriangleTree::exchange(int64_t triangle, const Corners& corners) {

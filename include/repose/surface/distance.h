@@ -9,8 +9,7 @@
 
 namespace repose::surface {
 
-/// Answers distance and ray questions about one surface from trees built once, that for rays at the
-/// first of them.
+/// Answers distance and ray questions about one surface from a tree that is built once.
 /// Construction O(T log T); each question O(log T). Const members may be called from any thread.
 /// Triangles without area are left out. Throws InputError where none remains, InternalError for a
 /// question about a point that is not finite.

@@ -72,21 +72,21 @@ class TriangleTree {
   /// first and receives that triangle.
   bool one_covers(std::span<const Vec3> points, double limit, int64_t& hint) const;
 
-  /// Calls visit(triangle) for each triangle whose box overlaps `box`, until it returns true;
-  /// whether one did.
-  template <class Visit>
-  bool overlapping(const Box& box, Visit&& visit) const {
+  /// Calls visit(triangle) for each triangle whose box `region` overlaps, until it returns true;
+  /// whether one did. `region` is a Box, or another class with overlaps(const Box&).
+  template <class Region, class Visit>
+  bool overlapping(const Region& region, Visit&& visit) const {
     int64_t stack[max_depth], depth = 0;
     stack[depth++] = 0;
     while (depth > 0) {
       const Node& node = nodes_[stack[--depth]];
-      if (!node.box.overlaps(box)) continue;
+      if (!region.overlaps(node.box)) continue;
       if (node.count == 0) {
         stack[depth++] = node.right;
         stack[depth++] = &node - nodes_.data() + 1;
       }
       for (int64_t i = node.first; i < node.first + node.count; ++i)
-        if (box_of(sorted_[i]).overlaps(box) && visit(order_[i])) return true;
+        if (region.overlaps(box_of(sorted_[i])) && visit(order_[i])) return true;
     }
     return false;
   }
