@@ -339,14 +339,16 @@ void fetch_points(MPI_Comm comm, const Numbers& numbers, Piece& piece) {
   piece.unknown = given(numbers.unknown);
 }
 
-/// Assigns the points to ranks, and to `piece` its unknowns. Collective.
-void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet>& set,
-            Numbers& numbers, ColumnRanks& needing, Piece& piece) {
+/// Assigns the points to ranks, and to `piece` its unknowns. Returns the ranks that need each
+/// column. Collective.
+ColumnRanks assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet>& set,
+                   Numbers& numbers, Piece& piece) {
   ColumnGraph graph = gather_graph(comm, piece.model, column, numbers.columns);
   graph.weight.assign(numbers.columns, 1);
   for (size_t p = 0; p < set.size(); ++p)
     if (set[p] == PointSet::soft_tissue) ++graph.weight[numbers.column[p]];
   const std::vector<int> owner = partition(comm, graph);
+  ColumnRanks needing;
   base::on_root(comm, [&] {
     numbers.owner = pick(owner, numbers.column);
     keep_cuts_whole(piece.model, numbers);
@@ -358,6 +360,7 @@ void assign(MPI_Comm comm, const HeldColumns& column, const std::vector<PointSet
   piece.total_unknowns = numbers.unknown_begin.back();
   piece.first_unknown = numbers.unknown_begin[rank];
   piece.unknowns = numbers.unknown_begin[rank + 1] - piece.first_unknown;
+  return needing;
 }
 
 void count_rows(MPI_Comm comm, Piece& piece) {
@@ -382,9 +385,8 @@ std::vector<int64_t> exchange_rows(MPI_Comm comm, Piece& piece, Model& global_me
     number_columns(names, numbers);
     remove_fixed_pairs(set, held);
   });
-  ColumnRanks needing;
   const HeldColumns column(comm, held, numbers);
-  assign(comm, column, set, numbers, needing, piece);
+  const ColumnRanks needing = assign(comm, column, set, numbers, piece);
   piece.bones = gather_motions(comm, held);
   global_metadata = copy_metadata(held);
   if (held.bone_transform.empty() && !std::ranges::count(piece.bones.straight, true))

@@ -50,23 +50,20 @@ Columns compute_columns(const SkinMesh& mesh, const BoneField& bones,
   const std::vector<Cone> cones = inward_cones(mesh, skin_name);
   std::vector<Vec3> directions = column_directions(mesh, cones, nearest, tissue.attach_within,
                                                    smoothing_length(nearest, tissue));
-  const surface::DistanceTree skin({"skin", mesh.points, mesh.triangles});
-  const size_t vertices = mesh.points.size();
-  Reach reach{std::vector<double>(vertices), std::vector<double>(vertices),
-              std::vector<char>(vertices)};
+  ColumnTracer tracer(mesh, bones, nearest, tissue);
   std::vector<double> laid;
   const auto lay = [&](const std::vector<int64_t>& changed) {
-    trace_columns(mesh, skin, changed, directions, nearest, bones, tissue, reach);
-    laid = column_thickness(mesh, reach, tissue.free_thickness);
+    tracer.trace(changed, directions);
+    laid = column_thickness(mesh, tracer.reach(), tissue.free_thickness);
   };
-  lay(base::all_rows(vertices));
+  lay(base::all_rows(mesh.points.size()));
 
   Columns columns;
   if (tissue.edge) columns.bent = bend_folded(mesh, cones, lay, laid, directions);
   columns.thickness = laid;
   shorten_folded(mesh, directions, skin_name, columns.thickness);
 
-  columns.holds = std::move(reach.holds);
+  columns.holds = tracer.reach().holds;
   columns.deep.resize(mesh.points.size());
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     columns.deep[v] = mesh.points[v] + columns.thickness[v] * directions[v];

@@ -37,22 +37,30 @@ void cut_spikes(const SkinMesh& mesh, std::vector<double>& thickness) {
 
 }  // namespace
 
-void trace_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
-                   const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
-                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                   const scene::Tissue& tissue, Reach& reach) {
+ColumnTracer::ColumnTracer(const SkinMesh& mesh, const BoneField& bones,
+                           const std::vector<BoneField::Nearest>& nearest,
+                           const scene::Tissue& tissue)
+    : mesh_(mesh),
+      bones_(bones),
+      nearest_(nearest),
+      tissue_(tissue),
+      skin_({"skin", mesh.points, mesh.triangles}),
+      reach_{std::vector<double>(mesh.points.size()), std::vector<double>(mesh.points.size()),
+             std::vector<char>(mesh.points.size())} {}
+
+void ColumnTracer::trace(const std::vector<int64_t>& columns, const std::vector<Vec3>& directions) {
   const double farthest =
-      std::max(tissue.attach_within, tissue.free_thickness / std::min(bone_room, skin_room));
+      std::max(tissue_.attach_within, tissue_.free_thickness / std::min(bone_room, skin_room));
   for (const int64_t v : columns) {
-    const auto hit = bones.first_hit(mesh.points[v], directions[v], farthest);
-    reach.to_bone[v] = hit ? hit->distance : std::numeric_limits<double>::infinity();
-    const double start = 1e-3 * std::sqrt(mesh.vertex_area[v]);
-    const double skin_distance =
-        to_other_side(skin, mesh.points[v], directions[v], start, farthest);
-    const double deepest = std::min({tissue.attach_within, skin_distance,
-                                     deeper_than_nearest * nearest[v].distance + deeper_by});
-    reach.holds[v] = reach.to_bone[v] <= deepest;
-    reach.room[v] = std::min(bone_room * reach.to_bone[v], skin_room * skin_distance);
+    const Vec3& from = mesh_.points[v];
+    const auto hit = bones_.first_hit(from, directions[v], farthest);
+    reach_.to_bone[v] = hit ? hit->distance : std::numeric_limits<double>::infinity();
+    const double start = 1e-3 * std::sqrt(mesh_.vertex_area[v]);
+    const double skin_distance = to_other_side(skin_, from, directions[v], start, farthest);
+    const double deepest = std::min({tissue_.attach_within, skin_distance,
+                                     deeper_than_nearest * nearest_[v].distance + deeper_by});
+    reach_.holds[v] = reach_.to_bone[v] <= deepest;
+    reach_.room[v] = std::min(bone_room * reach_.to_bone[v], skin_room * skin_distance);
   }
 }
 

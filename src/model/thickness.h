@@ -7,22 +7,35 @@
 
 namespace repose::model {
 
-/// Distances that each column meets on its way inwards, [V] each.
+/// Distances that each column meets on its way inwards, [V] each; 0 before it is traced.
 struct Reach {
   std::vector<double> to_bone;  ///< mm along the column to the first bone, infinite where none
   std::vector<double> room;     ///< mm a column that ends free may be long
   std::vector<char> holds;      ///< 1 where the bone met is the one beneath, near enough to attach
 };
 
-/// Casts a ray down each of the columns given by number, into their entries of `reach` [V]. `skin`
-/// is the tree of the mesh. A bone holds the column where it is met within `attach_within`,
+/// Casts rays down columns of a mesh. A bone holds a column where it is met within `attach_within`,
 /// before the skin's own other side, and not much deeper than the nearest bone is away (1.6 times
 /// and 2 mm: a ray that slips between teeth or into an orbit finds no bone). A free column keeps to
 /// 0.95 of the way to bone and 0.45 of the way to the skin's other side.
-void trace_columns(const SkinMesh& mesh, const surface::DistanceTree& skin,
-                   const std::vector<int64_t>& columns, const std::vector<Vec3>& directions,
-                   const std::vector<BoneField::Nearest>& nearest, const BoneField& bones,
-                   const scene::Tissue& tissue, Reach& reach);
+class ColumnTracer {
+ public:
+  /// All arguments outlive it; `nearest` [V].
+  ColumnTracer(const SkinMesh& mesh, const BoneField& bones,
+               const std::vector<BoneField::Nearest>& nearest, const scene::Tissue& tissue);
+
+  /// Traces the columns given by number along `directions` [V].
+  void trace(const std::vector<int64_t>& columns, const std::vector<Vec3>& directions);
+  const Reach& reach() const { return reach_; }
+
+ private:
+  const SkinMesh& mesh_;
+  const BoneField& bones_;
+  const std::vector<BoneField::Nearest>& nearest_;
+  const scene::Tissue& tissue_;
+  surface::DistanceTree skin_;
+  Reach reach_;
+};
 
 /// Thickness [V] in mm: down to the bone where it holds, elsewhere from the neighboring bone's
 /// depth to `free_thickness` over about that distance, within the room there is. Then lowered,

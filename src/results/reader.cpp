@@ -116,21 +116,19 @@ StoredArray open_attribute(hid_t file, const Reader& reader, const std::string& 
       fmt::format("{}: {}", reader.file(), place));
 }
 
-/// Opens attribute `name` of `object`, requires `count` values and reads them with `read`.
+}  // namespace
+
 template <class Value>
-std::vector<Value> attribute_values(hid_t file, const Reader& reader, const std::string& object,
-                                    const char* name, int64_t count,
-                                    std::vector<Value> (StoredArray::*read)() const) {
+std::vector<Value> Reader::attribute_values(const std::string& object, const char* name,
+                                            int64_t count,
+                                            std::vector<Value> (StoredArray::*read)() const) const {
   const std::string place = attribute_place(object, name);
-  return named(reader, place, [&] {
-    const StoredArray array = open_attribute(file, reader, object, name, place);
-    if (array.size() != count)
-      reader.refuse(place, "has {} values, expected {}", array.size(), count);
+  return named(*this, place, [&] {
+    const StoredArray array = open_attribute(file_, *this, object, name, place);
+    if (array.size() != count) refuse(place, "has {} values, expected {}", array.size(), count);
     return (array.*read)();
   });
 }
-
-}  // namespace
 
 std::vector<double> Reader::numbers(const std::string& path, const Shape& shape) const {
   return named(*this, path, [&] {
@@ -179,23 +177,21 @@ double Reader::number(const std::string& object, const char* attribute) const {
 }
 
 double Reader::number_or_infinity(const std::string& object, const char* attribute) const {
-  const double value =
-      attribute_values(file_, *this, object, attribute, 1, &StoredArray::numbers)[0];
+  const double value = attribute_values(object, attribute, 1, &StoredArray::numbers)[0];
   if (std::isnan(value)) refuse(attribute_place(object, attribute), "is not a number");
   return value;
 }
 
 int64_t Reader::integer(const std::string& object, const char* attribute) const {
-  return attribute_values(file_, *this, object, attribute, 1, &StoredArray::whole_numbers)[0];
+  return attribute_values(object, attribute, 1, &StoredArray::whole_numbers)[0];
 }
 
 std::string Reader::text(const std::string& object, const char* attribute) const {
-  return attribute_values(file_, *this, object, attribute, 1, &StoredArray::strings)[0];
+  return attribute_values(object, attribute, 1, &StoredArray::strings)[0];
 }
 
 Vec3 Reader::vector(const std::string& object, const char* attribute) const {
-  const std::vector<double> values =
-      attribute_values(file_, *this, object, attribute, 3, &StoredArray::numbers);
+  const std::vector<double> values = attribute_values(object, attribute, 3, &StoredArray::numbers);
   require_finite(*this, attribute_place(object, attribute), values, 3);
   return Vec3::Map(values.data());
 }

@@ -87,6 +87,10 @@ class Reader {
 
  private:
   std::vector<int64_t> whole_numbers(const std::string& path, const Shape& shape) const;
+  /// Opens attribute `name` of `object`, requires `count` values and reads them with `read`.
+  template <class Value>
+  std::vector<Value> attribute_values(const std::string& object, const char* name, int64_t count,
+                                      std::vector<Value> (base::StoredArray::*read)() const) const;
 
   template <class Int>
   std::vector<Int> narrow(const std::string& path, const std::vector<int64_t>& wide) const {

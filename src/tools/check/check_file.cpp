@@ -69,7 +69,7 @@ Comparison check_file(const std::string& file) {
   for (int64_t s = 0; s < count; ++s) {
     const results::StoredStep step = results::read_step(file, s, model);
     comparison.begin(fmt::format("step {:04}", s));
-    check_step(model, motion, step.numbers, step.rows, step.displacement, films, comparison);
+    check_step(model, motion, step, films, comparison);
     check_advance(model, normals, step, comparison);
     check_bones(bones, motion, step, comparison);
     steps.push_back(step.numbers);

@@ -59,16 +59,17 @@ std::vector<Vec3> prescribed(const model::Model& model, const model::PrescribedM
 }  // namespace
 
 void check_step(const model::Model& model, const model::PrescribedMotion& motion,
-                const model::StepNumbers& numbers, const model::StepRows& rows,
-                const std::vector<Vec3>& displacement, const std::vector<Film>& films,
+                const results::StoredStep& step, const std::vector<Film>& films,
                 Comparison& comparison) {
+  const model::StepNumbers& numbers = step.numbers;
+  const model::StepRows& rows = step.rows;
   const RecomputedStep again = recompute(
       model, numbers, rows, films, evaluate(model, films, motion, numbers.load, rows.position));
   check_ranges(numbers, comparison);
   check_numbers(numbers, again, comparison);
   const std::vector<Vec3> fixed = prescribed(model, motion, numbers.load, rows.position);
   comparison.array("point/position, fixed", flat(rows.position), flat(fixed), again.position_scale);
-  comparison.array("point/displacement", flat(displacement), flat(again.displacement),
+  comparison.array("point/displacement", flat(step.displacement), flat(again.displacement),
                    again.displacement_scale);
   comparison.array("point/residual_force", flat(rows.residual_force),
                    flat(again.rows.residual_force), again.force_scale);
