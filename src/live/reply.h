@@ -14,11 +14,12 @@ class Reply {
   Reply() : head_{{"id", nullptr}, {"ok", true}, {"arrays", nlohmann::json::array()}} {}
 
   nlohmann::json& head() { return head_; }
-  /// Adds little-endian float32 rows of three.
+  /// Adds an array to the answer, as little-endian float32: rows of three, or single values.
   void add(const std::string& name, const std::vector<Vec3>& rows);
   void add(const std::string& name, const std::vector<double>& values);
-  void add(const std::string& name, const std::vector<Triangle>& triangles);  ///< int32
-  /// Adds rows of so many numbers.
+  /// Adds an array of little-endian int32, rows of three.
+  void add(const std::string& name, const std::vector<Triangle>& triangles);
+  /// Adds an array of rows of `columns` numbers, float32 or int32.
   template <class Number>
   void add(const std::string& name, const std::vector<Number>& values, size_t columns) {
     append(name, std::is_same_v<Number, float> ? "f4" : "i4",

@@ -19,12 +19,14 @@ struct Convergence {
   std::string limit;  ///< why there is none finer
 };
 
-/// Where the scene lets both the skin's edges (tissue.edge) and the layers be any number, up to two
-/// finer than its own, of at most `most_unknowns`. On rank 0.
+/// Returns the resolutions of a convergence study: halved_resolutions(), the scene's own and, where
+/// the scene sets tissue.edge and leaves the layers free, up to two finer ones of at most
+/// `max_unknowns`. On rank 0.
 Convergence convergence_of(const model::Anatomy& anatomy, const model::Counts& own,
                            int64_t max_unknowns = 5'000'000);
 
-/// A row about the last model of a convergence, which was solved to `requested` mm.
+/// Returns a row of the end-of-run summary about the last model of a convergence study, whose
+/// requested accuracy is `requested` mm and which `limit` (Convergence) keeps from finer ones.
 std::string describe_convergence(const GridSequence& sequence, double requested,
                                  const std::string& limit);
 
@@ -37,12 +39,13 @@ struct Discretization {
   std::vector<double> at_point;  ///< [N of the model] 0 below the skin
 };
 
-/// Richardson's extrapolation (1911): where differences between resolutions fall with the order p,
-/// |u_h − u_2h| / (2^p − 1) is left. p is observed where `sequence` has two resolutions, and is
-/// kept within 1/2 and 2. `position` [N] is the rest position of the scene's own model. On rank 0.
+/// Estimates the discretization error of the rest position `position` [N] of the scene's own model
+/// by Richardson's extrapolation (1911): where differences between resolutions fall with the order
+/// p, |u_h − u_2h| / (2^p − 1) is left. p is observed where `sequence` has two resolutions, and is
+/// kept within 1/2 and 2. On rank 0.
 Discretization discretization_of(const std::vector<Vec3>& position, const GridSequence& sequence);
 
-/// One row for a person.
+/// Returns a row of the end-of-run summary about the discretization error.
 std::string describe_discretization(const Discretization& found);
 
 }  // namespace repose::adapt

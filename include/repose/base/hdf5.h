@@ -88,10 +88,16 @@ class StoredArray {
   StoredArray(Hdf5Dataset dataset, std::string where);
   StoredArray(Hdf5Attribute attribute, std::string where);
 
+  /// Returns the length along each axis; empty for a single value.
   const std::vector<int64_t>& shape() const { return shape_; }
+  /// Returns the number of values, the product of the lengths.
   int64_t size() const;
+  /// Returns all values, row-major: the last index runs fastest. Throws InputError unless a double
+  /// holds each exactly.
   std::vector<double> numbers() const;
+  /// Returns all values, row-major. Throws InputError unless they are integers that fit.
   std::vector<int64_t> whole_numbers() const;
+  /// Returns all values, row-major. Throws InputError unless they are strings.
   std::vector<std::string> strings() const;
 
  private:

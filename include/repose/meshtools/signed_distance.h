@@ -22,6 +22,7 @@ class SignedDistance {
     double distance;  ///< mm, signed
     bool beyond_rim;  ///< the nearest point lies on a border of the surface
   };
+  /// Returns the signed distance of a point, mm.
   Answer at(const Vec3& point) const;
 
  private:

@@ -32,10 +32,10 @@ Surface weld_and_orient(const Surface& raw);
 /// Writes a binary little-endian PLY (double coordinates) to NAME.part and renames it.
 void write_ply(const std::filesystem::path& file, const Surface& surface);
 
-/// read_surface, weld_and_orient, inspect (defects.h), then refuse what `role` does not allow, in
-/// one line naming file, defect, number and remedy. Self-intersections are not searched for:
-/// whoever cannot bear them inspects. What is smaller than 20 mm or larger than 2000 mm across is
-/// refused, but as a mesh, as being in meters or in micrometers, saying so.
+/// Reads a surface, welds and orients it (weld_and_orient), and refuses defects (defects.h) that
+/// `role` does not allow, in one line naming file, defect, number and remedy. Self-intersections
+/// are not searched for: a caller that needs to know them inspects. A surface smaller than 20 mm or
+/// larger than 2000 mm across, unless a mesh, is refused as being in meters or in micrometers.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
 /// Checks a surface that has been read, or taken from a volume, as load_surface does.

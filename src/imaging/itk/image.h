@@ -24,11 +24,11 @@ struct Image {
 /// Returns whether the file is DICOM. Throws InputError for one that begins so and is damaged.
 bool is_dicom(const std::filesystem::path& file);
 
-/// The header alone; `values` stay empty. An axis that the file lacks has the spacing 1. Throws
-/// InputError naming the file where ITK cannot read it.
+/// Reads the header alone; `values` stay empty. An axis that the file lacks has the spacing 1.
+/// Throws InputError naming the file where ITK cannot read it.
 Image read_header(const std::filesystem::path& file, ImageFormat format);
 
-/// The whole image. Throws InputError, also where the memory for it is lacking.
+/// Reads the whole image. Throws InputError, also where the memory for it is lacking.
 Image read_image(const std::filesystem::path& file, ImageFormat format);
 
 }  // namespace repose::imaging

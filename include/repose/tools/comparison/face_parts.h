@@ -15,13 +15,13 @@ class FaceParts {
   /// where they do not follow each other downwards.
   FaceParts(const std::map<std::string, Vec3>& landmarks, const std::string& file);
 
-  /// Height between, and half width about the midline of: nose (nasion to subnasale, 20 mm), upper
-  /// lip (to the middle between the lips, 30 mm), lower lip (to the middle between it and
-  /// pogonion), chin (to 5 mm below menton); left and right cheek: beside the lips and the chin's
-  /// upper half, from there to 15 mm above pronasale, at most 70 mm from the midline and behind
-  /// pronasale. Empty: none of them.
+  /// Returns the name of the part that a point (mm) lies in, or an empty one. Parts are bounded by
+  /// heights and by the distance from the midline: nose (nasion to subnasale, 20 mm), upper lip (to
+  /// the middle between the lips, 30 mm), lower lip (to the middle between it and pogonion), chin
+  /// (to 5 mm below menton); left and right cheek: beside the lips and the chin's upper half, from
+  /// there to 15 mm above pronasale, at most 70 mm from the midline and behind pronasale.
   std::string at(const Vec3& point) const;
-  /// Height of subnasale: jaw surgery moves nothing above it but the nose.
+  /// Returns the height (z, mm) of subnasale: jaw surgery moves nothing above it but the nose.
   double upper_face() const { return subnasale_; }
 
  private:
