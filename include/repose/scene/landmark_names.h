@@ -16,7 +16,6 @@ const Vec3* find(const Landmarks& landmarks, const char* name);
 /// One landmark that has a standard name.
 struct LandmarkName {
   std::string name;                  ///< as files of this project have it
-  std::string meaning;               ///< one phrase, for tables
   std::vector<std::string> aliases;  ///< other spellings that are understood, lower case
   bool on_skin;
 };
