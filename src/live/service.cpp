@@ -68,6 +68,7 @@ class Service {
   void find_visible();
   std::vector<std::pair<int64_t, Vec3>> functional(const Request& request) const;
   nlohmann::json write_gradient(const solve::Gradient& gradient) const;
+  void add_arrays(const PlanSession::Answer& answer, bool all, Reply& reply) const;
 
   MPI_Comm comm_;
   std::filesystem::path scene_;
@@ -226,6 +227,22 @@ json write_other_rest(const solve::Outcome& last) {
   return {{"distance", last.other->distance}, {"place", last.other->place}};
 }
 
+/// Adds positions and fields, of all points or of the visible ones. On rank 0.
+void Service::add_arrays(const PlanSession::Answer& answer, bool all, Reply& reply) const {
+  reply.add("position", all ? answer.position : visible(answer.position));
+  for (const model::PointField& field : answer.field) {
+    if (field.vector) {
+      std::vector<Vec3> vectors;
+      for (size_t i = 0; i + 2 < field.values.size(); i += 3)
+        vectors.push_back(Vec3::Map(&field.values[i]));
+      reply.add(field.name, all ? vectors : visible(vectors));
+    } else {
+      reply.add(field.name, all ? field.values : visible(field.values));
+    }
+    for (const auto& [name, flag] : field.flags) reply.head()["flags"][field.name][name] = flag;
+  }
+}
+
 void Service::solve(const Request& request, Reply& reply) {
   find_visible();
   PlanSession::Request requested;
@@ -252,20 +269,7 @@ void Service::solve(const Request& request, Reply& reply) {
   if (request.other_rest) head["other_rest"] = write_other_rest(path.last);
   head["seconds"] = base::cpu_seconds() - before;
   if (answer.summary.gradient) head["gradient"] = write_gradient(*answer.summary.gradient);
-  if (base::rank(comm_) > 0) return;
-  const bool all = request.all_points;
-  reply.add("position", all ? answer.position : visible(answer.position));
-  for (const model::PointField& field : answer.field) {
-    std::vector<Vec3> vectors;
-    if (field.vector)
-      for (size_t i = 0; i + 2 < field.values.size(); i += 3)
-        vectors.push_back(Vec3::Map(&field.values[i]));
-    if (field.vector)
-      reply.add(field.name, all ? vectors : visible(vectors));
-    else
-      reply.add(field.name, all ? field.values : visible(field.values));
-    for (const auto& [name, flag] : field.flags) head["flags"][field.name][name] = flag;
-  }
+  if (base::rank(comm_) == 0) add_arrays(answer, request.all_points, reply);
 }
 
 }  // namespace

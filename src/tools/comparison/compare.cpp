@@ -21,6 +21,23 @@ void visit_parts(const Vec3& a, const Vec3& b, const Vec3& c, int64_t n, Visit v
     }
 }
 
+using Absolute = std::vector<std::pair<double, double>>;  // |distance|, area; ascending
+
+/// Least distance within which `area` lies.
+double distance_of_area(const Absolute& sorted, double area) {
+  double sum = 0;
+  for (const auto& [distance, part] : sorted)
+    if ((sum += part) >= area) return distance;
+  return sorted.back().first;
+}
+
+double area_within(const Absolute& sorted, double limit) {
+  double sum = 0;
+  for (const auto& [distance, part] : sorted)
+    if (distance <= limit) sum += part;
+  return sum;
+}
+
 }  // namespace
 
 std::vector<Sample> sample_distances(const Surface& from, const SignedDistance& to, double spacing,
@@ -44,7 +61,7 @@ std::vector<Sample> sample_distances(const Surface& from, const SignedDistance& 
 
 DistanceStatistics statistics(const std::vector<Sample>& samples) {
   DistanceStatistics result;
-  std::vector<std::pair<double, double>> sorted;  // |distance|, area
+  Absolute sorted;
   for (const Sample& sample : samples) {
     const double distance = std::abs(sample.distance);
     sorted.emplace_back(distance, sample.area);
@@ -60,23 +77,11 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
   result.mean /= result.area;
   result.rms = std::sqrt(result.rms / result.area);
   std::sort(sorted.begin(), sorted.end());
-  const auto percentile = [&](double share) {
-    double area = 0;
-    for (const auto& [distance, part] : sorted)
-      if ((area += part) >= share * result.area) return distance;
-    return result.maximum;
-  };
-  const auto within = [&](double limit) {
-    double area = 0;
-    for (const auto& [distance, part] : sorted)
-      if (distance <= limit) area += part;
-    return area / result.area;
-  };
-  result.within_1 = within(1);
-  result.within_2 = within(2);
-  result.median = percentile(0.50);
-  result.percentile_90 = percentile(0.90);
-  result.percentile_95 = percentile(0.95);
+  result.within_1 = area_within(sorted, 1) / result.area;
+  result.within_2 = area_within(sorted, 2) / result.area;
+  result.median = distance_of_area(sorted, 0.50 * result.area);
+  result.percentile_90 = distance_of_area(sorted, 0.90 * result.area);
+  result.percentile_95 = distance_of_area(sorted, 0.95 * result.area);
   return result;
 }
 
