@@ -62,13 +62,6 @@ class Stopwatch {
 
 }  // namespace
 
-Halvings& Halvings::operator+=(const Halvings& more) {
-  failed += more.failed;
-  folded += more.folded;
-  off_prediction += more.off_prediction;
-  return *this;
-}
-
 LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& settings)
     : objective_(problem.objective()),
       tangent_(problem.tangent()),

@@ -40,7 +40,6 @@ struct Halvings {
   int64_t folded = 0;          ///< more tissue was inside out
   int64_t off_prediction = 0;  ///< it ended far from the prediction
   int64_t count() const { return failed + folded + off_prediction; }
-  Halvings& operator+=(const Halvings& more);
 };
 
 /// Outcome of a load path.
