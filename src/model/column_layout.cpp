@@ -57,9 +57,9 @@ void release_from_bones(const scene::Scene& scene, const MotionRange& range, con
                         const Columns& columns, const BoneField& field, Attachment& attachment) {
   const double distance = scene.tissue.release;
   const std::vector<double> pedicle = pedicles(scene);
-  const std::vector<double> limits =
-      release_near_other_pieces(columns.deep, mesh.vertex_area, field, range,
-                                {distance, scene.tissue.released, pedicle}, attachment);
+  const std::vector<double> limits = release_near_other_pieces(
+      columns.deep, field, range, {distance, scene.tissue.released, pedicle, mesh.vertex_area},
+      attachment);
   for (size_t b = 0; b < limits.size(); ++b)
     if (limits[b] < distance)
       attachment.remarks.push_back(fmt::format(

@@ -45,14 +45,14 @@ double distance_of_share(const std::vector<std::array<double, 2>>& columns, doub
 /// Release distance of each bone, mm: release.distance, or less where that leaves less than the
 /// pedicle attached. `releasing` [V] is the releasing_distance of each column.
 std::vector<double> distances_of_bones(const std::vector<double>& releasing,
-                                       const std::vector<double>& area,
                                        const Attachment& attachment, size_t bones,
                                        const Release& release) {
   std::vector<double> limits(bones, release.distance);
   if (release.pedicle.empty()) return limits;
   std::vector<std::vector<std::array<double, 2>>> columns(bones);
   for (size_t v = 0; v < releasing.size(); ++v)
-    if (attachment.bone[v] >= 0) columns[attachment.bone[v]].push_back({releasing[v], area[v]});
+    if (attachment.bone[v] >= 0)
+      columns[attachment.bone[v]].push_back({releasing[v], release.area[v]});
   for (size_t b = 0; b < bones; ++b) {
     if (!(release.pedicle[b] > 0)) continue;
     std::ranges::sort(columns[b]);
@@ -63,17 +63,16 @@ std::vector<double> distances_of_bones(const std::vector<double>& releasing,
 
 }  // namespace
 
-std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep,
-                                              const std::vector<double>& area,
-                                              const BoneField& bones, const MotionRange& range,
-                                              const Release& release, Attachment& attachment) {
+std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
+                                              const MotionRange& range, const Release& release,
+                                              Attachment& attachment) {
   if (!(release.distance > 0)) return std::vector<double>(bones.size(), release.distance);
   std::vector<double> releasing(deep.size(), INFINITY);
   for (size_t v = 0; v < deep.size(); ++v)
     if (attachment.bone[v] >= 0)
       releasing[v] = releasing_distance(deep[v], attachment.bone[v], bones, range);
   const std::vector<double> limits =
-      distances_of_bones(releasing, area, attachment, bones.size(), release);
+      distances_of_bones(releasing, attachment, bones.size(), release);
   for (size_t v = 0; v < deep.size(); ++v) {
     const int32_t own = attachment.bone[v];
     if (own < 0 || releasing[v] > limits[own]) continue;

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "attachment.h"
@@ -12,6 +13,7 @@ struct Release {
   scene::Attach how;  ///< what it does then
   std::vector<double> pedicle =
       {};  ///< [bones] least share of the tissue that stays attached; or empty
+  std::span<const double> area = {};  ///< [V] mm², of the columns; needed with `pedicle`
 };
 
 /// Releases the deepest points near a bone piece whose displacement there differs from that of
@@ -19,13 +21,12 @@ struct Release {
 /// difference, from 0 to the whole distance where it is 4 mm, so that the attachment follows the
 /// plan without a jump where two pieces move alike. Distances are at the initial position. Of a
 /// scene with a plan the difference is the largest in its box. Of the columns on each bone, those
-/// nearest to other pieces are released, with no more than the share 1 − pedicle of their area
-/// (`area` [V], mm²). Returns the release distance of each bone, mm [bones]: release.distance, or
-/// less where the pedicle limits it (negative: nothing is released).
-std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep,
-                                              const std::vector<double>& area,
-                                              const BoneField& bones, const MotionRange& range,
-                                              const Release& release, Attachment& attachment);
+/// nearest to other pieces are released, with no more than the share 1 − pedicle of their area.
+/// Returns the release distance of each bone, mm [bones]: release.distance, or less where the
+/// pedicle limits it (negative: nothing is released).
+std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
+                                              const MotionRange& range, const Release& release,
+                                              Attachment& attachment);
 
 /// Lets go by the same rule of deepest points near that of a rim column (`rim` [V], 1 or 0): the
 /// rim stays where it is, so to bones that move it is another piece.

@@ -49,10 +49,17 @@ class Lines {
   int64_t number_ = 0;
 };
 
-void check_counts(const Content& content, int64_t line, int64_t points, int64_t faces,
-                  int64_t point_bytes, int64_t face_bytes) {
+struct Counts {
+  int64_t points, faces;
+};
+
+/// Refuses a header that promises more than the file can hold, with at least so many bytes each.
+void check_counts(const Content& content, int64_t line, const Counts& promised,
+                  const Counts& bytes_each) {
   const auto room = static_cast<int64_t>(content.bytes.size());
-  if (points < 0 || faces < 0 || points > room / point_bytes || faces > room / face_bytes)
+  const auto [points, faces] = promised;
+  if (points < 0 || faces < 0 || points > room / bytes_each.points ||
+      faces > room / bytes_each.faces)
     fail(content, line,
          fmt::format("the header promises {} vertices and {} faces, which the file ({} bytes) "
                      "cannot hold: it is truncated or damaged",
@@ -64,7 +71,7 @@ Soup parse_text(const Content& content, Lines& lines, std::vector<std::string_vi
   if (counts.size() < 2) fail(content, lines.line(), "numbers of vertices and faces expected");
   const auto points = lines.integer(counts[0]);
   const auto faces = lines.integer(counts[1]);
-  check_counts(content, lines.line(), points, faces, 6, 2);
+  check_counts(content, lines.line(), {points, faces}, {6, 2});
   Soup soup;
   for (int64_t i = 0; i < points; ++i) {
     const auto line = lines.next();
@@ -110,7 +117,7 @@ Soup parse_binary(const Content& content, const Lines& lines) {
   const int64_t points = data.next<int32_t>();
   const int64_t faces = data.next<int32_t>();
   data.next<int32_t>();  // the number of edges, which nobody uses
-  check_counts(content, lines.line(), points, faces, 12, 8);
+  check_counts(content, lines.line(), {points, faces}, {12, 8});
   Soup soup;
   for (int64_t i = 0; i < points; ++i) {
     const double x = data.next<float>(), y = data.next<float>(), z = data.next<float>();
