@@ -15,7 +15,7 @@ struct Bracket {
 };
 
 /// Goes downhill from `first` and `second` by golden-section and parabolic steps until the
-/// function rises. A function that falls for `most_steps` steps gives the last three places.
+/// function rises. A function that falls for `max_steps` steps gives the last three places.
 Bracket bracket_minimum(const LineFunction& f, double first, double second);
 
 struct LineMinimum {

@@ -50,7 +50,7 @@ struct SequencePlan {
 };
 
 /// Resolutions that are compared to see how fine is fine enough: edges twice as long from level to
-/// level, from about `most_columns` down to the fewest worth solving, and one layer fewer where the
+/// level, from about `max_columns` down to the fewest worth solving, and one layer fewer where the
 /// scene lets layers be any number (layers_are_free).
 std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t max_columns);
 

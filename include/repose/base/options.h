@@ -37,16 +37,10 @@ struct Option {
 
 /// Command-line options, checked against one table; the program's own are read from the command
 /// line or, where not given there, from PETSc's database (an -options_file, PETSC_OPTIONS). A
-/// program does
-///
-///     base::Options options(argc, argv, "Does this.", {{"INPUT", "…"}}, {…});
-///     base::Session session(options.petsc_argc(), options.petsc_argv(), nullptr);
-///     if (options.help_wanted()) …print options.help() from one rank and leave with status 0
-///     options.check();
-///
-/// so that every error comes when ranks can agree who prints it. As in PETSc a token is a name
-/// if a letter follows its dash (or two); "-300" and "-.5" are values. The last of several wins.
-/// Nothing here is collective; every rank sees the same command line.
+/// program makes them and calls run_program (program.h), which starts PETSc, answers -help and
+/// calls check(): every error comes when ranks can agree who prints it. As in PETSc a token is a
+/// name if a letter follows its dash (or two); "-300" and "-.5" are values. The last of several
+/// wins. Nothing here is collective; every rank sees the same command line.
 class Options {
  public:
   /// Sorts the command line into the program's own options, PETSc's and arguments. Never throws.

@@ -101,7 +101,7 @@ struct PrismTerm {
   double nodal_slope = 0, nodal_curvature = 0;
 };
 
-/// Its 6×6 blocks: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `most_slope`.
+/// Its 6×6 blocks: φ″ ∇v∇vᵀ + φ′ ∇²v, with |φ′| at most `max_slope`.
 using PrismBlocks = std::array<std::array<Mat3, 6>, 6>;
 PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& term,
                          const Weights& weights, double max_slope);
@@ -113,7 +113,7 @@ PrismBlocks prism_blocks(const std::array<Vec3, 6>& corners, const PrismTerm& te
 std::vector<double> semidefinite_slopes(const PrismLoop& loop, std::span<const Vec3> initial,
                                         std::span<const Vec3> position);
 
-/// Calls visit(prism number, blocks) for each prism of the loops. `most_slope` [M], or empty for
+/// Calls visit(prism number, blocks) for each prism of the loops. `max_slope` [M], or empty for
 /// the exact Hessian, of which averaged volumes have more (nodal_gradients); else λ/V ∇v∇vᵀ of each
 /// prism is in their place, which is never less (Cauchy & Schwarz), with λ at most 20 μ: a
 /// multigrid that resists volume more corrects shear worse (docs/theory/linear_solver.md).

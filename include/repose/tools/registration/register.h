@@ -32,7 +32,7 @@ struct LandmarkFit {
 /// worst, where its error is too large for the scatter of the others, at a level of 0.1 % over all
 /// landmarks (an F test on the prediction variance of the rigid fit, to first order). At most a
 /// third of them is left out, and at least four remain, but of four one may go. Three cannot be
-/// checked. Throws InputError for fewer than three, or a set on a line (least_breadth).
+/// checked. Throws InputError for fewer than three, or a set on a line (min_breadth).
 LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
                           bool with_scale);
 
