@@ -68,9 +68,15 @@ std::optional<double> FrontMap::foremost(double x, double z, double half_width) 
 }
 
 std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double half_width) const {
+  constexpr double rounding = 1e-6;  // of a cell, so that heights of the profile are ends of others
+  const auto row = [&](double z) { return (z - low_z()) / spacing_ - 0.5; };
+  const auto first = static_cast<int64_t>(std::ceil(std::max(row(from_z), 0.0) - rounding));
+  const double last = std::min(row(to_z) + rounding, static_cast<double>(rows_ - 1));
   std::vector<ProfilePoint> points;
-  for (double z = std::max(from_z, low_z()); z <= std::min(to_z, high_z()); z += spacing_)
+  for (int64_t i = first; static_cast<double>(i) <= last; ++i) {
+    const double z = low_z() + (static_cast<double>(i) + 0.5) * spacing_;
     if (const auto y = foremost(0, z, half_width)) points.emplace_back(*y, z);
+  }
   return points;
 }
 

@@ -26,7 +26,8 @@ class FrontMap {
   double high_z() const { return low_.y() + spacing_ * static_cast<double>(rows_); }
   double spacing() const { return spacing_; }
 
-  /// The foremost points within `half_width` of the midline between two heights, from below.
+  /// The foremost points within `half_width` of the midline between two heights, from below, at
+  /// the middles of cells.
   std::vector<ProfilePoint> profile(double from_z, double to_z, double half_width) const;
 
  private:

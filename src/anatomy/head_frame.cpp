@@ -2,22 +2,24 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
-#include "repose/surface/distance.h"
+#include "repose/base/error.h"
+#include "repose/surface/triangle_tree.h"
+#include "search.h"
 
 namespace repose::anatomy {
 namespace {
 
-constexpr size_t samples = 3000, coarse_samples = 300;
-constexpr int rounds = 60;
-constexpr double kept = 0.67;  // share of pairs that a round fits
-
-/// A plane by a unit normal that points left, and a point.
+/// A plane by a unit normal, of either sign, and a point.
 struct Plane {
   Vec3 normal, point;
 
   Vec3 mirrored(const Vec3& x) const { return x - 2 * normal.dot(x - point) * normal; }
+  /// The part of a direction that is parallel to the plane.
+  Vec3 within(const Vec3& way) const { return way - normal.dot(way) * normal; }
 };
 
 std::vector<Vec3> thinned(const std::vector<Vec3>& points, size_t number) {
@@ -27,76 +29,119 @@ std::vector<Vec3> thinned(const std::vector<Vec3>& points, size_t number) {
   return chosen;
 }
 
-/// A point, the vertex nearest to its mirror image, and how far, mm, they are apart.
-struct Pair {
-  Vec3 point, partner;
+/// The mirror image of a skull in a plane, compared with the skull: Σ d²/(1 + d²/s²) over points, d
+/// mm from their image to the surface, so that points without a partner hardly count.
+class MirrorFit {
+ public:
+  MirrorFit(const surface::TriangleTree& tree, const std::vector<Vec3>& points, double scale)
+      : tree_(tree), points_(points), scale_(scale) {}
+
+  double off(const Plane& plane) const {
+    double sum = 0;
+    for (const Vec3& p : points_) {
+      const double squared = tree_.nearest(plane.mirrored(p)).squared;
+      sum += squared / (1 + squared / (scale_ * scale_));
+    }
+    return sum;
+  }
+  Plane next(const Plane& plane) const;
+
+ private:
+  const surface::TriangleTree& tree_;
+  const std::vector<Vec3>& points_;
+  double scale_;
+};
+
+/// The plane after a step of reweighted Gauss-Newton.
+Plane MirrorFit::next(const Plane& plane) const {
+  const Vec3 n = plane.normal, a = n.unitOrthogonal(), b = n.cross(a);
+  Mat3 matrix = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  for (const Vec3& p : points_) {
+    const Vec3 image = plane.mirrored(p), way = image - tree_.nearest(image).point;
+    const double d = way.norm();
+    if (d == 0) continue;
+    const Vec3 u = way / d, arm = p - plane.point;
+    const auto turned = [&](const Vec3& axis) {
+      return -2 * (u.dot(n) * arm.dot(axis) + u.dot(axis) * arm.dot(n));
+    };
+    const Vec3 row(turned(a), turned(b), 2 * u.dot(n));
+    const double root = 1 + d * d / (scale_ * scale_), weight = 1 / (root * root);
+    matrix += weight * row * row.transpose();
+    right -= weight * d * row;
+  }
+  const Vec3 step = matrix.ldlt().solve(right);
+  return {(n + step.x() * a + step.y() * b).normalized(), plane.point + step.z() * n};
+}
+
+/// A plane, and how far off the mirror image lies, mm².
+struct Fit {
+  Plane plane;
   double off;
 };
 
-/// The pairs that are nearest to each other, a fixed share of all.
-std::vector<Pair> nearest_pairs(const Plane& plane, const std::vector<Vec3>& chosen,
-                                const std::vector<Vec3>& points, const surface::PointTree& tree) {
-  std::vector<Pair> pairs;
-  for (const Vec3& p : chosen) {
-    const Vec3 image = plane.mirrored(p);
-    const Vec3& partner = points[tree.nearest(image)];
-    pairs.push_back({p, partner, (partner - image).norm()});
+std::vector<Fit> best_of(std::vector<Fit> fits, size_t number) {
+  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.off < b.off; });
+  fits.resize(std::min(number, fits.size()));
+  return fits;
+}
+
+/// Planes through the middle of points, with normals some 7° apart over half of the sphere.
+std::vector<Fit> first_planes(const Vec3& middle, const MirrorFit& fit) {
+  constexpr int directions = 400;
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  std::vector<Fit> fits;
+  for (int i = 0; i < directions; ++i) {
+    const double x = 1 - (i + 0.5) / directions, radius = std::sqrt(1 - x * x);
+    const Plane plane{Vec3(x, radius * std::cos(golden * i), radius * std::sin(golden * i)),
+                      middle};
+    fits.push_back({plane, fit.off(plane)});
   }
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.off < b.off; });
-  pairs.resize(std::max<size_t>(3, static_cast<size_t>(kept * static_cast<double>(pairs.size()))));
-  return pairs;
+  return fits;
 }
 
-/// The best of planes through `middle`, yawed and rolled by up to 20° in steps of 4°.
-Plane first_plane(const Vec3& middle, const std::vector<Vec3>& points,
-                  const surface::PointTree& tree) {
-  constexpr double maximum = 20, step = 4, degree = 0.017453292519943295;
-  const std::vector<Vec3> few = thinned(points, coarse_samples);
-  Plane best{Vec3::UnitX(), middle};
-  double minimum = INFINITY;
-  for (double yaw = -maximum; yaw <= maximum; yaw += step)
-    for (double roll = -maximum; roll <= maximum; roll += step) {
-      const Plane plane{Vec3(1, std::tan(degree * yaw), std::tan(degree * roll)).normalized(),
-                        middle};
-      double sum = 0;
-      for (const Pair& pair : nearest_pairs(plane, few, points, tree)) sum += pair.off;
-      if (!(sum < minimum)) continue;
-      minimum = sum;
-      best = plane;
-    }
-  return best;
-}
-
-/// The plane that mirrors the first of each pair onto the second with the least squares.
-Plane plane_of(const std::vector<Pair>& pairs) {
-  std::vector<Vec3> moving, fixed;
-  Vec3 middle = Vec3::Zero();
-  for (const Pair& pair : pairs) {
-    moving.push_back(pair.point);
-    fixed.push_back(pair.partner);
-    middle += (pair.point + pair.partner) / (2.0 * static_cast<double>(pairs.size()));
-  }
-  const Mat3 turn = base::fit_similarity(moving, fixed, false, base::Handedness::mirrored).rotation;
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes((turn + turn.transpose()) / 2);
-  Vec3 normal = axes.eigenvectors().col(0);  // eigenvalue −1
-  if (normal.x() < 0) normal = -normal;
-  return {normal, middle};
-}
-
-Plane fit_plane(const surface::Surface& skull) {
-  const std::vector<Vec3> chosen = thinned(skull.points, samples);
-  const surface::PointTree tree(skull.points);
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& p : chosen) middle += p / static_cast<double>(chosen.size());
-  Plane plane = first_plane(middle, skull.points, tree);
+Fit refine(Plane plane, const MirrorFit& fit) {
+  constexpr int rounds = 60;
+  constexpr double end = 1e-5;  // radians, and 1e-3 mm
   for (int round = 0; round < rounds; ++round) {
-    const Plane next = plane_of(nearest_pairs(plane, chosen, skull.points, tree));
-    const double change = (next.normal - plane.normal).norm() +
+    const Plane next = fit.next(plane);
+    const double change = next.normal.cross(plane.normal).norm() +
                           0.01 * std::abs(next.normal.dot(next.point - plane.point));
     plane = next;
-    if (change < 1e-5) break;
+    if (change < end) break;
   }
-  return plane;
+  return {plane, fit.off(plane)};
+}
+
+/// Many directions are tried on few points, and the best planes refined on more.
+Plane fit_plane(const surface::Surface& skull) {
+  const surface::TriangleTree tree(skull);
+  const std::vector<Vec3> few = thinned(skull.points, 300), many = thinned(skull.points, 3000);
+  const MirrorFit coarse(tree, few, 10), fine(tree, many, 2);
+  std::vector<Fit> fits = best_of(first_planes(mean_of(few), coarse), 12);
+  for (Fit& fit : fits) fit = refine(fit.plane, coarse);
+  fits = best_of(std::move(fits), 3);
+  for (Fit& fit : fits) fit = refine(fit.plane, fine);
+  return best_of(std::move(fits), 1).front().plane;
+}
+
+/// The middles of the symphysis, near the plane, and of both rami, the parts farthest from it.
+std::array<Vec3, 2> symphysis_and_rami(const surface::Surface& mandible, const Plane& plane) {
+  constexpr double near = 6, beside = 0.7;  // mm; share of the largest distance
+  const auto off = [&](const Vec3& p) { return std::abs(plane.normal.dot(p - plane.point)); };
+  double reach = 0;
+  for (const Vec3& p : mandible.points) reach = std::max(reach, off(p));
+  std::vector<Vec3> symphysis, rami;
+  for (const Vec3& p : mandible.points) {
+    if (off(p) < near) symphysis.push_back(p);
+    if (off(p) > beside * reach) rami.push_back(p);
+  }
+  if (symphysis.empty())
+    base::refuse(
+        "{}: has no point within {:g} mm of the skull's midsagittal plane; give surfaces of one "
+        "head in one frame",
+        mandible.name, near);
+  return {mean_of(symphysis), mean_of(rami)};
 }
 
 }  // namespace
@@ -109,16 +154,17 @@ HeadFrame HeadFrame::upright(const Vec3& low, const Vec3& high) const {
   return turned;
 }
 
-HeadFrame fit_head_frame(const surface::Surface& skull) {
+HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& mandible) {
+  constexpr double rise = 22 * std::numbers::pi / 180;  // of the way from symphysis to rami
   const Plane plane = fit_plane(skull);
-  const Vec3 left = plane.normal;
-  const Vec3 back = (Vec3::UnitY() - left.y() * left).normalized();
-  HeadFrame frame;
-  frame.axes.row(0) = left.transpose();
-  frame.axes.row(1) = back.transpose();
-  frame.axes.row(2) = left.cross(back).transpose();
-  frame.origin = plane.point;
-  return frame;
+  const auto [symphysis, rami] = symphysis_and_rami(mandible, plane);
+  const Vec3 way = plane.within(rami - symphysis).normalized(),
+             above = plane.within(mean_of(skull.points) - (symphysis + rami) / 2);
+  Mat3 axes;
+  axes.row(1) = way;
+  axes.row(2) = (above - above.dot(way) * way).normalized();
+  axes.row(0) = axes.row(1).cross(axes.row(2));
+  return {Eigen::AngleAxisd(rise, Vec3::UnitX()).toRotationMatrix() * axes, plane.point};
 }
 
 }  // namespace repose::anatomy

@@ -1,45 +1,42 @@
 #include "repose/anatomy/propose.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "repose/base/error.h"
 #include "search.h"
 
 namespace repose::anatomy {
 namespace {
 
-Vec3 mean_of(const std::vector<Vec3>& points) {
-  Vec3 sum = Vec3::Zero();
-  for (const Vec3& p : points) sum += p;
-  return sum / static_cast<double>(points.size());
+/// The largest distance, mm, of a point from the middle of all.
+double reach_of(const surface::Surface& part) {
+  const Vec3 middle = mean_of(part.points);
+  double reach = 0;
+  for (const Vec3& p : part.points) reach = std::max(reach, (p - middle).norm());
+  return reach;
 }
 
-/// Refuses surfaces of which the mandible does not lie as in a head in LPS.
+/// Refuses surfaces that are not the skin, the skull and the mandible of one head in mm.
 void require_head(const surface::Surface& skin, const surface::Surface& skull,
                   const surface::Surface& mandible) {
   for (const surface::Surface* part : {&skin, &skull, &mandible})
     if (part->points.empty()) base::refuse("{}: has no points", part->name);
-  const Vec3 jaw = mean_of(mandible.points), cranium = mean_of(skull.points);
-  if (jaw.z() > cranium.z())
+  constexpr double min_reach = 35, max_reach = 170;  // mm
+  const double reach = reach_of(mandible), skull_reach = reach_of(skull);
+  if (skull_reach < reach)
     base::refuse(
-        "{}: its middle lies {:.0f} mm above that of {}; give the skull and the mandible in this "
-        "order, with +z up",
-        mandible.name, jaw.z() - cranium.z(), skull.name);
-  double low = INFINITY, high = -INFINITY;
-  for (const Vec3& p : mandible.points) {
-    low = std::min(low, p.z());
-    high = std::max(high, p.z());
-  }
-  std::vector<Vec3> chin, rami;
-  for (const Vec3& p : mandible.points)
-    if (p.z() < low + (high - low) / 3)
-      chin.push_back(p);
-    else if (p.z() > high - (high - low) / 4)
-      rami.push_back(p);
-  if (const double back = mean_of(chin).y() - mean_of(rami).y(); back > 0)
+        "{}: reaches {:.3g} mm from its middle, more than {} ({:.3g} mm); give the skull and the "
+        "mandible in this order",
+        mandible.name, reach, skull.name, skull_reach);
+  if (!(reach >= min_reach && reach <= max_reach))
     base::refuse(
-        "{}: its chin lies {:.0f} mm behind its rami along +y, as in RAS; surfaces must be in LPS: "
-        "change the signs of x and y",
-        mandible.name, back);
+        "{}: reaches {:.3g} mm from its middle, a mandible {:g} to {:g} mm; surfaces must be in mm",
+        mandible.name, reach, min_reach, max_reach);
   constexpr double beside = 30;  // mm
+  const Vec3 jaw = mean_of(mandible.points);
   Vec3 minimum = skin.points.front(), maximum = minimum;
   for (const Vec3& p : skin.points) {
     minimum = minimum.cwiseMin(p);
@@ -50,12 +47,71 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
                  skin.name, mandible.name);
 }
 
+/// Remarks on a mandible whose triangles point inwards. A head looks alike when left and right are
+/// exchanged, so that shape alone does not show it.
+void remark_mirrored(const surface::Surface& mandible, Search& search) {
+  const Vec3 middle = mean_of(mandible.points);
+  double volume = 0;
+  for (const Triangle& t : mandible.triangles) {
+    const auto [a, b, c] = base::pick(mandible.points, t);
+    volume += (a - middle).dot((b - middle).cross(c - middle)) / 6;
+  }
+  if (volume < 0)
+    search.remark(
+        "triangles of MANDIBLE point inwards, as in a head that is mirrored: check that its left "
+        "is the patient's left");
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text = words[0];
+  for (size_t i = 1; i < words.size(); ++i)
+    text += (i + 1 < words.size() ? ", " : " and ") + words[i];
+  return text;
+}
+
+/// What brings a head into LPS of which these axes point the other way. Of a mirrored head the
+/// frame has left and right exchanged.
+std::string remedy_of(const std::vector<std::string>& opposite) {
+  std::vector<std::string> mirrored;
+  if (opposite[0] == "x")
+    mirrored.assign(opposite.begin() + 1, opposite.end());
+  else
+    mirrored = {"x", "y", "z"};
+  return fmt::format("change the signs of {}, or of {} alone if the scan is mirrored",
+                     joined(opposite), joined(mirrored));
+}
+
+/// Refuses a head that is turned in the scan by more than a patient is. A pitch of 45° with a yaw
+/// and a roll of 30° is a turn of at most 67°.
+void require_lps(const HeadFrame& frame, const std::string& name) {
+  constexpr double most = 75 * std::numbers::pi / 180;
+  if (Eigen::AngleAxisd(frame.axes).angle() <= most) return;
+  std::vector<std::string> along, opposite;
+  bool turned = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    int nearest = 0;
+    frame.axes.row(axis).cwiseAbs().maxCoeff(&nearest);
+    const std::string letter(1, "xyz"[nearest]);
+    const bool negative = frame.axes(axis, nearest) < 0;
+    along.push_back((negative ? "-" : "+") + letter);
+    if (negative) opposite.push_back(letter);
+    turned = turned || nearest != axis;
+  }
+  const bool ras = !turned && joined(opposite) == "x and y";
+  base::refuse(
+      "{}: by the shape of the bones the head's left, back and up lie along {}{}; surfaces must be "
+      "in LPS, where they lie along +x, +y and +z: {}",
+      name, joined(along), ras ? ", as in RAS" : "",
+      turned ? "turn the head" : remedy_of(opposite));
+}
+
 }  // namespace
 
 Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface& skull,
                            const surface::Surface& mandible, const Landmarks& given) {
   require_head(skin, skull, mandible);
-  HeadFrame frame = fit_head_frame(skull);
+  HeadFrame frame = fit_head_frame(skull, mandible);
+  require_lps(frame, mandible.name);
   constexpr int turns = 3;
   for (int turn = 0; turn < turns; ++turn) {
     Search search(frame, given);
@@ -68,6 +124,7 @@ Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface&
   Search search(frame, given);
   search_bones(skull, mandible, search);
   search_skin(skin, search);
+  remark_mirrored(mandible, search);
   return search.proposal();
 }
 

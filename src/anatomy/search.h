@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -7,6 +8,12 @@
 #include "repose/anatomy/propose.h"
 
 namespace repose::anatomy {
+
+inline Vec3 mean_of(const std::vector<Vec3>& points) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& p : points) sum += p;
+  return sum / static_cast<double>(points.size());
+}
 
 /// A search for landmarks: what is known so far, in one head frame.
 class Search {

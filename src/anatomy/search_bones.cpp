@@ -110,6 +110,21 @@ std::optional<double> nasal_floor(const FrontMap& map, const ProfilePoint& edge)
   return base::median(std::move(heights));
 }
 
+/// The point of a profile between two heights above `from` where a line from there touches it in
+/// front; nothing where the profile has no point there.
+std::optional<ProfilePoint> tangent_point(const std::vector<ProfilePoint>& profile,
+                                          const ProfilePoint& from, double from_z, double to_z) {
+  std::optional<ProfilePoint> best;
+  double minimum = INFINITY;
+  for (const ProfilePoint& p : profile) {
+    const double slope = (p.x() - from.x()) / (p.y() - from.y());
+    if (p.y() < from_z || p.y() > to_z || !(slope < minimum)) continue;
+    minimum = slope;
+    best = p;
+  }
+  return best;
+}
+
 /// Nasal spine, point A and nasion, by the skull's profile above the incisors.
 void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search& search) {
   constexpr double near = 3;  // mm, of the spine to the nasal floor's height
@@ -135,7 +150,7 @@ void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search&
                "SKULL has no bone between the nasal spine and the upper incisors");
   const auto bridge = foremost_of(profile, *floor + 15, *floor + 45);
   const auto brow =
-      bridge ? foremost_of(profile, bridge->y() + 20, bridge->y() + 38) : std::nullopt;
+      bridge ? tangent_point(profile, *bridge, bridge->y() + 20, bridge->y() + 38) : std::nullopt;
   if (!brow) return search.lack("nasion_bone", "SKULL ends below the glabella");
   search.put("nasion_bone",
              farthest_from_chord(profile, *bridge, *brow, bridge->y() + 5, brow->y() - 3, -1),

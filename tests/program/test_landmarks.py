@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from conftest import PROJECT, finish, programs
+from heads import DATA
 
 MESHES = PROJECT / "meshes"
 SURFACES = [MESHES / "head_skin.ply", "-skull", MESHES / "head_skull.ply", "-mandible",
@@ -32,20 +33,39 @@ def test_writes_landmarks_and_a_picture(run, tmp_path):
     assert "remark: the mouth is open in SKIN" in result.stdout
 
 
-@pytest.mark.parametrize("degrees", [-20, 20])
-def test_a_pitched_scan_has_the_same_landmarks(run, tmp_path, degrees):
-    turn = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+def turned(folder, head, change):
+    """Arguments with the surfaces of a head, each point multiplied by a matrix."""
     surfaces = []
     for part in ("skin", "skull", "mandible"):
-        mesh = meshio.read(MESHES / f"head_{part}.ply")
-        mesh.points = mesh.points @ turn.T
-        mesh.write(tmp_path / f"{part}.ply")
+        mesh = meshio.read(f"{head}{part}.ply")
+        mesh.points = mesh.points @ change.T
+        mesh.write(folder / f"{part}.ply")
         surfaces += [f"-{part}", f"{part}.ply"] if surfaces else [f"{part}.ply"]
-    for name, given in (("upright", SURFACES), ("pitched", surfaces)):
-        assert run("repose-landmarks", *given, "-output", name).returncode == 0
-    upright, pitched = (points(tmp_path / f"{name}.mrk.json") for name in ("upright", "pitched"))
-    assert pitched.keys() == upright.keys()
-    assert max(np.linalg.norm(turn.T @ place - upright[name]) for name, place in pitched.items()) < 0.5
+    return surfaces
+
+
+@pytest.mark.parametrize("head", [f"{MESHES}/head_", pytest.param(
+    f"{DATA}/", marks=pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing"))])
+@pytest.mark.parametrize("pitch, yaw, roll", [(-45, 0, 0), (45, 0, 0), (0, 30, -30), (30, -30, 0)])
+def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, head, pitch, yaw, roll):
+    turn = Rotation.from_euler("xyz", [pitch, roll, yaw], degrees=True).as_matrix()
+    for name, change in (("upright", np.eye(3)), ("turned", turn)):
+        assert run("repose-landmarks", *turned(tmp_path, head, change), "-output", name).returncode == 0
+    upright, found = (points(tmp_path / f"{name}.mrk.json") for name in ("upright", "turned"))
+    assert len(found) == len(upright) == 23
+    assert max(np.linalg.norm(turn.T @ place - upright[name]) for name, place in found.items()) < 0.5
+
+
+@pytest.mark.parametrize("change, line", [
+    (np.diag([-1, -1, 1]), "as in RAS"),
+    (np.diag([-1, 1, -1]), "left, back and up lie along -x, +y and -z"),
+    (np.diag([1, -1, 1]), "or of y alone if the scan is mirrored"),
+    (10 * np.eye(3), "surfaces must be in mm"),
+    (0.1 * np.eye(3), "surfaces must be in mm"),
+])
+def test_refuses_another_frame_or_unit(run, tmp_path, change, line):
+    result = run("repose-landmarks", *turned(tmp_path, f"{MESHES}/head_", change))
+    assert result.returncode == 1 and line in result.stderr and result.stderr.count("\n") == 1
 
 
 def test_known_landmarks_are_kept(run, tmp_path):

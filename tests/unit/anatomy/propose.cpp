@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
+#include <array>
+#include <cmath>
 
 #include "../../folder.h"
 #include "repose/anatomy/picture.h"
@@ -47,15 +49,19 @@ TEST(ProposeLandmarks, LieNearThoseOfTheShippedHead) {
 }
 
 TEST(ProposeLandmarks, TurnWithTheHead) {
-  const Mat3 turn =
-      (Eigen::AngleAxisd(0.15, Vec3::UnitX()) * Eigen::AngleAxisd(-0.1, Vec3::UnitY()) *
-       Eigen::AngleAxisd(0.12, Vec3::UnitZ()))
-          .toRotationMatrix();
-  const Proposal upright = propose(shipped()), tilted = propose(turned(turn));
-  for (const auto& [name, place] : upright.found) {
-    const bool by_height = name.starts_with("condyle") || name.starts_with("gonion");
-    ASSERT_TRUE(tilted.found.contains(name)) << name;
-    EXPECT_LT((tilted.found.at(name) - turn * place).norm(), by_height ? 4 : 2.5) << name;
+  const Proposal upright = propose(shipped());
+  for (const auto& [pitch, yaw, roll] : {std::array{45.0, 0.0, 0.0},
+                                         {-45.0, 0.0, 0.0},
+                                         {45.0, 30.0, -30.0},
+                                         {-45.0, -30.0, -30.0}}) {
+    const Mat3 turn = (Eigen::AngleAxisd(pitch * M_PI / 180, Vec3::UnitX()) *
+                       Eigen::AngleAxisd(roll * M_PI / 180, Vec3::UnitY()) *
+                       Eigen::AngleAxisd(yaw * M_PI / 180, Vec3::UnitZ()))
+                          .toRotationMatrix();
+    const Proposal tilted = propose(turned(turn));
+    ASSERT_EQ(tilted.found.size(), upright.found.size());
+    for (const auto& [name, place] : upright.found)
+      EXPECT_LT((tilted.found.at(name) - turn * place).norm(), 0.5) << name << " " << pitch;
   }
 }
 
@@ -76,9 +82,26 @@ TEST(ProposeLandmarks, NoneThatIsGivenIsReplaced) {
     EXPECT_EQ(propose(shipped(), {{name, place}}).found.at(name), place) << name;
 }
 
-TEST(ProposeLandmarks, RefusesRasAndExchangedBones) {
-  const Head ras = turned(Vec3(-1, -1, 1).asDiagonal());
-  EXPECT_NE(refusal([&] { propose(ras); }).find("as in RAS"), std::string::npos);
+TEST(ProposeLandmarks, RefusesOtherFramesAndUnits) {
+  const auto refused = [](const Mat3& change) { return refusal([&] { propose(turned(change)); }); };
+  const Mat3 chin_up = Eigen::AngleAxisd(0.7, Vec3::UnitX()).toRotationMatrix();
+  const Mat3 ras = Vec3(-1, -1, 1).asDiagonal(), feet_first = Vec3(-1, 1, -1).asDiagonal(),
+             front_back = Vec3(1, -1, 1).asDiagonal(), up_down = Vec3(1, 1, -1).asDiagonal();
+  Mat3 permuted = Mat3::Zero();
+  permuted(0, 1) = permuted(1, 2) = permuted(2, 0) = 1;
+  for (const auto& [change, expected] : std::vector<std::pair<Mat3, std::string>>{
+           {ras, "along -x, -y and +z, as in RAS"},
+           {chin_up * ras, "along -x, -y and +z, as in RAS"},
+           {front_back, "or of y alone if the scan is mirrored"},
+           {feet_first, "along -x, +y and -z; "},
+           {up_down, "or of z alone if the scan is mirrored"},
+           {permuted, "along +z, +x and +y; "},
+           {10 * Mat3::Identity(), "reaches 832 mm from its middle, a mandible 35 to 170 mm"},
+           {0.1 * Mat3::Identity(), "reaches 8.32 mm from its middle, a mandible 35 to 170 mm"}})
+    EXPECT_NE(refused(change).find(expected), std::string::npos) << refused(change);
+}
+
+TEST(ProposeLandmarks, RefusesExchangedBonesAndPartsOfSeveralHeads) {
   const Head& head = shipped();
   EXPECT_NE(refusal([&] {
               propose_landmarks(head.skin, head.mandible, head.skull, {});
@@ -87,6 +110,15 @@ TEST(ProposeLandmarks, RefusesRasAndExchangedBones) {
   Head far = head;
   for (Vec3& p : far.skin.points) p.x() += 500;
   EXPECT_NE(refusal([&] { propose(far); }).find("one head in one frame"), std::string::npos);
+  far = head;
+  for (Vec3& p : far.mandible.points) p.x() += 80;
+  EXPECT_NE(refusal([&] { propose(far); }).find("midsagittal plane"), std::string::npos);
+}
+
+TEST(ProposeLandmarks, RemarksOnTrianglesThatPointInwards) {
+  const Proposal mirrored = propose(turned(Vec3(-1, 1, 1).asDiagonal()));
+  ASSERT_EQ(mirrored.remarks.size(), 2u);
+  EXPECT_NE(mirrored.remarks[1].find("MANDIBLE point inwards"), std::string::npos);
 }
 
 TEST(ProposeLandmarks, ASkullThatEndsLowHasNoNasion) {
