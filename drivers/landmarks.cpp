@@ -9,6 +9,7 @@
 /// internal error.
 #include <cstdio>
 
+#include "repose/anatomy/complete.h"
 #include "repose/anatomy/picture.h"
 #include "repose/anatomy/propose.h"
 #include "repose/base/agreement.h"
@@ -42,6 +43,21 @@ constexpr const char* needed[] = {"condyle_right_center", "condyle_left_center",
 surface::Surface read(const base::Options& options, const char* name) {
   if (!options.has(name)) base::refuse("-{} FILE is required: the surface of the {}", name, name);
   return surface::read_surface(options.text(name));
+}
+
+/// Refuses a pair of which the left one lies to the right of the other.
+void require_sides(const scene::Landmarks& given, const anatomy::HeadFrame& frame,
+                   const std::string& file) {
+  for (const auto& [right, left] : {std::pair{"condyle_right_center", "condyle_left_center"},
+                                    {"gonion_right", "gonion_left"},
+                                    {"mouth_right", "mouth_left"}}) {
+    const Vec3 *one = scene::find(given, right), *other = scene::find(given, left);
+    if (!one || !other) continue;
+    const double apart = frame.to_frame(*other).x() - frame.to_frame(*one).x();
+    if (apart < 0)
+      base::refuse("{}: {} lies {:.0f} mm to the patient's right of {}: they are exchanged", file,
+                   left, -apart, right);
+  }
 }
 
 void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal& alone,
@@ -91,8 +107,10 @@ base::Exit run(const base::Options& options) {
   if (options.has("landmarks")) {
     const std::string file = options.text("landmarks");
     given = scene::with_standard_names(scene::landmarks_by_name(file), file);
+    anatomy::require_same_head(given, file, skin, {skull, mandible});
   }
   const anatomy::Proposal alone = anatomy::propose_landmarks(skin, skull, mandible, {});
+  require_sides(given, alone.frame, options.text("landmarks"));
   const anatomy::Proposal proposal =
       given.empty() ? alone : anatomy::propose_landmarks(skin, skull, mandible, given);
   print_landmarks(proposal, alone, given);

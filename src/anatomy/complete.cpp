@@ -16,30 +16,6 @@ using scene::find;
 
 constexpr double off_surface = 15;  // mm, farther than a landmark is ever placed beside its surface
 
-/// Refuses landmarks far from the surface that they are said to be on.
-void require_same_head(const scene::AnatomyPlan& plan, const surface::Surface& skin,
-                       const std::vector<surface::Surface>& bones) {
-  surface::Surface bone;
-  for (const surface::Surface& part : bones) {
-    const auto first = static_cast<int64_t>(bone.points.size());
-    bone.points.insert(bone.points.end(), part.points.begin(), part.points.end());
-    for (const Triangle& t : part.triangles)
-      bone.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  const surface::TriangleTree on_skin(skin), on_bone(bone);
-  for (const scene::LandmarkName& name : scene::landmark_names()) {
-    const auto found = plan.landmarks.find(name.name);
-    if (found == plan.landmarks.end()) continue;
-    const double off = std::sqrt((name.on_skin ? on_skin : on_bone).nearest(found->second).squared);
-    if (off > off_surface)
-      base::refuse(
-          "{}: landmark {} lies {:.0f} mm from the {}; the landmarks are those of another head or "
-          "in "
-          "another frame",
-          plan.file.string(), name.name, off, name.on_skin ? "skin" : "bones");
-  }
-}
-
 /// The frame of the head at the mouth.
 HeadFrame frame_of(const scene::AnatomyPlan& plan) {
   HeadFrame frame;
@@ -199,10 +175,33 @@ void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
 
 }  // namespace
 
+void require_same_head(const scene::Landmarks& landmarks, const std::string& file,
+                       const surface::Surface& skin, const std::vector<surface::Surface>& bones) {
+  surface::Surface bone;
+  for (const surface::Surface& part : bones) {
+    const auto first = static_cast<int64_t>(bone.points.size());
+    bone.points.insert(bone.points.end(), part.points.begin(), part.points.end());
+    for (const Triangle& t : part.triangles)
+      bone.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  const surface::TriangleTree on_skin(skin), on_bone(bone);
+  for (const scene::LandmarkName& name : scene::landmark_names()) {
+    const auto found = landmarks.find(name.name);
+    if (found == landmarks.end()) continue;
+    const double off = std::sqrt((name.on_skin ? on_skin : on_bone).nearest(found->second).squared);
+    if (off > off_surface)
+      base::refuse(
+          "{}: landmark {} lies {:.0f} mm from the {}; the landmarks are those of another head or "
+          "in "
+          "another frame",
+          file, name.name, off, name.on_skin ? "skin" : "bones");
+  }
+}
+
 void complete(const surface::Surface& skin, const std::vector<surface::Surface>& bones,
               scene::Scene& scene, std::vector<std::string>& remarks) {
   if (!scene.anatomy) return;
-  require_same_head(*scene.anatomy, skin, bones);
+  require_same_head(scene.anatomy->landmarks, scene.anatomy->file.string(), skin, bones);
   remark_pitch(*scene.anatomy, remarks);
   remark_teeth(*scene.anatomy, remarks);
   part_lips(skin, scene, remarks);

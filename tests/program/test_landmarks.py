@@ -101,6 +101,19 @@ def test_refuses_in_one_line(run, tmp_path, arguments, line):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("change, line", [
+    (lambda name, p: (name, [-p[0], -p[1], p[2]]), "mm from the bones; the landmarks are those of another head"),
+    (lambda name, p: ({"mouth_left": "mouth_right", "mouth_right": "mouth_left"}.get(name, name), p),
+     "to the patient's right of mouth_right: they are exchanged"),
+])
+def test_refuses_landmarks_of_another_frame_or_side(run, tmp_path, change, line):
+    assert run("repose-landmarks", *SURFACES, "-output", "proposed").returncode == 0
+    found = dict(change(name, place) for name, place in points(tmp_path / "proposed.mrk.json").items())
+    (tmp_path / "given.json").write_text(json.dumps(found))
+    result = run("repose-landmarks", *SURFACES, "-landmarks", "given.json")
+    assert result.returncode == 1 and line in result.stderr and result.stderr.count("\n") == 1, result
+
+
 def test_measures_its_error(environment, tmp_path):
     pytest.importorskip("scipy")
     page = tmp_path / "page.md"
