@@ -109,7 +109,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
     if (part.unknown[i] < 0)
       travel[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
   objective_.round_bodies(true);
-  set_stiffness(stiffness_);
+  stiffen(1);
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
   qp_.linearize(displacement, load, travel);

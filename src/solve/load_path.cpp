@@ -63,7 +63,8 @@ class Stopwatch {
 }  // namespace
 
 LoadPath::LoadPath(Problem& problem, RestSearch& search, const PathSettings& settings)
-    : objective_(problem.objective()),
+    : problem_(problem),
+      objective_(problem.objective()),
       tangent_(problem.tangent()),
       function_(problem.function()),
       predictor_(objective_, problem.elastic_solver()),
@@ -236,6 +237,9 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     try_guess(displacement, guess, on_step);
     if (result_.leapt) return result_;
   }
+  const base::VecHandle start = positions.make_vector();
+  check(VecCopy(displacement, start));
+  const ContactPressures at_start = search_.pressures();
   settle(displacement, on_step);
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
       result_.load < 1)
@@ -244,9 +248,6 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     follow(displacement, requested_step(), 1, on_step);
     return result_;
   }
-  const base::VecHandle start = positions.make_vector();
-  check(VecCopy(displacement, start));
-  const ContactPressures at_start = search_.pressures();
   follow(displacement, requested_step(), 1 - requested_step(), on_step);
   if (result_.last.converged && !result_.last.stopped && result_.load < 1)
     follow_again(start, at_start, displacement, on_step);
@@ -281,19 +282,23 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
   }
 }
 
-/// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported.
-/// Where these fail, the path continues from `displacement`, which the requested steps have
-/// reached.
+/// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported,
+/// as if no others had been requested: linear solvers and contact begin anew. Where these steps
+/// fail, the path continues from `displacement`, which the requested ones have reached.
 void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
                             const OnStep& on_step) {
   const Stopwatch watch;
   const ContactPressures reached_pressures = search_.pressures();
   const PathOutcome reached = result_;
   discrete::Positions& positions = objective_.positions();
+  problem_.reset();
+  search_.set_pressures(at_start);
+  begun_ = function_.evaluations();
+  refused_ = 0;
   result_.load = 0;
   positions.set_load(0);
-  positions.update(start);
-  search_.set_pressures(at_start);
+  result_.last = search_.run(start, settings_.accuracy);
+  result_.iterations += result_.last.iterations;
   follow(start, automatic_step(), 1, [](const Outcome&, double, double) {});
   if (result_.complete() || (result_.load == 1 && result_.last.overlapped > 0)) {
     check(VecCopy(start, displacement));

@@ -77,6 +77,16 @@ def test_any_minimizer_ends_at_the_position_of_less_energy_and_reports_the_other
         assert distance == pytest.approx(0.27, abs=0.05)
 
 
+def test_requested_load_steps_change_no_bit_of_the_face(folder, environment):
+    run = runner(folder, environment)
+    faces = []
+    for name, options in (("automatic", ()), ("requested", ("-load_steps", 3))):
+        done = run("repose-solve", "head_le_fort.yaml", "-output", name, *options)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        faces.append(last(folder / f"{name}.h5")["point/position"])
+    assert np.array_equal(*faces)
+
+
 @real_head
 @pytest.mark.long
 def test_another_rest_position_is_reported_with_its_place_on_any_ranks(folder, environment):

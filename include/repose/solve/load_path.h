@@ -100,6 +100,7 @@ class LoadPath {
   void refuse_overlap();
   void explain_failure();
 
+  Problem& problem_;
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   const discrete::Function& function_;
