@@ -110,7 +110,7 @@ base::Exit run(const base::Options& options) {
     anatomy::require_same_head(given, file, skin, {skull, mandible});
   }
   const anatomy::Proposal alone = anatomy::propose_landmarks(skin, skull, mandible, {});
-  require_sides(given, alone.frame, options.text("landmarks"));
+  if (!given.empty()) require_sides(given, alone.frame, options.text("landmarks"));
   const anatomy::Proposal proposal =
       given.empty() ? alone : anatomy::propose_landmarks(skin, skull, mandible, given);
   print_landmarks(proposal, alone, given);

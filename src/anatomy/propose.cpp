@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "repose/base/error.h"
+#include "repose/surface/component.h"
 #include "search.h"
 
 namespace repose::anatomy {
@@ -50,27 +51,14 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
 /// Remarks on a mandible whose triangles point inwards. A head looks alike when left and right are
 /// exchanged, so that shape alone does not show it.
 void remark_mirrored(const surface::Surface& mandible, Search& search) {
-  const Vec3 middle = mean_of(mandible.points);
-  double volume = 0;
-  for (const Triangle& t : mandible.triangles) {
-    const auto [a, b, c] = base::pick(mandible.points, t);
-    volume += (a - middle).dot((b - middle).cross(c - middle)) / 6;
-  }
-  if (volume < 0)
+  if (surface::volume_of(mandible) < 0)
     search.remark(
         "triangles of MANDIBLE point inwards, as in a head that is mirrored: check that its left "
         "is the patient's left");
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text = words[0];
-  for (size_t i = 1; i < words.size(); ++i)
-    text += (i + 1 < words.size() ? ", " : " and ") + words[i];
-  return text;
-}
-
-/// What brings a head into LPS of which these axes point the other way. Of a mirrored head the
-/// frame has left and right exchanged.
+/// Returns how a head of which these axes point the other way is brought into LPS. Of a mirrored
+/// head the frame has left and right exchanged.
 std::string remedy_of(const std::vector<std::string>& opposite) {
   std::vector<std::string> mirrored;
   if (opposite[0] == "x")
@@ -78,7 +66,7 @@ std::string remedy_of(const std::vector<std::string>& opposite) {
   else
     mirrored = {"x", "y", "z"};
   return fmt::format("change the signs of {}, or of {} alone if the scan is mirrored",
-                     joined(opposite), joined(mirrored));
+                     fmt::join(opposite, ", "), fmt::join(mirrored, ", "));
 }
 
 /// Refuses a head that is turned in the scan by more than a patient is. A pitch of 45° with a yaw
@@ -97,11 +85,11 @@ void require_lps(const HeadFrame& frame, const std::string& name) {
     if (negative) opposite.push_back(letter);
     turned = turned || nearest != axis;
   }
-  const bool ras = !turned && joined(opposite) == "x and y";
+  const bool ras = !turned && opposite == std::vector<std::string>{"x", "y"};
   base::refuse(
-      "{}: by the shape of the bones the head's left, back and up lie along {}{}; surfaces must be "
-      "in LPS, where they lie along +x, +y and +z: {}",
-      name, joined(along), ras ? ", as in RAS" : "",
+      "{}: by the shape of the bones the head's left, back, up lie along {}{}; surfaces must be "
+      "in LPS, where they lie along +x, +y, +z: {}",
+      name, fmt::join(along, ", "), ras ? ", as in RAS" : "",
       turned ? "turn the head" : remedy_of(opposite));
 }
 

@@ -41,13 +41,7 @@ void BodyContact::reset(double stiffness) {
   acting_.clear();
 }
 
-void BodyContact::set_multipliers(std::span<const double> p) {
-  multiplier_.assign(p.begin(), p.end());
-  for (size_t c = 0; c < multiplier_.size(); ++c)
-    if (released(c)) multiplier_[c] = 0;
-}
-
-std::vector<size_t> BodyContact::overlapped(double overlap) const {
+bool BodyContact::release_overlapped(double overlap) {
   constexpr double facing = -0.9;  // cosine of the angle of normals
   std::vector<size_t> near, found;
   for (size_t c = 0; c < gap_.size(); ++c)
@@ -60,16 +54,11 @@ std::vector<size_t> BodyContact::overlapped(double overlap) const {
   for (auto c = near.begin(); c != near.end(); ++c)
     for (auto d = c + 1; d != near.end() && pairs_.point[*d] == pairs_.point[*c]; ++d)
       if (faces(*c, *d)) found.push_back(slides(*d) && !slides(*c) ? *c : *d);
-  return found;
-}
-
-int64_t BodyContact::release_overlapped(double overlap) {
-  const std::vector<size_t> constraints = overlapped(overlap);
-  for (const size_t c : constraints) {
+  for (const size_t c : found) {
     released_[c] = 1;
     multiplier_[c] = 0;
   }
-  return static_cast<int64_t>(constraints.size());
+  return !found.empty();
 }
 
 double BodyContact::min_gap(size_t c, const Vec3& beside) const {

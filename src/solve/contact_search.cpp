@@ -263,10 +263,9 @@ bool ContactSearch::release_overlapped(double accuracy) {
   discrete::Positions& positions = objective_.positions();
   mechanics::BodyContact& contact = objective_.body_contact();
   contact.update_gaps(positions.local());
-  const int64_t count =
-      base::sum_over_ranks(positions.comm(), contact.release_overlapped(accuracy));
-  if (count > 0) tangent_.forget_contact();
-  return count > 0;
+  const bool any = base::on_any_rank(positions.comm(), contact.release_overlapped(accuracy));
+  if (any) tangent_.forget_contact();
+  return any;
 }
 
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
@@ -494,9 +493,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain", violation());
-  outcome.overlapped =
-      base::sum_over_ranks(objective_.positions().comm(),
-                           std::ranges::count(objective_.body_contact().released(), char{1}));
+  outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
+                                            objective_.body_contact().count_released());
   if (outcome.converged && outcome.overlapped == 0 && may_have_other &&
       presses_near_edge(displacement))
     find_other(displacement, accuracy, outcome);

@@ -158,6 +158,7 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   result_.last = search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   require_value(result_.last, result_.load);
+  refuse_overlap();
   ++result_.steps;
   objective_.positions().update(displacement);
   on_step(result_.last, result_.load, watch.seconds());
@@ -167,7 +168,7 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   require_value(outcome, load);
   result_.last = outcome;
   result_.load = load;
-  if (load == 1) refuse_overlap();
+  refuse_overlap();
   ++result_.steps;
   check(VecCopy(trial_, displacement));
   objective_.positions().update(displacement);
@@ -211,17 +212,15 @@ bool LoadPath::in_vain(const Attempt& tried) const {
 
 /// Explains the step that ends the path without rest.
 void LoadPath::explain_failure() {
-  const Outcome& last = result_.last;
-  if (last.converged || last.stopped || last.overlapped > 0 || result_.halvings.count() == 0)
-    return;
+  if (result_.last.converged || result_.last.stopped || result_.halvings.count() == 0) return;
   result_.last.reason += fmt::format("; {} load steps have been halved, which took {} evaluations",
                                      result_.halvings.count(), refused_);
 }
 
-/// A state where points had to be released from bodies that overlap is no rest position.
+/// An end of the path where points had to be released from bodies that overlap is no rest position.
 void LoadPath::refuse_overlap() {
   Outcome& last = result_.last;
-  if (!last.converged || last.overlapped == 0) return;
+  if (result_.load < 1 || !last.converged || last.overlapped == 0) return;
   last.converged = false;
   last.reason = fmt::format("points of tissue between bodies that overlap: {}", last.overlapped);
 }
@@ -283,8 +282,8 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
 }
 
 /// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported,
-/// as if no others had been requested: linear solvers and contact begin anew. Where these steps
-/// fail, the path continues from `displacement`, which the requested ones have reached.
+/// as if no others had been requested: linear solvers and contact are reset first. Where they
+/// fail, the path continues from `displacement`, which the requested steps have reached.
 void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
                             const OnStep& on_step) {
   const Stopwatch watch;

@@ -58,7 +58,7 @@ def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, head, pitch, yaw, r
 
 @pytest.mark.parametrize("change, line", [
     (np.diag([-1, -1, 1]), "as in RAS"),
-    (np.diag([-1, 1, -1]), "left, back and up lie along -x, +y and -z"),
+    (np.diag([-1, 1, -1]), "left, back, up lie along -x, +y, -z"),
     (np.diag([1, -1, 1]), "or of y alone if the scan is mirrored"),
     (10 * np.eye(3), "surfaces must be in mm"),
     (0.1 * np.eye(3), "surfaces must be in mm"),

@@ -18,10 +18,10 @@ struct HeadFrame {
 };
 
 /// Fits the frame of a head by its bones alone, however it lies in the scan. The midsagittal plane
-/// is that in which the skull's mirror image lies nearest to it, by iterated closest points over
-/// the nearest two thirds. In it the way from the mandible's symphysis to its rami leads back and
-/// rises by 22°, and the skull lies above. A mirrored head is taken for a turned one. Throws
-/// InputError where the mandible does not cross the plane.
+/// is that in which the skull's mirror image lies nearest to it, by robust distances, to which
+/// points without a partner hardly add (docs/guide/landmarks.md). In it the way from the mandible's
+/// symphysis to its rami leads back and rises by 22°, and the skull lies above. A mirrored head is
+/// taken for a turned one. Throws InputError where the mandible does not cross the plane.
 HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& mandible);
 
 }  // namespace repose::anatomy

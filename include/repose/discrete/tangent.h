@@ -24,9 +24,9 @@ class Tangent : public Hessian {
   /// contact until the state changes.
   void set_contact(std::vector<Objective::Block> exact, std::vector<Objective::Block> convex);
 
-  /// Lets averaged volumes turn tissue by no more than its shear stiffness outweighs, so that the
-  /// action is positive semidefinite but for contact, or takes that back. Returns false where no
-  /// volumes are averaged.
+  /// Limits |φ′| of volumes in the action (semidefinite_slopes of hessian.h) and leaves the
+  /// negative curvature of further terms out, so that it is positive semidefinite but for contact,
+  /// or takes that back. Returns false where the tissue is no solid. Collective.
   bool limit_slopes(bool limited);
 
   base::MatHandle make_third();  ///< a matrix for third(); collective

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <limits>
 #include <span>
 #include <utility>
@@ -58,7 +59,7 @@ class BodyContact {
   bool empty() const { return pairs_.point.empty(); }
   const model::ContactPairs& pairs() const { return pairs_; }
   std::span<const double> multipliers() const { return multiplier_; }
-  void set_multipliers(std::span<const double> p);
+  void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }
   std::vector<RigidBody>& bodies() { return bodies_; }
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
@@ -100,20 +101,20 @@ class BodyContact {
   /// update, [C].
   std::span<const double> gaps() const { return gap_; }
   double pressure(size_t c) const { return now(c).pressure; }
-
-  /// Returns a constraint of each point between two bodies whose surfaces face each other and
-  /// overlap by more than `overlap` mm, so that no place is outside both: that on the latter body
-  /// in the model, or the one that does not slide. Of this rank, at the latest update.
-  std::vector<size_t> overlapped(double overlap) const;
-  /// Releases these constraints: they do not act until restore_released(). Returns how many.
-  int64_t release_overlapped(double overlap);
-  void restore_released() { released_.assign(released_.size(), 0); }
-  /// [C] nonzero where the constraint is released.
-  std::span<const char> released() const { return released_; }
-  bool released(size_t c) const { return released_[c] != 0; }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
+  /// Releases a constraint of each point between two bodies whose surfaces face each other and
+  /// overlap by more than `overlap` mm at the latest update, so that no place is outside both: that
+  /// on the latter body in the model, or the one that does not slide. Returns true if there are
+  /// any. Of this rank.
+  bool release_overlapped(double overlap);
+  /// Lets released constraints act again.
+  void restore_released() { released_.assign(released_.size(), 0); }
+  /// Returns how many constraints are released, of this rank.
+  int64_t count_released() const { return std::ranges::count(released_, char{1}); }
+
  private:
+  bool released(size_t c) const { return released_[c] != 0; }
   bool slides(size_t c) const { return pairs_.binding[c] == model::Binding::slides; }
   double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
   bool stays_above(double gap, size_t c, const Vec3& beside);

@@ -59,7 +59,8 @@ class Minimizer : public RestSearch {
   struct Callbacks;
   void make_tao();
   void set_forcing();
-  /// What ends a search: the estimated distance to rest, or the preconditioned gradient alone.
+  /// The criterion that ends a search: the estimated distance to rest, or the preconditioned
+  /// gradient alone.
   enum class Test { distance, gradient };
   /// Calls TAO. Returns the iterations and whether it was stopped; `near` as presolve().
   Outcome search(Vec displacement, double accuracy, Test test, bool near = false);

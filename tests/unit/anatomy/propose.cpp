@@ -90,12 +90,12 @@ TEST(ProposeLandmarks, RefusesOtherFramesAndUnits) {
   Mat3 permuted = Mat3::Zero();
   permuted(0, 1) = permuted(1, 2) = permuted(2, 0) = 1;
   for (const auto& [change, expected] : std::vector<std::pair<Mat3, std::string>>{
-           {ras, "along -x, -y and +z, as in RAS"},
-           {chin_up * ras, "along -x, -y and +z, as in RAS"},
+           {ras, "along -x, -y, +z, as in RAS"},
+           {chin_up * ras, "along -x, -y, +z, as in RAS"},
            {front_back, "or of y alone if the scan is mirrored"},
-           {feet_first, "along -x, +y and -z; "},
+           {feet_first, "along -x, +y, -z; "},
            {up_down, "or of z alone if the scan is mirrored"},
-           {permuted, "along +z, +x and +y; "},
+           {permuted, "along +z, +x, +y; "},
            {10 * Mat3::Identity(), "reaches 832 mm from its middle, a mandible 35 to 170 mm"},
            {0.1 * Mat3::Identity(), "reaches 8.32 mm from its middle, a mandible 35 to 170 mm"}})
     EXPECT_NE(refused(change).find(expected), std::string::npos) << refused(change);
