@@ -41,24 +41,32 @@ void BodyContact::reset(double stiffness) {
   acting_.clear();
 }
 
-bool BodyContact::release_overlapped(double overlap) {
+/// True if the surfaces that two constraints are beside face each other, at the latest update.
+bool BodyContact::face(size_t c, size_t d) const {
   constexpr double facing = -0.9;  // cosine of the angle of normals
-  std::vector<size_t> near, found;
+  return normal_[c].dot(normal_[d]) < facing * normal_[c].norm() * normal_[d].norm();
+}
+
+std::vector<std::pair<size_t, size_t>> BodyContact::overlapped(double overlap) const {
+  std::vector<size_t> near;
   for (size_t c = 0; c < gap_.size(); ++c)
     if (!released(c) && std::isfinite(gap_[c])) near.push_back(c);
   std::ranges::stable_sort(near, {}, [this](size_t c) { return pairs_.point[c]; });
-  const auto faces = [&](size_t c, size_t d) {
-    return gap_[c] + gap_[d] < -overlap &&
-           normal_[c].dot(normal_[d]) < facing * normal_[c].norm() * normal_[d].norm();
-  };
+  std::vector<std::pair<size_t, size_t>> found;
   for (auto c = near.begin(); c != near.end(); ++c)
     for (auto d = c + 1; d != near.end() && pairs_.point[*d] == pairs_.point[*c]; ++d)
-      if (faces(*c, *d)) found.push_back(slides(*d) && !slides(*c) ? *c : *d);
-  for (const size_t c : found) {
+      if (gap_[*c] + gap_[*d] < -overlap && face(*c, *d)) found.emplace_back(*c, *d);
+  return found;
+}
+
+bool BodyContact::release_overlapped(double overlap) {
+  const auto pairs = overlapped(overlap);
+  for (const auto& [first, second] : pairs) {
+    const size_t c = slides(second) && !slides(first) ? first : second;
     released_[c] = 1;
     multiplier_[c] = 0;
   }
-  return !found.empty();
+  return !pairs.empty();
 }
 
 double BodyContact::min_gap(size_t c, const Vec3& beside) const {
@@ -189,6 +197,23 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
     if (!plane) continue;
     const auto point = static_cast<int32_t>(pairs_.point[c]);
     found.push_back({c, false, pairs_.area[c], plane->distance, {{point, plane->normal}}, {}});
+  }
+  return found;
+}
+
+std::vector<LinearGap> BodyContact::ways_out(std::span<const Vec3> position, double overlap) const {
+  std::vector<LinearGap> found;
+  for (const auto& [first, second] : overlapped(overlap)) {
+    std::optional<LinearGap> nearest;
+    for (const size_t c : {first, second}) {
+      const RigidBody& body = bodies_[pairs_.body[c]];
+      const auto point = static_cast<int32_t>(pairs_.point[c]);
+      const Vec3 beside = body.beside(position[point]);
+      const auto plane = plane_round_edge(body, beside, normal_[c], pairs_.offset[c]);
+      if (plane && (!nearest || plane->distance > nearest->gap))
+        nearest = {c, false, pairs_.area[c], plane->distance, {{point, plane->normal}}, {}};
+    }
+    if (nearest) found.push_back(*nearest);
   }
   return found;
 }

@@ -268,6 +268,22 @@ bool ContactSearch::release_overlapped(double accuracy) {
   return any;
 }
 
+/// Leads points between bodies that overlap out round an edge of one of them. Returns true if there
+/// are any that have such a way. Collective.
+bool ContactSearch::lead_out(Vec displacement, double accuracy) {
+  discrete::Positions& positions = objective_.positions();
+  objective_.evaluate(displacement, gradient_);
+  subtract_contact();
+  qp_.linearize(displacement);
+  const auto ways = objective_.body_contact().ways_out(positions.local(), accuracy);
+  if (!base::on_any_rank(positions.comm(), !ways.empty())) return false;
+  for (const mechanics::LinearGap& way : ways) qp_.replace(way);
+  const bool found = qp_.solve(displacement, slope_, predicted_to, step_);
+  if (found) check(VecAXPY(displacement, 1.0, step_));
+  tangent_.forget_contact();
+  return found;
+}
+
 Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   outcome.converged = false;
   outcome.stopped = true;
@@ -458,7 +474,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   stiffen(1);
   int64_t iterations = 0;
   int left = 0;  // saddles
-  bool needs_presolve = false;
+  bool needs_presolve = false, led_out = false;
   double missing = std::numeric_limits<double>::infinity();  // mm of gaps
   const auto leaves = [&] {
     tangent_.forget_contact();
@@ -481,10 +497,13 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     if (outcome.converged) break;
     if (!outcome.stable && leaves()) continue;
     const double before = std::exchange(missing, violation());
-    if (missing > steady * before && release_overlapped(accuracy)) {
-      missing = std::numeric_limits<double>::infinity();
-      needs_presolve = true;
-      continue;
+    if (missing > steady * before) {
+      const bool leads = !std::exchange(led_out, true) && lead_out(displacement, accuracy);
+      if (leads || release_overlapped(accuracy)) {
+        missing = std::numeric_limits<double>::infinity();
+        needs_presolve = !leads;
+        continue;
+      }
     }
     needs_presolve = end != End::reached;
     stiffen(std::min(2 * times_, stiffest));

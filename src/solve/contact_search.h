@@ -10,7 +10,8 @@ namespace repose::solve {
 /// the augmented Lagrangian with a soft penalty comes near to the rest position among bodies with
 /// rounded edges; sequential quadratic programs (Nocedal & Wright 2006, chapter 18) lead there, and
 /// on to the bodies themselves, multipliers included. Where these fail, they are repeated after
-/// finer soft searches, with a stiffer penalty. The multipliers of a load are where the next
+/// finer soft searches, with a stiffer penalty; points between bodies that overlap are led out
+/// round an edge, or released from one of them. The multipliers of a load are where the next
 /// begins. At load 1, where points press near an edge of a body, quadratic programs start from the
 /// prediction, too: where this ends elsewhere, the rest position of less energy is taken, and the
 /// outcome states the distance of the other. Then single points are tried on the other side of the
@@ -49,6 +50,7 @@ class ContactSearch : public RestSearch {
   Outcome finish(Vec displacement, double accuracy);
   Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
   bool release_overlapped(double accuracy);
+  bool lead_out(Vec displacement, double accuracy);
   bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);

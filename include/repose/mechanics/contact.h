@@ -110,12 +110,17 @@ class BodyContact {
   bool release_overlapped(double overlap);
   /// Lets released constraints act again.
   void restore_released() { released_.assign(released_.size(), 0); }
+  /// Gaps to first order, as those of other_sides(), of points that release_overlapped() would
+  /// release: for each the less deep of its two bodies' sides round an edge, if there is one.
+  std::vector<LinearGap> ways_out(std::span<const Vec3> position, double overlap) const;
   /// Returns how many constraints are released, of this rank.
   int64_t count_released() const { return std::ranges::count(released_, char{1}); }
 
  private:
   bool released(size_t c) const { return released_[c] != 0; }
   bool slides(size_t c) const { return pairs_.binding[c] == model::Binding::slides; }
+  bool face(size_t c, size_t d) const;
+  std::vector<std::pair<size_t, size_t>> overlapped(double overlap) const;
   double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
   bool stays_above(double gap, size_t c, const Vec3& beside);
   Pressing now(size_t c) const {

@@ -167,6 +167,27 @@ TEST(Contact, PointsBetweenBodiesThatOverlapRestOnTheFirst) {
   }
 }
 
+// The plane ends 0.3 mm below the top of a narrow box. One point between them has a way out past
+// the side of the box, which is 1.8 mm away.
+TEST(Contact, APointBetweenBodiesThatOverlapLeavesRoundTheNearEdge) {
+  model::Model m = solid_block(4, 4, 4, poisson, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::held : PointSet::soft_tissue;
+  });
+  testing::aim(m, [](const Vec3& x) -> Vec3 { return x + Vec3(0, 0.1, 0); });
+  const std::vector<double> top = face_areas(m, Vec3::UnitZ(), 0);
+  bind_face(m, plane(Vec3::Zero(), -Vec3::UnitZ(), {0, 0, -0.9}), Binding::touches, top);
+  const scene::Box narrow{{5.6, 5, -1.8}, {4.8, 6, 2.4}};
+  bind_face(m, {"box", -1, narrow, Vec3::Zero()}, Binding::touches, top);
+  const Rest rest = testing::find_rest(m, settings(1e-4));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  EXPECT_LE(rest.summary.last.penetration, 1e-4);
+  for (size_t i = 0; i < rest.rows.position.size(); ++i)
+    if (m.points.position[i].isApprox(Vec3(5, 5, 0))) {
+      EXPECT_NEAR(rest.rows.position[i].x(), 3.2, 2e-4) << rest.rows.position[i].transpose();
+      EXPECT_LE(rest.rows.position[i].z(), -0.9 + 1e-4);
+    }
+}
+
 TEST(Contact, ABlockThatSlidesAlongAPlaneMeetsNoResistance) {
   model::Model m = solid_block(6, 5, 4, poisson, 0, [](int, int, int a) {
     return a == 0 ? PointSet::held : PointSet::soft_tissue;
