@@ -5,8 +5,8 @@
 ///     repose-osteotomy scene.yaml -output plan
 ///
 /// Makes all osteotomies of a scene, where one is given. Writes NAME_PIECE.ply for every part, the
-/// rest under the bone's own name. Exit status: 0 done, 1 bad input (nothing written), 3 internal
-/// error.
+/// rest under the bone's own name, and with -moved NAME_PIECE_moved.ply. Exit status: 0 done, 1 bad
+/// input (nothing written), 3 internal error.
 #include <cstdio>
 
 #include "repose/base/agreement.h"
@@ -43,6 +43,9 @@ std::vector<base::Option> option_table() {
            .unit = "mm"},
           triple("seed", "A point inside the piece, which then chooses it."),
           {"piece", OptionKind::text, "piece", "Name of the piece."},
+          {"moved", OptionKind::flag, "",
+           "Also writes each bone of a scene that moves where its moves take it, to "
+           "NAME_PIECE_moved.ply; the scene may have no osteotomies."},
           {"output", OptionKind::path, "",
            "Path of the files without _PIECE.ply; default: the input's name here."}};
 }
@@ -74,6 +77,7 @@ meshtools::Osteotomy plan_of(const base::Options& options) {
 struct Parts {
   std::vector<surface::Surface> surfaces;
   std::vector<std::string> names, remarks;
+  std::vector<scene::RigidMotion> moves;  ///< of each surface, or none
 };
 
 Parts parts_of_scene(const base::Options& options, const std::filesystem::path& input) {
@@ -81,20 +85,37 @@ Parts parts_of_scene(const base::Options& options, const std::filesystem::path& 
     if (options.has(name))
       base::refuse("-{} does not go with a scene, whose osteotomies say how to cut", name);
   const scene::Scene scene = scene::read_scene(input);
-  if (scene.osteotomies.empty()) base::refuse("{}: has no osteotomies to make", input.string());
+  const bool moved = options.flag("moved");
+  if (scene.osteotomies.empty() && !moved)
+    base::refuse("{}: has no osteotomies to make", input.string());
   model::Bones bones = model::read_bones(scene);
-  Parts parts{std::move(bones.surfaces), {}, std::move(bones.remarks)};
+  Parts parts{std::move(bones.surfaces), {}, std::move(bones.remarks), {}};
+  if (moved) parts.moves = scene.moves;
   for (const scene::BoneEntry& bone : scene.bones) parts.names.push_back(bone.name);
   return parts;
 }
 
 Parts parts_of_bone(const base::Options& options, const std::filesystem::path& input) {
+  if (options.flag("moved")) base::refuse("-moved needs a scene, whose moves it makes");
   const meshtools::Osteotomy plan = plan_of(options);
   meshtools::Pieces pieces =
       meshtools::cut_bone(surface::load_surface(input, surface::Role::bone), plan);
   std::vector<std::string> remarks = pieces.remarks;
   if (plan.kerf > 0) remarks.push_back(fmt::format("the saw takes {:.1f} mm³", pieces.kerf_volume));
-  return {{pieces.rest, pieces.piece}, {"rest", plan.piece}, remarks};
+  return {{pieces.rest, pieces.piece}, {"rest", plan.piece}, remarks, {}};
+}
+
+void write(const std::string& file, const surface::Surface& surface) {
+  surface::write_ply(file, surface);
+  std::printf("  wrote %s: %zu triangles, %.1f mm³\n", file.c_str(), surface.triangles.size(),
+              surface::volume_of(surface));
+}
+
+void write_moved(const std::string& file, surface::Surface surface,
+                 const scene::RigidMotion& motion) {
+  if (motion.is_identity()) return;
+  for (Vec3& point : surface.points) point = motion.apply(point);
+  write(file, surface);
 }
 
 void cut(const base::Options& options) {
@@ -104,10 +125,9 @@ void cut(const base::Options& options) {
   const std::string name = options.has("output") ? options.text("output") : input.stem().string();
   for (const std::string& remark : parts.remarks) std::printf("  %s\n", remark.c_str());
   for (size_t k = 0; k < parts.surfaces.size(); ++k) {
-    const std::string file = fmt::format("{}_{}.ply", name, parts.names[k]);
-    surface::write_ply(file, parts.surfaces[k]);
-    std::printf("  wrote %s: %zu triangles, %.1f mm³\n", file.c_str(),
-                parts.surfaces[k].triangles.size(), surface::volume_of(parts.surfaces[k]));
+    const std::string file = fmt::format("{}_{}", name, parts.names[k]);
+    write(file + ".ply", parts.surfaces[k]);
+    if (!parts.moves.empty()) write_moved(file + "_moved.ply", parts.surfaces[k], parts.moves[k]);
   }
 }
 

@@ -10,7 +10,8 @@ skull, maxilla and mandible; LABELS a label map or segmentation of the bones of 
 and jaw are taken apart where they touch least. Writes into the folder plan: surfaces, landmarks,
 scene.yaml to edit, pictures of both (landmarks.svg, proposal.png), and the solved face with a picture
 and its planning sheet (face.html). Operations: Le Fort I, sagittal split, genioplasty, jaw; each with
-movements in mm (forward, back, up, down, left, right) and degrees (open, close, yaw, roll).
+movements in mm (forward, back, up, down, left, right) and degrees (open, close, yaw, roll), along the axes
+of the head, whatever those of the scan (docs/guide/anatomy.md).
 
   -level HU    of the skin in a CT (-300)
   -apart SKULL JAW    points in the two bones of a CT without LABELS, in the place of those that are
@@ -22,7 +23,6 @@ movements in mm (forward, back, up, down, left, right) and degrees (open, close,
 After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face."""
 
 import argparse
-import json
 import os
 import pathlib
 import re
@@ -41,13 +41,19 @@ TEETH = r"(teeth|tooth|dent)"
 ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
          "maxilla": r"maxill|upper.?jaw", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
 OUTSIDE = r"table|head.?rest|background|^air$"
-OPERATIONS = (r"le ?fort|maxill", r"genio|chin", r"split|bsso", r"jaw|mandib|open")
+# Words of an operation → bone, piece that is cut from it, and template; the first that is found.
+OPERATIONS = {r"le ?fort|maxill": ("skull", "maxilla", "le_fort_1"),
+              r"genio|chin": ("mandible", "chin", "genioplasty"),
+              r"split|bsso": ("mandible", "jaw", "sagittal_split"),
+              r"jaw|mandib|open": ("mandible", None, None)}
 CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
-DIRECTIONS = {"forward": (0, -1, 0), "advance": (0, -1, 0), "back": (0, 1, 0), "setback": (0, 1, 0),
-              "up": (0, 0, 1), "impact": (0, 0, 1), "down": (0, 0, -1), "left": (1, 0, 0),
-              "right": (-1, 0, 0)}
-TURNS = {"open": (1, 0, 0), "close": (-1, 0, 0), "yaw": (0, 0, 1), "roll": (0, 1, 0)}
+# Word of a movement → key of a clinical move, and its sign.
+MOVES = {"forward": ("advance", 1), "advance": ("advance", 1), "back": ("set_back", 1), "setback": ("set_back", 1),
+         "up": ("impaction", 1), "impact": ("impaction", 1), "down": ("lower", 1), "left": ("left", 1),
+         "right": ("left", -1), "open": ("open", 1), "close": ("open", -1), "yaw": ("yaw", 1), "roll": ("roll", 1)}
+# Template → back and up of the head in each direction in which its piece moves towards what it is cut from.
+INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
 
 
 class Arguments(argparse.ArgumentParser):
@@ -84,12 +90,6 @@ def draw(script, *arguments):
         return f", {arguments[-1]}"
     print(f"{arguments[-1]} was not drawn: {done.stderr.strip()}", flush=True)
     return ""
-
-
-class Landmarks(dict):
-    def __missing__(self, name):
-        refuse(f"landmark {name} was not found, and the operation needs it: place it in 3D Slicer, and give "
-               "it to repose-landmarks by -landmarks")
 
 
 class Segmentation:
@@ -193,7 +193,7 @@ def extract_bones(volume, options, folder):
 
 def movements(text):
     """(number, word) of each movement in the text, in its order."""
-    known = "|".join([*DIRECTIONS, *TURNS])
+    known = "|".join(MOVES)
     before = rf"({known})\w*\D{{0,20}}?([\d.]+)\s*(?:mm|°|deg\w*)"
     after = rf"([\d.]+)\s*(?:mm|°|deg\w*)?\s*(?:of |to the )?({known})"
     text = text.lower().replace("-", "")
@@ -201,92 +201,43 @@ def movements(text):
     return found or [(float(n), word) for word, n in re.findall(before, text)]
 
 
-def movements_or_refuse(operation):
-    if not any(re.search(words, operation.lower()) for words in OPERATIONS):
-        refuse(f"-operation {operation!r}: name Le Fort I, sagittal split, genioplasty or jaw")
-    found = movements(operation)
-    if not found:
-        refuse(f"-operation {operation!r}: give a movement, such as 5 mm forward or 8 degrees open")
-    return found
+def read_operation(text):
+    """Bone, piece, template and clinical move {key: mm or degrees} of the operation that a text names."""
+    named = [operation for words, operation in OPERATIONS.items() if re.search(words, text.lower())]
+    if not named:
+        refuse(f"-operation {text!r}: name Le Fort I, sagittal split, genioplasty or jaw")
+    move = {}
+    for number, word in movements(text):
+        key, sign = MOVES[word]
+        move[key] = move.get(key, 0) + sign * number
+    if not move:
+        refuse(f"-operation {text!r}: give a movement, such as 5 mm forward or 8 degrees open")
+    return *named[0], move
 
 
-def point(xyz):
-    return "[" + ", ".join(f"{x:.1f}" for x in xyz) + "]"
-
-
-def along(mark, share, ahead, behind):
-    """A height and depth between two landmarks."""
-    return [mark[behind][k] + share * (mark[ahead][k] - mark[behind][k]) for k in range(3)]
-
-
-def kerf_of(planes, shift):
+def kerf_of(template, move):
     """mm: the saw's, or so much that a piece which moves towards what it is cut from has room."""
-    inwards = [-sum(a * b for a, b in zip(normal, shift)) for _, normal in planes]
-    return min(20, max(0.5, max(inwards) + 1))
+    back = move.get("set_back", 0) - move.get("advance", 0)
+    up = move.get("impaction", 0) - move.get("lower", 0)
+    inwards = [along_back * back + along_up * up for along_back, along_up in INWARDS.get(template, ())]
+    return min(20, max([0.5, *(way + 1 for way in inwards)]))
 
 
-def osteotomy(operation, mark):
-    """(bone, piece, planes) of the operation that the text names; piece None: no cut."""
-    le_fort, genioplasty, split, _ = (re.search(words, operation) for words in OPERATIONS)
-    if le_fort:
-        level = [mark["nasal_spine"][0], mark["nasal_spine"][1], mark["nasal_spine"][2] + 5]
-        joint = [sum(mark[f"condyle_{side}_center"][k] for side in ("left", "right")) / 2
-                 for k in range(3)]
-        back = [level[k] + 0.55 * (joint[k] - level[k]) for k in range(2)] + [level[2]]
-        return "skull", "maxilla", [(level, (0, 0, -1)), (back, (0, -1, 0))]
-    if genioplasty:
-        b = mark["b_point"]
-        return "mandible", "chin", [([b[0], b[1], b[2] - 4], (0, -0.42, -0.91))]
-    if split:
-        low = along(mark, 0.13, "pogonion_bone", "gonion_left")
-        high = along(mark, 0.5, "pogonion_bone", "condyle_left_center")
-        y, z = high[1] - low[1], mark["condyle_left_center"][2] - mark["gonion_left"][2]
-        place = [mark["pogonion_bone"][0], low[1], mark["gonion_left"][2]]
-        length = (y * y + z * z)**0.5
-        return "mandible", "jaw", [(place, (0, -z / length, y / length))]
-    return "mandible", None, []
-
-
-def move_lines(operation, bone, mark):
-    lines = []
-    joint = [mark["condyle_right_center"], mark["condyle_left_center"]]
-    for number, word in movements_or_refuse(operation):
-        if word in DIRECTIONS:
-            shift = [number * x for x in DIRECTIONS[word]]
-            lines.append(f"  - {{bone: {bone}, translate: {point(shift)}}}   # {word}")
-            continue
-        hinge = word in ("open", "close")
-        axis = [b - a for a, b in zip(*joint)] if hinge else TURNS[word]
-        center = [(a + b) / 2 for a, b in zip(*joint)] if hinge else mark["upper_incisor_edge"]
-        lines.append(f"  - {{bone: {bone}, rotate: {{axis: {point(axis)}, center: {point(center)}, "
-                     f"angle: {-number if word == 'close' else number:g}}}}}   # {word}")
-    return lines
-
-
-def scene_text(options, mark, bones):
-    operation = options.operation.lower()
-    bone, piece, planes = osteotomy(operation, mark)
-    shift = [sum(n * DIRECTIONS[word][k] for n, word in movements(operation) if word in DIRECTIONS)
-             for k in range(3)]
-    if piece in bones:  # segmented already
-        bone, piece, planes = piece, None, []
-    lines = [f"# {options.operation}. Proposed by drivers/plan.py: look at landmarks.svg, edit, and",
-             "# solve again: repose-solve scene.yaml. LPS, mm: +x patient left, +y back, +z up.",
+def scene_text(options, bones):
+    bone, piece, template, move = read_operation(options.operation)
+    lines = [f"# {options.operation}. Proposed by drivers/plan.py: look at landmarks.svg and proposal.png, edit,",
+             "# and solve again: repose-solve scene.yaml. mm and degrees along the head's own axes.",
              "skin: skin.ply", "bones:"]
     lines += [f"  - {{name: {name}, file: {name}.ply}}" for name in bones]
     lines += [f"tissue: {{layers: 4, edge: {options.edge:g}}}",
               "anatomy: {landmarks: landmarks.mrk.json}   # lips are parted, and free of the teeth"]
-    if planes:
-        lines += ["osteotomies:", f"  - bone: {bone}", f"    piece: {piece}", "    planes:"]
-        lines += [f"      - {{point: {point(at)}, normal: [{n[0]:g}, {n[1]:.3g}, {n[2]:.3g}]}}"
-                  for at, n in planes]
-        lines += [f"    kerf: {kerf_of(planes, shift):.3g}   # mm, the saw, and bone taken out"]
-    return "\n".join(lines + ["moves:"] + move_lines(operation, piece or bone, mark)) + "\n"
-
-
-def read_landmarks(file):
-    points = json.loads(file.read_text())["markups"][0]["controlPoints"]
-    return Landmarks((entry["label"], entry["position"]) for entry in points)
+    if template and piece not in bones:  # a segmented piece needs no cut
+        lines += [f"osteotomies:   # kerf: mm, the saw{' and bone taken out' if template in INWARDS else ''}",
+                  f"  - {{bone: {bone}, piece: {piece}, template: {template}, kerf: {kerf_of(template, move):.3g}}}"]
+    clinical = [f"{key}: {number:g}" for key, number in move.items()]
+    if piece == "maxilla" and piece in bones and move.keys() & {"yaw", "roll"}:
+        clinical.append("pivot: upper_incisor_edge")
+    return "\n".join([*lines, "moves:", f"  - {{bone: {piece or bone}, clinical: {{{', '.join(clinical)}}}}}"]) + "\n"
 
 
 def arguments():
@@ -320,7 +271,7 @@ def main():
         if not file.exists():
             refuse(f"{file}: no such file or folder")
     alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
-    movements_or_refuse(options.operation)
+    read_operation(options.operation)
     folder.mkdir(parents=True, exist_ok=True)
     segmented = volume.name.endswith(".seg.nrrd")
     if alone:
@@ -337,7 +288,8 @@ def main():
         folder / "mandible.ply", "-output", folder / "landmarks")
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
-    scene.write_text(scene_text(options, read_landmarks(folder / "landmarks.mrk.json"), bones))
+    scene.write_text(scene_text(options, bones))
+    run(program("repose-solve"), scene, "-dry_run")
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")
     print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): check "
           "the pictures", flush=True)

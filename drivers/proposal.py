@@ -18,6 +18,8 @@ import tempfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import plan  # noqa: E402
 import render  # noqa: E402
+from sheet.landmarks import read_landmarks  # noqa: E402
+from sheet.result import Unusable  # noqa: E402
 
 ORANGE, BLUE, GREEN, RED = (0.93, 0.53, 0.18), (0.20, 0.45, 0.80), (0.30, 0.68, 0.55), (0.80, 0.12, 0.15)
 WIDE, MARGIN, PLANE = 620, 1.1, 42  # pixels; beside the head; mm, half the side of a plane's square
@@ -25,31 +27,6 @@ SHORT = {"nasion_bone": "N", "nasal_spine": "ANS", "a_point": "A", "upper_inciso
          "lower_incisor_edge": "L1", "b_point": "B", "pogonion_bone": "Pog", "menton_bone": "Me",
          "condyle_right_center": "Co", "condyle_left_center": "Co", "gonion_right": "Go",
          "gonion_left": "Go"}
-
-
-def transform_of(moves, bone):
-    """All moves of a bone one after another, as repose-solve takes them."""
-    total = vtk.vtkTransform()
-    total.PostMultiply()
-    for move in moves:
-        if move.get("bone") != bone:
-            continue
-        if "translate" in move:
-            total.Translate(*move["translate"])
-        if "rotate" in move:
-            turn = move["rotate"]
-            total.Translate(*(-x for x in turn["center"]))
-            total.RotateWXYZ(turn["angle"], *turn["axis"])
-            total.Translate(*turn["center"])
-    return total
-
-
-def moved(mesh, transform):
-    made = vtk.vtkTransformFilter()
-    made.SetInputData(mesh)
-    made.SetTransform(transform)
-    made.Update()
-    return made.GetOutput()
 
 
 def run(*command):
@@ -61,13 +38,12 @@ def run(*command):
         render.refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
 
 
-def parts_of(scene, file, work):
-    """Mesh of each bone and piece after the cuts, by name."""
-    names = {bone["name"]: file.parent / bone["file"] for bone in scene["bones"] if "file" in bone}
-    if scene.get("osteotomies"):
-        run(plan.program("repose-osteotomy"), file, "-output", work / "cut")
-        names |= {made.stem.removeprefix("cut_"): made for made in work.glob("cut_*.ply")}
-    return {name: render.read_mesh(path) for name, path in names.items()}
+def parts_of(file, work):
+    """(mesh, mesh where it goes or None) of each bone and piece after the cuts."""
+    run(plan.program("repose-osteotomy"), file, "-moved", "-output", work / "cut")
+    found = {made.stem: render.read_mesh(made) for made in sorted(work.glob("cut_*.ply"))}
+    return [(mesh, found.get(f"{name}_moved")) for name, mesh in found.items()
+            if not (name.endswith("_moved") and name.removesuffix("_moved") in found)]
 
 
 def square(at, normal):
@@ -155,14 +131,12 @@ def boxes_of(scene):
 
 def bones_drawn(scene, file, parts, marks):
     """Bones, pieces before and after, planes; and before them the landmarks."""
-    drawn, moves = [], scene.get("moves") or []
-    for name, mesh in parts.items():
-        transform = transform_of(moves, name)
-        if transform.GetNumberOfConcatenatedTransforms() == 0:
+    drawn = []
+    for mesh, moved in parts:
+        if moved is None:
             drawn.append(render.actor(mesh, render.IVORY))
-            continue
-        drawn += [render.actor(mesh, render.GREY, opacity=0.35),
-                  render.actor(moved(mesh, transform), ORANGE)]
+        else:
+            drawn += [render.actor(mesh, render.GREY, opacity=0.35), render.actor(moved, ORANGE)]
     for cut in scene.get("osteotomies") or []:
         for plane in cut.get("planes") or []:
             side = square(plane["point"], plane["normal"])
@@ -225,15 +199,19 @@ def main():
     scene = render.read_scene(file)
     if not isinstance(scene.get("skin"), str):
         render.refuse(f"{file}: its skin is no file; make one with repose-isosurface")
-    marks = plan.read_landmarks(file.parent / scene["landmarks"]) if "landmarks" in scene else {}
+    anatomy = scene.get("anatomy") or scene
+    try:
+        marks = read_landmarks(file.parent / anatomy["landmarks"]) if "landmarks" in anatomy else {}
+    except Unusable as reason:
+        render.refuse(reason)
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
-        parts = parts_of(scene, file, work)
+        parts = parts_of(file, work)
         run(plan.program("repose-solve"), file, "-dry_run", "-output", work / "model")
         solved = render.read_mesh(work / "model_solved_skin.ply")
     skin = render.read_mesh(file.parent / scene["skin"])
     frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
-                            for mesh in (*parts.values(), solved)])
+                            for mesh in (*(mesh for mesh, _ in parts), solved)])
     draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved)),
          frame, ("bones; moved pieces (orange), cuts (blue), landmarks",
                  "solved skin (green), its border, lips (red)"), chosen.output)

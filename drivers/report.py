@@ -77,10 +77,17 @@ def main():
         refuse(f"-output {chosen.output}: make its folder first")
     norms = measures.read_norms(chosen.norms)
     marks = landmarks.read_landmarks(chosen.landmarks) if chosen.landmarks else {}
-    plans = [page.Plan(page.title_of(name), Result(f"{name}.h5"), marks, norms)
-             for name in chosen.names]
-    appearance = read_appearance(chosen.skin, plans[0].result.skin) if chosen.skin else None
-    written = page.write(plans, norms, chosen.scene, appearance)
+    axes, frame = landmarks.head_axes(marks)
+    results = [Result(f"{name}.h5") for name in chosen.names]
+    appearance = read_appearance(chosen.skin, results[0].skin) if chosen.skin else None
+    for result in results:
+        result.turn(axes)
+    if appearance and appearance.skin is not results[0].skin:
+        appearance.skin.turn(axes)
+    marks = {name: axes @ place for name, place in marks.items()}
+    plans = [page.Plan(page.title_of(name), result, marks, norms)
+             for name, result in zip(chosen.names, results)]
+    written = page.write(plans, norms, chosen.scene, appearance, frame)
     pathlib.Path(chosen.output + ".part").write_text(written, encoding="utf-8")
     os.replace(chosen.output + ".part", chosen.output)
     print(chosen.output)

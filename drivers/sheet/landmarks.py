@@ -1,13 +1,15 @@
 """Landmarks: read, placed on skin and bones, found by the shape of the profile, and the parts of the
-face that they bound. In mm and LPS: +x patient left, +y posterior, +z up, the head upright."""
+face that they bound. In mm along the axes of the head: +x patient left, +y posterior, +z up."""
 
 import json
+import math
 import pathlib
 
 import numpy as np
 
 from sheet.result import Unusable
 
+RISE = math.radians(14)  # of nasion and upper incisors as seen from the condyles, together
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
 BEYOND = "skin beyond the solved part"
 NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_soft", "n'"),
@@ -15,12 +17,12 @@ NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_sof
          "subnasale": ("subnasale", "sn"), "upper lip": ("upper_lip", "labrale_superius", "ls"),
          "upper stomion": ("stomion_superius", "stms"), "lower stomion": ("stomion_inferius", "stmi"),
          "lower lip": ("lower_lip", "labrale_inferius", "li"),
-         "sublabiale": ("sublabiale", "mentolabial_sulcus", "b'"),
+         "sublabiale": ("sublabiale", "mentolabial_sulcus", "b_soft", "b'"),
          "pogonion": ("pogonion_soft", "soft_pogonion", "pog'"),
          "gnathion": ("gnathion_soft", "soft_gnathion", "gn'"),
          "menton": ("menton_soft", "soft_menton", "me'"), "throat": ("throat", "cervical_point", "c'")}
 BONES = {"upper incisor": ("upper_incisor_edge", "u1"), "lower incisor": ("lower_incisor_edge", "l1"),
-         "nasal spine": ("anterior_nasal_spine", "ans"), "chin bone": ("pogonion_bone", "pog")}
+         "nasal spine": ("nasal_spine", "anterior_nasal_spine", "ans"), "chin bone": ("pogonion_bone", "pog")}
 MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip",
            "sublabiale", "pogonion", "menton")
 
@@ -40,6 +42,25 @@ def read_landmarks(file):
             if point.get("positionStatus", "defined") == "defined":
                 found[point["label"]] = np.array(point["position"]) * sign
     return {name: np.array(value, float) for name, value in found.items()}
+
+
+def head_axes(landmarks):
+    """Left, back and up of the head as rows, those of templates and clinical moves
+    (docs/guide/anatomy.md), and what they follow from; the scan's own without the condyles."""
+    right, left, nasion, edge = (landmarks.get(name) for name in (
+        "condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"))
+    if right is None or left is None:
+        return np.eye(3), "the scan: no landmarks of the condyles are given"
+    across = (left - right) / np.linalg.norm(left - right)
+    back = np.array([0, 1, 0]) - across[1] * across
+    axes = np.stack([across, back / np.linalg.norm(back), np.cross(across, back / np.linalg.norm(back))])
+    if nasion is None or edge is None:
+        return axes, "the head by its condyles, level as in the scan"
+    ways = [axes @ (place - (right + left) / 2) for place in (nasion, edge)]
+    chin_up = (sum(math.atan2(way[2], -way[1]) for way in ways) - RISE) / 2
+    turn = np.array([[1, 0, 0], [0, math.cos(chin_up), -math.sin(chin_up)],
+                     [0, math.sin(chin_up), math.cos(chin_up)]])
+    return turn @ axes, "the head by its condyles, nasion and upper incisors"
 
 
 def on_surface(before, after, corners, point):

@@ -127,9 +127,9 @@ def measured(known, norms):
 
 def turns(rotation):
     """Pitch, roll and yaw in degrees of a rotation: about the axes left–right (front down positive),
-    back (left side down positive) and up (front to the left positive), turned in this order."""
+    forward (left side up positive) and up (front to the left positive), turned in this order."""
     pitch = math.degrees(math.atan2(rotation[2, 1], rotation[2, 2]))
-    roll = math.degrees(-math.asin(np.clip(rotation[2, 0], -1, 1)))
+    roll = math.degrees(math.asin(np.clip(rotation[2, 0], -1, 1)))
     yaw = math.degrees(math.atan2(rotation[1, 0], rotation[0, 0]))
     return pitch, roll, yaw
 
@@ -144,7 +144,7 @@ def shift_in_words(shift, digits=1):
 
 def turns_in_words(rotation):
     named = zip(turns(rotation), ("pitch", "roll", "yaw"),
-                (("front down", "front up"), ("left side down", "right side down"),
+                (("front down", "front up"), ("left side up", "right side up"),
                  ("front to the left", "front to the right")))
     return ", ".join(f"{name} {abs(value):.1f}° ({words[int(value < 0)]})"
                      for value, name, words in named if abs(value) >= 0.05)

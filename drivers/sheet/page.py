@@ -265,7 +265,7 @@ def plan_lines(plan):
     return "".join(lines) or "<p>No bone moves.</p>"
 
 
-def plan_table(plans):
+def plan_table(plans, frame):
     rows = []
     for plan in plans:
         for name, place, step, turn in moved_bones(plan):
@@ -282,7 +282,8 @@ def plan_table(plans):
     else:
         page += '<p class="note">'
     page += ("A negative advance is a setback; up is impaction of an upper jaw. Pitch: front down; "
-             "roll: left side down; yaw: front to the patient's left, each positive.</p>")
+             "roll: left side up; yaw: front to the patient's left, each positive. Advance, up and left "
+             f"are along the axes of {frame}.</p>")
     teeth = [occlusion(plan.bones) for plan in plans]
     for k, (name, before, _) in enumerate(teeth[0] if all(teeth) else ()):
         after = ", ".join(f"{tenths(one[k][2])} mm {title}" for one, title in
@@ -440,8 +441,8 @@ def scripts():
                    for name in ("three.js", "viewer.js", "pack.js", "sheet.js"))
 
 
-def write(plans, norms, scene, appearance):
-    """The page as text."""
+def write(plans, norms, scene, appearance, frame):
+    """The page as text; `frame`: whose axes its directions are along."""
     first = plans[0]
     title = html.escape(" and ".join(plan.name for plan in plans))
     words, packed = described(plans, appearance)
@@ -457,7 +458,7 @@ def write(plans, norms, scene, appearance):
 <header><h1>{title}</h1><span class="soft">predicted face after the planned surgery</span></header>
 <section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{message}</div></section>
 <div class="stills" id="stills"></div>
-<section><h2>The plan</h2>{plan_table(plans)}</section>
+<section><h2>The plan</h2>{plan_table(plans, frame)}</section>
 <section class="two"><div><h2 class="page-two">Profile</h2>{profile_section(plans)}</div>
 <div><h2 class="page-two">How far the skin follows the bone</h2>{ratio_table(plans)}
 <h2>Parts of the face</h2>{region_table(plans)}</div></section>

@@ -86,6 +86,15 @@ class Result:
             self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
                                "motion": rigid(points, after)})
 
+    def turn(self, axes):
+        """Takes all places to axes that are given as rows."""
+        for skin in {self.solved, self.given, self.skin} - {None}:
+            skin.turn(axes)
+        self.places = self.places @ axes.T
+        for bone in self.bones:
+            bone["before"], bone["after"] = bone["before"] @ axes.T, bone["after"] @ axes.T
+            bone["motion"] = rigid(bone["before"], bone["after"])
+
     def read_uncertainty(self, step, rows):
         """mm at each vertex of the shown skin: how far the face may be from the model's exact
         answer; None where mesh and layers were not estimated."""

@@ -18,6 +18,10 @@ class Skin:
         self.before, self.after, self.corners, self.solved = before, after, corners, solved
         self.movement = np.linalg.norm(after - before, axis=1)
 
+    def turn(self, axes):
+        """Takes all places to axes that are given as rows."""
+        self.before, self.after = self.before @ axes.T, self.after @ axes.T
+
 
 def read_given(file):
     """The given skin of a NAME_given_skin.vtp, or None where there is no such file."""

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import h5py
 import meshio
@@ -103,6 +104,20 @@ def test_plan_and_face_turn_with_the_head(run, tmp_path, head, template, move):
     assert np.abs(motions[0] - motions[1]).max() < 1e-3
     assert np.linalg.norm(ways[0], axis=1).max() > 1.5
     assert np.linalg.norm(ways[0] - ways[1], axis=1).max() < 0.1, "mm, the accuracy"
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_the_planning_sheet_has_the_axes_of_clinical_moves(run, tmp_path, head):
+    turn_head(tmp_path, Rotation.from_euler("xyz", [-15, 7, -9], degrees=True).as_matrix())
+    sys.path.insert(0, str(PROJECT / "drivers"))
+    from sheet.landmarks import head_axes, read_landmarks
+    axes, _ = head_axes(read_landmarks(tmp_path / "turned/head.mrk.json"))
+    for row, move, sign in ((0, "left", 1), (1, "set_back", 1), (2, "lower", -1)):
+        write_scene(tmp_path / "turned", f"moves: [{{bone: mandible, clinical: {{{move}: 10}}}}]\n")
+        result = run("repose-osteotomy", "turned/scene.yaml", "-moved", "-output", "cut")
+        assert (result.returncode, result.stderr) == (0, ""), result
+        before, after = (meshio.read(tmp_path / f"cut_mandible{end}.ply").points for end in ("", "_moved"))
+        assert np.abs(after - before - sign * 10 * axes[row]).max() < 1e-4
 
 
 def lip_gap(initial, rest, head):
