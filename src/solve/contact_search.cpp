@@ -341,7 +341,7 @@ double ContactSearch::energy(Vec displacement) {
 /// `outcome` states the distance to the other.
 void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& outcome) {
   const ContactPressures here = pressures();
-  const double energy_here = energy(displacement);
+  const double value_here = objective_.evaluate(displacement, gradient_);
   set_pressures(at_prediction_);
   int64_t iterations = 0;
   bool taken = false;
@@ -350,7 +350,7 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     end = newton(start_, accuracy, iterations);
   if (end == End::reached) {
     OtherRest other = compare_skins(displacement, displacements(start_));
-    const bool is_less = energy(start_) < energy_here;
+    const bool is_less = objective_.evaluate(start_, gradient_) < value_here;
     const bool is_other = other.distance > 2 * accuracy;
     Outcome there;
     if (is_other && is_less) there = finish_reached(start_, accuracy, iterations);
@@ -368,17 +368,18 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     set_pressures(here);
 }
 
-/// Searches from `displacement`, whose energy is `energy_here`, with one point beyond the other
-/// side of its body; ends in start_. Fails where that has no less energy. Collective; `side` is
-/// null on ranks that do not own the point.
+/// Searches from `displacement`, where energy() is `energy_here`, with one point beyond the other
+/// side of its body; ends in start_. Fails where the augmented Lagrangian is no less there, which
+/// misses the energy by the square of the gaps that are left. Collective; `side` is null on ranks
+/// that do not own the point.
 ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displacement,
                                               double accuracy, double energy_here) {
   // Of the work of the contact's force over the gap: after the program, which is not exact, and
   // after a further step.
   constexpr double promising = 0.4, still_promising = 0.1;
-  constexpr double rounding = 1e-5;  // of the energy
+  constexpr double rounding = 1e-6;  // of the value
   check(VecCopy(displacement, start_));
-  objective_.evaluate(start_, gradient_);
+  const double value_here = objective_.evaluate(start_, gradient_);
   subtract_contact();
   qp_.linearize(start_);
   double work = 0;
@@ -395,7 +396,8 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
   End end = newton(start_, accuracy, iterations, 1);
   if (end == End::failed && energy(start_) <= energy_here + still_promising * work)
     end = newton(start_, accuracy, iterations);
-  const bool less = energy(start_) < energy_here - rounding * std::abs(energy_here);
+  const double value = objective_.evaluate(start_, gradient_);
+  const bool less = value < value_here - rounding * std::abs(value_here);
   return end == End::reached && !less ? End::failed : end;
 }
 
