@@ -9,9 +9,9 @@
 /// internal error.
 #include <cstdio>
 
-#include "repose/anatomy/complete.h"
 #include "repose/anatomy/picture.h"
 #include "repose/anatomy/propose.h"
+#include "repose/anatomy/same_head.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/text.h"

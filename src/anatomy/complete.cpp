@@ -7,14 +7,11 @@
 #include "lip_crease.h"
 #include "repose/anatomy/propose.h"
 #include "repose/base/error.h"
-#include "repose/surface/triangle_tree.h"
 
 namespace repose::anatomy {
 namespace {
 
 using scene::find;
-
-constexpr double off_surface = 15;  // mm, farther than a landmark is ever placed beside its surface
 
 /// The frame of the head at the mouth.
 HeadFrame frame_of(const scene::AnatomyPlan& plan) {
@@ -156,7 +153,7 @@ void remark_pitch(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
 }
 
 void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
-  constexpr double lower_height = 32, upper_height = 18;  // mm, with teeth at least
+  constexpr double lower_height = 34, upper_height = 18;  // mm, with teeth at least
   const Vec3 *spine = find(plan.landmarks, "nasal_spine"),
              *upper = find(plan.landmarks, "upper_incisor_edge"),
              *lower = find(plan.landmarks, "lower_incisor_edge"),
@@ -175,33 +172,9 @@ void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
 
 }  // namespace
 
-void require_same_head(const scene::Landmarks& landmarks, const std::string& file,
-                       const surface::Surface& skin, const std::vector<surface::Surface>& bones) {
-  surface::Surface bone;
-  for (const surface::Surface& part : bones) {
-    const auto first = static_cast<int64_t>(bone.points.size());
-    bone.points.insert(bone.points.end(), part.points.begin(), part.points.end());
-    for (const Triangle& t : part.triangles)
-      bone.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  const surface::TriangleTree on_skin(skin), on_bone(bone);
-  for (const scene::LandmarkName& name : scene::landmark_names()) {
-    const auto found = landmarks.find(name.name);
-    if (found == landmarks.end()) continue;
-    const double off = std::sqrt((name.on_skin ? on_skin : on_bone).nearest(found->second).squared);
-    if (off > off_surface)
-      base::refuse(
-          "{}: landmark {} lies {:.0f} mm from the {}; the landmarks are those of another head or "
-          "in "
-          "another frame",
-          file, name.name, off, name.on_skin ? "skin" : "bones");
-  }
-}
-
-void complete(const surface::Surface& skin, const std::vector<surface::Surface>& bones,
-              scene::Scene& scene, std::vector<std::string>& remarks) {
+void complete(const surface::Surface& skin, scene::Scene& scene,
+              std::vector<std::string>& remarks) {
   if (!scene.anatomy) return;
-  require_same_head(scene.anatomy->landmarks, scene.anatomy->file.string(), skin, bones);
   remark_pitch(*scene.anatomy, remarks);
   remark_teeth(*scene.anatomy, remarks);
   part_lips(skin, scene, remarks);

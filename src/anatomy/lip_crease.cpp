@@ -13,28 +13,54 @@ constexpr double climb = 1;     // mm, by which the crease may rise or fall from
 constexpr double share = 0.25;  // of the depth in the middle, where it ends
 constexpr double ending = 2.5;  // mm, over which it is that shallow
 constexpr double widest_half = 45;  // mm
-constexpr double behind = 6;        // mm, that what is seen through a gap lies behind the lips
+constexpr double behind = 6;        // mm, that what is seen through a gap lies behind a lip
+constexpr double near = 2;          // mm, of a lip, beside the gap
+constexpr double overjet = 25;      // mm, that the lower lip lies behind the upper one at most
+constexpr double widest_gap = 40;   // mm
 
-/// Skin between the lips is missing, or lies far behind them.
-bool is_gap(const FrontMap& skin, double x, double z, double lips) {
-  const auto y = skin.depth(x, z);
-  return !y || *y > lips + behind;
+/// Lowest and highest place between open lips, in one column of the map.
+struct Gap {
+  double low, high;
+  double middle() const { return (low + high) / 2; }
+};
+
+/// The foremost y of a column from a height on over `near`.
+std::optional<double> lip_above(const FrontMap& skin, double x, double z) {
+  std::optional<double> lip;
+  for (double at = z; at <= z + near; at += skin.spacing())
+    if (const auto y = skin.depth(x, at); y && (!lip || *y < *lip)) lip = y;
+  return lip;
 }
 
-/// The gap around a height, as its lower and upper end.
-std::optional<std::pair<double, double>> gap_at(const FrontMap& skin, double x, double z,
-                                                double lips) {
-  constexpr double reach = 12;  // mm
-  const double step = skin.spacing();
-  for (double off = 0; off <= reach; off += step)
-    for (const double at : {z + off, z - off}) {
-      if (!is_gap(skin, x, at, lips)) continue;
-      double low = at, high = at;
-      while (is_gap(skin, x, low - step, lips) && at - low < 40) low -= step;
-      while (is_gap(skin, x, high + step, lips) && high - at < 40) high += step;
-      if (at - low < 40 && high - at < 40) return std::pair(low, high);
-    }
+/// The lower end of the gap below `high`, behind a lip at `lip`: where skin is near that lip's
+/// depth, or steps forward to the lower lip, which may lie behind the upper one.
+std::optional<double> low_end(const FrontMap& skin, double x, double high, double lip) {
+  for (double low = high; high - low < widest_gap; low -= skin.spacing()) {
+    const auto next = skin.depth(x, low - skin.spacing()), back = skin.depth(x, low);
+    if (!next || *next > lip + overjet) continue;
+    if (*next <= lip + behind || !back || *next < *back - behind) return low;
+  }
   return std::nullopt;
+}
+
+/// The uppermost gap whose upper end lies between two heights: skin is missing there, or steps back
+/// behind the lip above it.
+std::optional<Gap> gap_between(const FrontMap& skin, double x, double top, double bottom) {
+  for (double z = top; z >= bottom; z -= skin.spacing()) {
+    const auto lip = lip_above(skin, x, z), next = skin.depth(x, z - skin.spacing());
+    if (!lip || (next && *next <= *lip + behind)) continue;
+    const double high = z - skin.spacing();
+    const auto low = low_end(skin, x, high, *lip);
+    return low ? std::optional(Gap{*low, high}) : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+/// The gap in the midline near a height.
+std::optional<Gap> middle_gap(const FrontMap& skin, double z) {
+  constexpr double minimum = 1.5, above = 14, below = 12;  // mm
+  const auto gap = gap_between(skin, 0, z + above, z - below);
+  return gap && gap->high - gap->low >= minimum ? gap : std::nullopt;
 }
 
 /// The height within `climb` of z at which the crease is deepest.
@@ -67,19 +93,20 @@ std::vector<Vec3> follow_side(const FrontMap& skin, double z, double middle, int
   return points;
 }
 
-LipCrease follow_gap(const FrontMap& skin, double z, double lips) {
+LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
   LipCrease crease;
   crease.open = true;
   for (const int side : {-1, 1}) {
-    double at = z;
+    Gap last = middle;
     std::vector<Vec3> points;
     for (double x = 0; x <= widest_half; x += skin.spacing()) {
-      const auto gap = gap_at(skin, side * x, at, lips + 0.02 * x * x);
-      if (!gap || (x > 0 && std::abs((gap->first + gap->second) / 2 - at) > 2 * climb)) break;
-      at = (gap->first + gap->second) / 2;
-      crease.gap = std::max(crease.gap, gap->second - gap->first);
-      const auto above = skin.depth(side * x, gap->second + skin.spacing());
-      points.emplace_back(side * x, above.value_or(lips), at);
+      const auto gap = gap_between(skin, side * x, last.high + near, last.low);
+      if (!gap || (x > 0 && std::abs(gap->middle() - last.middle()) > 2 * climb)) break;
+      last = *gap;
+      crease.gap = std::max(crease.gap, gap->high - gap->low);
+      const double edge = gap->high + skin.spacing();
+      const auto lip = skin.depth(side * x, edge);
+      points.emplace_back(side * x, lip ? *lip : *lip_above(skin, side * x, edge), gap->middle());
     }
     if (side < 0) {
       std::reverse(points.begin(), points.end());
@@ -101,18 +128,13 @@ std::optional<double> crease_depth(const FrontMap& skin, double x, double z) {
 }
 
 std::optional<double> open_mouth(const FrontMap& skin, double z) {
-  constexpr double minimum = 1.5, above = 14;  // mm
-  const auto lips = skin.foremost(0, z + above, 1);
-  if (!lips) return std::nullopt;
-  const auto gap = gap_at(skin, 0, z, *lips);
-  if (!gap || gap->second - gap->first < minimum) return std::nullopt;
-  return (gap->first + gap->second) / 2;
+  const auto gap = middle_gap(skin, z);
+  return gap ? std::optional(gap->middle()) : std::nullopt;
 }
 
 LipCrease follow_crease(const FrontMap& skin, double z, std::optional<double> right,
                         std::optional<double> left) {
-  if (const auto gap = open_mouth(skin, z))
-    return follow_gap(skin, *gap, skin.foremost(0, *gap + 14, 1).value_or(0));
+  if (const auto gap = middle_gap(skin, z)) return follow_gap(skin, *gap);
   const auto middle = deepest(skin, 0, z, arm);
   if (!middle) return {};
   LipCrease crease;

@@ -11,7 +11,7 @@ constexpr double incisors = 7;        // mm, half width of the front teeth
 constexpr double condyle_depth = 9;   // mm below its top
 constexpr double condyle_reach = 12;  // mm before and behind its top
 constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
-constexpr double dentate = 32;        // mm, height of a symphysis with teeth at least
+constexpr double dentate = 34;        // mm, height of a symphysis with teeth at least
 
 /// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell within the
 /// incisors' width that is no farther than `reach` from depth `y`.
@@ -158,18 +158,21 @@ void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search&
 }
 
 void search_upper_jaw(const FrontMap& map, Search& search) {
-  constexpr double reach = 18, above = 14;  // mm, from the lower incisors
+  constexpr double reach = 18, least = 14,
+                   most = 32;  // mm, from the lower incisors, or their ridge
   const auto lower = search.find("lower_incisor_edge");
   if (!lower) return search.lack("upper_incisor_edge", "the lower incisors were not found");
-  const auto middle = map.foremost(0, lower->z() + above, midline);
-  if (middle && std::abs(*middle - lower->y()) <= reach)
+  for (double above = least; above <= most && !search.find("upper_incisor_edge"); above += 6) {
+    const auto middle = map.foremost(0, lower->z() + above, midline);
+    if (!middle || std::abs(*middle - lower->y()) > reach) continue;
     if (const auto edge =
-            tooth_edge(map, -1, lower->z() + above, lower->z() - 2 * above, *middle, reach / 2))
+            tooth_edge(map, -1, lower->z() + above, lower->z() - 2 * least, *middle, reach / 2))
       search.put("upper_incisor_edge", *edge);
+  }
   const auto edge = search.profile_point("upper_incisor_edge");
   if (edge) return search_nasal_opening(map, *edge, search);
   for (const char* name : {"upper_incisor_edge", "nasal_spine", "a_point", "nasion_bone"})
-    search.lack(name, "SKULL has no bone in front, 14 mm above the lower incisors");
+    search.lack(name, "SKULL has no bone in front, 14 to 32 mm above the lower incisors");
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ std::optional<double> crease_height(const FrontMap& skin, double edge) {
   return height;
 }
 
-void search_mouth(const FrontMap& skin, Search& search) {
+/// Returns half of the widest gap between the lips, mm.
+double search_mouth(const FrontMap& skin, Search& search) {
   const auto edge = search.find("upper_incisor_edge"), known = search.find("stomion");
   std::optional<double> z;
   if (known)
@@ -48,7 +49,7 @@ void search_mouth(const FrontMap& skin, Search& search) {
     for (const char* name : {"stomion", "mouth_right", "mouth_left"})
       search.lack(name, edge ? "SKIN has no crease between lips near the upper incisors"
                              : "the upper incisors were not found");
-    return;
+    return 0;
   }
   const auto middle = std::min_element(
       crease.points.begin(), crease.points.end(),
@@ -60,6 +61,7 @@ void search_mouth(const FrontMap& skin, Search& search) {
     search.remark(fmt::format(
         "the mouth is open in SKIN, by up to {:.1f} mm: stomion and corners are those of the gap",
         crease.gap));
+  return crease.gap / 2;
 }
 
 void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
@@ -78,7 +80,7 @@ void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
              "SKIN ends below the glabella");
 }
 
-void search_lips(const std::vector<ProfilePoint>& profile, Search& search) {
+void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& search) {
   const auto tip = search.profile_point("pronasale"), stomion = search.profile_point("stomion"),
              spine = search.profile_point("nasal_spine");
   const auto chin = search.profile_point("pogonion_soft");
@@ -87,7 +89,7 @@ void search_lips(const std::vector<ProfilePoint>& profile, Search& search) {
       search.lack(name, "nose or mouth was not found");
     return;
   }
-  const double s = stomion->y();
+  const double s = stomion->y(), low = gap > 0 ? s - gap : s - 2;  // where the lower lip begins
   const auto first = foremost_of(profile, s + 2, s + 0.6 * (tip->y() - s));
   if (first)
     search.put("subnasale",
@@ -98,14 +100,14 @@ void search_lips(const std::vector<ProfilePoint>& profile, Search& search) {
                "SKIN has no upper lip");
   if (!base) search.lack("subnasale", "SKIN has no base of the nose");
   if (!chin) return search.lack("lower_lip", "the chin was not found");
-  const auto lip = foremost_of(profile, s - 14, s - 2);
+  const auto lip = foremost_of(profile, low - 12, low);
   if (!lip) return search.lack("lower_lip", "SKIN has no lower lip");
   search.put("b_soft", farthest_from_chord(profile, *chin, *lip, chin->y() + 3, lip->y() - 3, -1),
              "SKIN has no sulcus between lower lip and chin");
   const auto sulcus = search.profile_point("b_soft");
   search.put("lower_lip",
              farthest_from_chord(profile, sulcus.value_or(*chin), *stomion,
-                                 std::max(s - 16, sulcus ? sulcus->y() + 2 : 0), s - 2, 1),
+                                 std::max(low - 14, sulcus ? sulcus->y() + 2 : 0), low, 1),
              "SKIN has no lower lip");
 }
 
@@ -137,10 +139,10 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
 void search_skin(const surface::Surface& skin, Search& search) {
   const FrontMap map(skin, search.frame());
   const auto profile = map.profile(map.low_z(), map.high_z(), skin_midline);
-  search_mouth(map, search);
+  const double half_gap = search_mouth(map, search);
   search_nose_tip(profile, search);
   search_soft_chin(profile, skin, search);
-  search_lips(profile, search);
+  search_lips(profile, half_gap, search);
 }
 
 std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame& frame,

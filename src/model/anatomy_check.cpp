@@ -205,6 +205,16 @@ std::string check_lips(const Anatomical& head) {
       drop);
 }
 
+/// The frame of a head by its landmarks where they tell it, otherwise by skin and bones.
+std::optional<HeadFrame> frame_of(const Anatomical& head) {
+  const auto& plan = head.scene.anatomy;
+  if (!plan || !plan->landmarks.contains("condyle_right_center") || head.upper.empty() ||
+      head.lower.empty())
+    return head_frame(head.mesh, head.upper, head.lower);
+  const Vec3 left = plan->axes.row(0), forward = -plan->axes.row(1), up = plan->axes.row(2);
+  return HeadFrame{up, forward, left, forward, up};
+}
+
 }  // namespace
 
 std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRange& range,
@@ -213,7 +223,7 @@ std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRa
   Anatomical head{scene, range, mesh, bones, roles_of(scene), {}, {}, {}};
   head.upper = bones_of(BoneRole::upper, head.roles, bones);
   head.lower = bones_of(BoneRole::lower, head.roles, bones);
-  head.frame = head_frame(mesh, head.upper, head.lower);
+  head.frame = frame_of(head);
   std::vector<std::string> warnings;
   for (const auto check :
        {check_flatness, check_rest, check_axes, check_sides, check_fit, check_hinge, check_lips})

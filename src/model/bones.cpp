@@ -1,6 +1,7 @@
 #include "repose/model/build.h"
 
 #include "load_entry.h"
+#include "repose/anatomy/same_head.h"
 #include "repose/base/error.h"
 #include "repose/meshtools/osteotomy.h"
 #include "repose/surface/component.h"
@@ -35,7 +36,7 @@ void make(const scene::Scene& scene, const scene::Osteotomy& cut, Bones& bones) 
 
 }  // namespace
 
-Bones read_bones(const scene::Scene& scene) {
+Bones read_bones(const scene::Scene& scene, const surface::Surface* skin) {
   scene::require_bones(scene);
   Bones bones;
   const size_t whole = scene.bones.size() - scene.osteotomies.size();
@@ -48,6 +49,9 @@ Bones read_bones(const scene::Scene& scene) {
           "left is left, and export the mesh again",
           raw.name));
   }
+  if (skin && scene.anatomy)
+    anatomy::require_same_head(scene.anatomy->landmarks, scene.anatomy->file.string(), *skin,
+                               bones.surfaces);
   for (size_t k = 0; k < scene.osteotomies.size(); ++k) {
     try {
       make(scene, scene.osteotomies[k], bones);

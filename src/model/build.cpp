@@ -18,12 +18,12 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   const base::Logged logged(event);
   GivenSkin given = load_skin(scene);
   Anatomy anatomy{scene, std::move(given.surface), {}, {}, {}, {}};
-  Bones bones = read_bones(scene);
+  Bones bones = read_bones(scene, &anatomy.skin);
   anatomy.bones = std::move(bones.surfaces);
   anatomy.remarks = std::move(bones.remarks);
   anatomy.warnings = std::move(bones.warnings);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
-  anatomy::complete(anatomy.skin, anatomy.bones, anatomy.scene, anatomy.remarks);
+  anatomy::complete(anatomy.skin, anatomy.scene, anatomy.remarks);
   resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
   report_initial_overlaps(anatomy.bones, scene, anatomy.warnings);
   if (scene.tissue.edge)

@@ -49,6 +49,20 @@ void check_sides(const Value& file, const Landmarks& landmarks) {
   }
 }
 
+/// Refuses condyles that are as far apart as those of no head in mm.
+void check_unit(const Value& file, const Landmarks& landmarks) {
+  constexpr double low = 60, high = 160;  // mm
+  const Vec3 *right = find(landmarks, "condyle_right_center"),
+             *left = find(landmarks, "condyle_left_center");
+  if (!right || !left) return;
+  const double apart = (*left - *right).norm();
+  if (!(apart >= low && apart <= high))
+    file.refuse(
+        "has condyle_left_center {:.3g} mm from condyle_right_center, in a head {:g} to {:g} mm: "
+        "landmarks must be in mm; multiply them by 10 if they are in cm, by 1000 if in m",
+        apart, low, high);
+}
+
 void check_order(const Value& file, const Landmarks& landmarks) {
   for (const auto& [upper, lower] : order) {
     const Vec3 *a = find(landmarks, upper), *b = find(landmarks, lower);
@@ -68,6 +82,7 @@ AnatomyPlan read_anatomy(const Value& value) {
   plan.landmarks = with_standard_names(landmarks_by_name(plan.file), plan.file.string());
   check_front(file, plan.landmarks);
   check_sides(file, plan.landmarks);
+  check_unit(file, plan.landmarks);
   check_order(file, plan.landmarks);
   plan.axes = head_axes(plan.landmarks);
   if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;

@@ -124,3 +124,24 @@ def test_measures_its_error(environment, tmp_path):
     assert (result.returncode, result.stderr) == (0, ""), result
     mean, most = re.search(r"\*\*all\*\* \| \d+ \| ([\d.]+) \| ([\d.]+) \|", page.read_text()).groups()
     assert float(mean) < 4 and float(most) < 15
+
+
+@pytest.mark.parametrize("jaws", [["upper"], ["lower"], ["upper", "lower"]])
+def test_the_landmarks_of_a_jaw_without_teeth_are_found(run, tmp_path, jaws):
+    """The crowns are cut off; the crest of the bone takes the place of the edges of the incisors."""
+    cuts = {"upper": "{bone: skull, piece: upper, planes: [{point: [0, -85, -10.5], normal: [0, 0, -1]}, "
+                     "{point: [0, -40, 0], normal: [0, -1, 0]}]}",
+            "lower": "{bone: mandible, piece: lower, planes: [{point: [0, -85, -36], normal: [0, 0, 1]}, "
+                     "{point: [0, -40, 0], normal: [0, -1, 0]}]}"}
+    (tmp_path / "scene.yaml").write_text(
+        f"skin: {SURFACES[0]}\nbones: [{{name: skull, file: {SURFACES[2]}}}, {{name: mandible, file: {SURFACES[4]}}}]\n"
+        f"tissue: {{layers: 4, edge: 6}}\nosteotomies: [{', '.join(cuts[jaw] for jaw in jaws)}]\n")
+    assert run("repose-osteotomy", "scene.yaml", "-output", "cut").returncode == 0
+    assert run("repose-landmarks", *SURFACES, "-output", "whole").returncode == 0
+    result = run("repose-landmarks", SURFACES[0], "-skull", "cut_skull.ply", "-mandible", "cut_mandible.ply",
+                 "-output", "toothless")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    whole, found = (points(tmp_path / f"{name}.mrk.json") for name in ("whole", "toothless"))
+    assert len(found) == 23
+    for name in ("nasal_spine", "nasion_bone", "pogonion_bone", "stomion", "pronasale", "mouth_left"):
+        assert np.linalg.norm(np.subtract(found[name], whole[name])) < 2, name

@@ -24,8 +24,7 @@ struct Completed {
 
 /// A head completed by those landmarks that are proposed for it, but for `without`.
 Completed complete_head(const std::string& skin_file, const std::string& skull_file,
-                        const std::string& mandible_file, const std::vector<std::string>& without,
-                        const Vec3& shift = Vec3::Zero()) {
+                        const std::string& mandible_file, const std::vector<std::string>& without) {
   const surface::Surface skin = surface::read_surface(skin_file),
                          skull = surface::read_surface(skull_file),
                          mandible = surface::read_surface(mandible_file);
@@ -34,20 +33,17 @@ Completed complete_head(const std::string& skin_file, const std::string& skull_f
   plan.file = "head.mrk.json";
   plan.landmarks = propose_landmarks(skin, skull, mandible, {}).found;
   for (const std::string& name : without) plan.landmarks.erase(name);
-  for (auto& [name, place] : plan.landmarks) place += shift;
   done.scene.anatomy = plan;
   done.scene.tissue.material = scene::Material{};
   done.scene.tissue.attach_regions.push_back(
       {scene::SphereRegion{Vec3::Zero(), 1}, scene::Attach::slide, 0});
-  complete(skin, {skull, mandible}, done.scene, done.remarks);
+  complete(skin, done.scene, done.remarks);
   return done;
 }
 
-Completed complete_shipped(const std::vector<std::string>& without = {},
-                           const Vec3& shift = Vec3::Zero()) {
+Completed complete_shipped(const std::vector<std::string>& without = {}) {
   const std::string head = REPOSE_MESHES "/head_";
-  return complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply", without,
-                       shift);
+  return complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply", without);
 }
 
 bool says(const Completed& done, const std::string& part) {
@@ -70,7 +66,7 @@ Completed complete_turned(double degrees) {
   for (surface::Surface* surface : {&skin, &skull, &mandible})
     for (Vec3& place : surface->points) place = turn * place;
   plan.part_lips = plan.vestibule = false;
-  complete(skin, {skull, mandible}, done.scene, done.remarks);
+  complete(skin, done.scene, done.remarks);
   return done;
 }
 
@@ -136,11 +132,6 @@ TEST(CompleteScene, TheToneIsStatedOrWhyThereIsNone) {
   EXPECT_TRUE(says(complete_shipped(), "ring muscle by landmarks: a tone of up to 0.006 N/mm²"));
   const Completed without = complete_shipped({"b_soft"});
   EXPECT_TRUE(says(without, "landmark b_soft is missing, so the ring muscle has no tone"));
-}
-
-TEST(CompleteScene, LandmarksOfAnotherHeadAreRefused) {
-  EXPECT_NE(refusal([] { complete_shipped({}, Vec3(0, 40, 0)); }).find("another head"),
-            std::string::npos);
 }
 
 TEST(CompleteScene, TheCreaseIsFoundByTheCornersAlone) {

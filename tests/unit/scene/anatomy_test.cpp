@@ -85,6 +85,9 @@ TEST(Anatomy, RefusesLandmarksOfNoHead) {
   Landmarks lone = head();
   lone.erase("condyle_left_center");
   has(refused(lone), "has condyle_right_center without condyle_left_center");
+  Landmarks in_cm = head();
+  for (auto& [name, place] : in_cm) place /= 10;
+  has(refused(in_cm, le_fort), "landmarks must be in mm; multiply them by 10 if they are in cm");
   Landmarks low = head();
   low["b_point"].z() = -10;
   has(refused(low), "lower_incisor_edge at z = -24.0 mm, not above b_point");

@@ -1,0 +1,45 @@
+#include "anatomy/lip_crease.h"
+
+#include <gtest/gtest.h>
+
+namespace repose::anatomy {
+namespace {
+
+/// Adds a rectangle in the frontal plane at a depth.
+void add(surface::Surface& skin, double y, const Eigen::Vector2d& low,
+         const Eigen::Vector2d& high) {
+  const auto first = static_cast<int64_t>(skin.points.size());
+  for (const double x : {low.x(), high.x()})
+    for (const double z : {low.y(), high.y()}) skin.points.emplace_back(x, y, z);
+  skin.triangles.push_back({first, first + 1, first + 2});
+  skin.triangles.push_back({first + 1, first + 3, first + 2});
+}
+
+/// A face with an open mouth 40 mm wide: the gap is from −12 to −3 mm, the lower lip lies 8 mm
+/// behind the upper one, and the back of the head is seen through the gap.
+surface::Surface open_face() {
+  surface::Surface skin;
+  add(skin, 0, {-50, -3}, {50, 40});
+  add(skin, 8, {-50, -60}, {50, -12});
+  add(skin, 0, {-50, -12}, {-20, -3});
+  add(skin, 0, {20, -12}, {50, -3});
+  add(skin, 150, {-50, -60}, {50, 40});
+  return skin;
+}
+
+TEST(LipCrease, OpenLipsAreThoseOfTheGapAndNotWhatIsSeenThroughIt) {
+  const FrontMap map(open_face(), HeadFrame{});
+  const auto gap = open_mouth(map, 1);
+  ASSERT_TRUE(gap);
+  EXPECT_NEAR(*gap, -7.5, 0.5);
+  const LipCrease crease = follow_crease(map, *gap, {}, {});
+  EXPECT_TRUE(crease.open);
+  EXPECT_NEAR(crease.gap, 9, 1);
+  ASSERT_GT(crease.points.size(), 10u);
+  EXPECT_NEAR(crease.points.front().x(), -20, 1);
+  EXPECT_NEAR(crease.points.back().x(), 20, 1);
+  for (const Vec3& point : crease.points) EXPECT_NEAR(point.y(), 0, 0.1);
+}
+
+}  // namespace
+}  // namespace repose::anatomy
