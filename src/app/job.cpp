@@ -8,6 +8,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/hdf5.h"
+#include "repose/discrete/model_rows.h"
 #include "repose/model/cut.h"
 #include "repose/model/material.h"
 #include "repose/model/skin_mesh.h"
@@ -122,26 +123,39 @@ void build(MPI_Comm comm, const std::filesystem::path& input, const scene::Scene
   job.initial_equilibrium = false;
 }
 
+/// Reads the rows of a model file that this rank holds, all valid. Collective.
+model::Model read_rows(MPI_Comm comm, const std::filesystem::path& input) {
+  model::Model rows;
+  try {
+    base::collective_try(
+        comm, [&] { rows = results::read_model_rows(input, base::rank(comm), base::size(comm)); });
+    discrete::validate(comm, rows, input.string());
+  } catch (const base::InputError&) {
+    // Read whole, the model shows which array and row are the first at fault.
+    base::on_root(comm, [&] { results::read_model(input); });
+    throw;
+  }
+  return rows;
+}
+
 /// Collective.
 void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
           const scene::SceneChanges& changes, Job& job) {
-  model::Model stored;
   base::on_root(comm, [&] {
-    if (!base::is_hdf5(input)) {
-      read_scene(scene::read_scene(input, changes), job);
-      if (watch) watch(share_of_surfaces);
-      return;
-    }
-    stored = results::read_model(input);
-    job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
-    set_bulk_modulus(model::effective_modulus(stored), job);
+    if (base::is_hdf5(input)) return;
+    read_scene(scene::read_scene(input, changes), job);
+    if (watch) watch(share_of_surfaces);
   });
   bool is_scene = job.anatomy.has_value();
   base::broadcast(comm, is_scene);
-  if (is_scene)
-    build(comm, input, changes, job);
-  else
-    job.local_model = discrete::build_local(comm, std::move(stored));
+  if (is_scene) return build(comm, input, changes, job);
+  model::Model rows = read_rows(comm, input);
+  const double effective_modulus = discrete::effective_modulus(comm, rows);
+  base::on_root(comm, [&] {
+    job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
+    set_bulk_modulus(effective_modulus, job);
+  });
+  job.local_model = discrete::build_local(comm, std::move(rows));
 }
 
 /// After the initial equilibrium, which would balance the tone again. Collective.

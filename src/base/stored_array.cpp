@@ -57,14 +57,25 @@ void StoredArray::inspect() {
   shape_.assign(extent.begin(), extent.end());
 }
 
-int64_t StoredArray::size() const { return check_hdf5(H5Sget_simple_extent_npoints(space_)); }
+int64_t StoredArray::size() const { return check_hdf5(H5Sget_select_npoints(space_)); }
+
+void StoredArray::select_rows(int64_t begin, int64_t rows) {
+  std::vector<hsize_t> start(shape_.size(), 0), count(shape_.begin(), shape_.end());
+  start[0] = begin;
+  count[0] = rows;
+  check_hdf5(
+      H5Sselect_hyperslab(space_, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr));
+}
 
 void StoredArray::read(hid_t memory_type, void* data) const {
   if (size() == 0) return;
-  if (attribute_ >= 0)
+  if (attribute_ >= 0) {
     check_hdf5(H5Aread(attribute_, memory_type, data));
-  else
-    check_hdf5(H5Dread(dataset_, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data));
+    return;
+  }
+  const auto values = static_cast<hsize_t>(size());
+  const Hdf5Space memory(H5Screate_simple(1, &values, nullptr));
+  check_hdf5(H5Dread(dataset_, memory_type, memory, space_, H5P_DEFAULT, data));
 }
 
 void StoredArray::refuse_type(const char* expected) const {

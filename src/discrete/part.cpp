@@ -21,25 +21,6 @@ using model::Model;
 using model::PointSet;
 using RowsOfRanks = std::vector<std::vector<int64_t>>;  // [ranks] rows that each receives
 
-/// Calls visit(point) for every point of an element, of whatever kind.
-template <class Model, class Visit>
-void for_each_point(Model& model, const Visit& visit) {
-  const auto visit_all = [&](auto& elements) {
-    for (auto& points : elements)
-      for (auto& point : points) visit(point);
-  };
-  const auto visit_each = [&](auto& points) {
-    for (auto& point : points) visit(point);
-  };
-  visit_all(model.springs.points);
-  visit_all(model.prisms.points);
-  visit_all(model.edges.points);
-  visit_all(model.skin);
-  visit_each(model.contact.pairs.point);
-  visit_each(model.contact.cut_faces.point);
-  for (auto& elements : model.elements) visit_each(elements.points);
-}
-
 /// Owners and numbers of all points, on rank 0.
 struct Numbers {
   std::vector<int64_t> column;  // [N] 0-based, consecutive, in order of first appearance

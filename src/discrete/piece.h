@@ -33,6 +33,25 @@ struct Piece {
   int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;  ///< blocks, of all and of this rank
 };
 
+/// Calls visit(point) for every point of an element, of whatever kind.
+template <class Model, class Visit>
+void for_each_point(Model& model, const Visit& visit) {
+  const auto visit_all = [&](auto& elements) {
+    for (auto& points : elements)
+      for (auto& point : points) visit(point);
+  };
+  const auto visit_each = [&](auto& points) {
+    for (auto& point : points) visit(point);
+  };
+  visit_all(model.springs.points);
+  visit_all(model.prisms.points);
+  visit_all(model.edges.points);
+  visit_all(model.skin);
+  visit_each(model.contact.pairs.point);
+  visit_each(model.contact.cut_faces.point);
+  for (auto& elements : model.elements) visit_each(elements.points);
+}
+
 /// Copies surfaces; their names stay behind.
 void copy_surfaces(const base::Message& copy, std::vector<surface::Surface>& surfaces);
 

@@ -176,10 +176,15 @@ void for_each_stiffness(const Model& model, Add&& add) {
 
 }  // namespace
 
+void add_stiffness(const Model& model, Stiffness& sums) {
+  for_each_stiffness(model,
+                     [&](int64_t, double k, double v) { sums.stiffness += k, sums.volume += v; });
+}
+
 double effective_modulus(const Model& model) {
-  double stiffness = 0, volume = 0;
-  for_each_stiffness(model, [&](int64_t, double k, double v) { stiffness += k, volume += v; });
-  return volume > 0 ? stiffness / volume : 0;
+  Stiffness sums;
+  add_stiffness(model, sums);
+  return sums.modulus();
 }
 
 std::vector<ColumnSums> column_sums(const Model& model, int64_t layers) {
@@ -195,9 +200,10 @@ std::vector<ColumnSums> column_sums(const Model& model, int64_t layers) {
 }
 
 double effective_modulus(const std::vector<ColumnSums>& columns) {
-  double stiffness = 0, volume = 0;
-  for (const ColumnSums& column : columns) stiffness += column.stiffness, volume += column.volume;
-  return volume > 0 ? stiffness / volume : 0;
+  Stiffness sums;
+  for (const ColumnSums& column : columns)
+    sums.stiffness += column.stiffness, sums.volume += column.volume;
+  return sums.modulus();
 }
 
 double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns) {

@@ -30,7 +30,7 @@ void read_arrays(const Reader& in, const std::string& group, Group& of,
     const bool may_lack = std::find(optional.begin(), optional.end(), name) != optional.end();
     if (may_lack && !in.has(path)) return;
     in.read(path, rows, values);
-    rows = static_cast<int64_t>(values.size());
+    rows = in.rows(path);
   });
 }
 
@@ -169,19 +169,16 @@ std::vector<surface::Surface> read_bone_surfaces(const Reader& in,
   return surfaces;
 }
 
-}  // namespace
-
-model::Model read_model(const std::filesystem::path& file) {
-  if (!std::filesystem::is_directory(file) && std::filesystem::exists(file) && !base::is_hdf5(file))
-    base::refuse("{}: is not an HDF5 file; give a model or result file (.h5)", file.string());
-  const Reader in(file);
-  require_format(in);
-  model::Model model;
-  model.gravity = in.vector("/model", "gravity");
+/// Reads points, springs, prisms and edges.
+void read_rows(const Reader& in, model::Model& model) {
   model.points = read_points(in);
   if (in.has("/model/spring")) read_arrays(in, "/model/spring", model.springs);
   model.prisms = read_prisms(in);
   if (in.has("/model/edge")) read_arrays(in, "/model/edge", model.edges);
+}
+
+/// Reads all else but gravity.
+void read_metadata(const Reader& in, model::Model& model) {
   model.elements = read_elements(in);
   if (in.has("/model/spring") || in.has("/model/spring_set"))
     model.spring_sets = in.names("/model/spring_set");
@@ -192,6 +189,24 @@ model::Model read_model(const std::filesystem::path& file) {
   if (in.has("/model/bone_surface")) model.bone_surfaces = read_bone_surfaces(in, model.bones);
   if (in.has("/model/adhesion")) model.adhesion = read_adhesion(in);
   if (in.has("/model/contact")) model.contact = read_contact(in);
+}
+
+}  // namespace
+
+model::Model read_model_rows(const std::filesystem::path& file, int rank, int ranks) {
+  if (!std::filesystem::is_directory(file) && std::filesystem::exists(file) && !base::is_hdf5(file))
+    base::refuse("{}: is not an HDF5 file; give a model or result file (.h5)", file.string());
+  const Reader in(file), slabs(file, rank, ranks);
+  require_format(in);
+  model::Model model;
+  model.gravity = in.vector("/model", "gravity");
+  read_rows(slabs, model);
+  if (rank == 0) read_metadata(in, model);
+  return model;
+}
+
+model::Model read_model(const std::filesystem::path& file) {
+  model::Model model = read_model_rows(file, 0, 1);
   model::validate(model, file.string());
   return model;
 }

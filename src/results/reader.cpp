@@ -1,5 +1,7 @@
 #include "reader.h"
 
+#include "repose/base/collective.h"
+
 namespace repose::results {
 
 using base::check_hdf5;
@@ -36,8 +38,8 @@ base::Hdf5File open_result(const std::filesystem::path& file) {
 
 }  // namespace
 
-Reader::Reader(const std::filesystem::path& file)
-    : name_(file.string()), file_(open_result(file)) {}
+Reader::Reader(const std::filesystem::path& file, int rank, int ranks)
+    : name_(file.string()), file_(open_result(file)), rank_(rank), ranks_(ranks) {}
 
 bool Reader::has(const std::string& path) const {
   try {
@@ -130,13 +132,25 @@ std::vector<Value> Reader::attribute_values(const std::string& object, const cha
   });
 }
 
+int64_t Reader::rows(const std::string& path) const {
+  return named(*this, path, [&] { return open_dataset(file_, *this, path).shape()[0]; });
+}
+
+StoredArray Reader::open_rows(const std::string& path, const Shape& shape, int64_t& rows) const {
+  StoredArray array = open_dataset(file_, *this, path);
+  require_shape(*this, path, array, shape);
+  const base::Slab slab = base::slab(array.shape()[0], rank_, ranks_);
+  rows = slab.rows();
+  if (ranks_ > 1) array.select_rows(slab.begin, rows);
+  return array;
+}
+
 std::vector<double> Reader::numbers(const std::string& path, const Shape& shape) const {
   return named(*this, path, [&] {
-    const StoredArray array = open_dataset(file_, *this, path);
-    require_shape(*this, path, array, shape);
-    std::vector<double> values = array.numbers();
-    const int64_t rows = std::max<int64_t>(array.shape()[0], 1);
-    require_finite(*this, path, values, std::max<int64_t>(values.size() / rows, 1));
+    int64_t rows = 0;
+    std::vector<double> values = open_rows(path, shape, rows).numbers();
+    const int64_t per_row = static_cast<int64_t>(values.size()) / std::max<int64_t>(rows, 1);
+    require_finite(*this, path, values, std::max<int64_t>(per_row, 1));
     return values;
   });
 }
@@ -150,9 +164,8 @@ std::vector<Vec3> Reader::vectors(const std::string& path, int64_t rows) const {
 
 std::vector<int64_t> Reader::whole_numbers(const std::string& path, const Shape& shape) const {
   return named(*this, path, [&] {
-    const StoredArray array = open_dataset(file_, *this, path);
-    require_shape(*this, path, array, shape);
-    return array.whole_numbers();
+    int64_t rows = 0;
+    return open_rows(path, shape, rows).whole_numbers();
   });
 }
 

@@ -28,7 +28,9 @@ struct Shape {
 /// may be of fixed or variable length.
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& file);
+  /// Datasets of numbers are read whole, or the slab (base::slab) of one of `ranks`: rows in a
+  /// refusal then count from the slab's first.
+  explicit Reader(const std::filesystem::path& file, int rank = 0, int ranks = 1);
 
   const std::string& file() const { return name_; }
   /// Returns whether something of that path is there, at the end of links that lead somewhere.
@@ -41,6 +43,8 @@ class Reader {
     base::refuse("{}: {}: {}", name_, path, fmt::format(what, std::forward<Args>(args)...));
   }
 
+  /// Returns the number of rows of a dataset that was read, whole.
+  int64_t rows(const std::string& path) const;
   std::vector<double> numbers(const std::string& path, const Shape& shape) const;
   std::vector<Vec3> vectors(const std::string& path, int64_t rows) const;
   std::vector<std::string> names(const std::string& path) const;
@@ -87,6 +91,8 @@ class Reader {
 
  private:
   std::vector<int64_t> whole_numbers(const std::string& path, const Shape& shape) const;
+  /// Opens a dataset of numbers of this shape and selects the rows that are read.
+  base::StoredArray open_rows(const std::string& path, const Shape& shape, int64_t& rows) const;
   /// Opens attribute `name` of `object`, requires `count` values and reads them with `read`.
   template <class Value>
   std::vector<Value> attribute_values(const std::string& object, const char* name, int64_t count,
@@ -107,6 +113,7 @@ class Reader {
 
   std::string name_;
   base::Hdf5File file_;
+  int rank_, ranks_;
 };
 
 }  // namespace repose::results

@@ -17,7 +17,7 @@ ROOMS = {
     "anatomy": {"base", "scene", "surface"},
     "model": {"base", "scene", "surface", "imaging", "meshtools", "anatomy"},
     "mechanics": {"base", "surface", "model"},
-    "discrete": {"base", "model", "mechanics"},
+    "discrete": {"base", "surface", "model", "mechanics"},
     "linear": {"base", "model", "mechanics", "discrete"},
     "solve": {"base", "model", "mechanics", "discrete", "linear"},
     "results": {"base", "model"},

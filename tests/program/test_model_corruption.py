@@ -224,16 +224,50 @@ BESIDE_OTHERS = {
 }
 
 
+@pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("case", BESIDE_OTHERS)
-def test_a_row_that_is_wrong_beside_others_is_refused(run, tmp_path, case):
+def test_a_row_that_is_wrong_beside_others_is_refused(run, tmp_path, case, ranks):
     spoil, words = BESIDE_OTHERS[case]
     with h5py.File(tmp_path / "model.h5", "w") as file:
         springs(file)
         spoil(file["model"])
-    result = run("repose-solve", "model.h5", "-output", "out")
+    result = run("repose-solve", "model.h5", "-output", "out", ranks=ranks)
     assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
     assert result.stderr.startswith("error: model.h5: /model/"), result.stderr
     assert [word for word in words if word not in result.stderr] == [], result.stderr
+
+
+def chain(file, held):
+    """A chain of springs through points in such an order that all ranks hold parts of it."""
+    points = 30
+    write_model(file)
+    model = file["model"]
+    for group in [name for name in model if name not in ("point", "spring")]:
+        del model[group]
+    for name in arrays(model):
+        rows = np.repeat(model[name][:1], points - name.startswith("spring/"), axis=0)
+        del model[name]
+        model[name] = rows
+    model["spring_set"] = np.array([b"all"])
+    order = np.arange(points) * 7 % points
+    place = np.argsort(order)
+    model["point/position"][:, 0] = model["point/target"][:, 0] = place * 10.0
+    model["point/column"][...] = np.arange(points)
+    model["spring/points"][...] = np.stack([order[:-1], order[1:]], axis=1)
+    if held:
+        model["point/set"][order[-1]] = 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("held", [True, False])
+def test_tissue_over_several_ranks_must_be_held_somewhere(run, tmp_path, held, ranks):
+    with h5py.File(tmp_path / "model.h5", "w") as file:
+        chain(file, held)
+    result = run("repose-solve", "model.h5", "-dry_run", ranks=ranks)
+    refusal = ("error: model.h5: /model/point: row 0 at (0, 0, 5) mm is soft tissue, and nothing "
+               "holds it or what it is joined to; make a point there a boundary point (set 1), "
+               "or remove the part\n")
+    assert (result.returncode, result.stderr) == ((0, "") if held else (1, refusal)), result
 
 
 def test_a_refusal_during_the_solve_names_the_file(run, tmp_path):

@@ -90,8 +90,10 @@ class StoredArray {
 
   /// Returns the length along each axis; empty for a single value.
   const std::vector<int64_t>& shape() const { return shape_; }
-  /// Returns the number of values, the product of the lengths.
+  /// Returns the number of values that are read: the product of the lengths, or of the selection.
   int64_t size() const;
+  /// Selects rows of a dataset that has an axis, for all reads that follow.
+  void select_rows(int64_t begin, int64_t rows);
   /// Returns all values, row-major: the last index runs fastest. Throws InputError unless a double
   /// holds each exactly.
   std::vector<double> numbers() const;

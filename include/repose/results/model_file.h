@@ -15,6 +15,10 @@ namespace repose::results {
 /// missing: point/mass and point/external_force (zero), the group prism, skin/points, bone,
 /// bone_surface and bone_transform (none).
 model::Model read_model(const std::filesystem::path& file);
+/// Reads the slabs (base::slab) of points, springs, prisms and edges of one of `ranks`, and all
+/// else on rank 0, without validation. InputError as read_model, whose rows count from the slab's
+/// first. Not collective.
+model::Model read_model_rows(const std::filesystem::path& file, int rank, int ranks);
 
 /// One whole step of a result file, serially.
 struct StoredStep {
