@@ -5,7 +5,7 @@
 const NUMBERS = [
   ["forward", "translate", 1, -1, "mm"], ["up", "translate", 2, 1, "mm"],
   ["to the patient's left", "translate", 0, 1, "mm"], ["pitch, front down", "rotate", 0, 1, "°"],
-  ["yaw, front to the left", "rotate", 2, 1, "°"], ["roll, left side down", "rotate", 1, 1, "°"]];
+  ["yaw, front to the left", "rotate", 2, 1, "°"], ["roll, left side up", "rotate", 1, -1, "°"]];
 const DEGREE = Math.PI / 180;
 
 const zero = () => ({translate: [0, 0, 0], rotate: [0, 0, 0]});
