@@ -131,9 +131,9 @@ model::Model read_rows(MPI_Comm comm, const std::filesystem::path& input) {
         comm, [&] { rows = results::read_model_rows(input, base::rank(comm), base::size(comm)); });
     discrete::validate(comm, rows, input.string());
   } catch (const base::InputError&) {
-    // Read whole, the model shows which array and row are the first at fault.
-    base::on_root(comm, [&] { results::read_model(input); });
-    throw;
+    // Read whole, the model shows which array and row are the first at fault, if any is.
+    rows = {};
+    base::on_root(comm, [&] { rows = results::read_model(input); });
   }
   return rows;
 }
