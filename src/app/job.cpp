@@ -123,17 +123,22 @@ void build(MPI_Comm comm, const std::filesystem::path& input, const scene::Scene
   job.initial_equilibrium = false;
 }
 
-/// Reads the rows of a model file that this rank holds, all valid. Collective.
-model::Model read_rows(MPI_Comm comm, const std::filesystem::path& input) {
+/// Reads the rows of a model file that this rank holds, all valid, and the effective modulus of
+/// all, on rank 0. Collective.
+model::Model read_rows(MPI_Comm comm, const std::filesystem::path& input,
+                       double& effective_modulus) {
   model::Model rows;
   try {
     base::collective_try(
         comm, [&] { rows = results::read_model_rows(input, base::rank(comm), base::size(comm)); });
-    discrete::validate(comm, rows, input.string());
+    effective_modulus = discrete::validate(comm, rows, input.string());
   } catch (const base::InputError&) {
     // Read whole, the model shows which array and row are the first at fault, if any is.
     rows = {};
-    base::on_root(comm, [&] { rows = results::read_model(input); });
+    base::on_root(comm, [&] {
+      rows = results::read_model(input);
+      effective_modulus = model::effective_modulus(rows);
+    });
   }
   return rows;
 }
@@ -149,8 +154,8 @@ void read(MPI_Comm comm, const std::filesystem::path& input, const Watch& watch,
   bool is_scene = job.anatomy.has_value();
   base::broadcast(comm, is_scene);
   if (is_scene) return build(comm, input, changes, job);
-  model::Model rows = read_rows(comm, input);
-  const double effective_modulus = discrete::effective_modulus(comm, rows);
+  double effective_modulus = 0;
+  model::Model rows = read_rows(comm, input, effective_modulus);
   base::on_root(comm, [&] {
     job.requested.bulk_modulus = results::last_bulk_modulus(input);  // solved again, it stays so
     set_bulk_modulus(effective_modulus, job);

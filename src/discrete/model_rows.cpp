@@ -4,7 +4,7 @@
 #include "piece.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
-#include "repose/model/stiffness.h"
+#include "repose/model/build.h"
 #include "repose/surface/edges.h"
 
 namespace repose::discrete {
@@ -69,50 +69,39 @@ std::vector<std::array<int64_t, 2>> joints(const Model& model, const std::vector
   return pairs;
 }
 
-/// Refuses soft tissue that is joined to no other point, as model::validate. On rank 0.
-void refuse_floating(const std::vector<PointSet>& set,
-                     const std::vector<std::array<int64_t, 2>>& pairs, const std::string& file) {
-  surface::UnionFind parts(static_cast<int64_t>(set.size()));
-  for (const auto& [p, q] : pairs) parts.unite(p, q);
-  std::vector<char> held(set.size(), 0);
-  for (size_t i = 0; i < set.size(); ++i)
-    if (set[i] != PointSet::soft_tissue) held[parts.find(static_cast<int64_t>(i))] = 1;
-  for (size_t i = 0; i < set.size(); ++i)
-    if (!held[parts.find(static_cast<int64_t>(i))])
-      base::refuse("{}: /model/point: row {} is soft tissue, and nothing holds it", file, i);
+/// Sums over the elements in their order, whatever the ranks.
+double modulus_of(MPI_Comm comm, const Model& rows) {
+  model::ColumnSums sums;
+  for (int r = 0; r < base::size(comm); ++r) {
+    if (base::rank(comm) == r) model::add_elements(rows, sums);
+    base::Message(comm, r)(sums);
+  }
+  return model::effective_modulus(std::vector{sums});
 }
 
 }  // namespace
 
-void validate(MPI_Comm comm, Model& rows, const std::string& file) {
+double validate(MPI_Comm comm, Model& rows, const std::string& file) {
   require_points(comm, rows, file);
   auto bones = rows.bones.size(), sets = rows.spring_sets.size();
   base::broadcast(comm, bones, sets);
   rows.bones.resize(bones);
   rows.spring_sets.resize(sets);
-  {
-    const OwnModel own(comm, rows);
-    base::collective_try(comm, [&] {
-      // A rank alone cannot tell what holds its tissue.
-      for (PointSet& set : rows.points.set)
-        if (set == PointSet::soft_tissue) set = PointSet::boundary;
-      if (base::rank(comm) == 0 || !own.row().empty()) model::validate(rows, file);
-    });
-    const auto set = base::gather(comm, own.slab_set());
-    const auto pairs = base::gather(comm, joints(rows, own.row()));
-    base::on_root(comm, [&] { refuse_floating(set, pairs, file); });
-  }
-  if (base::rank(comm) > 0) rows.spring_sets.clear();
-}
-
-double effective_modulus(MPI_Comm comm, Model& rows) {
   const OwnModel own(comm, rows);
-  model::Stiffness sums;
-  for (int r = 0; r < base::size(comm); ++r) {
-    if (base::rank(comm) == r) model::add_stiffness(rows, sums);
-    base::Message(comm, r)(sums);
-  }
-  return sums.modulus();
+  base::collective_try(comm, [&] {
+    // A rank alone cannot tell what holds its tissue.
+    for (PointSet& set : rows.points.set)
+      if (set == PointSet::soft_tissue) set = PointSet::boundary;
+    if (base::rank(comm) == 0 || !own.row().empty()) model::validate(rows, file);
+  });
+  const auto set = base::gather(comm, own.slab_set());
+  const auto pairs = base::gather(comm, joints(rows, own.row()));
+  base::on_root(comm, [&] {
+    if (const int64_t row = model::find_floating(set, {pairs}); row >= 0)
+      base::refuse("{}: /model/point: row {} is soft tissue, and nothing holds it", file, row);
+  });
+  if (base::rank(comm) > 0) rows.spring_sets.clear();
+  return modulus_of(comm, rows);
 }
 
 }  // namespace repose::discrete

@@ -176,15 +176,15 @@ void for_each_stiffness(const Model& model, Add&& add) {
 
 }  // namespace
 
-void add_stiffness(const Model& model, Stiffness& sums) {
+void add_elements(const Model& model, ColumnSums& sums) {
   for_each_stiffness(model,
                      [&](int64_t, double k, double v) { sums.stiffness += k, sums.volume += v; });
 }
 
 double effective_modulus(const Model& model) {
-  Stiffness sums;
-  add_stiffness(model, sums);
-  return sums.modulus();
+  ColumnSums sums;
+  add_elements(model, sums);
+  return effective_modulus(std::vector{sums});
 }
 
 std::vector<ColumnSums> column_sums(const Model& model, int64_t layers) {
@@ -200,10 +200,9 @@ std::vector<ColumnSums> column_sums(const Model& model, int64_t layers) {
 }
 
 double effective_modulus(const std::vector<ColumnSums>& columns) {
-  Stiffness sums;
-  for (const ColumnSums& column : columns)
-    sums.stiffness += column.stiffness, sums.volume += column.volume;
-  return sums.modulus();
+  double stiffness = 0, volume = 0;
+  for (const ColumnSums& column : columns) stiffness += column.stiffness, volume += column.volume;
+  return volume > 0 ? stiffness / volume : 0;
 }
 
 double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns) {

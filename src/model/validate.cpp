@@ -338,19 +338,12 @@ void refuse_unattached(const Model& m, const std::string& file) {
 }
 
 void refuse_floating(const Model& m, const std::string& file) {
-  const size_t points = m.points.set.size();
-  surface::UnionFind parts(static_cast<int64_t>(points));
-  for (const auto& ends : m.springs.points) parts.unite(ends[0], ends[1]);
-  for (const auto& ends : m.edges.points) parts.unite(ends[0], ends[1]);
-  std::vector<bool> held(points, false);
-  for (size_t i = 0; i < points; ++i)
-    if (m.points.set[i] != PointSet::soft_tissue) held[parts.find(static_cast<int64_t>(i))] = true;
-  for (size_t i = 0; i < points; ++i)
-    if (!held[parts.find(static_cast<int64_t>(i))])
-      refuse(
-          "{}: /model/point: row {} at {:.4g} mm is soft tissue, and nothing holds it or what it "
-          "is joined to; make a point there a boundary point (set 1), or remove the part",
-          file, i, m.points.position[i]);
+  const int64_t row = find_floating(m.points.set, {m.springs.points, m.edges.points});
+  if (row >= 0)
+    refuse(
+        "{}: /model/point: row {} at {:.4g} mm is soft tissue, and nothing holds it or what it "
+        "is joined to; make a point there a boundary point (set 1), or remove the part",
+        file, row, m.points.position[row]);
 }
 
 }  // namespace
@@ -382,6 +375,20 @@ ModelRows all_rows(const Model& model) {
   return {count(model), is_solid(model),     static_cast<int64_t>(model.contact.pairs.point.size()),
           model.points, model.springs,       model.prisms,
           model.edges,  model.contact.pairs, outward_normals(model)};
+}
+
+int64_t find_floating(const std::vector<PointSet>& set,
+                      std::initializer_list<std::span<const std::array<int64_t, 2>>> ends) {
+  const auto points = static_cast<int64_t>(set.size());
+  surface::UnionFind parts(points);
+  for (const auto pairs : ends)
+    for (const auto& [p, q] : pairs) parts.unite(p, q);
+  std::vector<bool> held(set.size(), false);
+  for (int64_t i = 0; i < points; ++i)
+    if (set[i] != PointSet::soft_tissue) held[parts.find(i)] = true;
+  for (int64_t i = 0; i < points; ++i)
+    if (!held[parts.find(i)]) return i;
+  return -1;
 }
 
 void validate(const Model& model, const std::string& file) {

@@ -8,11 +8,9 @@
 namespace repose::discrete {
 
 /// Refuses what model::validate refuses of a model whose rows lie on the ranks as for
-/// build_local(). The rows in a refusal are those of one rank. InputError. Collective.
-void validate(MPI_Comm comm, model::Model& rows, const std::string& file);
-
-/// Returns model::effective_modulus of these rows, which are valid, the same on any number of
-/// ranks, on all ranks. Collective.
-double effective_modulus(MPI_Comm comm, model::Model& rows);
+/// build_local(), and what a rank's rows alone do not show to be valid. Returns
+/// model::effective_modulus, the same on any number of ranks. InputError, whose rows are those of
+/// one rank. Collective.
+double validate(MPI_Comm comm, model::Model& rows, const std::string& file);
 
 }  // namespace repose::discrete

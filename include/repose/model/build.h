@@ -181,7 +181,7 @@ std::string remark_on_adhesion(const scene::Scene& scene, const Model& model);
 Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
                   const Piece& piece, std::vector<int64_t>& found);
 
-/// Sums over one column, for the means over the whole tissue.
+/// Sums over one column, or more, for the means over the whole tissue.
 struct ColumnSums {
   double stiffness = 0;  ///< N mm, as in effective_modulus(), of elements that begin in the column
   double volume = 0;     ///< mm³, of the same
@@ -198,6 +198,8 @@ void require_regions(const std::vector<int64_t>& found, const std::string& file)
 
 /// N/mm²: of springs Σ k0 r_0² / Σ v_0, of a solid the mean of Young's modulus over its volume.
 double effective_modulus(const Model& model);
+/// Adds stiffness and volume of a model's elements to `sums`, in their order.
+void add_elements(const Model& model, ColumnSums& sums);
 
 /// κ (N/mm²) of the volume term where a scene of springs names none: what springs lack in bulk
 /// modulus for Poisson's ratio `solve.poisson`, or that of the isotropic solid. Springs of modulus

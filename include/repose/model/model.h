@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -164,5 +165,10 @@ ModelRows all_rows(const Model& model);
 /// or rest length, s_ref ≤ 0, unknown exponent or set, arrays of different length, a volume that is
 /// not the prism's, an unattached point, no point at all. InputError naming `file`, array and row.
 void validate(const Model& model, const std::string& file);
+
+/// Returns the first point of soft tissue that no springs or edges join, directly or not, to a
+/// point of another set; −1 if there is none. `ends` are their points.
+int64_t find_floating(const std::vector<PointSet>& set,
+                      std::initializer_list<std::span<const std::array<int64_t, 2>>> ends);
 
 }  // namespace repose::model

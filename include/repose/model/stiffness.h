@@ -25,13 +25,4 @@ double layer_slope(const SkinMesh& mesh, const std::vector<Vec3>& deep,
 /// reads. Throws InputError for a rule whose name is no set of the model.
 void set_stiffness(const scene::Tissue& tissue, const SkinMesh& mesh, double slope, Model& model);
 
-/// Sums of effective_modulus().
-struct Stiffness {
-  double stiffness = 0;  ///< N mm
-  double volume = 0;     ///< mm³
-  double modulus() const { return volume > 0 ? stiffness / volume : 0; }
-};
-/// Adds the elements of a model to sums, in their order.
-void add_stiffness(const Model& model, Stiffness& sums);
-
 }  // namespace repose::model

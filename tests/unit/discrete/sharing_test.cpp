@@ -9,7 +9,9 @@
 #include "gathered.h"
 #include "repose/base/collective.h"
 #include "repose/base/error.h"
+#include "repose/discrete/model_rows.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/model/build.h"
 
 namespace repose {
 namespace sharing_test {
@@ -88,6 +90,40 @@ TEST(Sharing, RowsComeBackInTheModelsOrderHoweverFewAreCarriedAtOnce) {
           << j;
     }
   }
+}
+
+/// A rank's slab of rows of a model, and on rank 0 all else.
+model::Model slab_of(model::Model m) {
+  const int rank = base::rank(MPI_COMM_WORLD), ranks = base::size(MPI_COMM_WORLD);
+  const auto keep_slab = [&](const char*, auto& values) {
+    const base::Slab slab = base::slab(static_cast<int64_t>(values.size()), rank, ranks);
+    values = {values.begin() + slab.begin, values.begin() + slab.end};
+  };
+  model::Model rows;
+  if (rank == 0) rows = m;
+  rows.points = m.points, rows.springs = m.springs, rows.prisms = m.prisms, rows.edges = m.edges;
+  model::for_each_array(rows.points, keep_slab);
+  model::for_each_array(rows.springs, keep_slab);
+  model::for_each_array(rows.prisms, keep_slab);
+  model::for_each_array(rows.edges, keep_slab);
+  return rows;
+}
+
+TEST(Sharing, ASlabOfAModelOnEachRankIsAcceptedOrRefusedLikeTheWhole) {
+  model::Model m = patch();
+  model::Model rows = slab_of(m);
+  const std::vector<Vec3> held = rows.points.position;
+  EXPECT_EQ(discrete::validate(MPI_COMM_WORLD, rows, "patch"), model::effective_modulus(m));
+  EXPECT_EQ(rows.points.position, held);
+  const auto ends = base::gather(MPI_COMM_WORLD, rows.springs.points);
+  EXPECT_TRUE(base::rank(MPI_COMM_WORLD) > 0 || ends == m.springs.points);
+  for (auto& set : m.points.set) set = model::PointSet::soft_tissue;
+  rows = slab_of(m);
+  EXPECT_THROW(discrete::validate(MPI_COMM_WORLD, rows, "patch"), base::InputError);
+  m = patch();
+  m.springs.points.back()[1] = static_cast<int64_t>(m.points.set.size());
+  rows = slab_of(m);
+  EXPECT_THROW(discrete::validate(MPI_COMM_WORLD, rows, "patch"), base::InputError);
 }
 
 TEST(Sharing, CountsCoordinatesBeyondTwoBillionOrRefuses) {
