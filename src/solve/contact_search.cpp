@@ -368,18 +368,18 @@ void ContactSearch::consider_other(Vec displacement, double accuracy, Outcome& o
     set_pressures(here);
 }
 
-/// Searches from `displacement`, where energy() is `energy_here`, with one point beyond the other
-/// side of its body; ends in start_. Fails where the augmented Lagrangian is no less there, which
-/// misses the energy by the square of the gaps that are left. Collective; `side` is null on ranks
-/// that do not own the point.
+/// Searches from `displacement` with one point beyond the other side of its body; ends in start_.
+/// Fails where the augmented Lagrangian is no less there, which misses the energy by the square of
+/// the gaps that are left. Collective; `side` is null on ranks that do not own the point.
 ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displacement,
-                                              double accuracy, double energy_here) {
+                                              double accuracy) {
   // Of the work of the contact's force over the gap: after the program, which is not exact, and
   // after a further step.
   constexpr double promising = 0.4, still_promising = 0.1;
   constexpr double rounding = 1e-6;  // of the value
   check(VecCopy(displacement, start_));
   const double value_here = objective_.evaluate(start_, gradient_);
+  const double energy_here = value_here - objective_.weights().elastic * objective_.contact_value();
   subtract_contact();
   qp_.linearize(start_);
   double work = 0;
@@ -408,7 +408,7 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
   constexpr int max_tried = 8;
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
-  double energy_here = energy(displacement);
+  objective_.evaluate(displacement, gradient_);
   const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
   size_t next = 0;
   bool changed = false;
@@ -418,15 +418,13 @@ bool ContactSearch::change_sides(Vec displacement, double accuracy, Outcome& out
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
-    const End end =
-        change_side(mine ? &sides[next++] : nullptr, displacement, accuracy, energy_here);
+    const End end = change_side(mine ? &sides[next++] : nullptr, displacement, accuracy);
     Outcome there;
     int64_t iterations = 0;
     if (end == End::reached) there = finish_reached(start_, accuracy, iterations);
     there.iterations += iterations;
     if (there.converged) {
       take_other(displacement, accuracy, there, outcome);
-      energy_here = energy(displacement);
       changed = true;
     } else {
       set_pressures(here);

@@ -54,7 +54,7 @@ class ContactSearch : public RestSearch {
   bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
-  End change_side(const OtherSide* side, Vec displacement, double accuracy, double energy_here);
+  End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, Outcome& outcome);
   void find_other(Vec displacement, double accuracy, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
