@@ -225,8 +225,8 @@ def kerf_of(template, move):
 
 def scene_text(options, bones):
     bone, piece, template, move = read_operation(options.operation)
-    lines = [f"# {options.operation}. Proposed by drivers/plan.py: look at landmarks.svg and proposal.png, edit,",
-             "# and solve again: repose-solve scene.yaml. mm and degrees along the head's own axes.",
+    lines = [f"# {options.operation}. Proposed by drivers/plan.py: check landmarks.svg and proposal.png. After an edit:",
+             "# repose-solve scene.yaml. Moves are in mm and degrees along the axes of the head.",
              "skin: skin.ply", "bones:"]
     lines += [f"  - {{name: {name}, file: {name}.ply}}" for name in bones]
     lines += [f"tissue: {{layers: 4, edge: {options.edge:g}}}",
@@ -289,7 +289,8 @@ def main():
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
     scene.write_text(scene_text(options, bones))
-    run(program("repose-solve"), scene, "-dry_run")
+    if options.propose:
+        run(program("repose-solve"), scene, "-dry_run")
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")
     print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): check "
           "the pictures", flush=True)

@@ -155,6 +155,14 @@ def skin_drawn(scene, skin, solved):
     return [render.actor(skin, render.SKIN)], drawn, lines
 
 
+def legend_of(scene):
+    """Titles of both rows, which name what is drawn."""
+    planes = any(cut.get("planes") for cut in scene.get("osteotomies") or [])
+    lips = "path" in (scene.get("mouth") or {})
+    return (f"bones; moved pieces (orange){', cuts (blue)' if planes else ''}, landmarks",
+            f"solved skin (green), its border{', lips (red)' if lips else ''}")
+
+
 def draw(rows, frame, legend, output):
     views = list(render.VIEWS)
     extents = [render.extent(frame, view) for view in views]
@@ -213,8 +221,7 @@ def main():
     frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
                             for mesh in (*(mesh for mesh, _ in parts), solved)])
     draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved)),
-         frame, ("bones; moved pieces (orange), cuts (blue), landmarks",
-                 "solved skin (green), its border, lips (red)"), chosen.output)
+         frame, legend_of(scene), chosen.output)
     print(chosen.output)
 
 
