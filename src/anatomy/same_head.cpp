@@ -113,10 +113,8 @@ void require_unshifted(const Placed& head, const std::string& file) {
   if (shift.norm() > most && 2 * after < off)
     base::refuse(
         "{}: the landmarks lie {:.1f} mm from skin and bones in the mean, and {:.1f} mm when all "
-        "are "
-        "moved by ({:.1f}, {:.1f}, {:.1f}) mm: they are of another scan or frame; give those of "
-        "these "
-        "surfaces, or propose them with repose-landmarks",
+        "are moved by ({:.1f}, {:.1f}, {:.1f}) mm: they are of another scan or frame; give those "
+        "of these surfaces, or propose them with repose-landmarks",
         file, off, after, shift.x(), shift.y(), shift.z());
 }
 
@@ -128,8 +126,7 @@ void require_own_jaws(const Placed& head, const std::string& file) {
   if (skull == jaw || of_upper != jaw || of_lower != skull) return;
   base::refuse(
       "{}: {} lies {:.1f} mm from the lower jaw and {:.1f} mm from the upper, {} {:.1f} mm from "
-      "the "
-      "upper and {:.1f} mm from the lower: they are exchanged",
+      "the upper and {:.1f} mm from the lower: they are exchanged",
       file, upper, head.to_bone(upper, jaw), head.to_bone(upper, skull), lower,
       head.to_bone(lower, skull), head.to_bone(lower, jaw));
 }

@@ -9,8 +9,8 @@ namespace repose::anatomy {
 
 /// Completes a scene that names the landmarks of its head by what follows from them and from the
 /// surfaces: the parting of the lips along their crease, and the vestibule, in which tissue touches
-/// teeth and is not attached to them. What the scene says itself is kept. Adds lines for a person
-/// to `remarks`. Throws InputError where no crease is found.
+/// teeth and is not attached to them. Keys that the scene sets itself are kept. Appends to
+/// `remarks`. Throws InputError where no crease is found.
 void complete(const surface::Surface& skin, scene::Scene& scene, std::vector<std::string>& remarks);
 
 }  // namespace repose::anatomy
