@@ -13,8 +13,9 @@ namespace repose::tools::bone_separation {
 namespace {
 
 // Sizes of heads, mm.
-constexpr double profile_width = 15;  // of the profile, on either side of the middle
-constexpr double chin_depth = 35;     // the chin lies at most this far behind the front
+constexpr double profile_width = 15;   // of the profile, on either side of the middle
+constexpr double chin_depth = 65;      // of the chin behind the front: it swings back as jaws open
+constexpr double part_volume = 10000;  // mm³: smaller parts of bone are the hyoid or noise
 constexpr double teeth_height[] = {25, 70}, teeth_depth = 45, teeth_width = 30;
 constexpr double slab_half = 6, slab_depth = 55, slab_width = 36;
 constexpr double jaw_height = 110;                    // above the lowest point of the chin
@@ -37,10 +38,10 @@ Cell cell_of(const Vec3& point, double size) {
 class Head {
  public:
   Head(const Volume& volume, double level) : volume_(volume), level_(level) {
-    for (size_t v = 0; v < volume.values.size(); ++v)
-      if (volume.values[v] >= level) bone_.push_back(static_cast<int64_t>(v));
+    find_bone();
     if (bone_.empty())
-      base::refuse("{}: no value is {:g} or more; choose the level of bone", volume.name, level);
+      base::refuse("{}: no part of {:g} cm³ has values of {:g} or more; choose the level of bone",
+                   volume.name, part_volume / 1000, level);
     find_middle();
     find_chin();
     find_teeth();
@@ -111,27 +112,56 @@ class Head {
     return count == 6;
   }
 
+  double voxel_volume() const { return std::abs(volume_.axes.determinant()); }
+
+  /// Collects the voxels of the parts of bone that are large enough.
+  void find_bone() {
+    std::vector<bool> seen(volume_.values.size());
+    std::vector<int64_t> part;
+    const auto add = [&](int64_t voxel) {
+      if (seen[voxel] || volume_.values[voxel] < level_) return;
+      seen[voxel] = true;
+      part.push_back(voxel);
+    };
+    for (size_t v = 0; v < volume_.values.size(); ++v) {
+      part.clear();
+      add(static_cast<int64_t>(v));
+      for (size_t next = 0; next < part.size(); ++next) volume_.visit_neighbors(part[next], add);
+      if (static_cast<double>(part.size()) * voxel_volume() >= part_volume)
+        bone_.insert(bone_.end(), part.begin(), part.end());
+    }
+    std::sort(bone_.begin(), bone_.end());
+  }
+
   void find_middle() {
     std::vector<double> across;
     for (const int64_t voxel : bone_) across.push_back(center(voxel).x());
     middle_ = base::median(std::move(across));
   }
 
+  /// Finds the lowest bone behind the front, and the front between there and the teeth.
   void find_chin() {
-    std::map<int64_t, double> profile;  // every 2 mm of height
-    front_ = std::numeric_limits<double>::infinity();
+    std::map<int64_t, double> profile;  // every 2 mm of height: the foremost y
     for (const int64_t voxel : bone_) {
       const Vec3 at = center(voxel);
       if (std::abs(at.x() - middle_) > profile_width) continue;
       double& minimum = profile.try_emplace(std::llround(at.z() / 2), at.y()).first->second;
       minimum = std::min(minimum, at.y());
-      front_ = std::min(front_, at.y());
     }
+    const auto foremost = [&](double low, double high) {
+      double front = std::numeric_limits<double>::infinity();
+      for (const auto& [height, y] : profile)
+        if (2.0 * static_cast<double>(height) >= low && 2.0 * static_cast<double>(height) <= high)
+          front = std::min(front, y);
+      return front;
+    };
+    const double limit = foremost(-INFINITY, INFINITY) + chin_depth;
     for (const auto& [height, y] : profile)
-      if (y < front_ + chin_depth) {
+      if (y < limit) {
         chin_ = 2 * static_cast<double>(height);
-        return;
+        break;
       }
+    front_ = foremost(chin_, chin_ + teeth_height[1]);
   }
 
   /// Fits height over depth of the densest twentieth of the bone where teeth are.
@@ -179,10 +209,9 @@ class Head {
           std::abs(at.x() - middle_) < profile_width)
         add(voxel);
     }
-    const double voxel_volume = std::abs(volume_.axes.determinant());
     for (size_t next = 0; next < found.size(); ++next) {
       if (center(found[next]).z() > chin_ + jaw_height ||
-          static_cast<double>(found.size()) * voxel_volume > jaw_volume)
+          static_cast<double>(found.size()) * voxel_volume() > jaw_volume)
         return {};
       volume_.visit_neighbors(found[next], add);
     }
@@ -192,7 +221,7 @@ class Head {
   const Volume& volume_;
   double level_;
   std::vector<int64_t> bone_;
-  double middle_ = 0, front_ = 0, chin_ = 0;  // mm: x, y, z
+  double middle_ = 0, front_ = 0, chin_ = 0;  // mm: x, y at the teeth, z
   std::array<double, 2> teeth_{};  // height at the front, and slope, of the occlusal plane
 };
 

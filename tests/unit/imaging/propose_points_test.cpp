@@ -20,6 +20,10 @@ bool in_jaw(const Vec3& p) {
          (within(x, 38, 50) && within(p.y(), -5, 20) && within(z, 0, 72));
 }
 
+bool in_joint(const Vec3& p) {
+  return within(std::abs(p.x()), 38, 50) && within(p.y(), -5, 20) && within(p.z() + 62, 72, 75);
+}
+
 /// A skull with an upper jaw, which touches the jaw at the teeth and in both joints.
 double head(const Vec3& p, double joint) {
   const double x = std::abs(p.x()), z = p.z() + 62;
@@ -27,7 +31,7 @@ double head(const Vec3& p, double joint) {
   if (x < 28 && within(p.y(), -62, -52) && within(z, 30, 50)) return 1500;
   if (x < 28 && within(p.y(), -64, -20) && within(z, 48, 76)) return 1000;
   if (x < 58 && within(p.y(), -60, 60) && within(z, 75, 122)) return 1000;
-  if (within(x, 38, 50) && within(p.y(), -5, 20) && within(z, 72, 75)) return joint;
+  if (in_joint(p)) return joint;
   return -1000;
 }
 
@@ -58,6 +62,20 @@ TEST(ProposePoints, skull_and_jaw_are_parted_without_a_person) {
     if (bones.parts[1].values[v] < level) ++wrong;
   }
   EXPECT_LT(wrong, 0.01 * all);
+}
+
+TEST(ProposePoints, a_jaw_that_swung_back_is_found_above_the_hyoid) {
+  const Vec3 back(0, 40, 0);
+  const Volume volume = sampled(90, 1.5 * Mat3::Identity(), [&](const Vec3& p) -> double {
+    const Vec3 at = p - back;
+    if (std::abs(p.x()) < 10 && within(p.y(), -26, -14) && p.z() + 62 < -1) return 1000;
+    if (in_jaw(at)) return 1000;
+    if (in_joint(at)) return 400;
+    return in_jaw(p) ? -1000 : head(p, -1000);
+  });
+  const auto points = propose_points(volume, level);
+  EXPECT_GT(points[1].size(), 10u);
+  for (const Vec3& p : points[1]) EXPECT_TRUE(in_jaw(p - back) || p.z() + 62 < 36) << p.transpose();
 }
 
 TEST(ProposePoints, a_fused_jaw_and_a_skull_alone_are_refused) {
