@@ -8,13 +8,15 @@
 namespace repose::anatomy {
 namespace {
 
-constexpr double arm = 4;       // mm, to the skin above and below that a crease is measured by
-constexpr double climb = 1;     // mm, by which the crease may rise or fall from column to column
-constexpr double share = 0.25;  // of the depth in the middle, where it ends
-constexpr double ending = 2.5;  // mm, over which it is that shallow
+constexpr double arm = 4;          // mm, to the skin above and below that a crease is measured by
+constexpr double climb = 1;        // mm, by which the crease may rise or fall from column to column
+constexpr double share = 0.25;     // of the depth in the middle, where it ends
+constexpr double ending = 2.5;     // mm, over which it is that shallow
+constexpr double usual_depth = 4;  // mm, of a crease beside a gap
 constexpr double widest_half = 45;  // mm
 constexpr double behind = 6;        // mm, that what is seen through a gap lies behind a lip
 constexpr double near = 2;          // mm, of a lip, beside the gap
+constexpr double before = 3;        // mm, that the lower lip lies before what is seen there
 constexpr double overjet = 25;      // mm, that the lower lip lies behind the upper one at most
 constexpr double widest_gap = 40;   // mm
 
@@ -33,12 +35,16 @@ std::optional<double> lip_above(const FrontMap& skin, double x, double z) {
 }
 
 /// The lower end of the gap below `high`, behind a lip at `lip`: where skin is near that lip's
-/// depth, or steps forward to the lower lip, which may lie behind the upper one.
+/// depth, or steps forward to the lower lip, which may lie behind the upper one. Nothing where the
+/// lower lip is no farther forward than what lies above it: lips that touch, one behind the other.
 std::optional<double> low_end(const FrontMap& skin, double x, double high, double lip) {
+  double deepest = skin.depth(x, high).value_or(INFINITY);
   for (double low = high; high - low < widest_gap; low -= skin.spacing()) {
     const auto next = skin.depth(x, low - skin.spacing()), back = skin.depth(x, low);
+    deepest = std::max(deepest, back.value_or(INFINITY));
     if (!next || *next > lip + overjet) continue;
-    if (*next <= lip + behind || !back || *next < *back - behind) return low;
+    if (*next <= lip + behind || !back || *next < *back - behind)
+      return *next < deepest - before ? std::optional(low) : std::nullopt;
   }
   return std::nullopt;
 }
@@ -50,8 +56,7 @@ std::optional<Gap> gap_between(const FrontMap& skin, double x, double top, doubl
     const auto lip = lip_above(skin, x, z), next = skin.depth(x, z - skin.spacing());
     if (!lip || (next && *next <= *lip + behind)) continue;
     const double high = z - skin.spacing();
-    const auto low = low_end(skin, x, high, *lip);
-    return low ? std::optional(Gap{*low, high}) : std::nullopt;
+    if (const auto low = low_end(skin, x, high, *lip)) return Gap{*low, high};
   }
   return std::nullopt;
 }
@@ -74,15 +79,17 @@ std::optional<std::pair<double, double>> deepest(const FrontMap& skin, double x,
   return best;
 }
 
-std::vector<Vec3> follow_side(const FrontMap& skin, double z, double middle, int side,
+/// The crease on one side from a place, to x = `end` or, without it, to where it is shallower than
+/// `share` of `depth`.
+std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double depth, int side,
                               std::optional<double> end) {
   std::vector<Vec3> points;
-  double shallow = 0, tilt = 0;
+  double shallow = 0, tilt = 0, z = from.z();
   const double step = skin.spacing(), last = end ? std::abs(*end) : widest_half;
-  for (double x = step; x <= last; x += step) {
+  for (double x = std::abs(from.x()) + step; x <= last; x += step) {
     const auto place = deepest(skin, side * x, z + tilt * step, climb);
     if (!place) break;
-    shallow = place->second < share * middle ? shallow + step : 0;
+    shallow = place->second < share * depth ? shallow + step : 0;
     if (!end && shallow > ending) break;
     tilt = 0.9 * tilt + 0.1 * (place->first - z) / step;
     z = 0.5 * (z + tilt * step) + 0.5 * place->first;
@@ -93,6 +100,7 @@ std::vector<Vec3> follow_side(const FrontMap& skin, double z, double middle, int
   return points;
 }
 
+/// Follows the gap between open lips, and where it ends the crease between lips that touch.
 LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
   LipCrease crease;
   crease.open = true;
@@ -108,10 +116,13 @@ LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
       const auto lip = skin.depth(side * x, edge);
       points.emplace_back(side * x, lip ? *lip : *lip_above(skin, side * x, edge), gap->middle());
     }
+    if (points.empty()) continue;
+    const auto beside = follow_side(skin, points.back(), usual_depth, side, {});
+    points.insert(points.end(), beside.begin(), beside.end());
     if (side < 0) {
       std::reverse(points.begin(), points.end());
       crease.points = points;
-    } else if (!points.empty()) {
+    } else {
       crease.points.insert(crease.points.end(), points.begin() + 1, points.end());
     }
   }
@@ -138,10 +149,11 @@ LipCrease follow_crease(const FrontMap& skin, double z, std::optional<double> ri
   const auto middle = deepest(skin, 0, z, arm);
   if (!middle) return {};
   LipCrease crease;
-  crease.points = follow_side(skin, middle->first, middle->second, -1, right);
+  const Vec3 start(0, *skin.depth(0, middle->first), middle->first);
+  crease.points = follow_side(skin, start, middle->second, -1, right);
   std::reverse(crease.points.begin(), crease.points.end());
-  crease.points.emplace_back(0, *skin.depth(0, middle->first), middle->first);
-  const auto other = follow_side(skin, middle->first, middle->second, 1, left);
+  crease.points.push_back(start);
+  const auto other = follow_side(skin, start, middle->second, 1, left);
   crease.points.insert(crease.points.end(), other.begin(), other.end());
   return crease;
 }

@@ -41,5 +41,42 @@ TEST(LipCrease, OpenLipsAreThoseOfTheGapAndNotWhatIsSeenThroughIt) {
   for (const Vec3& point : crease.points) EXPECT_NEAR(point.y(), 0, 0.1);
 }
 
+TEST(LipCrease, OpenLipsThatTouchAtTheSidesEndAtTheCornersOfTheirCrease) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -3}, {50, 40});
+  add(skin, 0, {-50, -60}, {50, -12});
+  for (const int side : {-1, 1}) {
+    const auto strip = [&](double y, double from, double to, double low, double high) {
+      add(skin, y, {std::min(side * from, side * to), low},
+          {std::max(side * from, side * to), high});
+    };
+    strip(0, 6, 50, -12, -8.5);
+    strip(0, 6, 50, -6.5, -3);
+    strip(4, 6, 25, -8.5, -6.5);
+    strip(0, 25, 50, -8.5, -6.5);
+  }
+  add(skin, 150, {-50, -60}, {50, 40});
+  const LipCrease crease = follow_crease(FrontMap(skin, HeadFrame{}), -7.5, {}, {});
+  EXPECT_TRUE(crease.open);
+  EXPECT_NEAR(crease.gap, 9, 1);
+  ASSERT_GT(crease.points.size(), 10u);
+  EXPECT_NEAR(crease.points.front().x(), -25, 1);
+  EXPECT_NEAR(crease.points.back().x(), 25, 1);
+}
+
+TEST(LipCrease, ALowerLipFarBehindTheUpperOneIsNoOpenMouth) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -3}, {50, 40});
+  add(skin, 12, {-50, -60}, {50, -4});
+  add(skin, 14, {-50, -4}, {50, -3});
+  const FrontMap map(skin, HeadFrame{});
+  EXPECT_FALSE(open_mouth(map, -3));
+  const LipCrease crease = follow_crease(map, -3, -20, 20);
+  EXPECT_FALSE(crease.open);
+  ASSERT_FALSE(crease.points.empty());
+  EXPECT_NEAR(crease.points.front().x(), -20, 1);
+  EXPECT_NEAR(crease.points.back().x(), 20, 1);
+}
+
 }  // namespace
 }  // namespace repose::anatomy
