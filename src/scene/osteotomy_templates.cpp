@@ -36,13 +36,6 @@ void place_le_fort(const TemplatePlacement& head, double level, Osteotomy& cut) 
                 {edge + distance * head.axes().back, -head.axes().back, {}}};
 }
 
-void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& cut) {
-  constexpr double falls = 0.42, down = 0.91;  // sine and cosine of 25°
-  cut.planes = {{head.at("b_point") - level * head.axes().up,
-                 -falls * head.axes().back - down * head.axes().up,
-                 {}}};
-}
-
 /// A corner of a sheet: fractions of the half width between the condyles and of the length from the
 /// incisors to them, and which height.
 struct SheetCorner {
@@ -61,16 +54,22 @@ HeadAxes mandible_axes(const TemplatePlacement& head) {
   return {left, back, left.cross(back)};
 }
 
+void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& cut) {
+  constexpr double falls = 0.42, down = 0.91;  // sine and cosine of 25°
+  const HeadAxes axes = mandible_axes(head);
+  cut.planes = {{head.at("b_point") - level * axes.up, -falls * axes.back - down * axes.up, {}}};
+}
+
 void place_sagittal_split(const TemplatePlacement& head, Osteotomy& cut) {
   constexpr double below_condyle = 0.255, below_menton = 10;  // of the height; mm
   constexpr std::array<SheetCorner, 8> corners{{{0.70, 0.425, false},
                                                 {0.70, 0.425, true},
-                                                {1.02, 1.05, true},
-                                                {1.02, 1.05, false},
+                                                {1.15, 1.30, true},
+                                                {1.15, 1.30, false},
                                                 {1.22, 0.30, false},
                                                 {1.22, 0.30, true},
                                                 {0.22, 0.525, true},
-                                                {0.56, 1.12, true}}};
+                                                {0.70, 1.37, true}}};
   constexpr std::array<Triangle, 6> right{
       {{0, 3, 2}, {0, 2, 1}, {0, 1, 5}, {0, 5, 4}, {1, 2, 7}, {1, 7, 6}}};
   const Vec3 hinge = head.hinge(), edge = head.at("lower_incisor_edge");
@@ -122,7 +121,7 @@ std::vector<std::string> check_lower(const CutPlane& plane, const TemplatePlacem
   constexpr double roots = 25, canal = 5;        // mm
   constexpr double along = 0.25, upward = 0.36;  // of length and height: the mental foramen
   std::vector<std::string> lines;
-  const auto& [left, back, up] = head.axes();
+  const auto [left, back, up] = mandible_axes(head);
   const Vec3 edge = head.at("lower_incisor_edge"), menton = head.at("menton_bone");
   const double below = -height_above(plane, edge, up);
   if (below < roots)

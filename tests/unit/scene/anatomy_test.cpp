@@ -140,9 +140,29 @@ TEST(OsteotomyTemplate, LeFortLiesAboveTheNasalFloor) {
 }
 
 TEST(OsteotomyTemplate, ChinIsCutBelowPointB) {
-  const Scene scene = read(head(), chin);
-  expect_near(scene.osteotomies[0].planes[0].point, {0, -84, -48});
-  EXPECT_LT(scene.osteotomies[0].planes[0].normal.z(), -0.9);
+  const CutPlane plane = read(head(), chin).osteotomies[0].planes[0];
+  const Vec3 below(0, -84, -48);
+  EXPECT_LT((plane.point - below).norm(), 0.05);
+  EXPECT_NEAR((plane.point - head()["b_point"]).norm(), 4, 1e-9);
+  EXPECT_LT(plane.normal.z(), -0.9);
+}
+
+TEST(OsteotomyTemplate, CutsOfTheJawFollowAnOpenOne) {
+  const Mat3 open = Eigen::AngleAxisd(0.2, Vec3::UnitX()).toRotationMatrix();
+  Landmarks opened = head();
+  for (const char* name : {"lower_incisor_edge", "b_point", "pogonion_bone", "menton_bone"})
+    opened[name] = open * opened[name];
+  const CutPlane plane = read(head(), chin).osteotomies[0].planes[0],
+                 turned = read(opened, chin).osteotomies[0].planes[0];
+  const auto expect_turned = [&](const Vec3& now, const Vec3& before) {
+    EXPECT_LT((now - open * before).norm(), 1e-3) << now.transpose();  // files round landmarks
+  };
+  expect_turned(turned.point, plane.point);
+  expect_turned(turned.normal, plane.normal);
+  const CutSheet sheet = *read(head(), split).osteotomies[0].sheet,
+                 turned_sheet = *read(opened, split).osteotomies[0].sheet;
+  for (size_t i = 0; i < sheet.points.size(); ++i)
+    expect_turned(turned_sheet.points[i], sheet.points[i]);
 }
 
 TEST(OsteotomyTemplate, SplitIsAlikeOnBothSides) {
