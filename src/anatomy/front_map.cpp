@@ -113,4 +113,15 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
   return middle;
 }
 
+std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
+                                    double to_z) {
+  constexpr double end = 1;  // mm
+  const auto foremost = foremost_of(profile, from_z, to_z);
+  if (!foremost || foremost->y() < to_z - end) return foremost;
+  std::vector<ProfilePoint> inside;
+  for (const ProfilePoint& p : profile)
+    if (p.y() >= from_z && p.y() <= to_z) inside.push_back(p);
+  return farthest_from_chord(inside, inside.front(), inside.back(), from_z, to_z, 1);
+}
+
 }  // namespace repose::anatomy

@@ -48,5 +48,9 @@ std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>&
 /// The foremost point of a profile between two heights; of a flat stretch its middle.
 std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile, double from_z,
                                         double to_z);
+/// The chin: the foremost point of a profile between two heights or, where the profile still comes
+/// forward at the upper one, the farthest in front of the chord between its ends.
+std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
+                                    double to_z);
 
 }  // namespace repose::anatomy

@@ -53,12 +53,12 @@ void search_symphysis(const FrontMap& map, Search& search) {
         "MANDIBLE is {:.0f} mm high at the chin, {:.0f} mm or more with teeth: it may be "
         "edentulous, and lower_incisor_edge the crest of the bone",
         height, dentate));
-  const auto chin = foremost_of(profile, menton.z(), menton.z() + 0.45 * height);
+  const auto chin = chin_of(profile, menton.z(), menton.z() + 0.45 * height);
   search.put("pogonion_bone", chin, "no chin");
   const auto pogonion = *search.profile_point("pogonion_bone");
+  const double lowest_b = std::max(pogonion.y() + 0.1 * height, menton.z() + 0.35 * height);
   search.put("b_point",
-             farthest_from_chord(profile, pogonion, *edge, pogonion.y() + 0.1 * height,
-                                 edge->y() - 0.2 * height, -1),
+             farthest_from_chord(profile, pogonion, *edge, lowest_b, edge->y() - 0.2 * height, -1),
              "no bone between pogonion and the lower incisors");
 }
 

@@ -120,7 +120,7 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
       search.lack(name, "the chin of MANDIBLE was not found");
     return;
   }
-  search.put("pogonion_soft", foremost_of(profile, chin->z() - above, chin->z() + above),
+  search.put("pogonion_soft", chin_of(profile, chin->z() - above, chin->z() + above),
              "SKIN has no chin");
   std::optional<Vec3> below;
   for (const Vec3& point : skin.points) {
