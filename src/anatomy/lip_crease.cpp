@@ -34,17 +34,16 @@ std::optional<double> lip_above(const FrontMap& skin, double x, double z) {
   return lip;
 }
 
-/// The lower end of the gap below `high`, behind a lip at `lip`: where skin is near that lip's
-/// depth, or steps forward to the lower lip, which may lie behind the upper one. Nothing where the
-/// lower lip is no farther forward than what lies above it: lips that touch, one behind the other.
+/// The lower end of the gap below `high`, behind a lip at `lip`: where skin stands before what is
+/// seen above it. Nothing where it comes forward gradually: lips that touch, the lower far behind.
 std::optional<double> low_end(const FrontMap& skin, double x, double high, double lip) {
-  double deepest = skin.depth(x, high).value_or(INFINITY);
+  const auto is_lip = [&](std::optional<double> y) { return y && *y <= lip + overjet; };
   for (double low = high; high - low < widest_gap; low -= skin.spacing()) {
-    const auto next = skin.depth(x, low - skin.spacing()), back = skin.depth(x, low);
-    deepest = std::max(deepest, back.value_or(INFINITY));
-    if (!next || *next > lip + overjet) continue;
-    if (*next <= lip + behind || !back || *next < *back - behind)
-      return *next < deepest - before ? std::optional(low) : std::nullopt;
+    const auto back = skin.depth(x, low), next = skin.depth(x, low - skin.spacing()),
+               ahead = skin.depth(x, low - near);
+    if (!is_lip(next)) continue;
+    if (!is_lip(back) || (ahead && *ahead < *back - before)) return low;
+    if (*next <= lip + behind) return std::nullopt;
   }
   return std::nullopt;
 }

@@ -8,6 +8,7 @@ namespace repose::anatomy {
 namespace {
 
 constexpr double skin_midline = 1;  // mm, half width of the skin's profile
+constexpr double even = 0.7;        // of one corner's distance from the midline to the other's
 
 /// The height of the deepest crease of the skin near the edge of the upper incisors.
 std::optional<double> crease_height(const FrontMap& skin, double edge) {
@@ -43,7 +44,8 @@ double search_mouth(const FrontMap& skin, Search& search) {
     return place ? std::optional(place->x()) : std::nullopt;
   };
   LipCrease crease;
-  if (z) crease = follow_crease(skin, *z, x_of("mouth_right"), x_of("mouth_left"));
+  const auto known_right = x_of("mouth_right"), known_left = x_of("mouth_left");
+  if (z) crease = follow_crease(skin, *z, known_right, known_left);
   if (!z && edge) crease = follow_crease(skin, edge->z(), {}, {});
   if (crease.points.size() < 3) {
     for (const char* name : {"stomion", "mouth_right", "mouth_left"})
@@ -57,6 +59,12 @@ double search_mouth(const FrontMap& skin, Search& search) {
   search.put("stomion", Vec3(0, middle->y(), middle->z()));
   search.put("mouth_right", crease.points.front());
   search.put("mouth_left", crease.points.back());
+  const double right = -crease.points.front().x(), left = crease.points.back().x();
+  if (!known_right && !known_left && std::min(right, left) < even * std::max(right, left))
+    search.remark(fmt::format(
+        "the corners of the mouth lie {:.0f} mm right and {:.0f} mm left of the midline: "
+        "check them, and give the true ones (-landmarks)",
+        right, left));
   if (crease.open)
     search.remark(fmt::format(
         "the mouth is open in SKIN, by up to {:.1f} mm: stomion and corners are those of the gap",

@@ -67,7 +67,9 @@ TEST(LipCrease, OpenLipsThatTouchAtTheSidesEndAtTheCornersOfTheirCrease) {
 TEST(LipCrease, ALowerLipFarBehindTheUpperOneIsNoOpenMouth) {
   surface::Surface skin;
   add(skin, 0, {-50, -3}, {50, 40});
-  add(skin, 12, {-50, -60}, {50, -4});
+  add(skin, 4, {-50, -60}, {50, -22});
+  for (int row = 0; row < 18; ++row)
+    add(skin, 12 - row / 2.25, {-50, -5.0 - row}, {50, -4.0 - row});
   add(skin, 14, {-50, -4}, {50, -3});
   const FrontMap map(skin, HeadFrame{});
   EXPECT_FALSE(open_mouth(map, -3));
