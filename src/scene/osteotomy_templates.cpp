@@ -19,6 +19,7 @@ class TemplatePlacement {
   Vec3 at(const char* name) const {
     return require_landmark(anatomy_.landmarks, name, anatomy_.file.string());
   }
+  bool has(const char* name) const { return anatomy_.landmarks.contains(name); }
   Vec3 hinge() const { return (at("condyle_right_center") + at("condyle_left_center")) / 2; }
   const HeadAxes& axes() const { return axes_; }
 
@@ -56,7 +57,8 @@ HeadAxes mandible_axes(const TemplatePlacement& head) {
 
 void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& cut) {
   constexpr double falls = 0.42, down = 0.91;  // sine and cosine of 25°
-  const HeadAxes axes = mandible_axes(head);
+  const bool known = head.has("lower_incisor_edge") && head.has("menton_bone");
+  const HeadAxes axes = known ? mandible_axes(head) : head.axes();
   cut.planes = {{head.at("b_point") - level * axes.up, -falls * axes.back - down * axes.up, {}}};
 }
 
