@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "repose/base/error.h"
+#include "repose/imaging/volume_filter.h"
 
 namespace repose::tools::bone_separation {
 namespace {
@@ -18,12 +20,15 @@ constexpr double chin_depth = 65;      // of the chin behind the front: it swing
 constexpr double part_volume = 10000;  // mm³: smaller parts of bone are the hyoid or noise
 constexpr double teeth_height[] = {25, 70}, teeth_depth = 45, teeth_width = 30;
 constexpr double slab_half = 6, slab_depth = 55, slab_width = 36;
-constexpr double jaw_height = 110;                    // above the lowest point of the chin
-constexpr double jaw_volume = 150000;                 // mm³
-constexpr double joint_height = 8, joint_width = 25;  // the least of a jaw beyond the teeth
-constexpr double level_step = 40, max_steps = 40;     // HU
-constexpr double spacing[] = {25, 10};                // of points in skull and jaw
-constexpr double apart = 14;                          // skull's points from the jaw
+constexpr double jaw_height = 110;     // above the lowest point of the chin
+constexpr double jaw_volume = 150000;  // mm³
+constexpr double joint_width = 25;     // from the middle, at least
+constexpr double joint_way = 85;  // from the chin, seen from the side; angles of jaws lie nearer
+constexpr double closed_volume = 1000;  // mm³, of a skull at the middle, behind the teeth
+constexpr double coarser = 2;           // voxels that noise or metal is averaged over
+constexpr double level_step = 40, max_steps = 40;  // HU
+constexpr double spacing[] = {25, 10};             // of points in skull and jaw
+constexpr double apart = 14;                       // skull's points from the jaw
 
 using Cell = std::array<int64_t, 3>;
 
@@ -55,14 +60,18 @@ class Head {
     return {};
   }
 
-  bool has_joints(const std::vector<int64_t>& jaw) const {
-    std::array<bool, 2> found{};
-    for (const int64_t voxel : jaw) {
+  /// Whether a part has rami on both sides and is open at the back.
+  bool is_jaw(const std::vector<int64_t>& part) const {
+    std::array<bool, 2> ramus{};
+    double behind = 0;
+    for (const int64_t voxel : part) {
       const Vec3 at = center(voxel);
-      if (above_teeth(at) > joint_height && std::abs(at.x() - middle_) > joint_width)
-        found[at.x() > middle_] = true;
+      const double depth = at.y() - chin_y_, aside = std::abs(at.x() - middle_);
+      if (aside > joint_width && at.z() > chin_ && std::hypot(depth, at.z() - chin_) > joint_way)
+        ramus[at.x() > middle_] = true;
+      if (aside < profile_width && depth > slab_depth) behind += voxel_volume();
     }
-    return found[0] && found[1];
+    return ramus[0] && ramus[1] && behind < closed_volume;
   }
 
   /// One voxel inside bone in each cell of a grid, of those in `voxels`.
@@ -159,6 +168,7 @@ class Head {
     for (const auto& [height, y] : profile)
       if (y < limit) {
         chin_ = 2 * static_cast<double>(height);
+        chin_y_ = y;
         break;
       }
     front_ = foremost(chin_, chin_ + teeth_height[1]);
@@ -221,21 +231,29 @@ class Head {
   const Volume& volume_;
   double level_;
   std::vector<int64_t> bone_;
-  double middle_ = 0, front_ = 0, chin_ = 0;  // mm: x, y at the teeth, z
+  double middle_ = 0, front_ = 0, chin_ = 0, chin_y_ = 0;  // mm: x, y at the teeth, z, y
   std::array<double, 2> teeth_{};  // height at the front, and slope, of the occlusal plane
 };
+
+/// Points in skull and jaw; nothing where the jaw is not found.
+std::optional<std::array<std::vector<Vec3>, 2>> find_points(const Volume& volume, double level) {
+  Head head(volume, level);
+  const std::vector<int64_t> jaw = head.part_jaw();
+  if (jaw.empty() || !head.is_jaw(jaw)) return std::nullopt;
+  return std::array{head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])};
+}
 
 }  // namespace
 
 std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level) {
-  Head head(volume, level);
-  const std::vector<int64_t> jaw = head.part_jaw();
-  if (jaw.empty() || !head.has_joints(jaw))
+  auto points = find_points(volume, level);
+  if (!points) points = find_points(coarsen(volume, coarser), level);
+  if (!points)
     base::refuse(
         "{}: the jaw was not found, because it is part of the skull at every level or lacks its "
         "condyles; give points in skull and jaw (-apart)",
         volume.name);
-  return {head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])};
+  return *std::move(points);
 }
 
 }  // namespace repose::tools::bone_separation

@@ -1,5 +1,7 @@
 #include "repose/tools/bone_separation/propose_points.h"
 
+#include <random>
+
 #include "../surface/shapes.h"
 #include "repose/tools/bone_separation/part_bones.h"
 #include "volumes.h"
@@ -76,6 +78,16 @@ TEST(ProposePoints, a_jaw_that_swung_back_is_found_above_the_hyoid) {
   const auto points = propose_points(volume, level);
   EXPECT_GT(points[1].size(), 10u);
   for (const Vec3& p : points[1]) EXPECT_TRUE(in_jaw(p - back) || p.z() + 62 < 36) << p.transpose();
+}
+
+TEST(ProposePoints, noise_that_joins_skull_and_jaw_is_averaged) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 450);
+  const Volume volume =
+      sampled(134, Mat3::Identity(), [&](const Vec3& p) { return head(p, 700) + noise(random); });
+  const auto points = propose_points(volume, level);
+  EXPECT_GT(points[1].size(), 10u);
+  for (const Vec3& p : points[1]) EXPECT_TRUE(in_jaw(p) || p.z() + 62 < 36) << p.transpose();
 }
 
 TEST(ProposePoints, a_fused_jaw_and_a_skull_alone_are_refused) {
