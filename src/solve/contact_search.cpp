@@ -461,6 +461,7 @@ void ContactSearch::take_other(Vec displacement, double accuracy, Outcome there,
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
+  constexpr double lower = 1e-6;   // of the value: a saddle no lower than the last is not left
   constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
   Outcome outcome;
   if (!predicted_) {
@@ -473,13 +474,17 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   check(VecCopy(displacement, start_));
   stiffen(1);
   int64_t iterations = 0;
-  int left = 0;  // saddles
+  int left = 0;                                             // saddles
+  double saddle = std::numeric_limits<double>::infinity();  // value at the latest of them
   bool needs_presolve = false, led_out = false;
   double missing = std::numeric_limits<double>::infinity();  // mm of gaps
   const auto leaves = [&] {
     tangent_.forget_contact();
-    needs_presolve = true;
-    return left < max_left && leave_saddle(objective_, solver_, displacement) && ++left > 0;
+    needs_presolve = false;
+    const double value = objective_.evaluate(displacement, gradient_);
+    if (left++ == max_left || !(value < saddle - lower * std::abs(value))) return false;
+    saddle = value;
+    return leave_saddle(objective_, solver_, displacement);
   };
   if (approach(displacement, accuracy, iterations) == End::stopped)
     return stopped(displacement, outcome);
