@@ -37,11 +37,13 @@ void place_le_fort(const TemplatePlacement& head, double level, Osteotomy& cut) 
                 {edge + distance * head.axes().back, -head.axes().back, {}}};
 }
 
+enum class SheetHeight { low, high, top };
+
 /// A corner of a sheet: fractions of the half width between the condyles and of the length from the
 /// incisors to them, and which height.
 struct SheetCorner {
   double width, length;
-  bool high;
+  SheetHeight height;
 };
 
 /// The axes of the mandible, whatever the scan's pitch: its level goes through the edge of the
@@ -63,27 +65,44 @@ void place_genioplasty(const TemplatePlacement& head, double level, Osteotomy& c
 }
 
 void place_sagittal_split(const TemplatePlacement& head, Osteotomy& cut) {
+  using enum SheetHeight;
   constexpr double below_condyle = 0.255, below_menton = 10;  // of the height; mm
-  constexpr std::array<SheetCorner, 8> corners{{{0.70, 0.425, false},
-                                                {0.70, 0.425, true},
-                                                {1.15, 1.30, true},
-                                                {1.15, 1.30, false},
-                                                {1.22, 0.30, false},
-                                                {1.22, 0.30, true},
-                                                {0.22, 0.525, true},
-                                                {0.70, 1.37, true}}};
-  constexpr std::array<Triangle, 6> right{
-      {{0, 3, 2}, {0, 2, 1}, {0, 1, 5}, {0, 5, 4}, {1, 2, 7}, {1, 7, 6}}};
+  constexpr double above_condyle = 10;  // mm: crowns above the lingual sheet are cut, too
+  constexpr std::array<SheetCorner, 11> corners{{{0.70, 0.425, low},
+                                                 {0.70, 0.425, high},
+                                                 {1.15, 1.30, high},
+                                                 {1.15, 1.30, low},
+                                                 {1.22, 0.30, low},
+                                                 {1.22, 0.30, high},
+                                                 {0.22, 0.525, high},
+                                                 {0.70, 1.37, high},
+                                                 {0.70, 0.425, top},
+                                                 {1.22, 0.30, top},
+                                                 {0.22, 0.525, top}}};
+  constexpr std::array<Triangle, 10> right{{{0, 3, 2},
+                                            {0, 2, 1},
+                                            {0, 1, 5},
+                                            {0, 5, 4},
+                                            {1, 2, 7},
+                                            {1, 7, 6},
+                                            {1, 9, 5},
+                                            {1, 8, 9},
+                                            {6, 8, 1},
+                                            {6, 10, 8}}};
   const Vec3 hinge = head.hinge(), edge = head.at("lower_incisor_edge");
   const auto [left, back, up] = mandible_axes(head);
   const double half = (head.at("condyle_left_center") - hinge).norm();
   const double length = (hinge - edge).dot(back), menton = (head.at("menton_bone") - hinge).dot(up);
+  const auto height = [&](SheetHeight which) {
+    if (which == top) return above_condyle;
+    return which == high ? below_condyle * menton : menton - below_menton;
+  };
   CutSheet sheet;
   for (const int side : {-1, 1}) {
     const auto first = static_cast<int64_t>(sheet.points.size());
     for (const SheetCorner& c : corners)
       sheet.points.push_back(hinge + side * c.width * half * left + (c.length - 1) * length * back +
-                             (c.high ? below_condyle * menton : menton - below_menton) * up);
+                             height(c.height) * up);
     for (const Triangle& t : right)
       sheet.triangles.push_back(side < 0 ? Triangle{first + t[0], first + t[1], first + t[2]}
                                          : Triangle{first + t[0], first + t[2], first + t[1]});

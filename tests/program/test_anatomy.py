@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+import volumes
 from conftest import PROJECT
 from tissue import apart, last, model_of
 
@@ -41,6 +42,29 @@ def write_scene(folder, more, tissue="layers: 4, edge: 6", anatomy="landmarks: h
         "skin: skin.ply\nbones:\n  - {name: skull, file: skull.ply}\n"
         "  - {name: mandible, file: mandible.ply}\n"
         f"tissue: {{{tissue}}}\nanatomy: {{{anatomy}}}\n{more}")
+
+
+def test_crowns_above_the_lingual_cut_do_not_hold_a_split_together(run, tmp_path):
+    z, y, x = np.meshgrid(*(1.5 * np.arange(n) + low for n, low in ((52, -3), (64, -70), (76, -57))), indexing="ij")
+    box = lambda wide, deep, high: ((np.abs(x) > wide[0]) & (np.abs(x) < wide[1]) & (y > deep[0])
+                                    & (y < deep[1]) & (z > high[0]) & (z < high[1]))
+    jaw = (box((-1, 50), (-62, -50), (0, 44)) | box((32, 50), (-62, 20), (0, 15))
+           | box((38, 50), (-5, 20), (0, 72)) | box((34, 44), (-50, -6), (0, 60)))
+    volumes.write_segmentation(tmp_path / "jaw.seg.nrrd", jaw, ["Mandible"], (-57, -70, -3), 1.5)
+    assert run("repose-isosurface", "jaw.seg.nrrd", "-label", "1", "-output",
+               "mandible.ply").returncode == 0
+    for part in ("skin", "skull"):
+        (tmp_path / f"{part}.ply").symlink_to(MESHES / f"head_{part}.ply")
+    marks = {"condyle_right_center": (-44, 8, 70), "condyle_left_center": (44, 8, 70), "menton_bone": (0, -56, 0),
+             "lower_incisor_edge": (0, -60, 44), "upper_incisor_edge": (0, -62, 42)}
+    (tmp_path / "head.mrk.json").write_text(json.dumps({"markups": [{
+        "type": "Fiducial", "coordinateSystem": "LPS",
+        "controlPoints": [{"label": name, "position": at} for name, at in marks.items()]}]}))
+    write_scene(tmp_path, "osteotomies: [{bone: mandible, piece: jaw, template: sagittal_split, kerf: 0.5}]\n")
+    result = run("repose-osteotomy", "scene.yaml", "-output", "plan")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    piece, rest = (meshio.read(tmp_path / f"plan_{part}.ply").points for part in ("jaw", "mandible"))
+    assert piece[:, 1].min() < -55 < rest[:, 1].min() and rest[:, 2].max() > 65 > piece[:, 2].max()
 
 
 @pytest.mark.parametrize("template", TEMPLATES)

@@ -167,9 +167,9 @@ TEST(OsteotomyTemplate, CutsOfTheJawFollowAnOpenOne) {
 
 TEST(OsteotomyTemplate, SplitIsAlikeOnBothSides) {
   const CutSheet sheet = *read(head(), split).osteotomies[0].sheet;
-  ASSERT_EQ(sheet.points.size(), 16u);
-  for (size_t i = 0; i < 8; ++i)
-    expect_near(sheet.points[i + 8], sheet.points[i].cwiseProduct(Vec3(-1, 1, 1)));
+  const size_t half = sheet.points.size() / 2;
+  for (size_t i = 0; i < half; ++i)
+    expect_near(sheet.points[i + half], sheet.points[i].cwiseProduct(Vec3(-1, 1, 1)));
 }
 
 /// Rotations of a scan about x, y and z, degrees.
