@@ -459,9 +459,19 @@ void ContactSearch::take_other(Vec displacement, double accuracy, Outcome there,
   check(VecCopy(start_, displacement));
 }
 
+/// Leaves a saddle, unless its value is no less than that of the `latest` one, to which the search
+/// may have returned. Collective.
+bool ContactSearch::leave_lower_saddle(Vec displacement, double& latest) {
+  constexpr double lower = 1e-6;  // of the value
+  tangent_.forget_contact();
+  const double value = objective_.evaluate(displacement, gradient_);
+  if (!(value < latest - lower * std::abs(value))) return false;
+  latest = value;
+  return leave_saddle(objective_, solver_, displacement);
+}
+
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
-  constexpr double lower = 1e-6;   // of the value: a saddle no lower than the last is not left
   constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
   Outcome outcome;
   if (!predicted_) {
@@ -479,12 +489,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   bool needs_presolve = false, led_out = false;
   double missing = std::numeric_limits<double>::infinity();  // mm of gaps
   const auto leaves = [&] {
-    tangent_.forget_contact();
     needs_presolve = false;
-    const double value = objective_.evaluate(displacement, gradient_);
-    if (left++ == max_left || !(value < saddle - lower * std::abs(value))) return false;
-    saddle = value;
-    return leave_saddle(objective_, solver_, displacement);
+    return left++ < max_left && leave_lower_saddle(displacement, saddle);
   };
   if (approach(displacement, accuracy, iterations) == End::stopped)
     return stopped(displacement, outcome);

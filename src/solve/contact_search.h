@@ -51,6 +51,7 @@ class ContactSearch : public RestSearch {
   Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
   bool release_overlapped(double accuracy);
   bool lead_out(Vec displacement, double accuracy);
+  bool leave_lower_saddle(Vec displacement, double& latest);
   bool presses_near_edge(Vec displacement);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
