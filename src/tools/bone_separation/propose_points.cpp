@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
 #include <set>
 
 #include "repose/base/error.h"
@@ -20,10 +19,12 @@ constexpr double chin_depth = 65;      // of the chin behind the front: it swing
 constexpr double part_volume = 10000;  // mm³: smaller parts of bone are the hyoid or noise
 constexpr double teeth_height[] = {25, 70}, teeth_depth = 45, teeth_width = 30;
 constexpr double slab_half = 6, slab_depth = 55, slab_width = 36;
-constexpr double jaw_height = 110;     // above the lowest point of the chin
-constexpr double jaw_volume = 150000;  // mm³
-constexpr double joint_width = 25;     // from the middle, at least
-constexpr double joint_way = 85;  // from the chin, seen from the side; angles of jaws lie nearer
+constexpr double jaw_height = 110;      // above the lowest point of the chin
+constexpr double jaw_volume = 150000;   // mm³
+constexpr double chin_size = 10;        // half of it
+constexpr double joint_width = 25;      // from the middle, at least
+constexpr double joint_way = 97;        // mm from the chin, at least; angles of jaws lie nearer
+constexpr double alike = 0.9;           // of the ways on both sides
 constexpr double closed_volume = 1000;  // mm³, of a skull at the middle, behind the teeth
 constexpr double coarser = 2;           // voxels that noise or metal is averaged over
 constexpr double level_step = 40, max_steps = 40;  // HU
@@ -60,18 +61,18 @@ class Head {
     return {};
   }
 
-  /// Whether a part has rami on both sides and is open at the back.
-  bool is_jaw(const std::vector<int64_t>& part) const {
-    std::array<bool, 2> ramus{};
+  /// How far a part reaches from the chin on both sides, mm; 0 where it is closed at the back and
+  /// so no jaw.
+  std::array<double, 2> rami(const std::vector<int64_t>& part) const {
+    std::array<double, 2> reach{};
     double behind = 0;
     for (const int64_t voxel : part) {
-      const Vec3 at = center(voxel);
-      const double depth = at.y() - chin_y_, aside = std::abs(at.x() - middle_);
-      if (aside > joint_width && at.z() > chin_ && std::hypot(depth, at.z() - chin_) > joint_way)
-        ramus[at.x() > middle_] = true;
-      if (aside < profile_width && depth > slab_depth) behind += voxel_volume();
+      const Vec3 way = center(voxel) - Vec3(chin_x_, chin_y_, chin_);
+      double& side = reach[way.x() > 0];
+      if (std::abs(way.x()) > joint_width && way.z() > 0) side = std::max(side, way.norm());
+      if (std::abs(way.x()) < profile_width && way.y() > slab_depth) behind += voxel_volume();
     }
-    return ramus[0] && ramus[1] && behind < closed_volume;
+    return behind < closed_volume ? reach : std::array<double, 2>{};
   }
 
   /// One voxel inside bone in each cell of a grid, of those in `voxels`.
@@ -172,6 +173,12 @@ class Head {
         break;
       }
     front_ = foremost(chin_, chin_ + teeth_height[1]);
+    std::vector<double> across;
+    for (const int64_t voxel : bone_) {
+      const Vec3 way = center(voxel) - Vec3(0, chin_y_, chin_);
+      if (std::abs(way.y()) < chin_size && std::abs(way.z()) < chin_size) across.push_back(way.x());
+    }
+    chin_x_ = base::median(std::move(across));
   }
 
   /// Fits height over depth of the densest twentieth of the bone where teeth are.
@@ -231,29 +238,40 @@ class Head {
   const Volume& volume_;
   double level_;
   std::vector<int64_t> bone_;
-  double middle_ = 0, front_ = 0, chin_ = 0, chin_y_ = 0;  // mm: x, y at the teeth, z, y
+  double middle_ = 0, front_ = 0;              // mm: x, y at the teeth
+  double chin_x_ = 0, chin_y_ = 0, chin_ = 0;  // mm, the last is z
   std::array<double, 2> teeth_{};  // height at the front, and slope, of the occlusal plane
 };
 
-/// Points in skull and jaw; nothing where the jaw is not found.
-std::optional<std::array<std::vector<Vec3>, 2>> find_points(const Volume& volume, double level) {
+struct Proposal {
+  std::array<std::vector<Vec3>, 2> points;  // in skull and jaw
+  double least = 0, most = 0;               // mm, of the ways from the chin on both sides
+};
+
+Proposal propose(const Volume& volume, double level) {
   Head head(volume, level);
   const std::vector<int64_t> jaw = head.part_jaw();
-  if (jaw.empty() || !head.is_jaw(jaw)) return std::nullopt;
-  return std::array{head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])};
+  if (jaw.empty()) return {};
+  const auto [right, left] = head.rami(jaw);
+  return {{head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])},
+          std::min(right, left),
+          std::max(right, left)};
 }
 
 }  // namespace
 
 std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level) {
-  auto points = find_points(volume, level);
-  if (!points) points = find_points(coarsen(volume, coarser), level);
-  if (!points)
+  Proposal found = propose(volume, level);
+  if (found.least < joint_way || found.least < alike * found.most) {
+    Proposal smoother = propose(coarsen(volume, coarser), level);
+    if (smoother.least > found.least) found = std::move(smoother);
+  }
+  if (found.least < joint_way)
     base::refuse(
         "{}: the jaw was not found, because it is part of the skull at every level or lacks its "
         "condyles; give points in skull and jaw (-apart)",
         volume.name);
-  return *std::move(points);
+  return std::move(found.points);
 }
 
 }  // namespace repose::tools::bone_separation

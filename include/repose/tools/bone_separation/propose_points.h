@@ -11,7 +11,8 @@ using imaging::Volume;
 /// face, the occlusal plane that of the densest values above it. Without a slab at the teeth, the
 /// level of bone is raised until the chin's component leaves the skull: this is where the joints
 /// part. Points lie in that component, up to the condyles, and in what is left above the teeth.
-/// Throws InputError where the volume holds no chin, or the chin's component no condyle.
+/// Where its rami do not reach alike, voxels averaged to 2 mm are searched, too. Throws InputError
+/// where the volume holds no chin, or the chin's component no rami.
 std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level);
 
 }  // namespace repose::tools::bone_separation
