@@ -212,7 +212,7 @@ ContactSearch::End ContactSearch::newton(Vec displacement, double accuracy, int6
   taken_ = 0;
   for (int n = 0; n < max_steps; ++n) {
     subtract_contact();
-    const double tissue = value - objective_.weights().elastic * objective_.contact_value();
+    const double tissue = without_contact(value);
     qp_.linearize(displacement);
     if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
@@ -330,10 +330,14 @@ std::vector<Vec3> ContactSearch::displacements(Vec state) {
   return found;
 }
 
+/// The latest value without its part of contact, N mm.
+double ContactSearch::without_contact(double value) {
+  return value - objective_.weights().elastic * objective_.contact_value();
+}
+
 /// Energy of the tissue and its loads without contact, N mm.
 double ContactSearch::energy(Vec displacement) {
-  const double value = objective_.evaluate(displacement, gradient_);
-  return value - objective_.weights().elastic * objective_.contact_value();
+  return without_contact(objective_.evaluate(displacement, gradient_));
 }
 
 /// Searches for the rest position that quadratic programs lead to from the prediction, without
@@ -379,7 +383,7 @@ ContactSearch::End ContactSearch::change_side(const OtherSide* side, Vec displac
   constexpr double rounding = 1e-6;  // of the value
   check(VecCopy(displacement, start_));
   const double value_here = objective_.evaluate(start_, gradient_);
-  const double energy_here = value_here - objective_.weights().elastic * objective_.contact_value();
+  const double energy_here = without_contact(value_here);
   subtract_contact();
   qp_.linearize(start_);
   double work = 0;

@@ -53,6 +53,7 @@ class ContactSearch : public RestSearch {
   bool lead_out(Vec displacement, double accuracy);
   bool leave_lower_saddle(Vec displacement, double& latest);
   bool presses_near_edge(Vec displacement);
+  double without_contact(double value);
   double energy(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);

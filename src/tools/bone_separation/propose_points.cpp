@@ -61,13 +61,13 @@ class Head {
     return {};
   }
 
-  /// How far a part reaches from the chin on both sides, mm; 0 where it is closed at the back and
-  /// so no jaw.
+  /// Returns the largest distance of a part from the chin on each side, mm; 0 for a part that is
+  /// closed at the back, which is no jaw.
   std::array<double, 2> rami(const std::vector<int64_t>& part) const {
     std::array<double, 2> reach{};
     double behind = 0;
     for (const int64_t voxel : part) {
-      const Vec3 way = center(voxel) - Vec3(chin_x_, chin_y_, chin_);
+      const Vec3 way = center(voxel) - chin_;
       double& side = reach[way.x() > 0];
       if (std::abs(way.x()) > joint_width && way.z() > 0) side = std::max(side, way.norm());
       if (std::abs(way.x()) < profile_width && way.y() > slab_depth) behind += voxel_volume();
@@ -134,11 +134,12 @@ class Head {
       part.push_back(voxel);
     };
     for (size_t v = 0; v < volume_.values.size(); ++v) {
-      part.clear();
       add(static_cast<int64_t>(v));
+      if (part.empty()) continue;
       for (size_t next = 0; next < part.size(); ++next) volume_.visit_neighbors(part[next], add);
       if (static_cast<double>(part.size()) * voxel_volume() >= part_volume)
         bone_.insert(bone_.end(), part.begin(), part.end());
+      part.clear();
     }
     std::sort(bone_.begin(), bone_.end());
   }
@@ -168,17 +169,17 @@ class Head {
     const double limit = foremost(-INFINITY, INFINITY) + chin_depth;
     for (const auto& [height, y] : profile)
       if (y < limit) {
-        chin_ = 2 * static_cast<double>(height);
-        chin_y_ = y;
+        chin_ = {middle_, y, 2 * static_cast<double>(height)};
         break;
       }
-    front_ = foremost(chin_, chin_ + teeth_height[1]);
+    front_ = foremost(chin_.z(), chin_.z() + teeth_height[1]);
     std::vector<double> across;
     for (const int64_t voxel : bone_) {
-      const Vec3 way = center(voxel) - Vec3(0, chin_y_, chin_);
-      if (std::abs(way.y()) < chin_size && std::abs(way.z()) < chin_size) across.push_back(way.x());
+      const Vec3 way = center(voxel) - chin_;
+      if (std::abs(way.y()) < chin_size && std::abs(way.z()) < chin_size)
+        across.push_back(center(voxel).x());
     }
-    chin_x_ = base::median(std::move(across));
+    chin_.x() = base::median(std::move(across));
   }
 
   /// Fits height over depth of the densest twentieth of the bone where teeth are.
@@ -186,7 +187,7 @@ class Head {
     std::vector<std::pair<float, Vec3>> values;
     for (const int64_t voxel : bone_) {
       const Vec3 at = center(voxel);
-      const double height = at.z() - chin_;
+      const double height = at.z() - chin_.z();
       if (height > teeth_height[0] && height < teeth_height[1] && at.y() < front_ + teeth_depth &&
           std::abs(at.x() - middle_) < teeth_width)
         values.emplace_back(volume_.values[voxel], at);
@@ -194,7 +195,7 @@ class Head {
     if (values.size() < 100)
       base::refuse(
           "{}: no teeth above the chin, at height {:.0f} mm; does the CT hold the jaw, in LPS?",
-          volume_.name, chin_);
+          volume_.name, chin_.z());
     const size_t dense = values.size() / 20;
     std::nth_element(values.begin(), values.begin() + static_cast<int64_t>(dense), values.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -222,12 +223,12 @@ class Head {
     };
     for (const int64_t voxel : bone_) {
       const Vec3 at = center(voxel);
-      if (at.z() < chin_ + 15 && at.y() < front_ + chin_depth &&
+      if (at.z() < chin_.z() + 15 && at.y() < front_ + chin_depth &&
           std::abs(at.x() - middle_) < profile_width)
         add(voxel);
     }
     for (size_t next = 0; next < found.size(); ++next) {
-      if (center(found[next]).z() > chin_ + jaw_height ||
+      if (center(found[next]).z() > chin_.z() + jaw_height ||
           static_cast<double>(found.size()) * voxel_volume() > jaw_volume)
         return {};
       volume_.visit_neighbors(found[next], add);
@@ -238,8 +239,8 @@ class Head {
   const Volume& volume_;
   double level_;
   std::vector<int64_t> bone_;
-  double middle_ = 0, front_ = 0;              // mm: x, y at the teeth
-  double chin_x_ = 0, chin_y_ = 0, chin_ = 0;  // mm, the last is z
+  double middle_ = 0, front_ = 0;  // mm: x, y at the teeth
+  Vec3 chin_ = Vec3::Zero();
   std::array<double, 2> teeth_{};  // height at the front, and slope, of the occlusal plane
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -63,6 +64,20 @@ TEST(ProposeLandmarks, TurnWithTheHead) {
     for (const auto& [name, place] : upright.found)
       EXPECT_LT((tilted.found.at(name) - turn * place).norm(), 0.5) << name << " " << pitch;
   }
+}
+
+TEST(ProposeLandmarks, UnevenCornersOfTheMouthAreReported) {
+  Head head = shipped();
+  const Vec3 middle = propose(head).found.at("stomion");
+  const auto first = static_cast<int64_t>(head.skin.points.size());
+  for (const double x : {8.0, 60.0})
+    for (const double z : {-20.0, 20.0}) head.skin.points.push_back(middle + Vec3(x, -10, z));
+  head.skin.triangles.push_back({first, first + 1, first + 2});
+  head.skin.triangles.push_back({first + 1, first + 3, first + 2});
+  const Proposal covered = propose(head);
+  EXPECT_TRUE(std::any_of(covered.remarks.begin(), covered.remarks.end(), [](const auto& line) {
+    return line.find("corners of the mouth") != std::string::npos;
+  }));
 }
 
 TEST(ProposeLandmarks, GivenOnesAreKeptAndGuide) {
