@@ -10,12 +10,29 @@ namespace repose::solve {
 
 using base::check;
 
+bool ProgressTest::ends(const State& now) {
+  if (!begun_) {
+    first_objective_ = lowest_ = now.objective;
+    lowered_at_ = now.iteration;
+  }
+  begun_ = true;
+  at_rounding_ = is_at_rounding(now);
+  stalled_ = may_stall_ && stalls(now);
+  return at_rounding_ || stalled_;
+}
+
+bool ProgressTest::is_at_rounding(const State& now) {
+  constexpr int64_t many = 20;        // iterations
+  constexpr double rounding = 1e-14;  // of the value
+  if (now.objective < lowest_ - rounding * std::abs(lowest_)) {
+    lowest_ = now.objective;
+    lowered_at_ = now.iteration;
+  }
+  return now.iteration - lowered_at_ >= many;
+}
+
 bool ProgressTest::stalls(const State& now) {
   constexpr double tenth = 0.1, negligible = 1e-9;  // the latter of the objective
-  if (!begun_) {
-    begun_ = true;
-    first_objective_ = now.objective;
-  }
   const double decrease = first_objective_ - best_.objective;
   const double step = std::max({tenth * decrease, negligible * std::abs(now.objective), 0.0});
   const bool lower = now.objective < best_.objective - step;
@@ -25,8 +42,7 @@ bool ProgressTest::stalls(const State& now) {
   if (lower) best_.objective = now.objective;
   if (weaker) best_.largest_force = now.largest_force;
   if (nearer) best_.distance = now.distance;
-  stalled_ = now.evaluations - best_.evaluations >= patience;
-  return stalled_;
+  return now.evaluations - best_.evaluations >= patience;
 }
 
 Vec3 place_of_largest(const discrete::Positions& positions, Vec vector) {

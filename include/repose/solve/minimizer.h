@@ -1,20 +1,17 @@
 #pragma once
-#include <petsctao.h>
-
-#include <exception>
 #include <functional>
 #include <memory>
-#include <optional>
 
 #include "repose/linear/newton_estimate.h"
 #include "repose/solve/rest_search.h"
 
 namespace repose::solve {
 
-class InitialHessian;
+class NewtonFinish;
 class ProgressTest;
-
-using TaoHandle = base::Handle<Tao, TaoDestroy>;
+class RestDistance;
+class StoppingTest;
+class TaoSearch;
 
 /// Estimates how far a state is from rest by the Newton step of `function`, whose linear systems
 /// `solver` solves.
@@ -26,8 +23,10 @@ struct ErrorEstimate {
 /// Minimizes a function with TAO until the rest position is near enough, in mm. Newton by default;
 /// `-tao_type` chooses any unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options
 /// apply. `-tao_type lmvm -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the
-/// stiffness at the start of the search, and again where it has slowed (initial_hessian.h). All
-/// members collective.
+/// stiffness at the start of the search, and again where it has slowed (initial_hessian.h). Its
+/// parts: TAO (tao_search.h), the estimated distance to rest (rest_distance.h), the test that ends
+/// a search (stopping_test.h) and that of its progress (progress_test.h), and Newton steps at its
+/// end (newton_finish.h). All members collective.
 class Minimizer : public RestSearch {
  public:
   /// Receives each iteration; returns whether to continue, the same on all ranks.
@@ -56,70 +55,21 @@ class Minimizer : public RestSearch {
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
-  struct Callbacks;
-  void make_tao();
-  void set_forcing();
-  /// The criterion that ends a search: the estimated distance to rest, or the preconditioned
-  /// gradient alone.
-  enum class Test { distance, gradient };
-  /// Calls TAO. Returns the iterations and whether it was stopped; `near` as presolve().
-  Outcome search(Vec displacement, double accuracy, Test test, bool near = false);
+  Outcome search(Vec displacement, bool near);
   Outcome search_and_finish(Vec displacement, double accuracy);
-  /// Returns whether the search that ended after `iterations` begins again where it ended.
-  bool should_restart(int64_t iterations);
-  /// `last`: the search is over, so the estimate is reported.
-  double strict_estimate(Vec displacement, Vec gradient, bool last);
-  /// Returns θ (NewtonEstimate) of the latest Newton step δ, from `displacement`, and the next,
-  /// where the rest is |δ| / (1 − θ) away at most where Newton's method converges (Deuflhard 2004,
-  /// Newton Methods for Nonlinear Problems, 2.1); as good as 1 where θ is large or the quadratic
-  /// model misleads.
-  double contraction(Vec displacement);
-  bool step_was_cut() const;
-  /// Where no force is left: 0, or infinite at a saddle.
-  double distance_without_force(Vec displacement);
-  bool worth_estimating(double largest_force) const;
-  std::optional<bool> near_enough_at_a_step(Vec gradient);
-  bool near_enough(Vec displacement, Vec gradient, double largest_force);
-  double farthest_correction() const;  ///< mm, of a Newton step that ends a search
-  bool stalled(int64_t iteration, double value);
-  double measure(Vec displacement, bool last);
-  int polish(Vec displacement);
-  std::string reason_of(const Outcome& outcome, TaoConvergedReason reason) const;
-  /// Why the search stalls and where. Collective.
-  std::string no_progress(Vec displacement);
-  Outcome summary(Vec displacement);
+  Outcome summarize(Vec displacement, double accuracy, Outcome outcome, double taken = 0);
+  std::string reason_of(const Outcome& outcome) const;
+  std::string no_progress(Vec displacement) const;
 
   discrete::Function& function_;
   linear::TangentSolver& solver_;
-  ErrorEstimate estimate_;
-  linear::NewtonEstimate newton_estimate_;  // by the same solver
   Watch watch_;
+  bool may_leave_saddles_;  // the estimate is of the function itself
+  std::unique_ptr<RestDistance> distance_;
+  std::unique_ptr<TaoSearch> tao_;
+  std::unique_ptr<StoppingTest> test_;
   std::unique_ptr<ProgressTest> progress_;
-  TaoHandle tao_;
-  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is requested
-  bool newton_finish_allowed_ = false;       // … in the present search
-  bool newton_finish_ = false;               // it did
-  bool newton_finish_enabled_ = false;       // near rest its search is finished by Newton steps
-  bool newton_ = true;                       // the TAO method uses the Hessian
-  bool slowed_ = false;                      // the initial Hessian is to be renewed
-  int64_t iterations_ = 0;                   // of the present run, before TAO's present ones
-  bool automatic_forcing_ = true;
-  bool cut_ = false;                    // the latest Newton step was
-  double first_force_ = 0, force_ = 0;  // N, largest block of ∇Φ at the first and latest iterate
-  double accuracy_ = 0;                 // mm, of the present run
-  double error_ = 0;                    // mm, latest strict estimate
-  double softest_ = 0;                  // N/mm: force over distance at the last strict estimate
-  int64_t estimated_at_ = 0;            // evaluations at that estimate
-  double lowest_ = 0;                   // value, of the present run
-  int64_t lowered_at_ = 0;              // iteration at which it was found
-  bool stalled_ = false;                // the value has not fallen for long
-  bool presolving_ = false;             // the present search is a presolve
-  bool stopped_ = false;                // the watcher stopped the search
-  double taken_ = 0;                    // mm, the Newton step that led here, or 0
-  double contraction_ = 0;              // of the latest Newton step, …
-  int64_t contracted_at_ = -1;          // … at this many assemblies of the Hessian
-  base::VecHandle gradient_, saved_, trial_, estimate_gradient_;
-  std::exception_ptr thrown_;
+  std::unique_ptr<NewtonFinish> finish_;
 };
 
 }  // namespace repose::solve

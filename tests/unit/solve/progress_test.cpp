@@ -16,7 +16,7 @@ int64_t stalls_at(At&& at) {
   for (int64_t k = 1; k <= 10000; ++k) {
     ProgressTest::State state = at(static_cast<double>(k));
     state.evaluations = k;
-    if (test.stalls(state)) return k;
+    if (test.ends(state)) return k;
   }
   return 0;
 }
@@ -47,12 +47,31 @@ TEST(ProgressTest, WaitsForWhatFallsSlowly) {
 
 TEST(ProgressTest, CountsTheEvaluationsOfItsOwnSearch) {
   ProgressTest test;
-  EXPECT_FALSE(test.stalls({1000, 1, 1, 1}));
-  EXPECT_FALSE(test.stalls({1000 + ProgressTest::patience - 1, 1, 1, 1}));
-  EXPECT_TRUE(test.stalls({1000 + ProgressTest::patience, 1, 1, 1}));
+  EXPECT_FALSE(test.ends({1000, 1, 1, 1}));
+  EXPECT_FALSE(test.ends({1000 + ProgressTest::patience - 1, 1, 1, 1}));
+  EXPECT_TRUE(test.ends({1000 + ProgressTest::patience, 1, 1, 1}));
   test.begin();
   EXPECT_FALSE(test.stalled());
-  EXPECT_FALSE(test.stalls({5000, 2, 2, 2}));
+  EXPECT_FALSE(test.ends({5000, 2, 2, 2}));
+}
+
+TEST(ProgressTest, EndsAtRoundingAfterTwentyIterationsThatLowerNothing) {
+  ProgressTest test(false);
+  const auto at = [](int64_t iteration, double objective) {
+    return ProgressTest::State{iteration, objective, 1, 1, iteration};
+  };
+  EXPECT_FALSE(test.ends(at(0, 2)));
+  EXPECT_FALSE(test.ends(at(1, 1)));
+  EXPECT_FALSE(test.ends(at(20, 1 - 1e-15)));
+  EXPECT_TRUE(test.ends(at(21, 1)));
+  EXPECT_TRUE(test.at_rounding());
+  EXPECT_FALSE(test.stalled());
+}
+
+TEST(ProgressTest, WaitsForSpringsAsLongAsTheyFall) {
+  ProgressTest test(false);
+  for (int64_t k = 0; k <= 10000; ++k)
+    EXPECT_FALSE(test.ends({k, 1 - 1e-12 * static_cast<double>(k), 1, 1, k}));
 }
 
 }  // namespace progress_test

@@ -1,0 +1,58 @@
+#pragma once
+#include <petsctao.h>
+
+#include <exception>
+#include <functional>
+#include <memory>
+
+#include "initial_hessian.h"
+#include "stopping_test.h"
+
+namespace repose::solve {
+
+using TaoHandle = base::Handle<Tao, TaoDestroy>;
+
+/// TAO's minimization of a function, by Newton's method or what `-tao_type` chooses, with the
+/// forcing terms of its linear systems and the renewals of the initial Hessian of limited-memory
+/// BFGS. All members collective.
+class TaoSearch {
+ public:
+  TaoSearch(discrete::Function& function, linear::TangentSolver& solver);
+  TaoSearch(TaoSearch&&) = delete;
+
+  /// Iterate, from the first state on.
+  struct Iterate {
+    int64_t number;  ///< since the search began
+    double value;
+    StoppingTest::Iterate state;
+  };
+  /// Returns whether the search ends at an iterate; the same on all ranks.
+  using Ends = std::function<bool(const Iterate&)>;
+  /// Minimizes from `displacement`, in place. `near`: the search begins where the last one ended,
+  /// but for contact. Returns the iterations. What the function or `ends` throws is thrown again.
+  int64_t run(Vec displacement, bool near, Ends ends);
+
+  Method method() const;
+  std::string reason() const;  ///< why the latest search ended
+
+ private:
+  struct Callbacks;
+  void make_forcing();
+  void set_forcing();
+  bool step_was_cut() const;
+  bool should_restart(int64_t iterations) const;
+
+  discrete::Function& function_;
+  linear::TangentSolver& solver_;
+  TaoHandle tao_;
+  std::unique_ptr<InitialHessian> initial_;    // of limited-memory BFGS, where it is requested
+  bool newton_, sets_forcing_ = false;         // the method uses the Hessian; its options are ours
+  double first_force_ = 0, latest_force_ = 0;  // N, largest block of ∇Φ at these iterates
+  bool slowed_ = false;                        // the initial Hessian is to be renewed
+  int64_t before_ = 0;                         // iterations before TAO's present ones
+  Ends ends_;
+  base::VecHandle gradient_;  // where the value alone is requested
+  std::exception_ptr thrown_;
+};
+
+}  // namespace repose::solve
