@@ -122,7 +122,7 @@ void Tangent::take_slopes() {
 }
 
 bool Tangent::limit_slopes(bool limited) {
-  if (!objective_.loops().solid()) return false;
+  if (!objective_.positions().part().solid) return false;
   limited_ = limited;
   if (!at_.empty()) take_slopes();
   return true;
