@@ -1,8 +1,11 @@
 #include "contact_pressures.h"
 
+#include <algorithm>
 #include <limits>
 #include <tuple>
 #include <utility>
+
+#include "repose/base/collective.h"
 
 namespace repose::solve {
 
@@ -29,6 +32,18 @@ void set_pressures(discrete::Objective& objective, const std::vector<Vec3>& pres
     if (nearest[i]) *nearest[i] = pressure[i].x();
   body_contact.set_multipliers(multiplier);
   cut_faces.set_multipliers(wall_multiplier);
+}
+
+double penetration(discrete::Objective& objective) {
+  mechanics::BodyContact& body_contact = objective.body_contact();
+  const auto position = objective.positions().local();
+  body_contact.update_gaps(position);
+  double deepest = 0;
+  for (const double gap : body_contact.gaps()) deepest = std::max(deepest, -gap);
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  cut_faces.update_gaps(position);
+  for (size_t w = 0; w < cut_faces.size(); ++w) deepest = std::max(deepest, -cut_faces.gap(w));
+  return base::max_over_ranks(objective.positions().comm(), deepest);
 }
 
 }  // namespace repose::solve

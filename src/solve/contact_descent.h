@@ -1,0 +1,41 @@
+#pragma once
+#include "contact_penalty.h"
+#include "contact_programs.h"
+
+namespace repose::solve {
+
+/// Stages of a search with contact: soft quasi-Newton searches, programs among rounded bodies, and
+/// the estimate that ends it. All members collective.
+class ContactDescent {
+ public:
+  using End = ContactPrograms::End;
+  /// `minimizer` minimizes `objective`.
+  ContactDescent(discrete::Objective& objective, discrete::Tangent& tangent, Minimizer& minimizer,
+                 ContactPenalty& penalty, ContactPrograms& programs);
+
+  /// Takes so many times the model's stiffness as that of the penalty.
+  void stiffen(int times);
+  /// Searches on the augmented Lagrangian of a soft penalty until the multipliers hardly move.
+  Outcome presolve(Vec displacement, double accuracy);
+  /// Finds the rest position among bodies with rounded edges, which catch fewer points on either
+  /// side. It is found so finely that the sides do not depend on the way to it.
+  End approach(Vec displacement, double accuracy, int64_t& iterations);
+  /// Ends the search where a strict estimate says that it is over.
+  Outcome finish(Vec displacement, double accuracy);
+  /// finish() at a position that programs have reached. They go on where it misses the accuracy: an
+  /// end before the next step relies on what that step is expected to be.
+  Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
+
+ private:
+  void soften();
+  double harden(Vec displacement);
+
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+  Minimizer& minimizer_;
+  ContactPenalty& penalty_;
+  ContactPrograms& programs_;
+  double stiffness_;  // N/mm³
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,28 @@
+#pragma once
+#include "repose/discrete/tangent.h"
+#include "repose/solve/rest_search.h"
+
+namespace repose::solve {
+
+/// Multipliers and stiffness of the objective's contact, that of bodies and of the sides of cuts.
+class ContactPenalty {
+ public:
+  ContactPenalty(discrete::Objective& objective, discrete::Tangent& tangent)
+      : objective_(objective), tangent_(tangent) {}
+
+  void set_stiffness(double stiffness);  ///< N/mm³; not collective
+  ContactPressures multipliers() const;
+  void set_multipliers(const ContactPressures& to);  ///< those that are missing are 0
+  /// Takes the pressures at the objective's last update as multipliers. Not collective.
+  void move_multipliers();
+  /// Returns by how much pressures at the positions' last update differ from multipliers, over the
+  /// stiffness, mm: the gap where a point presses or slides, what a multiplier still pretends where
+  /// it does not. Collective.
+  double violation();
+
+ private:
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+};
+
+}  // namespace repose::solve

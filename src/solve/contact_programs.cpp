@@ -1,0 +1,121 @@
+#include "contact_programs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace repose::solve {
+
+using base::check;
+
+namespace {
+
+constexpr double predicted_to = 0.1;  // mm
+
+}  // namespace
+
+ContactPrograms::ContactPrograms(discrete::Objective& objective, discrete::Tangent& tangent,
+                                 linear::TangentSolver& solver, Minimizer::Watch watch)
+    : objective_(objective),
+      qp_(objective, tangent, solver),
+      watch_(std::move(watch)),
+      gradient_(objective.positions().make_vector()),
+      slope_(objective.positions().make_vector()),
+      step_(objective.positions().make_vector()),
+      trial_(objective.positions().make_vector()) {}
+
+bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
+  discrete::Positions& positions = objective_.positions();
+  positions.update(displacement);
+  objective_.place_bodies();
+  const discrete::Part& part = positions.part();
+  std::vector<Vec3> travel(positions.local().size(), Vec3::Zero());
+  for (size_t i = 0; i < travel.size(); ++i)
+    if (part.unknown[i] < 0)
+      travel[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  objective_.round_bodies(true);
+  check(VecSet(gradient_, 0));  // it is at rest
+  subtract_contact();
+  qp_.gaps().linearize(displacement, load, travel);
+  objective_.hessian_action(travel, trial_, false);
+  check(VecAXPY(slope_, 1.0, trial_));
+  return qp_.solve(displacement, slope_, predicted_to, increment);
+}
+
+/// slope_ = gradient_ without its part of contact, at the objective's last update.
+void ContactPrograms::subtract_contact() {
+  const discrete::Part& part = objective_.positions().part();
+  std::vector<Vec3> force = objective_.contact_force();
+  for (Vec3& f : force) f *= objective_.weights().elastic;
+  force.resize(part.point_row.size(), Vec3::Zero());
+  objective_.positions().restrict_to_owned(force, slope_);
+  check(VecAXPY(slope_, 1.0, gradient_));
+}
+
+double ContactPrograms::without_contact(double value) {
+  return value - objective_.weights().elastic * objective_.contact_value();
+}
+
+/// Takes step_, whose largest block is `length` mm, or less of it, where that lowers the augmented
+/// Lagrangian of the new multipliers from `tissue`, the value without contact. Its full length is
+/// tried first, or as much as the gaps, taken to first order, may hold for.
+double ContactPrograms::take_step(Vec displacement, double length, double tissue, double& value) {
+  constexpr int max_halved = 6;
+  constexpr double rounding = 1e-12;
+  constexpr double longest = 2;  // mm
+  const auto try_step = [&](double share) {
+    check(VecCopy(displacement, trial_));
+    check(VecAXPY(trial_, share, step_));
+    return objective_.evaluate(trial_, gradient_);
+  };
+  const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
+  const double largest = merit + rounding * std::abs(merit);
+  double share = std::min(1.0, longest / length);
+  value = try_step(share);
+  for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
+  if (value > largest) return 0;
+  check(VecCopy(trial_, displacement));
+  return share;
+}
+
+ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int64_t& iterations,
+                                          int max_steps) {
+  constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
+  constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
+  constexpr double fast = 0.2;               // ratio of full steps that is trusted
+  double value = objective_.evaluate(displacement, gradient_);
+  last_step_ = 0;
+  for (int n = 0; n < max_steps; ++n) {
+    const double tissue = without_contact(value);
+    linearize(displacement);
+    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
+    const double length = discrete::largest_block(step_);
+    const double share = take_step(displacement, length, tissue, value);
+    if (share == 0) return End::failed;
+    const double before = std::exchange(last_step_, share == 1 ? length : 0);
+    ++iterations;
+    if (qp_.reduced() && length <= at_saddle) return End::failed;
+    const bool falls = last_step_ > 0 && last_step_ <= fast * before;
+    const double next = falls ? length * length / before : length;
+    if (!qp_.reduced() && next <= near * accuracy) return End::reached;
+    if (watch_ && !watch_({iterations, objective_.positions().load(), value,
+                           discrete::largest_block(gradient_), length, objective_.evaluations(),
+                           displacement}))
+      return End::stopped;
+  }
+  return End::failed;
+}
+
+void ContactPrograms::linearize(Vec displacement) {
+  subtract_contact();
+  qp_.gaps().linearize(displacement);
+}
+
+bool ContactPrograms::step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement) {
+  for (const mechanics::LinearGap& gap : gaps) qp_.gaps().replace(gap);
+  if (!qp_.solve(displacement, slope_, predicted_to, step_)) return false;
+  check(VecAXPY(displacement, 1.0, step_));
+  return true;
+}
+
+}  // namespace repose::solve

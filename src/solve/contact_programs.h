@@ -1,0 +1,56 @@
+#pragma once
+#include "contact_qp.h"
+#include "repose/solve/minimizer.h"
+
+namespace repose::solve {
+
+/// Sequential quadratic programming with contact (Nocedal & Wright 2006, chapter 18): steps of
+/// programs, shortened until the augmented Lagrangian of the new multipliers decreases. All members
+/// collective.
+class ContactPrograms {
+ public:
+  ContactPrograms(discrete::Objective& objective, discrete::Tangent& tangent,
+                  linear::TangentSolver& solver, Minimizer::Watch watch);
+
+  void set_stiffness(double stiffness) { qp_.gaps().set_stiffness(stiffness); }  ///< N/mm³
+
+  /// Finds the step from rest at `displacement` to rest at `load`, in `increment`. Returns whether
+  /// there is one.
+  bool predict(Vec displacement, double load, Vec increment);
+
+  enum class End { reached, failed, stopped };
+  /// Takes steps until one is shorter than half of `accuracy`, or the next would be: full steps
+  /// fall by at least the ratio of the latest two. Adds to `iterations`.
+  End run(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
+  /// Returns whether the latest program met negative curvature.
+  bool reduced() const { return qp_.reduced(); }
+  /// Returns the full step that the latest run ended with, mm, or 0; from then on 0.
+  double take_last_step() { return std::exchange(last_step_, 0.0); }
+
+  /// Evaluates the augmented Lagrangian, N mm.
+  double evaluate(Vec displacement) { return objective_.evaluate(displacement, gradient_); }
+  /// N, largest block of the gradient that was evaluated last.
+  double largest_force() const { return discrete::largest_block(gradient_); }
+  /// Evaluates the energy of the tissue and its loads without contact, N mm.
+  double evaluate_tissue(Vec displacement) { return without_contact(evaluate(displacement)); }
+  /// The energy of `value`, the latest that was evaluated, without its part of contact, N mm.
+  double without_contact(double value);
+  /// Takes the gaps at `displacement`, which was evaluated last.
+  void linearize(Vec displacement);
+  /// Takes the step of one program from the `displacement` of linearize(), with these gaps of
+  /// bodies, of this rank, in place of those of the same constraints. Returns whether it has a
+  /// minimum.
+  bool step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement);
+
+ private:
+  void subtract_contact();
+  double take_step(Vec displacement, double length, double tissue, double& value);
+
+  discrete::Objective& objective_;
+  ContactQp qp_;
+  Minimizer::Watch watch_;
+  double last_step_ = 0;
+  base::VecHandle gradient_, slope_, step_, trial_;  // slope_: the gradient without contact
+};
+
+}  // namespace repose::solve

@@ -1,0 +1,190 @@
+#include "other_rest_search.h"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "repose/base/agreement.h"
+#include "repose/base/collective.h"
+
+namespace repose::solve {
+
+using base::check;
+
+OtherRestSearch::OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
+                                 ContactPenalty& penalty, ContactPrograms& programs,
+                                 ContactDescent& descent)
+    : objective_(objective),
+      tangent_(tangent),
+      penalty_(penalty),
+      programs_(programs),
+      descent_(descent),
+      start_(objective.positions().make_vector()) {}
+
+void OtherRestSearch::begin(Vec prediction) {
+  at_prediction_ = penalty_.multipliers();
+  check(VecCopy(prediction, start_));
+}
+
+/// True if a point presses on a body near an edge of it. Collective.
+bool OtherRestSearch::presses_near_edge(Vec displacement) {
+  discrete::Positions& positions = objective_.positions();
+  positions.update(displacement);
+  mechanics::BodyContact& contact = objective_.body_contact();
+  contact.update_gaps(positions.local());
+  return base::on_any_rank(positions.comm(), !contact.other_sides(positions.local()).empty());
+}
+
+/// Takes displacements of this rank's points as another rest position of a state of the skin: finds
+/// the largest distance and its place. Collective.
+OtherRest OtherRestSearch::compare_skins(Vec displacement, std::vector<Vec3> other) {
+  discrete::Positions& positions = objective_.positions();
+  const model::Points& points = positions.part().model.points;
+  positions.update(displacement);
+  OtherRest found;
+  for (int64_t i = 0; i < positions.part().owned_points; ++i) {
+    const double apart = (positions.local()[i] - points.position[i] - other[i]).norm();
+    if (points.layer[i] != 0 || apart <= found.distance) continue;
+    found.distance = apart;
+    found.place = points.position[i];
+  }
+  found.distance = base::max_over_ranks_with(positions.comm(), found.distance, found.place);
+  found.displacement = std::move(other);
+  return found;
+}
+
+/// Returns the displacements of this rank's points in a state. Collective.
+std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
+  discrete::Positions& positions = objective_.positions();
+  positions.update(state);
+  std::vector<Vec3> found(positions.part().owned_points);
+  for (size_t i = 0; i < found.size(); ++i)
+    found[i] = positions.local()[i] - positions.part().model.points.position[i];
+  return found;
+}
+
+/// Searches for the rest position that quadratic programs lead to from the prediction, without
+/// rounded bodies. Where it is another one, `displacement` becomes that of less energy, and
+/// `outcome` states the distance to the other.
+void OtherRestSearch::consider_other(Vec displacement, double accuracy, Outcome& outcome) {
+  const ContactPressures here = penalty_.multipliers();
+  const double value_here = programs_.evaluate(displacement);
+  penalty_.set_multipliers(at_prediction_);
+  int64_t iterations = 0;
+  bool taken = false;
+  End end = programs_.run(start_, accuracy, iterations);
+  if (end == End::failed && !descent_.presolve(start_, accuracy).stopped)
+    end = programs_.run(start_, accuracy, iterations);
+  if (end == End::reached) {
+    OtherRest other = compare_skins(displacement, displacements(start_));
+    const bool is_less = programs_.evaluate(start_) < value_here;
+    const bool is_other = other.distance > 2 * accuracy;
+    Outcome there;
+    if (is_other && is_less) there = descent_.finish_reached(start_, accuracy, iterations);
+    taken = there.converged;
+    there.iterations += outcome.iterations + iterations;
+    if (taken) outcome = there;
+    if (is_other && taken == is_less) {
+      if (taken) other.displacement = displacements(displacement);
+      outcome.other = std::move(other);
+    }
+  }
+  if (taken)
+    check(VecCopy(start_, displacement));
+  else
+    penalty_.set_multipliers(here);
+}
+
+/// Searches from `displacement` with one point beyond the other side of its body; ends in start_.
+/// Fails where the augmented Lagrangian is no less there, which misses the energy by the square of
+/// the gaps that are left. Collective; `side` is null on ranks that do not own the point.
+OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec displacement,
+                                                  double accuracy) {
+  // Of the work of the contact's force over the gap: after the program, which is not exact, and
+  // after a further step.
+  constexpr double promising = 0.4, still_promising = 0.1;
+  constexpr double rounding = 1e-6;  // of the value
+  check(VecCopy(displacement, start_));
+  const double value_here = programs_.evaluate(start_);
+  const double energy_here = programs_.without_contact(value_here);
+  programs_.linearize(start_);
+  double work = 0;
+  std::span<const mechanics::LinearGap> beyond;
+  if (side) {
+    const mechanics::LinearGap& gap = side->gap;
+    work = -gap.gap * gap.area * objective_.body_contact().multipliers()[gap.constraint];
+    beyond = {&gap, 1};
+  }
+  work = base::max_over_ranks(objective_.positions().comm(), work);
+  if (!programs_.step_with(beyond, start_)) return End::failed;
+  if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
+  int64_t iterations = 0;
+  End end = programs_.run(start_, accuracy, iterations, 1);
+  if (end == End::failed &&
+      programs_.evaluate_tissue(start_) <= energy_here + still_promising * work)
+    end = programs_.run(start_, accuracy, iterations);
+  const double value = programs_.evaluate(start_);
+  const bool less = value < value_here - rounding * std::abs(value_here);
+  return end == End::reached && !less ? End::failed : end;
+}
+
+/// Lets points that press near an edge of a body go round it, one at a time, where that ends at
+/// less energy. The position that is left is the outcome's other one. Returns whether there was
+/// one. Collective.
+bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
+  constexpr int max_tried = 8;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  discrete::Positions& positions = objective_.positions();
+  programs_.evaluate(displacement);
+  const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
+  size_t next = 0;
+  bool changed = false;
+  for (int n = 0; n < max_tried; ++n) {
+    const ContactPressures here = penalty_.multipliers();
+    const double softness = next < sides.size() ? sides[next].softness : none;
+    const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
+    if (first.value == none) break;
+    const bool mine = first.rank == base::rank(positions.comm());
+    const End end = change_side(mine ? &sides[next++] : nullptr, displacement, accuracy);
+    Outcome there;
+    int64_t iterations = 0;
+    if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
+    there.iterations += iterations;
+    if (there.converged) {
+      take_other(displacement, accuracy, there, outcome);
+      changed = true;
+    } else {
+      penalty_.set_multipliers(here);
+    }
+    if (end == End::stopped) return false;
+  }
+  return changed;
+}
+
+void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
+  constexpr int max_passes = 3;  // after a change, points that were left before may follow
+  if (!presses_near_edge(displacement)) return;
+  const int64_t evaluated = objective_.evaluations();
+  consider_other(displacement, accuracy, outcome);
+  for (int pass = 0; pass < max_passes; ++pass)
+    if (!change_sides(displacement, accuracy, outcome)) break;
+  programs_.evaluate(displacement);
+  evaluations_ += objective_.evaluations() - evaluated;
+}
+
+/// Takes start_, which ended in `there`, in place of `displacement`. Of this and the other rest
+/// position so far, the one that is farther away is the outcome's other one.
+void OtherRestSearch::take_other(Vec displacement, double accuracy, Outcome there,
+                                 Outcome& outcome) {
+  OtherRest other = compare_skins(start_, displacements(displacement));
+  if (outcome.other) {
+    OtherRest earlier = compare_skins(start_, std::move(outcome.other->displacement));
+    if (earlier.distance > other.distance) other = std::move(earlier);
+  }
+  there.iterations += outcome.iterations;
+  outcome = std::move(there);
+  if (other.distance > 2 * accuracy) outcome.other = std::move(other);
+  check(VecCopy(start_, displacement));
+}
+
+}  // namespace repose::solve

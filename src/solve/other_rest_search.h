@@ -1,0 +1,42 @@
+#pragma once
+#include "contact_descent.h"
+#include "contact_sides.h"
+
+namespace repose::solve {
+
+/// Finds other rest positions of tissue that presses on bodies near edges of these
+/// (docs/theory/contact.md): by programs from the prediction without rounded bodies, then with
+/// single points on the other side of the edge that they press near. All members collective.
+class OtherRestSearch {
+ public:
+  OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
+                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent);
+
+  /// Keeps a prediction, with the multipliers there, as what programs start from.
+  void begin(Vec prediction);
+  /// Searches for rest positions of less energy than that of `displacement`, which it then becomes,
+  /// with its `outcome`, which states the distance to the other.
+  void find(Vec displacement, double accuracy, Outcome& outcome);
+  int64_t evaluations() const { return evaluations_; }  ///< by all calls of find()
+
+ private:
+  using End = ContactPrograms::End;
+  bool presses_near_edge(Vec displacement);
+  void consider_other(Vec displacement, double accuracy, Outcome& outcome);
+  End change_side(const OtherSide* side, Vec displacement, double accuracy);
+  bool change_sides(Vec displacement, double accuracy, Outcome& outcome);
+  void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
+  OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
+  std::vector<Vec3> displacements(Vec state);
+
+  discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+  ContactPenalty& penalty_;
+  ContactPrograms& programs_;
+  ContactDescent& descent_;
+  int64_t evaluations_ = 0;
+  ContactPressures at_prediction_;
+  base::VecHandle start_;
+};
+
+}  // namespace repose::solve
