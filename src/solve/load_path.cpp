@@ -118,26 +118,31 @@ void LoadPath::presolve_softer() {
   }
 }
 
-LoadPath::Attempt LoadPath::attempt(Vec displacement, double load) {
-  discrete::Positions& positions = objective_.positions();
-  const int64_t folded_before = inverted(displacement), evaluated = function_.evaluations();
-  Attempt attempt;
-  attempt.before = search_.pressures();
-  const bool predicted = predict(displacement, load);
-  check(VecCopy(displacement, trial_));
-  if (predicted) check(VecAXPY(trial_, 1.0, increment_));
-  positions.set_load(load);
+/// Begins a step to `load`: takes trial_ to the predicted end, where there is a prediction.
+LoadPath::Attempt LoadPath::begin_step(Vec displacement, double load) {
+  Attempt step;
+  step.inverted = inverted(displacement);
+  step.begun = function_.evaluations();
+  step.before = search_.pressures();
+  step.predicted = predict(displacement, load);
+  if (step.predicted) {
+    step.expected = discrete::largest_block(increment_);
+    check(VecAXPY(increment_, 1.0, displacement));
+  }
+  check(VecCopy(step.predicted ? increment_ : displacement, trial_));
+  objective_.positions().set_load(load);
   if (begins_softer()) presolve_softer();
-  attempt.outcome = search_.run(trial_, settings_.accuracy);
-  attempt.evaluations = function_.evaluations() - evaluated;
-  result_.iterations += attempt.outcome.iterations;
-  attempt.folded = inverted(trial_) > folded_before;
-  if (!predicted) return attempt;
-  attempt.expected = discrete::largest_block(increment_);
-  check(VecAXPY(increment_, 1.0, displacement));
+  return step;
+}
+
+/// Takes in what the step ended in, at trial_.
+void LoadPath::end_step(Attempt& step) {
+  step.evaluations = function_.evaluations() - step.begun;
+  result_.iterations += step.outcome.iterations;
+  step.folded = inverted(trial_) > step.inverted;
+  if (!step.predicted) return;
   check(VecAXPY(increment_, -1.0, trial_));
-  attempt.miss = discrete::largest_block(increment_);
-  return attempt;
+  step.miss = discrete::largest_block(increment_);
 }
 
 bool LoadPath::follows(const Attempt& now, const std::optional<Attempt>& coarser) const {
@@ -263,7 +268,9 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
     const Stopwatch watch;
     const double target = result_.load + step;
     const double load = target > 1 - nearly ? 1 : target;
-    const Attempt tried = attempt(displacement, load);
+    Attempt tried = begin_step(displacement, load);
+    tried.outcome = search_.run(trial_, settings_.accuracy);
+    end_step(tried);
     const bool last = halvings == max_halvings || in_vain(tried);
     if (tried.outcome.stopped || last || follows(tried, coarser)) {
       accept(tried.outcome, load, displacement);

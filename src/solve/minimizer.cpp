@@ -31,30 +31,28 @@ Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver
 
 Minimizer::~Minimizer() = default;
 
-/// Calls TAO until the test, which has begun, ends it. Returns the iterations and whether it was
-/// stopped.
-Outcome Minimizer::search(Vec displacement, bool near) {
-  Outcome outcome;
+/// Returns what ends a search of TAO's; `outcome` receives whether it was stopped.
+std::function<bool(const TaoIterate&)> Minimizer::ending(Outcome& outcome) {
   progress_->begin();
-  outcome.iterations = tao_->run(displacement, near, [&](const TaoSearch::Iterate& at) {
+  return [&](const TaoIterate& at) {
     const StoppingTest::Iterate& state = at.state;
     const bool done = test_->ends(state);
-    const int64_t evaluations = function_.evaluations();
     if (watch_ && !done)
       outcome.stopped =
           !watch_({at.number, function_.positions().load(), at.value, state.largest_force,
-                   test_->error(), evaluations, state.displacement});
+                   test_->error(), function_.evaluations(), state.displacement});
     const bool in_vain = progress_->ends(
         {function_.evaluations(), at.value, state.largest_force, test_->error(), at.number});
     return done || outcome.stopped || in_vain;
-  });
-  return outcome;
+  };
 }
 
 Outcome Minimizer::presolve(Vec displacement, double distance, bool near) {
   if (tao_->method() != Method::preconditioned) return run(displacement, distance);
   test_->begin(distance, StoppingTest::Criterion::gradient, false);
-  return search(displacement, near);
+  Outcome outcome;
+  outcome.iterations = tao_->run(displacement, near, ending(outcome));
+  return outcome;
 }
 
 Outcome Minimizer::finish(Vec displacement, double accuracy, double taken) {
@@ -82,8 +80,10 @@ Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   int64_t iterations = 0;
   for (const bool may_finish : {true, false}) {
     test_->begin(accuracy, StoppingTest::Criterion::distance, may_finish);
-    outcome = summarize(displacement, accuracy, search(displacement, false));
-    iterations += std::exchange(outcome.iterations, 0);
+    Outcome found;
+    found.iterations = tao_->run(displacement, false, ending(found));
+    outcome = summarize(displacement, accuracy, std::move(found));
+    iterations += outcome.iterations;
     // Where Newton steps do not end it, it continues where they led.
     if (!test_->left_to_finish() || outcome.converged || outcome.stopped) break;
   }

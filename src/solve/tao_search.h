@@ -12,6 +12,13 @@ namespace repose::solve {
 
 using TaoHandle = base::Handle<Tao, TaoDestroy>;
 
+/// Iterate of TAO's, from the first state on.
+struct TaoIterate {
+  int64_t number;  ///< since the search began
+  double value;
+  StoppingTest::Iterate state;
+};
+
 /// TAO's minimization of a function, by Newton's method or what `-tao_type` chooses, with the
 /// forcing terms of its linear systems and the renewals of the initial Hessian of limited-memory
 /// BFGS. All members collective.
@@ -20,14 +27,8 @@ class TaoSearch {
   TaoSearch(discrete::Function& function, linear::TangentSolver& solver);
   TaoSearch(TaoSearch&&) = delete;
 
-  /// Iterate, from the first state on.
-  struct Iterate {
-    int64_t number;  ///< since the search began
-    double value;
-    StoppingTest::Iterate state;
-  };
   /// Returns whether the search ends at an iterate; the same on all ranks.
-  using Ends = std::function<bool(const Iterate&)>;
+  using Ends = std::function<bool(const TaoIterate&)>;
   /// Minimizes from `displacement`, in place. `near`: the search begins where the last one ended,
   /// but for contact. Returns the iterations. What the function or `ends` throws is thrown again.
   int64_t run(Vec displacement, bool near, Ends ends);

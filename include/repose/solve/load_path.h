@@ -73,18 +73,22 @@ class LoadPath {
 
  private:
   struct Attempt {
-    Outcome outcome;
-    bool folded = false;  // more inverted prisms than at the start of the step
-    double expected = 0;  // largest predicted displacement, mm
-    double miss = 0;      // largest distance of the end from the prediction, mm
-    int64_t evaluations = 0;
     ContactPressures before;  // of the step
+    int64_t begun = 0;        // evaluations before it
+    int64_t inverted = 0;     // prisms, before it
+    bool predicted = false;   // trial_ began at the predicted end, increment_
+    double expected = 0;      // mm, largest predicted displacement
+    Outcome outcome = {};
+    int64_t evaluations = 0;  // of the step
+    bool folded = false;      // more prisms are inverted than before
+    double miss = 0;          // mm, largest distance of the end from the prediction
   };
   double automatic_step() const;
   double requested_step() const;
   bool ends_in_automatic_steps() const;
   int64_t inverted(Vec displacement);
-  Attempt attempt(Vec displacement, double load);
+  Attempt begin_step(Vec displacement, double load);
+  void end_step(Attempt& step);
   bool predict(Vec displacement, double load);
   bool begins_softer() const;
   void presolve_softer();

@@ -12,6 +12,7 @@ class ProgressTest;
 class RestDistance;
 class StoppingTest;
 class TaoSearch;
+struct TaoIterate;
 
 /// Estimates how far a state is from rest by the Newton step of `function`, whose linear systems
 /// `solver` solves.
@@ -55,7 +56,7 @@ class Minimizer : public RestSearch {
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
-  Outcome search(Vec displacement, bool near);
+  std::function<bool(const TaoIterate&)> ending(Outcome& outcome);
   Outcome search_and_finish(Vec displacement, double accuracy);
   Outcome summarize(Vec displacement, double accuracy, Outcome outcome, double taken = 0);
   std::string reason_of(const Outcome& outcome) const;
