@@ -62,8 +62,8 @@ BREAKS = [
     # the way of the bones
     (
         "tissue that folds passes",
-        "attempt.folded = inverted(trial_) > folded_before;",
-        "attempt.folded = false;",
+        "step.folded = inverted(trial_) > step.inverted;",
+        "step.folded = false;",
         f"{SOLVE}load_path|extremes|load_steps",
     ),
     (
@@ -94,8 +94,8 @@ BREAKS = [
     # how far
     (
         "estimate of half a step",
-        "constexpr double safety = 2;     // the estimate",
-        "constexpr double safety = 0.5;  // the estimate",
+        "static constexpr double safety = 2;  ///< the estimate",
+        "static constexpr double safety = 0.5;  ///< the estimate",
         f"{SOLVE}|extremes",
     ),
     (
@@ -112,8 +112,8 @@ BREAKS = [
     ),
     (
         "ten times the accuracy is enough",
-        "outcome.converged = error_ <= accuracy_;",
-        "outcome.converged = error_ <= 10 * accuracy_;",
+        "outcome.converged = end.error <= accuracy;",
+        "outcome.converged = end.error <= 10 * accuracy;",
         f"{SOLVE}|extremes",
     ),
     (
@@ -231,19 +231,19 @@ BREAKS = [
     ),
     (
         "a body pushes with its first guess for ever",
-        "body_contact.set_multipliers(pressure);",
+        "bodies.set_multipliers(pressure);",
         "",
         r"^solve\.contact",
     ),
     (
         "what passes into bone is not in the estimate",
-        "outcome.displacement_error += contact_safety * violation();",
+        "outcome.displacement_error += contact_safety * penalty_.violation();",
         "",
         r"^solve\.contact",
     ),
     (
         "a penalty that is too soft stays so",
-        "stiffen(std::min(2 * times_, stiffest));",
+        "stiffen(times = std::min(2 * times, stiffest));",
         "stiffen(1);",
         r"^solve\.contact",
     ),
