@@ -93,7 +93,7 @@ struct TaoSearch::Callbacks {
       PetscReal value = 0, length = 0;
       check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, &length, nullptr));
       StoppingTest::Iterate state;
-      state.cut = self.newton_ && iteration > 0 && self.step_was_cut();
+      state.cut = iteration > 0 && self.method() == Method::newton && self.step_was_cut();
       check(TaoGetSolution(tao, &state.displacement));
       check(TaoGetGradient(tao, &state.gradient, nullptr, nullptr));
       state.largest_force = discrete::largest_block(state.gradient);
@@ -125,8 +125,7 @@ TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver
   base::check_options(TaoSetFromOptions(tao_));
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_ = std::make_unique<InitialHessian>(tao_, solver_);
-  newton_ = uses_hessian(tao_);
-  if (newton_) make_forcing();
+  if (method() == Method::newton) make_forcing();
 }
 
 void TaoSearch::make_forcing() {
@@ -162,7 +161,7 @@ bool TaoSearch::step_was_cut() const {
 }
 
 Method TaoSearch::method() const {
-  if (newton_) return Method::newton;
+  if (uses_hessian(tao_)) return Method::newton;
   return initial_ ? Method::preconditioned : Method::gradient;
 }
 

@@ -47,7 +47,7 @@ class TaoSearch {
   linear::TangentSolver& solver_;
   TaoHandle tao_;
   std::unique_ptr<InitialHessian> initial_;    // of limited-memory BFGS, where it is requested
-  bool newton_, sets_forcing_ = false;         // the method uses the Hessian; its options are ours
+  bool sets_forcing_ = false;                  // of Newton's linear systems; else an option does
   double first_force_ = 0, latest_force_ = 0;  // N, largest block of ∇Φ at these iterates
   bool slowed_ = false;                        // the initial Hessian is to be renewed
   int64_t before_ = 0;                         // iterations before TAO's present ones
