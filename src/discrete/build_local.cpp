@@ -20,13 +20,10 @@ using model::PointSet;
 /// The model of a rank's piece; refuses regions that hold no prism of any.
 /// Collective.
 model::Model build_piece(MPI_Comm comm, const scene::Scene& scene,
-                         const std::vector<surface::Surface>& bones,
-                         const RankColumns& rank_columns) {
+                         const std::vector<surface::Surface>& bones, const model::Piece& piece) {
   model::Model model;
   std::vector<int64_t> found;
-  base::collective_try(
-      comm, [&] { model = model::build_local(scene, bones, rank_columns.piece, found); });
-  model.contact.spacing = rank_columns.spacing;
+  base::collective_try(comm, [&] { model = model::build_local(scene, bones, piece, found); });
   MPI_Allreduce(MPI_IN_PLACE, found.data(), static_cast<int>(found.size()), MPI_INT64_T, MPI_SUM,
                 comm);
   base::on_root(comm, [&] { model::require_regions(found, scene.file.string()); });
@@ -123,15 +120,16 @@ void number_points(const RankColumns& rank_columns, const PiecePoints& points, P
   piece.point_row = points.row;
   piece.counts.points = rank_columns.columns * rank_columns.layers;
   for (const model::DoubledColumn& at : rank_columns.doubled) piece.counts.points += at.points;
-  piece.total_unknowns = rank_columns.total_unknowns;
-  piece.first_unknown = rank_columns.first_unknown;
   piece.unknowns = rank_columns.unknowns;
 }
 
-/// Row of a prism of the piece in the whole model.
-int64_t row_of_prism(const RankColumns& rank_columns, int64_t row) {
-  const auto triangles = static_cast<int64_t>(rank_columns.piece.triangle.size());
-  return row / triangles * rank_columns.triangles + rank_columns.piece.triangle[row % triangles];
+/// Rows of the piece's prisms in the whole model.
+std::vector<int64_t> rows_of_prisms(const RankColumns& rank_columns) {
+  std::vector<int64_t> rows;
+  for (int64_t layer = 0; layer + 1 < rank_columns.layers; ++layer)
+    for (const int64_t triangle : rank_columns.piece.triangle)
+      rows.push_back(layer * rank_columns.triangles + triangle);
+  return rows;
 }
 
 /// [C] Marks a rank's columns and those beside them: the piece has all elements at these.
@@ -204,8 +202,7 @@ void number_elements(MPI_Comm comm, const RankColumns& rank_columns, const Piece
     springs = rows_of_springs(comm, rank, rank_columns, points, piece.model.springs);
   piece.spring_row = std::move(springs.row);
   piece.edge_row = std::move(edges.row);
-  for (size_t m = 0; m < piece.model.prisms.points.size(); ++m)
-    piece.prism_row.push_back(row_of_prism(rank_columns, static_cast<int64_t>(m)));
+  piece.prism_row = rows_of_prisms(rank_columns);
   piece.counts.springs = springs.total;
   piece.counts.prisms = (rank_columns.layers - 1) * rank_columns.triangles;
   piece.counts.edges = edges.total;
@@ -223,11 +220,9 @@ void take_balance(MPI_Comm comm, const LocalModel& balanced, const RankColumns& 
     model.springs.rest_length = natural.at_rows(rows.row, rows.total, slabs.springs.rest_length);
     return;
   }
-  std::vector<int64_t> prism_row, known, edge_row;
-  for (size_t m = 0; m < model.prisms.points.size(); ++m)
-    prism_row.push_back(row_of_prism(rank_columns, static_cast<int64_t>(m)));
-  model.prisms.target_volume =
-      natural.at_rows(prism_row, slabs.counts.prisms, slabs.prisms.target_volume);
+  std::vector<int64_t> known, edge_row;
+  model.prisms.target_volume = natural.at_rows(rows_of_prisms(rank_columns), slabs.counts.prisms,
+                                               slabs.prisms.target_volume);
   const ColumnRows rows = rows_of_edges(comm, base::rank(comm), rank_columns, points, model);
   for (size_t e = 0; e < rows.row.size(); ++e)
     if (rows.row[e] >= 0) known.push_back(static_cast<int64_t>(e)), edge_row.push_back(rows.row[e]);
@@ -296,12 +291,12 @@ LocalModel build_local(MPI_Comm comm, const model::ColumnGeometry* geometry, sce
   const base::Logged logged(event);
   model::Model global_metadata;
   std::vector<surface::Surface> bones;
-  const RankColumns rank_columns =
-      distribute_columns(comm, geometry, scene, global_metadata, bones);
-  scene.moves = rank_columns.moves;
+  const RankColumns rank_columns = distribute_columns(comm, geometry, global_metadata, bones);
+  base::broadcast(comm, scene.moves, global_metadata.contact.spacing);
   Piece piece;
   model::Model& model = piece.model;
-  model = build_piece(comm, scene, bones, rank_columns);
+  model = build_piece(comm, scene, bones, rank_columns.piece);
+  model.contact.spacing = global_metadata.contact.spacing;
   piece.solid = scene.tissue.material.has_value();
   const double effective_modulus = set_mean_moduli(comm, scene, rank_columns, model);
   remove_empty_terms(comm, model);

@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include "exchange.h"
+
 namespace repose::discrete {
 
 ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column,
@@ -16,16 +18,8 @@ ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int6
   }
   std::vector<int64_t> first = gather_by_column(comm, columns + 1, own, count);
   if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
-  // Every rank requests the first rows of the columns that it knows.
+  const std::vector<int64_t> begin = Exchange::fetch(comm, known, std::ssize(first))(first);
   ColumnRows rows;
-  std::vector<int64_t> begin, theirs, answer;
-  for (int r = 0; r < base::size(comm); ++r) {
-    if (base::rank(comm) == r) theirs = known;
-    base::Message(comm, r, 0)(theirs);
-    if (base::rank(comm) == 0) answer = base::pick(first, theirs);
-    base::Message(comm, 0, r)(answer);
-    if (base::rank(comm) == r) begin = answer;
-  }
   if (base::rank(comm) == 0) rows.total = first.back();
   base::broadcast(comm, rows.total);
   size_t k = 0;

@@ -17,7 +17,7 @@ void for_each_force(Objective& elastic, Visit&& visit) {
   const Part& part = elastic.positions().part();
   const std::vector<Vec3> force = elastic.residual_force();
   for (int64_t i = 0; i < part.owned_points; ++i)
-    if (part.unknown[i] >= 0) visit(part.unknown[i] - part.first_unknown, force[i]);
+    if (part.unknown[i] >= 0) visit(part.unknown[i] - part.unknowns.first, force[i]);
 }
 
 }  // namespace
@@ -84,8 +84,8 @@ ForceHessian::ForceHessian(ForceFunctional& functional, Tangent& elastic)
 
 void ForceHessian::make_metric() {
   const Part& part = functional_.positions().part();
-  const auto owned = static_cast<PetscInt>(3 * part.owned_unknowns);
-  const auto total = static_cast<PetscInt>(3 * part.total_unknowns);
+  const auto owned = static_cast<PetscInt>(3 * part.unknowns.owned);
+  const auto total = static_cast<PetscInt>(3 * part.unknowns.total);
   check(MatCreate(functional_.positions().comm(), metric_.out()));
   check(MatSetSizes(metric_, owned, owned, total, total));
   check(MatSetType(metric_, MATAIJ));
@@ -95,7 +95,7 @@ void ForceHessian::make_metric() {
 }
 
 void ForceHessian::fill_metric() {
-  const PetscInt first = static_cast<PetscInt>(functional_.positions().part().first_unknown);
+  const PetscInt first = static_cast<PetscInt>(functional_.positions().part().unknowns.first);
   for_each_force(functional_.elastic(), [&](int64_t row, const Vec3& force) {
     const double length = std::hypot(force.norm(), functional_.epsilon());
     const Vec3 unit = force / length;

@@ -79,8 +79,7 @@ void remove_fixed_pairs(const std::vector<PointSet>& set, Model& model) {
   std::vector<int64_t> free;
   for (size_t c = 0; c < pairs.point.size(); ++c)
     if (set[pairs.point[c]] == PointSet::soft_tissue) free.push_back(static_cast<int64_t>(c));
-  pairs = {pick(pairs.point, free), pick(pairs.body, free), pick(pairs.binding, free),
-           pick(pairs.area, free)};
+  pairs = pick_rows(std::move(pairs), free);
 }
 
 /// The ranks that need the elements of each column: those that own it or a column beside it.
@@ -337,10 +336,7 @@ ColumnRanks assign(MPI_Comm comm, const HeldColumns& column, const std::vector<P
     needing = ranks_of_columns(graph, numbers);
   });
   base::broadcast(comm, needing.begin, needing.rank, numbers.unknown_begin);
-  const int rank = base::rank(comm);
-  piece.total_unknowns = numbers.unknown_begin.back();
-  piece.first_unknown = numbers.unknown_begin[rank];
-  piece.unknowns = numbers.unknown_begin[rank + 1] - piece.first_unknown;
+  piece.unknowns = unknown_blocks(numbers.unknown_begin, base::rank(comm));
   return needing;
 }
 

@@ -98,26 +98,9 @@ void number(std::vector<std::array<int64_t, n>>& elements, LocalNumbers& local) 
     for (int64_t& point : element) point = local.of(point);
 }
 
-template <size_t n>
-std::vector<std::array<int64_t, n>> pick_elements(
-    const std::vector<std::array<int64_t, n>>& elements, const std::vector<int64_t>& rows,
-    LocalNumbers& local) {
-  std::vector<std::array<int64_t, n>> picked = pick(elements, rows);
-  number(picked, local);
-  return picked;
-}
-
-void pick_points(const Piece& piece, Part& part) {
-  const model::Points& all = piece.model.points;
+void pick_points(Piece& piece, Part& part) {
   model::Points& mine = part.model.points;
-  mine.position = pick(all.position, part.point_row);
-  mine.set = pick(all.set, part.point_row);
-  mine.target = pick(all.target, part.point_row);
-  mine.layer = pick(all.layer, part.point_row);
-  mine.column = pick(all.column, part.point_row);
-  mine.bone = pick(all.bone, part.point_row);
-  mine.mass = pick(all.mass, part.point_row);
-  mine.external_force = pick(all.external_force, part.point_row);
+  mine = pick_rows(std::move(piece.model.points), part.point_row);
   part.unknown = pick(piece.unknown, part.point_row);
   part.original_set.assign(mine.set.begin(), mine.set.begin() + part.owned_points);
   for (size_t p = 0; p < mine.set.size(); ++p)
@@ -152,8 +135,8 @@ model::Contact pick_contact(const Piece& piece, const std::vector<double>& offse
   };
   model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
   const std::vector<int64_t>& rows = pair_row = mine(all.pairs.point);
-  part.pairs = {pick(all.pairs.point, rows), pick(all.pairs.body, rows),
-                pick(all.pairs.binding, rows), pick(all.pairs.area, rows), pick(offset, rows)};
+  part.pairs = pick_rows(all.pairs, rows);
+  part.pairs.offset = pick(offset, rows);
   number_all(part.pairs.point);
   if (all.cut_faces.empty() || piece.owner[all.cut_faces.point.front()] != rank) return part;
   part.cut_faces = all.cut_faces;
@@ -161,32 +144,28 @@ model::Contact pick_contact(const Piece& piece, const std::vector<double>& offse
   return part;
 }
 
-void pick_springs(const Piece& piece, LocalNumbers& local, int rank, Part& part) {
-  const Model& model = piece.model;
+void pick_springs(Piece& piece, LocalNumbers& local, int rank, Part& part) {
+  Model& model = piece.model;
   auto rows = element_rows(piece, model.springs.points, rank, part.owned_springs);
-  part.model.springs = {pick_elements(model.springs.points, rows, local),
-                        pick(model.springs.set, rows),
-                        pick(model.springs.rest_length, rows),
-                        pick(model.springs.stiffness, rows),
-                        pick(model.springs.exponent, rows),
-                        pick(model.springs.reference, rows)};
+  part.model.springs = pick_rows(std::move(model.springs), rows);
+  number(part.model.springs.points, local);
   rows.resize(part.owned_springs);
   part.spring_row = pick(piece.spring_row, rows);
 }
 
 /// Prisms, and edges.
-void pick_solid(const Piece& piece, LocalNumbers& local, int rank, Part& part) {
-  const Model& model = piece.model;
+void pick_solid(Piece& piece, LocalNumbers& local, int rank, Part& part) {
+  Model& model = piece.model;
   std::vector<char> surrounded;
   if (model::is_solid(model)) surrounded = surrounded_points(piece, rank);
   auto rows = element_rows(piece, model.prisms.points, rank, part.owned_prisms, surrounded);
-  part.model.prisms = model::pick_prisms(model.prisms, rows);
+  part.model.prisms = pick_rows(std::move(model.prisms), rows);
   number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);
   part.prism_row = pick(piece.prism_row, rows);
   rows = element_rows(piece, model.edges.points, rank, part.owned_edges);
-  part.model.edges = {pick_elements(model.edges.points, rows, local),
-                      pick(model.edges.weight, rows)};
+  part.model.edges = pick_rows(std::move(model.edges), rows);
+  number(part.model.edges.points, local);
   rows.resize(part.owned_edges);
   part.edge_row = pick(piece.edge_row, rows);
 }
@@ -225,7 +204,8 @@ void add_contact(MPI_Comm comm, const Piece& piece, LocalNumbers& local, Part& p
   if (!part.bodies.empty()) part.body_meshes = body_meshes(model);
 }
 
-Part make_part(MPI_Comm comm, const Piece& piece, const std::vector<int64_t>& own) {
+/// Takes points and elements out of `piece`. Collective.
+Part make_part(MPI_Comm comm, Piece& piece, const std::vector<int64_t>& own) {
   const Model& model = piece.model;
   const int rank = base::rank(comm);
   Part part;
@@ -244,12 +224,10 @@ Part make_part(MPI_Comm comm, const Piece& piece, const std::vector<int64_t>& ow
   part.model.gravity = model.gravity;
   part.model.bones = model.bones;
   part.model.bone_transform = piece.bones.transform;
-  part.first_unknown = piece.first_unknown;
-  part.owned_unknowns = piece.unknowns;
+  part.unknowns = piece.unknowns;
   part.total_points = piece.counts.points;
   part.total_springs = piece.counts.springs;
   part.total_prisms = piece.counts.prisms;
-  part.total_unknowns = piece.total_unknowns;
   return part;
 }
 
@@ -267,6 +245,10 @@ void copy_surfaces(const base::Message& copy, std::vector<surface::Surface>& sur
   copy(count);
   surfaces.resize(count);
   for (surface::Surface& of : surfaces) copy(of.points, of.triangles);
+}
+
+UnknownBlocks unknown_blocks(const std::vector<int64_t>& begin, int rank) {
+  return {begin[rank], begin[rank + 1] - begin[rank], begin.back()};
 }
 
 LocalModel build_part(MPI_Comm comm, Piece& piece) {

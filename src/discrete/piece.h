@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "repose/base/collective.h"
+#include "repose/base/geometry.h"
 #include "repose/discrete/part.h"
 
 namespace repose::discrete {
@@ -30,7 +31,7 @@ struct Piece {
   /// Rows in the whole model: [N], [springs], [prisms], [edges]. −1 where no part needs it.
   std::vector<int64_t> point_row, spring_row, prism_row, edge_row;
   model::Counts counts;  ///< of the whole model; kinds of points are counted by build_part()
-  int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;  ///< blocks, of all and of this rank
+  UnknownBlocks unknowns;
 };
 
 /// Calls visit(point) for every point of an element, of whatever kind.
@@ -52,10 +53,22 @@ void for_each_point(Model& model, const Visit& visit) {
   for (auto& elements : model.elements) visit_each(elements.points);
 }
 
+/// Returns rows of a group of arrays (model::for_each_array).
+template <class Group>
+Group pick_rows(Group group, const std::vector<int64_t>& rows) {
+  model::for_each_array(group,
+                        [&](const char*, auto& values) { values = base::pick(values, rows); });
+  return group;
+}
+
 /// Copies surfaces; their names stay behind.
 void copy_surfaces(const base::Message& copy, std::vector<surface::Surface>& surfaces);
 
-/// Builds this rank's part of a model from its piece, with the counts and normals of the whole.
+/// Returns a rank's blocks; `begin` [ranks + 1]: the first block of each rank.
+UnknownBlocks unknown_blocks(const std::vector<int64_t>& begin, int rank);
+
+/// Builds this rank's part of a model from its piece, whose points and elements it takes, with the
+/// counts and normals of the whole.
 /// Rows of contact are those of the piece's pairs. Collective.
 LocalModel build_part(MPI_Comm comm, Piece& piece);
 

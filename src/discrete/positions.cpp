@@ -31,8 +31,8 @@ base::VecHandle Positions::make_vector() const {
   base::VecHandle v;
   check(VecCreate(comm_, v.out()));
   check(VecSetBlockSize(v, 3));
-  check(VecSetSizes(v, static_cast<PetscInt>(3 * part_.owned_unknowns),
-                    static_cast<PetscInt>(3 * part_.total_unknowns)));
+  check(VecSetSizes(v, static_cast<PetscInt>(3 * part_.unknowns.owned),
+                    static_cast<PetscInt>(3 * part_.unknowns.total)));
   check(VecSetType(v, VECSTANDARD));
   check(VecSet(v, 0));
   return v;
@@ -76,7 +76,7 @@ void Positions::restrict_to_owned(std::span<const Vec3> values, Vec out) const {
   check(VecGetArrayWrite(out, &target));
   for (int64_t i = 0; i < part_.owned_points; ++i)
     if (part_.unknown[i] >= 0)
-      Eigen::Map<Vec3>(target + 3 * (part_.unknown[i] - part_.first_unknown)) = values[i];
+      Eigen::Map<Vec3>(target + 3 * (part_.unknown[i] - part_.unknowns.first)) = values[i];
   check(VecRestoreArrayWrite(out, &target));
 }
 

@@ -22,8 +22,8 @@ void copy_columns(const base::Message& copy, RankColumns& d) {
   copy(p.column, p.skin, p.deep, p.bone, p.slides, p.free, p.rim, p.parted, p.jaws, p.corner,
        p.triangle, p.edge, p.slope, p.loads.instrument, p.loads.target, p.loads.force,
        p.loads.layer_area);
-  copy(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.total_unknowns,
-       d.first_unknown, d.unknowns, d.spacing, d.moves, d.doubled);
+  copy(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.unknowns,
+       d.doubled);
   auto count = d.cuts.size();
   copy(count);
   d.cuts.resize(count);
@@ -63,9 +63,9 @@ void keep_cuts_whole(std::span<const model::Cut> cuts, std::vector<int>& owner) 
 /// Distributes columns from rank 0.
 class Distributor {
  public:
-  Distributor(const model::ColumnGeometry& geometry, const scene::Scene& scene,
-              const ColumnGraph& graph, const std::vector<int>& owner, int ranks)
-      : geometry_(geometry), scene_(scene), owner_(owner), own_(ranks), first_unknown_(ranks + 1) {
+  Distributor(const model::ColumnGeometry& geometry, const ColumnGraph& graph,
+              const std::vector<int>& owner, int ranks)
+      : geometry_(geometry), owner_(owner), own_(ranks), unknown_begin_(ranks + 1) {
     const auto columns = static_cast<int64_t>(owner.size());
     const std::vector<int64_t> memory = memory_order(graph);
     std::vector<int64_t> order = base::all_rows(columns);
@@ -76,19 +76,19 @@ class Distributor {
     unknown_.resize(columns);
     std::vector<int64_t> doubled(columns, 0);
     for (const model::DoubledColumn& at : geometry.doubled()) doubled[at.column] = at.points;
-    for (int64_t k = 0; k < columns; ++k) {
-      const int64_t c = order[k];
-      place_[c] = points_;
-      points_ += geometry.layers() + doubled[c];
-      unknown_[c] = unknowns_;
-      unknowns_ += geometry.soft_points(c);
-      first_unknown_[owner[c] + 1] += geometry.soft_points(c);
+    int64_t points = 0, unknowns = 0;
+    for (const int64_t c : order) {
+      place_[c] = points;
+      points += geometry.layers() + doubled[c];
+      unknown_[c] = unknowns;
+      unknowns += geometry.soft_points(c);
+      unknown_begin_[owner[c] + 1] += geometry.soft_points(c);
     }
-    std::partial_sum(first_unknown_.begin(), first_unknown_.end(), first_unknown_.begin());
+    std::partial_sum(unknown_begin_.begin(), unknown_begin_.end(), unknown_begin_.begin());
     for (int64_t c = 0; c < columns; ++c) own_[owner[c]].push_back(c);
   }
 
-  RankColumns columns_of(int rank, double spacing) const {
+  RankColumns columns_of(int rank) const {
     RankColumns rank_columns;
     rank_columns.piece = geometry_.piece(own_[rank]);
     rank_columns.owner = pick(owner_, rank_columns.piece.column);
@@ -98,11 +98,7 @@ class Distributor {
     rank_columns.columns = static_cast<int64_t>(owner_.size());
     rank_columns.triangles = static_cast<int64_t>(geometry_.skin().triangles.size());
     rank_columns.edges = static_cast<int64_t>(geometry_.skin().edges.size());
-    rank_columns.total_unknowns = unknowns_;
-    rank_columns.first_unknown = first_unknown_[rank];
-    rank_columns.unknowns = first_unknown_[rank + 1] - first_unknown_[rank];
-    rank_columns.spacing = spacing;
-    rank_columns.moves = scene_.moves;
+    rank_columns.unknowns = unknown_blocks(unknown_begin_, rank);
     rank_columns.doubled = geometry_.doubled();
     rank_columns.cuts = {geometry_.cuts().begin(), geometry_.cuts().end()};
     for (model::Cut& cut : rank_columns.cuts)
@@ -112,18 +108,16 @@ class Distributor {
 
  private:
   const model::ColumnGeometry& geometry_;
-  const scene::Scene& scene_;
   const std::vector<int>& owner_;
   std::vector<std::vector<int64_t>> own_;  // [ranks] columns
   std::vector<int64_t> place_, unknown_;   // [columns] as in RankColumns
-  std::vector<int64_t> first_unknown_;     // [ranks + 1]
-  int64_t points_ = 0, unknowns_ = 0;
+  std::vector<int64_t> unknown_begin_;     // [ranks + 1]
 };
 
 }  // namespace
 
 RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
-                               const scene::Scene& scene, model::Model& global_metadata,
+                               model::Model& global_metadata,
                                std::vector<surface::Surface>& bones) {
   const int ranks = base::size(comm);
   ColumnGraph graph;
@@ -139,12 +133,11 @@ RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geome
   std::optional<Distributor> distributor;  // on rank 0
   base::on_root(comm, [&] {
     keep_cuts_whole(geometry->cuts(), owner);
-    distributor.emplace(*geometry, scene, graph, owner, ranks);
+    distributor.emplace(*geometry, graph, owner, ranks);
   });
   RankColumns rank_columns;
   for (int r = ranks - 1; r >= 0; --r) {
-    base::on_root(
-        comm, [&] { rank_columns = distributor->columns_of(r, global_metadata.contact.spacing); });
+    base::on_root(comm, [&] { rank_columns = distributor->columns_of(r); });
     base::collective_try(comm, [&] {
       const base::Message copy(comm, 0, r);
       copy_columns(copy, rank_columns);

@@ -1,10 +1,5 @@
 #pragma once
-#include <mpi.h>
-
-#include <cstdint>
-#include <vector>
-
-#include "repose/model/build.h"
+#include "repose/discrete/part.h"
 
 namespace repose::discrete {
 
@@ -14,20 +9,17 @@ struct RankColumns {
   std::vector<int> owner;        ///< [C] rank of each column
   std::vector<int64_t> place;    ///< [C] of its first point, as in Distribution
   std::vector<int64_t> unknown;  ///< [C] block number of its first unknown
+  UnknownBlocks unknowns;
   int64_t layers = 0, columns = 0, triangles = 0, edges = 0;  ///< of the whole
-  int64_t total_unknowns = 0, first_unknown = 0, unknowns = 0;
   /// Cuts of the whole; those meet whose sides this rank holds.
   std::vector<model::Cut> cuts;
   std::vector<model::DoubledColumn> doubled;  ///< of the whole
-  double spacing = 0;                         ///< mm, of contact's grids
-  std::vector<scene::RigidMotion> moves;      ///< [bones]
 };
 
 /// Distributes the `geometry`, which rank 0 alone reads: to every rank its piece, and the bones; to
 /// rank 0 the model's global metadata. Columns are shared out as by build_local() of a model.
 /// Collective.
 RankColumns distribute_columns(MPI_Comm comm, const model::ColumnGeometry* geometry,
-                               const scene::Scene& scene, model::Model& global_metadata,
-                               std::vector<surface::Surface>& bones);
+                               model::Model& global_metadata, std::vector<surface::Surface>& bones);
 
 }  // namespace repose::discrete

@@ -30,8 +30,8 @@ Tangent::Tangent(Objective& objective) : objective_(objective) { make_action(); 
 
 void Tangent::make_action() {
   const Part& part = objective_.positions().part();
-  const auto owned = static_cast<PetscInt>(3 * part.owned_unknowns);
-  const auto total = static_cast<PetscInt>(3 * part.total_unknowns);
+  const auto owned = static_cast<PetscInt>(3 * part.unknowns.owned);
+  const auto total = static_cast<PetscInt>(3 * part.unknowns.total);
   direction_.assign(part.point_row.size(), Vec3::Zero());
   work_ = direction_;
   check(MatCreateShell(objective_.positions().comm(), owned, owned, total, total, this,
@@ -169,7 +169,7 @@ base::MatHandle Tangent::nodal_coupling() const {
   const Part& part = objective_.positions().part();
   const mechanics::NodalVolumes& nodal = objective_.loops().nodal;
   const auto rows = mechanics::nodal_gradients(nodal, part.owned_points, at_);
-  const auto columns = static_cast<PetscInt>(3 * part.owned_unknowns);
+  const auto columns = static_cast<PetscInt>(3 * part.unknowns.owned);
   base::MatHandle gradients, product;
   check(MatCreateAIJ(objective_.positions().comm(), static_cast<PetscInt>(part.owned_points),
                      columns, PETSC_DETERMINE, PETSC_DETERMINE, max_around(rows), nullptr,

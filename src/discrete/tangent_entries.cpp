@@ -44,10 +44,10 @@ void for_each_facing_pair(const model::CutFaces& cut_faces, Link&& link) {
 }  // namespace
 
 void TangentEntries::make_pattern() {
-  std::vector<std::vector<int32_t>> neighbors(part_.owned_unknowns);
+  std::vector<std::vector<int32_t>> neighbors(part_.unknowns.owned);
   const auto link = [&](int32_t p, int32_t q) {
     if (!owns(p) || part_.unknown[q] < 0) return;
-    neighbors[part_.unknown[p] - part_.first_unknown].push_back(
+    neighbors[part_.unknown[p] - part_.unknowns.first].push_back(
         static_cast<int32_t>(part_.unknown[q]));
   };
   for (int64_t i = 0; i < part_.owned_points; ++i)
@@ -61,7 +61,7 @@ void TangentEntries::make_pattern() {
         for (int32_t q : corners) link(p, q);
   for (const mechanics::TermLoop& loop : objective_.loops().terms) loop.for_each_link(link);
   for_each_facing_pair(part_.model.contact.cut_faces, link);
-  const int64_t first = part_.first_unknown, last = first + part_.owned_unknowns;
+  const int64_t first = part_.unknowns.first, last = first + part_.unknowns.owned;
   for (BlockRows& rows : rows_) rows.begin.push_back(0);
   for (auto& row : neighbors) {
     base::sort_unique(row);
@@ -72,12 +72,12 @@ void TangentEntries::make_pattern() {
 }
 
 void TangentEntries::make_pattern_matrix() {
-  const auto owned = static_cast<PetscInt>(part_.owned_unknowns);
+  const auto owned = static_cast<PetscInt>(part_.unknowns.owned);
   std::vector<PetscInt> count[2];
   for (int side = 0; side < 2; ++side)
     for (PetscInt k = 0; k < owned; ++k)
       count[side].push_back(rows_[side].begin[k + 1] - rows_[side].begin[k]);
-  const auto total = static_cast<PetscInt>(part_.total_unknowns);
+  const auto total = static_cast<PetscInt>(part_.unknowns.total);
   check(MatCreate(objective_.positions().comm(), pattern_.out()));
   check(MatSetSizes(pattern_, 3 * owned, 3 * owned, 3 * total, 3 * total));
   check(MatSetBlockSize(pattern_, 3));
@@ -85,7 +85,7 @@ void TangentEntries::make_pattern_matrix() {
   check(MatXAIJSetPreallocation(pattern_, 3, count[0].data(), count[1].data(), nullptr, nullptr));
   check(MatSetOption(pattern_, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   for (PetscInt k = 0; k < owned; ++k) {
-    const auto row = static_cast<PetscInt>(part_.first_unknown + k);
+    const auto row = static_cast<PetscInt>(part_.unknowns.first + k);
     for (const BlockRows& rows : rows_) {
       const PetscInt n = rows.begin[k + 1] - rows.begin[k];
       const std::vector<PetscScalar> zeros(size_t{9} * n, 0.0);
@@ -109,10 +109,10 @@ base::MatHandle TangentEntries::make() const {
 
 TangentEntries::Slot TangentEntries::find(int32_t row_point, int32_t column_point) const {
   if (!owns(row_point) || part_.unknown[column_point] < 0) return -1;
-  const int64_t k = part_.unknown[row_point] - part_.first_unknown;
+  const int64_t k = part_.unknown[row_point] - part_.unknowns.first;
   const auto column = static_cast<int32_t>(part_.unknown[column_point]);
-  const int64_t offset = column - part_.first_unknown;
-  const int side = offset >= 0 && offset < part_.owned_unknowns ? 0 : 1;
+  const int64_t offset = column - part_.unknowns.first;
+  const int side = offset >= 0 && offset < part_.unknowns.owned ? 0 : 1;
   const BlockRows& rows = rows_[side];
   const auto first = rows.column.begin() + rows.begin[k];
   const auto place = std::lower_bound(first, rows.column.begin() + rows.begin[k + 1], column);
@@ -146,7 +146,7 @@ void TangentEntries::add(double* const values[2], Slot slot, int32_t row_point,
   if (slot < 0) return;
   const int32_t beyond = 9 * rows_[0].begin.back();
   const int side = slot < beyond ? 0 : 1;
-  const int64_t k = part_.unknown[row_point] - part_.first_unknown;
+  const int64_t k = part_.unknown[row_point] - part_.unknowns.first;
   const int32_t stride = 3 * (rows_[side].begin[k + 1] - rows_[side].begin[k]);
   double* entry = values[side] + slot - (side == 0 ? 0 : beyond);
   for (int r = 0; r < 3; ++r, entry += stride)

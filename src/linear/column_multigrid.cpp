@@ -21,14 +21,14 @@ std::vector<int32_t> number_points(const discrete::Part& part) {
   for (size_t i = 0; i < number.size(); ++i) {
     if (part.unknown[i] < 0) continue;
     if (static_cast<int64_t>(i) < part.owned_points)
-      number[i] = static_cast<int32_t>(part.unknown[i] - part.first_unknown);
+      number[i] = static_cast<int32_t>(part.unknown[i] - part.unknowns.first);
     else
       ghost.push_back(static_cast<int32_t>(i));
   }
   std::sort(ghost.begin(), ghost.end(),
             [&](int32_t a, int32_t b) { return part.unknown[a] < part.unknown[b]; });
   for (size_t g = 0; g < ghost.size(); ++g)
-    number[ghost[g]] = static_cast<int32_t>(part.owned_unknowns + static_cast<int64_t>(g));
+    number[ghost[g]] = static_cast<int32_t>(part.unknowns.owned + static_cast<int64_t>(g));
   return number;
 }
 
@@ -95,7 +95,7 @@ std::vector<Place> places(const discrete::Part& part, bool layered) {
 std::vector<int64_t> ghosts(const discrete::Part& part, const std::vector<int32_t>& number) {
   std::vector<int64_t> ghost;
   for (size_t i = 0; i < number.size(); ++i)
-    if (number[i] >= part.owned_unknowns) ghost.push_back(part.unknown[i]);
+    if (number[i] >= part.unknowns.owned) ghost.push_back(part.unknown[i]);
   std::sort(ghost.begin(), ghost.end());
   return ghost;
 }
@@ -219,7 +219,7 @@ ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
 ColumnMultigrid::~ColumnMultigrid() = default;
 
 void ColumnMultigrid::make_fine(const discrete::Part& part, const BlockSource& blocks) {
-  Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.owned_unknowns));
+  Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.unknowns.owned));
   blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.add(p, q, block); });
   const bool layered = base::on_all_ranks(comm_, couplings.layered);
   const double stiffest = base::max_over_ranks(comm_, couplings.stiffest());

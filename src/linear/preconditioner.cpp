@@ -52,7 +52,7 @@ bool is_columns(PC pc) {
 }
 
 int64_t unknowns(const discrete::Positions& positions) {
-  return 3 * positions.part().total_unknowns;  // scalar, of all ranks
+  return 3 * positions.part().unknowns.total;  // scalar, of all ranks
 }
 
 }  // namespace

@@ -348,14 +348,6 @@ void refuse_floating(const Model& m, const std::string& file) {
 
 }  // namespace
 
-Prisms pick_prisms(const Prisms& p, const std::vector<int64_t>& rows) {
-  const auto of_solid = [&](const std::vector<double>& values) {
-    return values.empty() ? values : base::pick(values, rows);
-  };
-  return {base::pick(p.points, rows), base::pick(p.rest_volume, rows), of_solid(p.shear_modulus),
-          of_solid(p.modulus),        of_solid(p.target_volume),       of_solid(p.nodal_modulus)};
-}
-
 Counts count(const Model& model) {
   Counts c;
   c.points = static_cast<int64_t>(model.points.position.size());

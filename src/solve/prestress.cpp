@@ -280,7 +280,7 @@ void refuse_unbalanced(MPI_Comm comm, const discrete::Part& part, Vec force,
   Vec3 at = Vec3::Zero();
   for (int64_t i = 0; i < part.owned_points; ++i) {
     if (part.unknown[i] < 0) continue;
-    const auto* f = values + 3 * (part.unknown[i] - part.first_unknown);
+    const auto* f = values + 3 * (part.unknown[i] - part.unknowns.first);
     if (Eigen::Map<const Vec3>(f).norm() < so_far.residual || part.point_row[i] < worst) continue;
     worst = part.point_row[i];
     at = part.model.points.position[i];

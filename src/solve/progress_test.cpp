@@ -53,7 +53,7 @@ Vec3 place_of_largest(const discrete::Positions& positions, Vec vector) {
   check(VecGetArrayRead(vector, &values));
   for (int64_t i = 0; i < part.owned_points; ++i) {
     if (part.unknown[i] < 0) continue;
-    const PetscScalar* block = values + 3 * (part.unknown[i] - part.first_unknown);
+    const PetscScalar* block = values + 3 * (part.unknown[i] - part.unknowns.first);
     const double length = Eigen::Map<const Vec3>(block).norm();
     if (length <= largest) continue;
     largest = length;

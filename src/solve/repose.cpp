@@ -355,7 +355,7 @@ struct RestSolver::State {
 };
 
 RestSolver::RestSolver(MPI_Comm comm, const discrete::Part& part, const Settings& settings) {
-  if (part.total_unknowns == 0)
+  if (part.unknowns.total == 0)
     base::refuse("the model has no soft-tissue point: nothing is free to move");
   const base::LogStage stage("Search");  // what makes the solvers counts with what uses them
   state_ = std::make_unique<State>(comm, part, settings);
@@ -408,7 +408,7 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
-  summary.unknowns = 3 * positions.part().total_unknowns;
+  summary.unknowns = 3 * positions.part().unknowns.total;
   summary.evaluations = searcher.evaluations();
   summary.evaluations_for_other = searcher.evaluations_for_other();
   summary.assemblies = searcher.assemblies();

@@ -11,6 +11,13 @@
 /// Distribution of a model over ranks: columns are the unit, nothing is ever added across ranks.
 namespace repose::discrete {
 
+/// Unknown points of a model, each a block of three unknowns, numbered rank after rank.
+struct UnknownBlocks {
+  int64_t first = 0, owned = 0;  ///< first block of this rank, and how many it owns
+  int64_t total = 0;             ///< of all ranks
+  bool operator==(const UnknownBlocks&) const = default;
+};
+
 /// Part of a model on one rank. `model` is a model in local numbers: the points of its own columns
 /// come first, column after column, then ghosts; springs, edges and prisms whose first point it
 /// owns come first (they count in energies and are written here), then those that merely touch a
@@ -35,9 +42,8 @@ struct Part {
   /// [owned points] as in the whole model, where bones that do not move rigidly have bone points.
   std::vector<model::PointSet> original_set;
   std::vector<int64_t> unknown;  ///< [local points] block number of its unknowns, −1 if fixed
-  int64_t first_unknown = 0;     ///< block number of this rank's first unknown point
-  int64_t owned_unknowns = 0;    ///< unknown points owned here
-  int64_t total_points = 0, total_springs = 0, total_prisms = 0, total_unknowns = 0;
+  UnknownBlocks unknowns;
+  int64_t total_points = 0, total_springs = 0, total_prisms = 0;
 };
 
 /// A rank's part of a model, and global numbers of it.

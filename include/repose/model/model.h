@@ -92,9 +92,6 @@ struct Model {
 /// Returns whether the tissue is a neo-Hookean solid, not springs.
 inline bool is_solid(const Model& model) { return !model.prisms.modulus.empty(); }
 
-/// Some rows of the prisms, with all that belongs to them.
-Prisms pick_prisms(const Prisms& prisms, const std::vector<int64_t>& rows);
-
 /// [N] of every point the outward unit normal of the skin above it, area-weighted, at the initial
 /// position; zero where there is no skin above.
 std::vector<Vec3> outward_normals(const Model& model);

@@ -153,12 +153,12 @@ TEST(Tangent, LimitsAreTakenBack) {
 TEST(Part, EveryRowHasOneOwner) {
   Moved m({mechanics::VolumeTerm::none});
   int64_t owned[4] = {m.part.owned_points, m.part.owned_springs, m.part.owned_prisms,
-                      m.part.owned_unknowns};
+                      m.part.unknowns.owned};
   MPI_Allreduce(MPI_IN_PLACE, owned, 4, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
   EXPECT_EQ(owned[0], m.part.total_points);
   EXPECT_EQ(owned[1], m.part.total_springs);
   EXPECT_EQ(owned[2], m.part.total_prisms);
-  EXPECT_EQ(owned[3], m.part.total_unknowns);
+  EXPECT_EQ(owned[3], m.part.unknowns.total);
   for (int64_t i = 0; i + 1 < m.part.owned_points; ++i) {
     if (m.part.model.points.column[i] != m.part.model.points.column[i + 1]) continue;
     EXPECT_EQ(m.part.point_row[i] + 1, m.part.point_row[i + 1]) << "columns stay in one piece";

@@ -179,12 +179,10 @@ void expect_same(const Part& one, const Part& other) {
   EXPECT_EQ(one.owned_springs, other.owned_springs);
   EXPECT_EQ(one.owned_prisms, other.owned_prisms);
   EXPECT_EQ(one.owned_edges, other.owned_edges);
-  EXPECT_EQ(one.first_unknown, other.first_unknown);
-  EXPECT_EQ(one.owned_unknowns, other.owned_unknowns);
+  EXPECT_EQ(one.unknowns, other.unknowns);
   EXPECT_EQ(one.total_points, other.total_points);
   EXPECT_EQ(one.total_springs, other.total_springs);
   EXPECT_EQ(one.total_prisms, other.total_prisms);
-  EXPECT_EQ(one.total_unknowns, other.total_unknowns);
   EXPECT_EQ(one.solid, other.solid);
   EXPECT_EQ(one.contact, other.contact);
   ASSERT_EQ(one.bodies.size(), other.bodies.size());
