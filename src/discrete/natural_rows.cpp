@@ -176,11 +176,24 @@ void NaturalRows::add_stress(std::span<const Vec3> position, model::StepRows& ro
 }
 
 void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const {
-  const ContactState state = contact_state(objective);
-  rows.point_fields.push_back({"contact_gap", false, to_slab<double>(points_, state.gap)});
-  rows.point_fields.push_back(
-      {"contact_pressure", false, to_slab<double>(points_, state.pressure)});
-  rows.point_fields.push_back(field("contact_force", state.force));
+  constexpr double farthest = 6;  // mm, of gaps that are found
+  const std::vector<Vec3> force = objective.contact_force();
+  std::vector<double> least_gap(force.size(), farthest), sum(force.size(), 0.0);
+  const auto add = [&](int64_t point, double gap, double pressure) {
+    least_gap[point] = std::min(least_gap[point], gap);
+    sum[point] += pressure;
+  };
+  mechanics::BodyContact& bodies = objective.body_contact();
+  bodies.update_all_gaps(objective.positions().local());
+  for (size_t c = 0; c < bodies.gaps().size(); ++c)
+    add(bodies.pairs().point[c], bodies.gaps()[c], bodies.pressure(c));
+  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  cut_faces.update_gaps(objective.positions().local());
+  for (size_t w = 0; w < cut_faces.size(); ++w)
+    add(cut_faces.point(w), cut_faces.gap(w), cut_faces.pressure(w));
+  rows.point_fields.push_back({"contact_gap", false, to_slab<double>(points_, least_gap)});
+  rows.point_fields.push_back({"contact_pressure", false, to_slab<double>(points_, sum)});
+  rows.point_fields.push_back(field("contact_force", force));
 }
 
 model::StepRows NaturalRows::rows(Objective& objective) const {

@@ -1,6 +1,6 @@
 #pragma once
+#include "repose/discrete/contact.h"
 #include "repose/discrete/function.h"
-#include "repose/mechanics/cut_face_contact.h"
 #include "repose/mechanics/energy.h"
 
 namespace repose::discrete {
@@ -30,16 +30,11 @@ class Objective : public Function {
   std::span<const std::array<int32_t, 2>> links() const { return links_; }
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
-  mechanics::BodyContact& body_contact() { return body_contact_; }
-  /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
-  /// are kept. Not collective.
-  void round_bodies(bool rounded);
-  mechanics::CutFaceContact& cut_face_contact() { return cut_face_contact_; }
-  const mechanics::CutFaceContact& cut_face_contact() const { return cut_face_contact_; }
-  /// Takes the bodies to where they are at the positions' load. Not collective.
-  void place_bodies();
-  /// Takes contact back to the state after construction. Not collective.
-  void reset_contact();
+  mechanics::BodyContact& body_contact() { return contact_.bodies(); }
+  mechanics::CutFaceContact& cut_face_contact() { return contact_.cut_faces(); }
+  void round_bodies(bool rounded) { contact_.round_bodies(rounded); }  ///< not collective
+  void place_bodies() { contact_.place_bodies(); }                     ///< not collective
+  void reset_contact() { contact_.reset(); }                           ///< not collective
   /// Contact's value, at the last update, summed over ranks, N·mm.
   double contact_value();
   /// N, of what is touched on each owned point, at the last update. Not collective.
@@ -65,30 +60,18 @@ class Objective : public Function {
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;
   void subtract_loads(double scale, std::span<Vec3> gradient) const;
-  double add_contact(double scale, std::span<Vec3> gradient);
   double add_terms(double scale, std::span<Vec3> gradient) const;
 
   mechanics::Weights weights_;
   mechanics::Loops loops_;
   bool averages_volumes_;
   double largest_bulk_;
-  mechanics::BodyContact body_contact_, other_body_contact_;  // those in use, and the others
-  bool rounded_ = false;                                      // bodies in use are
-  mechanics::CutFaceContact cut_face_contact_;
-  int64_t placed_at_ = -1;        // positions' revision at which the bodies are
+  Contact contact_;
   bool loaded_ = false;           // some rank has a weight or an external force
   std::vector<Vec3> load_force_;  // [local points] m g + f^ext on soft tissue; empty if all zero
   mechanics::Totals initial_;     // this rank's share
   std::vector<std::array<int32_t, 2>> links_;
   std::vector<Vec3> work_;  // [local points]
 };
-
-/// Contact of points at the objective's last update, [owned points].
-struct ContactState {
-  std::vector<double> gap;       ///< mm, the smallest; what is looked at at most where none is
-  std::vector<double> pressure;  ///< N/mm², the sum
-  std::vector<Vec3> force;       ///< N
-};
-ContactState contact_state(Objective& objective);
 
 }  // namespace repose::discrete

@@ -1,0 +1,46 @@
+#pragma once
+#include "repose/discrete/positions.h"
+#include "repose/mechanics/cut_face_contact.h"
+
+namespace repose::discrete {
+
+/// Contact of the points that this rank owns: with bodies, which move with the positions' load, and
+/// between the faces of cuts. Members are not collective unless said otherwise.
+class Contact {
+ public:
+  explicit Contact(const Positions& positions);  ///< collective
+
+  mechanics::BodyContact& bodies() { return bodies_; }
+  mechanics::CutFaceContact& cut_faces() { return cut_faces_; }
+  const mechanics::CutFaceContact& cut_faces() const { return cut_faces_; }
+  /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
+  /// are kept.
+  void round_bodies(bool rounded);
+  /// Takes the bodies to where they are at the positions' load.
+  void place_bodies();
+  /// Goes back to the state after construction.
+  void reset();
+
+  /// Returns this rank's value, N·mm, and adds `scale` times its derivative to `gradient` [local
+  /// points].
+  double add_gradient(double scale, std::span<Vec3> gradient);
+  /// Calls visit(p, q, block) for the second derivatives, exact or of a semidefinite relative.
+  template <class Visit>
+  void for_each_block(bool exact, Visit&& visit) {
+    if (!positions_.part().contact) return;
+    place_bodies();
+    bodies_.update_gaps(positions_.local());
+    bodies_.for_each_block(exact, [&](int64_t p, const Mat3& block) { visit(p, p, block); });
+    cut_faces_.update_gaps(positions_.local());
+    cut_faces_.for_each_block(exact, visit);
+  }
+
+ private:
+  const Positions& positions_;
+  mechanics::BodyContact bodies_, other_bodies_;  // those in use, and the others
+  bool rounded_ = false;                          // bodies in use are
+  int64_t placed_at_ = -1;                        // positions' revision at which they are
+  mechanics::CutFaceContact cut_faces_;
+};
+
+}  // namespace repose::discrete
