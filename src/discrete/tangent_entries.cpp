@@ -153,12 +153,6 @@ void TangentEntries::add(double* const values[2], Slot slot, int32_t row_point,
     for (int c = 0; c < 3; ++c) entry[c] += block(r, c);
 }
 
-void TangentEntries::add_spring(double* const values[2], size_t loop, int64_t spring,
-                                const Mat3& block) const {
-  add_pair(values, objective_.loops().springs[loop].points[spring], spring_slots_[loop][spring],
-           block);
-}
-
 void TangentEntries::add_pair(double* const values[2], const std::array<int32_t, 2>& points,
                               const PairSlots& slots, const Mat3& block) const {
   const auto [p, q] = points;
@@ -186,13 +180,15 @@ void TangentEntries::refill(Mat matrix, Work&& add_blocks) const {
 
 void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
                           std::span<const Objective::Block> blocks, Curvature curvature) const {
+  const double scale = objective_.weights().elastic;
+  const auto& springs = objective_.loops().springs;
   refill(matrix, [&](double* const values[2]) {
     for (size_t l = 0; l < spring_slots_.size(); ++l)
       mechanics::for_each_spring_block(
-          objective_.loops().springs[l], at, objective_.weights().elastic, curvature,
-          [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
+          springs[l], at, scale, curvature, [&](int64_t e, const Mat3& block) {
+            add_pair(values, springs[l].points[e], spring_slots_[l][e], block);
+          });
     const mechanics::EdgeLoop& edges = objective_.loops().edges;
-    const double scale = objective_.weights().elastic;
     for (size_t e = 0; e < edge_slots_.size(); ++e)
       add_pair(values, edges.points[e], edge_slots_[e], scale * edges.weight[e] * Mat3::Identity());
     const mechanics::PrismLoop& prisms = objective_.loops().prisms;
@@ -215,11 +211,14 @@ void TangentEntries::fill(Mat matrix, std::span<const Vec3> at,
 
 void TangentEntries::fill_third(Mat matrix, std::span<const Vec3> position,
                                 std::span<const Vec3> direction) const {
+  const auto& springs = objective_.loops().springs;
   refill(matrix, [&](double* const values[2]) {
     for (size_t l = 0; l < spring_slots_.size(); ++l)
-      mechanics::for_each_spring_third(
-          objective_.loops().springs[l], position, objective_.weights().elastic, direction,
-          [&](int64_t e, const Mat3& block) { add_spring(values, l, e, block); });
+      mechanics::for_each_spring_third(springs[l], position, objective_.weights().elastic,
+                                       direction, [&](int64_t e, const Mat3& block) {
+                                         add_pair(values, springs[l].points[e], spring_slots_[l][e],
+                                                  block);
+                                       });
   });
 }
 

@@ -1,22 +1,22 @@
 #pragma once
 #include <memory>
-#include <vector>
 
+#include "repose/discrete/hessian_action.h"
 #include "repose/discrete/tangent_entries.h"
 
 namespace repose::discrete {
 
-/// The Hessian of an objective: the exact one acts spring by spring and prism by prism, without
-/// entries (MATSHELL); the convex one, from which a positive definite preconditioner is made, is
-/// given block by block. Matrices of either are made only where they are requested.
+/// The Hessian of an objective: the exact one acts without entries; the convex one, from which a
+/// positive definite preconditioner is made, is given block by block. Matrices of either are made
+/// only where they are requested.
 class Tangent : public Hessian {
  public:
-  explicit Tangent(Objective& objective);  ///< collective
+  explicit Tangent(Objective& objective) : objective_(objective), action_(objective) {}
 
   /// Nothing is done if `displacement` is the state it is at, and nothing has changed since.
   void assemble(Vec displacement) override;
   /// The next assembly is done in any case: the elements have changed.
-  void invalidate() { at_.clear(); }
+  void invalidate() { state_changed_ = true; }
   /// The next assembly takes the objective's contact as it is then.
   void forget_contact() { contact_changed_ = true; }
 
@@ -24,10 +24,7 @@ class Tangent : public Hessian {
   /// contact until the state changes.
   void set_contact(std::vector<Objective::Block> exact, std::vector<Objective::Block> convex);
 
-  /// Limits |φ′| of volumes in the action (semidefinite_slopes of hessian.h) and leaves the
-  /// negative curvature of further terms out, so that it is positive semidefinite but for contact,
-  /// or takes that back. Returns false where the tissue is no solid. Collective.
-  bool limit_slopes(bool limited);
+  bool limit_slopes(bool limited) { return action_.limit_slopes(limited); }
 
   base::MatHandle make_third();  ///< a matrix for third(); collective
   /// The springs' third derivative on `direction` [local points]: ∂(H d)/∂x at the positions' last
@@ -37,14 +34,11 @@ class Tangent : public Hessian {
   Mat exact() override;
   Mat spd_approximation() override;
   void renew() override;
-  Mat action() override { return action_; }
+  Mat action() override { return action_.matrix(); }
   void visit_spd_blocks(const BlockVisitor& visit) const override;
   void visit_contact_blocks(const BlockVisitor& visit) const override;
 
  private:
-  static PetscErrorCode multiply(Mat matrix, Vec direction, Vec product);
-  void make_action();
-  void take_slopes();
   const TangentEntries& entries();
   base::MatHandle nodal_coupling() const;
   void lift_diagonal();
@@ -52,16 +46,12 @@ class Tangent : public Hessian {
   void visit_level(std::span<const Objective::Block> blocks, const BlockVisitor& visit) const;
 
   Objective& objective_;
+  HessianAction action_;
   std::unique_ptr<TangentEntries> entries_;
-  base::MatHandle exact_, spd_, action_;
-  base::MatHandle coupled_;               // exact_ and what averaged volumes couple
-  std::vector<Objective::Block> blocks_;  // of terms and contact, at the last assembly
+  base::MatHandle exact_, spd_;
+  base::MatHandle coupled_;  // exact_ and what averaged volumes couple
   std::vector<Objective::Block> convex_terms_, convex_contact_;  // of the relative
-  std::vector<Vec3> at_;                // [local points] positions of the last assembly
-  std::vector<double> nodal_slopes_;    // there, where volumes are averaged
-  std::vector<double> max_slope_;       // [prisms] there, or empty: no limit
-  std::vector<Vec3> direction_, work_;  // [local points]
-  bool contact_changed_ = true, limited_ = false;
+  bool state_changed_ = true, contact_changed_ = true;
   int64_t filled_at_ = -1;  // assemblies() when exact_ was filled
 };
 

@@ -43,7 +43,6 @@ class TangentEntries {
   void add(double* const values[2], Slot slot, int32_t row_point, const Mat3& block) const;
   void add_pair(double* const values[2], const std::array<int32_t, 2>& points,
                 const PairSlots& slots, const Mat3& block) const;
-  void add_spring(double* const values[2], size_t loop, int64_t spring, const Mat3& block) const;
   template <class Work>
   void refill(Mat matrix, Work&& add_blocks) const;
 
