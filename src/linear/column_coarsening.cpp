@@ -94,9 +94,9 @@ Coarsening::Coarsening(MPI_Comm comm, const ColumnLevel& fine, const std::vector
   find_centers(at, point, own);
   smooth(fine, at, point);
   transpose(own);
-  const std::vector<int64_t> ghost = find_ghosts(comm, fine, own);
-  BlockPattern pattern = find_pattern(fine, own, static_cast<int32_t>(ghost.size()));
-  coarse_ = std::make_unique<ColumnLevel>(comm, std::move(place), ghost, std::move(pattern));
+  IndexMap points = number_ghosts(comm, fine, own);
+  BlockPattern pattern = find_pattern(fine, own, points.ghosts());
+  coarse_ = std::make_unique<ColumnLevel>(std::move(points), std::move(place), std::move(pattern));
 }
 
 void Coarsening::find_centers(const std::vector<Vec3>& at, const std::vector<int32_t>& point,
@@ -171,9 +171,8 @@ void Coarsening::smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
   }
 }
 
-/// Gives the ghosts their weights, and the coarse points they move with numbers behind `own`.
-/// Returns the global numbers of these.
-std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own) {
+/// Gives the ghosts their weights. Returns the coarse points, with those that ghosts move with.
+IndexMap Coarsening::number_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own) {
   struct Message {
     std::array<int64_t, maximum> point;
     std::array<float, maximum> weight;
@@ -186,18 +185,18 @@ std::vector<int64_t> Coarsening::find_ghosts(MPI_Comm comm, const ColumnLevel& f
       sent[i].weight[m] = weights_[i].weight[m];
     }
   const FloatsType unit(sizeof(Message) / sizeof(float));
-  fine.share(sent.data(), received.data(), unit);
+  fine.points().share(sent.data(), received.data(), unit);
   std::vector<int64_t> ghost;
   for (const Message& message : received)
     for (int m = 0; m < maximum; ++m) ghost.push_back(message.point[m]);
   base::sort_unique(ghost);
+  IndexMap points(comm, own, std::move(ghost));
   for (size_t g = 0; g < received.size(); ++g)
     for (int m = 0; m < maximum; ++m) {
-      const auto at = std::lower_bound(ghost.begin(), ghost.end(), received[g].point[m]);
-      weights_[fine.own() + g].point[m] = own + static_cast<int32_t>(at - ghost.begin());
+      weights_[fine.own() + g].point[m] = points.local(received[g].point[m]);
       weights_[fine.own() + g].weight[m] = received[g].weight[m];
     }
-  return ghost;
+  return points;
 }
 
 void Coarsening::transpose(int32_t own) {
@@ -237,7 +236,7 @@ BlockPattern Coarsening::find_pattern(const ColumnLevel& fine, int32_t own, int3
 }
 
 void Coarsening::refill(const ColumnLevel& fine) {
-  UpperSums sums(*coarse_);
+  coarse_->clear();
   std::vector<int32_t> at(coarse_->own() + coarse_->ghosts(), none), point;
   std::vector<Eigen::Matrix3f> row;  // of A P
   for (int32_t i = 0; i < fine_own_; ++i) {
@@ -257,11 +256,11 @@ void Coarsening::refill(const ColumnLevel& fine) {
     }
     weights_[i].visit([&](int32_t a, float weight) {
       for (size_t k = 0; k < point.size(); ++k)
-        if (point[k] >= a) sums.add(a, point[k], weight * row[k]);
+        if (point[k] >= a) coarse_->add_upper(a, point[k], weight * row[k]);
     });
     for (const int32_t b : point) at[b] = none;
   }
-  coarse_->fill(sums);
+  coarse_->mirror_upper();
 }
 
 void Coarsening::restrict_to(std::span<const Lanes> fine, std::span<Lanes> coarse) const {

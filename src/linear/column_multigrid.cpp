@@ -15,21 +15,13 @@ constexpr int64_t too_many = 1500;     // for factors
 constexpr double min_coarsening = 0.7;
 constexpr int coarse_sweeps = 2;  // down and up, on all levels but the finest
 
-/// The unknown points of `part` by their numbers in it: own ones, then ghosts by global number.
-std::vector<int32_t> number_points(const discrete::Part& part) {
-  std::vector<int32_t> number(part.unknown.size(), -1), ghost;
-  for (size_t i = 0; i < number.size(); ++i) {
-    if (part.unknown[i] < 0) continue;
-    if (static_cast<int64_t>(i) < part.owned_points)
-      number[i] = static_cast<int32_t>(part.unknown[i] - part.unknowns.first);
-    else
-      ghost.push_back(static_cast<int32_t>(i));
-  }
-  std::sort(ghost.begin(), ghost.end(),
-            [&](int32_t a, int32_t b) { return part.unknown[a] < part.unknown[b]; });
-  for (size_t g = 0; g < ghost.size(); ++g)
-    number[ghost[g]] = static_cast<int32_t>(part.unknowns.owned + static_cast<int64_t>(g));
-  return number;
+/// The unknown points of `part`. Collective.
+IndexMap unknown_points(MPI_Comm comm, const discrete::Part& part) {
+  std::vector<int64_t> ghost;
+  for (size_t i = part.owned_points; i < part.unknown.size(); ++i)
+    if (part.unknown[i] >= 0) ghost.push_back(part.unknown[i]);
+  std::ranges::sort(ghost);
+  return {comm, static_cast<int32_t>(part.unknowns.owned), std::move(ghost)};
 }
 
 /// Pairs of coupled points and their largest stiffness.
@@ -50,24 +42,19 @@ class Couplings {
   }
   /// Returns the pattern right of the diagonal and on it, and its transpose.
   BlockPattern pattern() {
-    std::vector<int64_t> left(own(), 0);
-    for (int32_t i = 0; i < own(); ++i) {
-      if (std::find(right_[i].begin(), right_[i].end(), i) == right_[i].end())
-        right_[i].push_back(i);
-      std::sort(right_[i].begin(), right_[i].end());
-      for (const int32_t j : right_[i])
-        if (j > i && j < own()) ++left[j];
-    }
     BlockPattern pattern;
-    for (int32_t i = 0; i < own(); ++i)
-      pattern.begin.push_back(pattern.begin[i] + left[i] + static_cast<int64_t>(right_[i].size()));
-    pattern.column.resize(pattern.begin.back());
-    std::vector<int64_t> next(pattern.begin.begin(), pattern.begin.end() - 1);
-    for (int32_t i = 0; i < own(); ++i)
-      for (const int32_t j : right_[i]) {
-        pattern.column[next[i]++] = j;
-        if (j > i && j < own()) pattern.column[next[j]++] = i;
-      }
+    std::vector<int32_t>& column = pattern.column;
+    std::vector<std::vector<int32_t>> left(own());
+    for (int32_t i = 0; i < own(); ++i) {
+      std::vector<int32_t>& right = right_[i];
+      if (std::ranges::find(right, i) == right.end()) right.push_back(i);
+      std::ranges::sort(right);
+      column.insert(column.end(), left[i].begin(), left[i].end());
+      column.insert(column.end(), right.begin(), right.end());
+      pattern.begin.push_back(std::ssize(column));
+      for (const int32_t j : right)
+        if (j > i && j < own()) left[j].push_back(i);
+    }
     return pattern;
   }
 
@@ -90,14 +77,6 @@ std::vector<Place> places(const discrete::Part& part, bool layered) {
     place.push_back(layered ? Place{column, part.model.points.layer[i]} : Place{own, 0});
   }
   return place;
-}
-
-std::vector<int64_t> ghosts(const discrete::Part& part, const std::vector<int32_t>& number) {
-  std::vector<int64_t> ghost;
-  for (size_t i = 0; i < number.size(); ++i)
-    if (number[i] >= part.unknowns.owned) ghost.push_back(part.unknown[i]);
-  std::sort(ghost.begin(), ghost.end());
-  return ghost;
 }
 
 }  // namespace
@@ -139,23 +118,16 @@ struct ColumnMultigrid::Level {
 class ColumnMultigrid::Coarsest {
  public:
   Coarsest(MPI_Comm comm, const ColumnLevel& level)
-      : comm_(comm), level_(level), right_side_(3 * level.total()) {
-    int ranks = 1;
-    MPI_Comm_size(comm, &ranks);
-    count_.resize(ranks);
-    begin_.assign(ranks, 0);
-    const int own = 3 * level.own();
-    MPI_Allgather(&own, 1, MPI_INT, count_.data(), 1, MPI_INT, comm);
-    for (int r = 0; r + 1 < ranks; ++r) begin_[r + 1] = begin_[r] + count_[r];
-  }
+      : comm_(comm), level_(level), right_side_(3 * level.points().total()) {}
 
   void factor() {
     constexpr double lift = 1e-5;  // of the largest diagonal entry: above what rounding leaves
-    const int64_t n = 3 * level_.total();
+    const int64_t n = 3 * level_.points().total();
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);
     for (int32_t i = 0; i < level_.own(); ++i)
       for (int64_t k = level_.pattern().begin[i]; k < level_.pattern().begin[i + 1]; ++k)
-        matrix.block<3, 3>(3 * level_.global(i), 3 * level_.global(level_.pattern().column[k])) =
+        matrix.block<3, 3>(3 * level_.points().global(i),
+                           3 * level_.points().global(level_.pattern().column[k])) =
             level_.block(k).cast<double>();
     MPI_Allreduce(MPI_IN_PLACE, matrix.data(), static_cast<int>(n * n), MPI_DOUBLE, MPI_SUM, comm_);
     const double largest = n > 0 ? matrix.diagonal().maxCoeff() : 0.0;
@@ -164,14 +136,15 @@ class ColumnMultigrid::Coarsest {
   }
 
   void solve(std::span<const Lanes> b, std::span<Lanes> x) {
+    right_side_.setZero();
     for (int32_t i = 0; i < level_.own(); ++i)
-      for (int d = 0; d < 3; ++d) right_side_[3 * (level_.first() + i) + d] = b[i][d];
-    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, right_side_.data(), count_.data(),
-                   begin_.data(), MPI_DOUBLE, comm_);
+      for (int d = 0; d < 3; ++d) right_side_[3 * (level_.points().first() + i) + d] = b[i][d];
+    MPI_Allreduce(MPI_IN_PLACE, right_side_.data(), static_cast<int>(right_side_.size()),
+                  MPI_DOUBLE, MPI_SUM, comm_);
     factors_.solveInPlace(right_side_);
     for (int32_t i = 0; i < level_.own(); ++i)
       for (int d = 0; d < 3; ++d)
-        x[i][d] = static_cast<float>(right_side_[3 * (level_.first() + i) + d]);
+        x[i][d] = static_cast<float>(right_side_[3 * (level_.points().first() + i) + d]);
   }
 
   using Factors = Eigen::LLT<Eigen::MatrixXd>;
@@ -181,7 +154,6 @@ class ColumnMultigrid::Coarsest {
  private:
   MPI_Comm comm_;
   const ColumnLevel& level_;
-  std::vector<int> count_, begin_;  // [ranks] scalars
   Eigen::VectorXd right_side_;
   Factors factors_;
 };
@@ -194,53 +166,56 @@ struct ColumnMultigrid::Numbers {
 
 ColumnMultigrid::ColumnMultigrid(MPI_Comm comm, const discrete::Part& part,
                                  const BlockSource& blocks)
-    : comm_(comm), number_(number_points(part)) {
+    : comm_(comm) {
   make_fine(part, blocks);
   fill_fine(blocks);
   levels_.emplace_back(*fine_);
   std::vector<Vec3> at;
   for (int64_t i = 0; i < part.owned_points; ++i)
     if (part.unknown[i] >= 0) at.push_back(part.model.points.position[i]);
-  while (levels_.back().matrix->total() > coarse_enough) {
+  while (levels_.back().matrix->points().total() > coarse_enough) {
     const ColumnLevel& above = *levels_.back().matrix;
     auto next = std::make_unique<Coarsening>(comm_, above, at);
-    const auto total = static_cast<double>(next->coarse().total());
-    if (total > min_coarsening * static_cast<double>(above.total())) break;
+    const auto total = static_cast<double>(next->coarse().points().total());
+    if (total > min_coarsening * static_cast<double>(above.points().total())) break;
     next->refill(above);
     at = next->center();
     levels_.emplace_back(next->coarse(), coarse_sweeps);
     coarsening_.push_back(std::move(next));
   }
   const ColumnLevel& last = *levels_.back().matrix;
-  if (last.total() <= too_many) coarsest_ = std::make_unique<Coarsest>(comm_, last);
+  if (last.points().total() <= too_many) coarsest_ = std::make_unique<Coarsest>(comm_, last);
   factor();
 }
 
 ColumnMultigrid::~ColumnMultigrid() = default;
 
 void ColumnMultigrid::make_fine(const discrete::Part& part, const BlockSource& blocks) {
-  Couplings couplings(number_, part.model.points.layer, static_cast<int32_t>(part.unknowns.owned));
+  IndexMap points = unknown_points(comm_, part);
+  for (const int64_t unknown : part.unknown)
+    number_.push_back(unknown < 0 ? -1 : points.local(unknown));
+  Couplings couplings(number_, part.model.points.layer, points.own());
   blocks([&](int32_t p, int32_t q, const Mat3& block) { couplings.add(p, q, block); });
   const bool layered = base::on_all_ranks(comm_, couplings.layered);
   const double stiffest = base::max_over_ranks(comm_, couplings.stiffest());
   if (stiffest > 0 && std::isfinite(stiffest)) scale_ = stiffest;
-  fine_ = std::make_unique<ColumnLevel>(comm_, places(part, layered), ghosts(part, number_),
-                                        couplings.pattern());
+  fine_ =
+      std::make_unique<ColumnLevel>(std::move(points), places(part, layered), couplings.pattern());
 }
 
 void ColumnMultigrid::fill_fine(const BlockSource& blocks) {
   const int32_t own = fine_->own();
   const double unit = 1 / scale_;
-  UpperSums sums(*fine_);
+  fine_->clear();
   blocks([&](int32_t p, int32_t q, const Mat3& block) {
     const int32_t i = number_[p], j = number_[q];
     if (i < 0 || j < 0 || std::min(i, j) >= own) return;
     if (i <= j)
-      sums.add(i, j, (unit * block).cast<float>());
+      fine_->add_upper(i, j, (unit * block).cast<float>());
     else
-      sums.add(j, i, (unit * block.transpose()).cast<float>());
+      fine_->add_upper(j, i, (unit * block.transpose()).cast<float>());
   });
-  fine_->fill(sums);
+  fine_->mirror_upper();
 }
 
 void ColumnMultigrid::factor() {

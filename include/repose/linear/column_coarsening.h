@@ -71,7 +71,7 @@ class Coarsening {
   void make_linear(const Vec3& at, std::vector<Candidate>& found) const;
   void smooth(const ColumnLevel& fine, const std::vector<Vec3>& at,
               const std::vector<int32_t>& point);
-  std::vector<int64_t> find_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own);
+  IndexMap number_ghosts(MPI_Comm comm, const ColumnLevel& fine, int32_t own);
   void transpose(int32_t own);
   BlockPattern find_pattern(const ColumnLevel& fine, int32_t own, int32_t ghosts) const;
 

@@ -1,32 +1,12 @@
 #pragma once
-#include <petscsf.h>
-
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "repose/base/geometry.h"
-#include "repose/base/petsc.h"
+#include "repose/linear/sweep_order.h"
 
 /// Matrices of layered tissue for preconditioners (column_multigrid.h).
 namespace repose::linear {
 
-class UpperSums;
-
 /// The numbers of a point, and one of padding.
 using Lanes = float __attribute__((vector_size(16)));
-
-/// `count` floats, or as many bytes of anything, as one thing to send.
-class FloatsType {
- public:
-  explicit FloatsType(int count);
-  ~FloatsType() { MPI_Type_free(&type_); }
-  FloatsType(FloatsType&&) = delete;
-  operator MPI_Datatype() const { return type_; }
-
- private:
-  MPI_Datatype type_;
-};
 
 /// Where a point is in layered tissue.
 struct Place {
@@ -34,46 +14,35 @@ struct Place {
   int32_t layer;
 };
 
-/// Which blocks of a matrix are not zero, in compressed rows.
-struct BlockPattern {
-  std::vector<int64_t> begin{0};  ///< [rows + 1]
-  std::vector<int32_t> column;    ///< ascending in each row
-  int32_t rows() const { return static_cast<int32_t>(begin.size() - 1); }
-};
-
 /// A symmetric positive semidefinite matrix of 3×3 blocks, this rank's rows of it, and
 /// Gauss–Seidel on it column by column: the points of a column, each coupled to those above and
-/// below it, are solved for at once. Rows and columns of blocks have local numbers: this rank's
-/// points, column by column from the top, then ghosts. Vectors are [own points + ghosts].
-///
-/// Sweeps are those of one matrix, whatever the number of ranks: first the columns at borders
-/// between ranks, neighboring ranks in turn, then all others at once (Adams 2001, "A distributed
-/// memory unstructured Gauss–Seidel algorithm for multigrid smoothers").
+/// below it, are solved for at once, in the order of sweep_order.h. Rows and columns of blocks have
+/// local numbers: this rank's points, column by column from the top, then ghosts. Vectors are [own
+/// points + ghosts].
 class ColumnLevel {
  public:
-  /// `place` of this rank's points; `ghost`: global numbers (rank after rank) of the ghosts. The
-  /// pattern couples points of a column to their neighbors in it only. Collective.
-  ColumnLevel(MPI_Comm comm, std::vector<Place> place, std::vector<int64_t> ghost,
-              BlockPattern pattern);
+  /// `place` [own]. The pattern couples points of a column to their neighbors in it only.
+  ColumnLevel(IndexMap points, std::vector<Place> place, BlockPattern pattern);
 
-  int32_t own() const { return static_cast<int32_t>(place_.size()); }
-  int32_t ghosts() const { return static_cast<int32_t>(ghost_.size()); }
-  int64_t first() const { return first_; }  ///< global number of this rank's first point
-  int64_t total() const { return total_; }  ///< points of all ranks
-  int64_t global(int32_t number) const {    ///< of an own point or a ghost
-    return number < own() ? first_ + number : ghost_[number - own()];
-  }
+  const IndexMap& points() const { return points_; }
+  int32_t own() const { return points_.own(); }
+  int32_t ghosts() const { return points_.ghosts(); }
   const std::vector<Place>& place() const { return place_; }
   const BlockPattern& pattern() const { return pattern_; }
   /// First points of this rank's columns, and own().
-  const std::vector<int32_t>& columns() const { return chain_; }
+  const std::vector<int32_t>& columns() const { return columns_; }
 
   /// The block at this place of the pattern.
   const Eigen::Matrix3f& block(int64_t place) const { return numbers_.block[place]; }
   /// The place of the diagonal block of an own row, which those right of it follow.
-  int64_t diagonal(int32_t row) const { return pattern_.begin[row] + diagonal_[row]; }
-  /// Sets all blocks again; those left of the diagonal are mirror images. Not collective.
-  void fill(const UpperSums& sums);
+  int64_t diagonal(int32_t row) const { return diagonal_[row]; }
+  /// Sets all blocks to zero; add_upper() and then mirror_upper() set them again.
+  void clear() { std::ranges::fill(numbers_.block, Eigen::Matrix3f::Zero()); }
+  /// Adds to the block of an own row and a column not left of it, which is in the pattern.
+  void add_upper(int32_t row, int32_t column, const Eigen::Matrix3f& block);
+  /// Sets blocks that are no normal numbers to zero, and those left of the diagonal to mirror
+  /// images.
+  void mirror_upper();
   /// Adds to the block of two own points, and to its mirror image; it is in the pattern.
   void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
   /// Factors the columns' own blocks, after the entries have changed: all, or those of the given
@@ -100,53 +69,36 @@ class ColumnLevel {
   /// afterwards. Collective.
   void backward(std::span<const Lanes> b, std::span<Lanes> x) const;
   /// Brings the ghosts of x up to date. Collective.
-  void update_ghosts(std::span<Lanes> x) const { share(x.data(), x.data() + own(), lanes_); }
-  /// Sends each own entry to the ranks where it is a ghost; entries of type `unit`. Collective.
-  void share(const void* own_entries, void* ghost_entries, MPI_Datatype unit) const;
-
- private:
-  using StarForest = base::Handle<PetscSF, PetscSFDestroy>;
-  void factor_column(size_t column);
-  /// Σ of the blocks [k, end) of a row with x.
-  Lanes row_product(int64_t k, int64_t end, std::span<const Lanes> x) const;
-  void solve_column(int64_t column, std::span<Lanes> x) const;
-  /// b − A x of an own row, but for the blocks of its own column.
-  Lanes residual_around(int32_t i, std::span<const Lanes> b, std::span<const Lanes> x) const;
-  void backward_column(size_t column, std::span<const Lanes> b, std::span<Lanes> x) const;
-  void find_columns();
-  void connect(MPI_Comm comm);
-  void find_border();
-
-  std::vector<Place> place_;
-  std::vector<int64_t> ghost_;
-  int64_t first_ = 0, total_ = 0;
-  BlockPattern pattern_;
-  std::vector<int32_t> chain_;            // [columns + 1] first points
-  std::vector<int32_t> left_, within_;    // [own] blocks left of the column's, and of it
-  std::vector<int32_t> diagonal_;         // [own] blocks left of the diagonal
-  std::vector<size_t> border_;            // columns coupled to ghosts, the last first
-  std::vector<char> is_border_, beside_;  // [columns] of the border, or coupled to a column of it
-  int turn_ = 0, turns_ = 1;              // of this rank among its neighbors, and of all
-  Numbers numbers_;
-  StarForest forest_;
-  FloatsType lanes_{4};
-};
-
-/// Sums of a level's blocks on the diagonal and right of it, from which it is filled.
-class UpperSums {
- public:
-  explicit UpperSums(const ColumnLevel& level);
-  /// To the block of an own row and a column not left of it, which is in the pattern.
-  void add(int32_t row, int32_t column, const Eigen::Matrix3f& block);
-  /// Returns the blocks of a row from the diagonal on.
-  std::span<const Eigen::Matrix3f> row(int32_t i) const {
-    return std::span(sum_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
+  void update_ghosts(std::span<Lanes> x) const {
+    points_.share(x.data(), x.data() + own(), lanes_);
   }
 
  private:
-  const ColumnLevel& level_;
-  std::vector<int64_t> begin_;  // [own + 1] in blocks
-  std::vector<Eigen::Matrix3f> sum_;
+  std::vector<int64_t> find_columns();
+  void factor_column(int32_t column);
+  /// Returns the end of an own row's blocks left of those of its column.
+  int64_t left_end(int32_t column, int32_t row) const {
+    return diagonal_[row] - (row > columns_[column] ? 1 : 0);
+  }
+  /// Returns the begin of an own row's blocks right of those of its column.
+  int64_t right_begin(int32_t column, int32_t row) const {
+    return diagonal_[row] + (row + 1 < columns_[column + 1] ? 2 : 1);
+  }
+  /// Σ of the blocks [k, end) of a row with x.
+  Lanes row_product(int64_t k, int64_t end, std::span<const Lanes> x) const;
+  void solve_column(int32_t column, std::span<Lanes> x) const;
+  /// b − A x of an own row, but for the blocks of its own column.
+  Lanes residual_around(int32_t column, int32_t row, std::span<const Lanes> b,
+                        std::span<const Lanes> x) const;
+
+  IndexMap points_;
+  std::vector<Place> place_;
+  BlockPattern pattern_;
+  std::vector<int32_t> columns_;   // [columns + 1] first points
+  std::vector<int64_t> diagonal_;  // [own] places of the diagonal blocks
+  SweepOrder order_;
+  Numbers numbers_;
+  FloatsType lanes_{4};
 };
 
 }  // namespace repose::linear

@@ -22,18 +22,17 @@ struct Level {
   linear::ColumnLevel level;
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * points, 3 * points);
 
-  Level() : level(PETSC_COMM_SELF, place(), {}, pattern()) {
+  Level() : level({PETSC_COMM_SELF, points, {}}, place(), pattern()) {
     engine.seed(3);
-    linear::UpperSums sums(level);
     for (int32_t i = 0; i < points; ++i)
       for (int64_t k = level.diagonal(i); k < level.pattern().begin[i + 1]; ++k) {
         const int32_t j = level.pattern().column[k];
         Eigen::Matrix3f block = Eigen::Matrix3f::NullaryExpr([] { return random_number(); });
         if (i == j) block = (block * block.transpose() + 12 * Eigen::Matrix3f::Identity()).eval();
-        sums.add(i, j, 0.25f * block);
-        sums.add(i, j, 0.75f * block);
+        level.add_upper(i, j, 0.25f * block);
+        level.add_upper(i, j, 0.75f * block);
       }
-    level.fill(sums);
+    level.mirror_upper();
     level.factor();
     for (int32_t i = 0; i < points; ++i)
       for (int64_t k = level.pattern().begin[i]; k < level.pattern().begin[i + 1]; ++k)
@@ -115,6 +114,42 @@ TEST_F(SweepsOfALevel, BackwardIsForwardTransposed) {
   EXPECT_NEAR(other.dot(vector(down)), some_.dot(vector(up)), 1e-5);
 }
 
+/// Each rank owns one point more than the rank before it, and its ghost is the next rank's first.
+TEST(IndexMap, GhostsAreNumberedAndShared) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  MPI_Comm_size(PETSC_COMM_WORLD, &ranks);
+  const int next = (rank + 1) % ranks;
+  const int64_t ghost = next * (next + 1) / 2;
+  const linear::IndexMap map(PETSC_COMM_WORLD, rank + 1, {ghost});
+  EXPECT_EQ(map.first(), rank * (rank + 1) / 2);
+  EXPECT_EQ(map.total(), ranks * (ranks + 1) / 2);
+  EXPECT_EQ(map.global(rank), map.first() + rank);
+  EXPECT_EQ(map.global(rank + 1), ghost);
+  EXPECT_EQ(map.local(map.first()), 0);
+  EXPECT_EQ(map.local(ghost), ranks > 1 ? rank + 1 : 0);
+  const std::vector<float> own(rank + 1, static_cast<float>(rank));
+  float received = static_cast<float>(next);  // stays on one rank, which shares nothing
+  map.share(own.data(), &received, linear::FloatsType(1));
+  EXPECT_EQ(received, static_cast<float>(next));
+  std::array<int, 2> colors = {map.color(), -1};
+  MPI_Allreduce(colors.data(), &colors[1], 1, MPI_INT, MPI_MAX, PETSC_COMM_WORLD);
+  EXPECT_EQ(colors[1] + 1, map.colors());
+}
+
+/// Column 0 of two points is coupled to column 1, which is coupled to a ghost; column 2 is alone.
+TEST(SweepOrder, BorderIsSweptFirstAndLastInReverse) {
+  const linear::IndexMap points(PETSC_COMM_SELF, 4, {4});
+  const linear::BlockPattern pattern{{0, 2, 5, 8, 9}, {0, 1, 0, 1, 2, 1, 2, 4, 3}};
+  const linear::SweepOrder order(points, pattern, std::array{0, 2, 3, 4});
+  std::vector<int32_t> down, up;
+  order.forward([&](int32_t column) { down.push_back(column); }, [] {});
+  order.backward([&](int32_t column) { up.push_back(column); }, [] {});
+  EXPECT_EQ(down, (std::vector{1, 0, 2}));
+  EXPECT_EQ(up, (std::vector{2, 0, 1}));
+  EXPECT_TRUE(order.beside_border(0) && order.beside_border(1) && !order.beside_border(2));
+}
+
 /// Two columns of one point on each rank, all coupled as strongly as a column to itself, nearly:
 /// where ranks swept at once, each would take away the whole residual.
 TEST(ColumnLevel, NeighboringRanksSweepInTurn) {
@@ -132,12 +167,11 @@ TEST(ColumnLevel, NeighboringRanksSweepInTurn) {
     for (int32_t j = 0; j < all; ++j) pattern.column.push_back(j);
     pattern.begin.push_back(static_cast<int64_t>(pattern.column.size()));
   }
-  linear::ColumnLevel level(PETSC_COMM_WORLD, {{0, 0}, {1, 0}}, ghost, pattern);
-  linear::UpperSums sums(level);
+  linear::ColumnLevel level({PETSC_COMM_WORLD, own, ghost}, {{0, 0}, {1, 0}}, pattern);
   for (int32_t i = 0; i < own; ++i)
     for (int32_t j = i; j < all; ++j)
-      sums.add(i, j, (i == j ? 1 + weak : 1.0f) * Eigen::Matrix3f::Identity());
-  level.fill(sums);
+      level.add_upper(i, j, (i == j ? 1 + weak : 1.0f) * Eigen::Matrix3f::Identity());
+  level.mirror_upper();
   level.factor();
   const std::vector<Lanes> none(all);
   std::vector<Lanes> x(all, Lanes{1, 1, 1});
@@ -161,10 +195,10 @@ TEST(ColumnLevel, NeighboringRanksSweepInTurn) {
 TEST(ColumnLevel, WhatIsNoNumberCouplesNothing) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   for (const float number : {1e-42f, infinity, std::nanf("")}) {
-    linear::ColumnLevel level(PETSC_COMM_SELF, Level::place(), {}, Level::pattern());
-    linear::UpperSums sums(level);
-    sums.add(0, 1, Eigen::Matrix3f::Constant(number));
-    level.fill(sums);
+    linear::ColumnLevel level({PETSC_COMM_SELF, Level::points, {}}, Level::place(),
+                              Level::pattern());
+    level.add_upper(0, 1, Eigen::Matrix3f::Constant(number));
+    level.mirror_upper();
     EXPECT_EQ(level.block(1), Eigen::Matrix3f::Zero());
   }
 }
