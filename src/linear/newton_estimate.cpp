@@ -64,14 +64,15 @@ double NewtonEstimate::distance(Vec displacement, Vec gradient) {
   distance_ = negative_curvature_ ? std::numeric_limits<double>::infinity()
                                   : discrete::largest_block(step_);
   measured_at_ = solver_.hessian().assemblies();
-  bounded_at_ = -1;
+  bounded_ = false;
   check(VecCopy(gradient, gradient_));
   return distance_;
 }
 
 double NewtonEstimate::largest_compliance(Vec displacement) {
   solver_.hessian().assemble(displacement);
-  if (loaded_at_ == solver_.hessian().assemblies()) return compliance_;
+  auto& [compliance, convex, at] = random_load_;
+  if (at == solver_.hessian().assemblies()) return compliance;
   base::VecHandle load = solver_.positions().make_vector();
   PetscInt begin = 0, end = 0;
   PetscScalar* values = nullptr;
@@ -82,13 +83,13 @@ double NewtonEstimate::largest_compliance(Vec displacement) {
   check(VecSet(next_, 0));
   bool known = false;
   for (const double share : {0.3, 1e-3, 1e-6}) {
-    convex_ = solver_.solve(displacement, load, next_, share);
-    known = convex_ && solver_.finished() && residual_decreased(load, next_);
-    if (known || !convex_) break;
+    convex = solver_.solve(displacement, load, next_, share);
+    known = convex && solver_.finished() && residual_decreased(load, next_);
+    if (known || !convex) break;
   }
-  compliance_ = known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
-  loaded_at_ = solver_.hessian().assemblies();
-  return compliance_;
+  at = solver_.hessian().assemblies();
+  return compliance =
+             known ? discrete::largest_block(next_) : std::numeric_limits<double>::infinity();
 }
 
 bool NewtonEstimate::residual_decreased(Vec rhs, Vec delta) {
@@ -102,7 +103,7 @@ bool NewtonEstimate::residual_decreased(Vec rhs, Vec delta) {
 }
 
 bool NewtonEstimate::is_minimum(Vec displacement) {
-  return std::isfinite(largest_compliance(displacement)) || convex_;
+  return std::isfinite(largest_compliance(displacement)) || random_load_.convex;
 }
 
 bool NewtonEstimate::refine(Vec displacement, Vec gradient, double factor) {
@@ -124,7 +125,7 @@ double NewtonEstimate::bound(Vec displacement, Vec gradient, double slack) {
   const CgInPlaceOfPreonly iterating(solver_.krylov());  // one application bounds nothing
   if (iterating.replaced()) measured_at_ = -1;
   const double rough = distance(displacement, gradient);
-  if (!(rough > 0) || !std::isfinite(rough) || bounded_at_ == measured_at_) return rough;
+  if (!(rough > 0) || !std::isfinite(rough) || bounded_) return rough;
   PetscReal energy = 0;
   check(VecDot(gradient, step_, &energy));
   const double reach = margin * std::sqrt(largest_compliance(displacement) * energy);  // mm
@@ -138,7 +139,7 @@ double NewtonEstimate::bound(Vec displacement, Vec gradient, double slack) {
                      : std::numeric_limits<double>::infinity();
   }
   error_slack_ = left > rough ? 2 * left : 0;
-  bounded_at_ = measured_at_;
+  bounded_ = true;
   return distance_;
 }
 
@@ -152,7 +153,6 @@ double NewtonEstimate::contraction(Vec displacement, Vec trial, Vec gradient) {
   check(VecSet(next_, 0));
   const bool convex = solver_.solve(trial, gradient, next_, close);
   solver_.hessian().assemble(displacement);
-  if (bounded_at_ == measured_at_) bounded_at_ = solver_.hessian().assemblies();
   measured_at_ = solver_.hessian().assemblies();  // what is known there is not lost
   if (!convex) return endless;
   check(VecDot(gradient, next_, &next_slope));

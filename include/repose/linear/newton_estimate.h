@@ -27,7 +27,7 @@ class NewtonEstimate {
   /// Returns whether a random load meets no negative curvature: a balanced state may be a saddle.
   bool is_minimum(Vec displacement);
   /// Returns whether the latest distance, or the random load that bounded it, met any.
-  bool negative_curvature() const { return negative_curvature_ || !convex_; }
+  bool negative_curvature() const { return negative_curvature_ || !random_load_.convex; }
 
   /// Estimates distance() by the preconditioner alone; 0 where there is none yet.
   double preconditioned_distance(Vec gradient);
@@ -51,16 +51,19 @@ class NewtonEstimate {
   static constexpr double usual_ = 0.05;  // to which steps are solved for
 
   TangentSolver& solver_;
-  base::VecHandle step_, gradient_;  // the latest step and the gradient it is of, …
-  base::VecHandle next_;             // the step at a trial
-  double distance_ = 0;              // … its length, …
-  int64_t measured_at_ = -1;         // … at this many assemblies of the Hessian
-  int64_t bounded_at_ = -1;          // and at this many it is sure
+  base::VecHandle step_, gradient_;  // the latest step and the gradient that it is of
+  double distance_ = 0;              // mm, length of the latest step
+  int64_t measured_at_ = -1;         // assemblies of the Hessian at the latest step, −1: none
+  bool bounded_ = false;             // distance_ is that of bound()
   double error_slack_ = 0;
   bool negative_curvature_ = false;  // the latest step met some
-  double compliance_ = 0;            // mm/N, of the softest point, by a random load, …
-  bool convex_ = true;               // … which met no negative curvature, …
-  int64_t loaded_at_ = -1;           // … at this many assemblies of the Hessian
+  /// Response to a load of random signs.
+  struct {
+    double compliance = 0;  // mm/N, of the softest point
+    bool convex = true;     // it met no negative curvature
+    int64_t at = -1;        // assemblies of the Hessian
+  } random_load_;
+  base::VecHandle next_;  // the step at a trial
 };
 
 }  // namespace repose::linear
