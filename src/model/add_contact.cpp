@@ -39,8 +39,8 @@ Body::Shape shape_of(const scene::Instrument& instrument) {
 /// Adds the pairs of free points with the bodies that they may come to.
 class ContactAdder {
  public:
-  ContactAdder(const scene::Scene& scene, const Attachment& attachment, Model& model)
-      : attachment_(attachment),
+  ContactAdder(const scene::Scene& scene, const ColumnEnds& ends, Model& model)
+      : ends_(ends),
         model_(model),
         trees_(model.bone_surfaces.begin(), model.bone_surfaces.end()),
         touching_(scene.contact && scene.contact->bones) {
@@ -67,7 +67,7 @@ class ContactAdder {
     for (int32_t b = 0; b < bones; ++b)
       if (b == slides_on(point))
         add(point, b, Binding::slides, area, model_.contact.pairs);
-      else if (touching_ && !attachment_.free[column] &&
+      else if (touching_ && !ends_.free[column] &&
                trees_[b].any_within(model_.points.position[point], reach_[b] * reach_[b]) >= 0)
         add(point, b, Binding::touches, area, model_.contact.pairs);
     for (int32_t b = bones; skin && b < bodies; ++b)
@@ -77,11 +77,11 @@ class ContactAdder {
  private:
   int32_t slides_on(int64_t point) const {
     const auto layers =
-        static_cast<int64_t>(model_.points.position.size() / attachment_.slides_on.size());
-    return point % layers == layers - 1 ? attachment_.slides_on[point / layers] : -1;
+        static_cast<int64_t>(model_.points.position.size() / ends_.slides_on.size());
+    return point % layers == layers - 1 ? ends_.slides_on[point / layers] : -1;
   }
 
-  const Attachment& attachment_;
+  const ColumnEnds& ends_;
   Model& model_;
   std::vector<surface::TriangleTree> trees_;
   std::vector<double> reach_;  // [bones] mm
@@ -121,10 +121,10 @@ double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout) {
   return std::clamp(thin_bone(layout, 2 * coarsest) / 2, finest, coarsest);
 }
 
-void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const ColumnEnds& ends,
                  Model& model) {
   const std::vector<double> area = point_areas(mesh, model);
-  ContactAdder adder(scene, attachment, model);
+  ContactAdder adder(scene, ends, model);
   for (size_t p = 0; p < area.size(); ++p)
     if (model.points.set[p] == PointSet::soft_tissue)
       adder.add_point(static_cast<int64_t>(p), area[p]);

@@ -1,5 +1,4 @@
 #pragma once
-#include "attachment.h"
 #include "column_layout.h"
 #include "repose/model/model.h"
 
@@ -8,7 +7,7 @@ namespace repose::model {
 /// Adds the contact of a model of make_layers or of a part of it, point by point: bones that the
 /// tissue may reach as they move, unless the scene's contact leaves them out; bones that it slides
 /// along; instruments on which the skin slides or, where bones touch, that hold it.
-void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const Attachment& attachment,
+void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const ColumnEnds& ends,
                  Model& model);
 
 /// Returns the spacing of the grids of distances, mm: the scene's, or half the thickness of thin

@@ -4,15 +4,12 @@
 
 #include "bone_field.h"
 #include "columns.h"
-#include "repose/scene/scene.h"
+#include "repose/model/build.h"
 
 namespace repose::model {
 
-/// Attachment of the deepest point of each column, [V].
-struct Attachment {
-  std::vector<int32_t> bone;         ///< that it moves with, −1 for none
-  std::vector<int32_t> slides_on;    ///< bone that it slides along, −1 for none
-  std::vector<char> free;            ///< 1: it does not even touch bones
+/// Attachment of columns, [V].
+struct Attachment : ColumnEnds {
   std::vector<int64_t> reached;      ///< [bones] columns that could hold to each bone
   double largest_gap = 0;            ///< mm between an attached deepest point and its bone
   int64_t released = 0;              ///< columns released near a piece that moves differently

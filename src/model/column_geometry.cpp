@@ -169,12 +169,12 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   for (const int64_t c : piece.column) {
     piece.skin.push_back(layout.mesh.points[c]);
     piece.deep.push_back(layout.columns.deep[c]);
-    piece.bone.push_back(layout.attachment.bone[c]);
-    piece.slides.push_back(layout.attachment.slides_on[c]);
-    piece.free.push_back(layout.attachment.free[c]);
     piece.rim.push_back(layout.rim[c]);
     piece.parted.push_back(state_->parted[c]);
   }
+  const ColumnEnds& ends = layout.attachment;
+  piece.ends = {base::pick(ends.bone, piece.column), base::pick(ends.slides_on, piece.column),
+                base::pick(ends.free, piece.column)};
   const ColumnLoads& loads = state_->loads;
   piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
                  base::pick(loads.force, piece.column), loads.layer_area};
@@ -225,24 +225,20 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
                   const Piece& piece, std::vector<int64_t>& found) {
   const bool solid = scene.tissue.material.has_value();
   const SkinMesh mesh = make_skin_mesh({"skin", piece.skin, piece.corner});
-  Attachment attachment;
-  attachment.bone = piece.bone;
-  attachment.slides_on = piece.slides;
-  attachment.free = piece.free;
   Model model = make_layers(mesh, piece.deep, layer_depths(scene.tissue), scene.tissue.depths_mm,
                             solid ? Elements::solid : Elements::springs);
   found.assign(solid ? scene.tissue.material->regions.size() : 0, 0);
   model.gravity = scene.gravity.value_or(Vec3::Zero());
   add_bones(scene, bones, model);
   if (!piece.column.empty()) {
-    set_points(piece.rim, attachment, scene.moves, model);
+    set_points(piece.rim, piece.ends, scene.moves, model);
     if (solid)
       found = set_material(scene.tissue, scene.file.string(), model);
     else
       set_stiffness(scene.tissue, mesh, piece.slope, model);
     set_loads(scene.tissue, mesh, piece.loads, model);
   }
-  add_contact(scene, mesh, attachment, model);
+  add_contact(scene, mesh, piece.ends, model);
   if (!piece.jaws.empty()) add_adhesion(*scene.anatomy, bones, piece, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;

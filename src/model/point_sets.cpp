@@ -61,14 +61,14 @@ std::vector<char> rim_columns(const SkinMesh& mesh, bool rim_fixed) {
   return rim;
 }
 
-void set_points(const std::vector<char>& rim, const Attachment& attachment,
+void set_points(const std::vector<char>& rim, const ColumnEnds& ends,
                 const std::vector<scene::RigidMotion>& moves, Model& model) {
   Points& points = model.points;
   const size_t layers = points.position.size() / rim.size();
   for (size_t c = 0; c < rim.size(); ++c) {
     const size_t first = c * layers, deepest = first + layers - 1;
     if (rim[c]) std::fill_n(points.set.begin() + first, layers, PointSet::boundary);
-    const int32_t bone = attachment.bone[c];
+    const int32_t bone = ends.bone[c];
     if (rim[c] || bone < 0) continue;
     points.set[deepest] = PointSet::bone;
     points.bone[deepest] = bone;

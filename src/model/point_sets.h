@@ -16,7 +16,7 @@ std::vector<char> rim_columns(const SkinMesh& mesh, bool rim_fixed);
 /// Says what every point of a model of make_layers is: rim columns are boundary points, the deepest
 /// points of the attached columns bone points with the bone's number and, as target, where its move
 /// takes them; the rest is soft tissue. `moves` is [bones].
-void set_points(const std::vector<char>& rim, const Attachment& attachment,
+void set_points(const std::vector<char>& rim, const ColumnEnds& ends,
                 const std::vector<scene::RigidMotion>& moves, Model& model);
 
 /// Refuses, in one line naming the scene, a model without a free point, one that nothing holds, and

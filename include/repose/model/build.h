@@ -84,6 +84,13 @@ auto build_on_solvable_skin(Anatomy& anatomy, const Build& build) {
 /// Reads the scene's surfaces and builds.
 BuiltModel build_model(const scene::Scene& scene);
 
+/// Attachment of the deepest points of columns of tissue, [C].
+struct ColumnEnds {
+  std::vector<int32_t> bone;       ///< that it moves with, −1 for none
+  std::vector<int32_t> slides_on;  ///< bone that it slides along, −1 for none
+  std::vector<char> free;          ///< 1: it does not even touch bones
+};
+
 /// Loads of columns of tissue.
 struct ColumnLoads {
   std::vector<int32_t> instrument;  ///< [C] that holds its skin point, −1 for none
@@ -104,11 +111,9 @@ struct AdheringJaw {
 struct Piece {
   std::vector<int64_t> column;   ///< [C] vertices of the whole skin
   std::vector<Vec3> skin, deep;  ///< [C] mm, where a column begins and ends
-  std::vector<int32_t> bone;     ///< [C] that the deepest point moves with, −1 for none
-  std::vector<int32_t> slides;   ///< [C] bone that it slides along, −1 for none
-  std::vector<char> free;        ///< [C] 1: it does not even touch bones
-  std::vector<char> rim;         ///< [C] 1: held in whole
-  std::vector<char> parted;      ///< [C] 1: on the path of an incision
+  ColumnEnds ends;
+  std::vector<char> rim;     ///< [C] 1: held in whole
+  std::vector<char> parted;  ///< [C] 1: on the path of an incision
   ColumnLoads loads;
   std::vector<AdheringJaw> jaws;  ///< frames in rows of the piece
   std::vector<Triangle> corner;   ///< [F] rows of the piece
