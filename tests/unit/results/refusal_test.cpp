@@ -90,6 +90,21 @@ std::ostream& operator<<(std::ostream& out, const Defect& defect) { return out <
 
 std::string name_of(const ::testing::TestParamInfo<Defect>& info) { return info.param.name; }
 
+// Single changes, as Defect::spoil.
+
+template <class Value>
+auto set(const char* path, hsize_t entry, Value value) {
+  return [=](const Spoiler& f) { f.set<Value>(path, entry, value); };
+}
+
+auto remove(const char* path) {
+  return [=](const Spoiler& f) { f.remove(path); };
+}
+
+auto remove_attribute(const char* object, const char* name) {
+  return [=](const Spoiler& f) { f.remove_attribute(object, name); };
+}
+
 class ModelDefect : public ::testing::TestWithParam<Defect> {};
 
 TEST_P(ModelDefect, IsRefusedByName) {
@@ -112,8 +127,7 @@ const double three_numbers[3] = {0, nan, 0};
 INSTANTIATE_TEST_SUITE_P(
     Header, ModelDefect,
     ::testing::Values(
-        Defect{"NoFormat", [](const Spoiler& f) { f.remove_attribute("/", "format"); },
-               "/ attribute format: is missing"},
+        Defect{"NoFormat", remove_attribute("/", "format"), "/ attribute format: is missing"},
         Defect{"OtherFormat",
                [](const Spoiler& f) { f.set_attribute("/", "format", H5T_C_S1, 1, "x"); },
                "/ attribute format: is \"x\", expected \"tissue-model\""},
@@ -123,8 +137,8 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"OtherVersion",
                [](const Spoiler& f) { f.set_attribute("/", "version", H5T_NATIVE_INT64, 1, &two); },
                "/ attribute version: is 2, this program reads version 1"},
-        Defect{"NoModel", [](const Spoiler& f) { f.remove("/model"); }, "/model: is missing"},
-        Defect{"NoGravity", [](const Spoiler& f) { f.remove_attribute("/model", "gravity"); },
+        Defect{"NoModel", remove("/model"), "/model: is missing"},
+        Defect{"NoGravity", remove_attribute("/model", "gravity"),
                "/model attribute gravity: is missing"},
         Defect{"GravityOfTwo",
                [](const Spoiler& f) {
@@ -138,19 +152,20 @@ INSTANTIATE_TEST_SUITE_P(
                "/model attribute gravity: row 0 holds nan"}),
     name_of);
 
-INSTANTIATE_TEST_SUITE_P(
-    Missing, ModelDefect, ::testing::ValuesIn([] {
-      std::vector<Defect> defects;
-      for (const char* path :
-           {"/model/point/position", "/model/point/set", "/model/point/target",
-            "/model/point/layer", "/model/point/column", "/model/point/bone",
-            "/model/spring/points", "/model/spring/set", "/model/spring/rest_length",
-            "/model/spring/stiffness", "/model/spring/exponent", "/model/spring/reference",
-            "/model/prism/points", "/model/prism/rest_volume", "/model/spring_set",
-            "/model/bone_surface/1/points", "/model/bone_surface/0/triangles"})
-        defects.push_back({path, [path](const Spoiler& f) { f.remove(path); }, path});
-      return defects;
-    }()));
+INSTANTIATE_TEST_SUITE_P(Missing, ModelDefect, ::testing::ValuesIn([] {
+                           std::vector<Defect> defects;
+                           for (const char* path :
+                                {"/model/point/position", "/model/point/set", "/model/point/target",
+                                 "/model/point/layer", "/model/point/column", "/model/point/bone",
+                                 "/model/spring/points", "/model/spring/set",
+                                 "/model/spring/rest_length", "/model/spring/stiffness",
+                                 "/model/spring/exponent", "/model/spring/reference",
+                                 "/model/prism/points", "/model/prism/rest_volume",
+                                 "/model/spring_set", "/model/bone_surface/1/points",
+                                 "/model/bone_surface/0/triangles"})
+                             defects.push_back({path, remove(path), path});
+                           return defects;
+                         }()));
 
 INSTANTIATE_TEST_SUITE_P(
     Shape, ModelDefect,
@@ -241,23 +256,20 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     NotFinite, ModelDefect,
-    ::testing::Values(
-        Defect{"PositionNotFinite",
-               [](const Spoiler& f) { f.set<double>("/model/point/position", 7, nan); },
-               "/model/point/position: row 2 holds nan"},
-        Defect{"StiffnessInfinite",
-               [](const Spoiler& f) { f.set<double>("/model/spring/stiffness", 4, INFINITY); },
-               "/model/spring/stiffness: row 4 holds inf"},
-        Defect{"SurfacePointNotFinite",
-               [](const Spoiler& f) { f.set<double>("/model/bone_surface/1/points", 4, nan); },
-               "/model/bone_surface/1/points: row 1 holds nan"}),
+    ::testing::Values(Defect{"PositionNotFinite", set<double>("/model/point/position", 7, nan),
+                             "/model/point/position: row 2 holds nan"},
+                      Defect{"StiffnessInfinite",
+                             set<double>("/model/spring/stiffness", 4, INFINITY),
+                             "/model/spring/stiffness: row 4 holds inf"},
+                      Defect{"SurfacePointNotFinite",
+                             set<double>("/model/bone_surface/1/points", 4, nan),
+                             "/model/bone_surface/1/points: row 1 holds nan"}),
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(
     Index, ModelDefect,
     ::testing::Values(
-        Defect{"SpringBeyondThePoints",
-               [](const Spoiler& f) { f.set<int64_t>("/model/spring/points", 5, 12); },
+        Defect{"SpringBeyondThePoints", set<int64_t>("/model/spring/points", 5, 12),
                "/model/spring/points: row 2 is 12, expected 0 to 11"},
         Defect{"SpringOfOnePoint",
                [](const Spoiler& f) {
@@ -265,66 +277,51 @@ INSTANTIATE_TEST_SUITE_P(
                  f.set<int64_t>("/model/spring/points", 7, 5);
                },
                "/model/spring/points: row 3 is (5, 5), expected two different points"},
-        Defect{"NegativeIndex",
-               [](const Spoiler& f) { f.set<int64_t>("/model/prism/points", 6, -1); },
+        Defect{"NegativeIndex", set<int64_t>("/model/prism/points", 6, -1),
                "/model/prism/points: row 1 is -1, expected 0 to 11"},
-        Defect{"SkinBeyondThePoints",
-               [](const Spoiler& f) { f.set<int64_t>("/model/skin/points", 0, 99); },
+        Defect{"SkinBeyondThePoints", set<int64_t>("/model/skin/points", 0, 99),
                "/model/skin/points: row 0 is 99"},
-        Defect{"SurfaceTriangleOutOfRange",
-               [](const Spoiler& f) { f.set<int64_t>("/model/bone_surface/0/triangles", 2, 3); },
+        Defect{"SurfaceTriangleOutOfRange", set<int64_t>("/model/bone_surface/0/triangles", 2, 3),
                "/model/bone_surface/0/triangles: row 0 is 3, expected 0 to 2"},
-        Defect{"LayerNegative",
-               [](const Spoiler& f) { f.set<int64_t>("/model/point/layer", 0, -1); },
+        Defect{"LayerNegative", set<int64_t>("/model/point/layer", 0, -1),
                "/model/point/layer: row 0 is -1"}),
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(
     Set, ModelDefect,
-    ::testing::Values(
-        Defect{"SpringSetUnknown",
-               [](const Spoiler& f) { f.set<int64_t>("/model/spring/set", 1, 4); },
-               "/model/spring/set: row 1 is 4, expected 0 to 3"},
-        Defect{"BoneUnknown", [](const Spoiler& f) { f.set<int64_t>("/model/point/bone", 1, 2); },
-               "/model/point/bone: row 1 is 2, expected -1 to 1"},
-        Defect{"BonePointWithoutBone",
-               [](const Spoiler& f) { f.set<int64_t>("/model/point/bone", 1, -1); },
-               "/model/point/bone: row 1 is -1, but point/set makes it a bone point"},
-        Defect{"PointSetUnknown",
-               [](const Spoiler& f) { f.set<int64_t>("/model/point/set", 5, 4); },
-               "/model/point/set: row 5 is 4, expected 0 to 3"},
-        Defect{"ExponentUnknown",
-               [](const Spoiler& f) { f.set<int64_t>("/model/spring/exponent", 0, 3); },
-               "/model/spring/exponent: row 0 is 3, expected 0 to 2"}),
+    ::testing::Values(Defect{"SpringSetUnknown", set<int64_t>("/model/spring/set", 1, 4),
+                             "/model/spring/set: row 1 is 4, expected 0 to 3"},
+                      Defect{"BoneUnknown", set<int64_t>("/model/point/bone", 1, 2),
+                             "/model/point/bone: row 1 is 2, expected -1 to 1"},
+                      Defect{"BonePointWithoutBone", set<int64_t>("/model/point/bone", 1, -1),
+                             "/model/point/bone: row 1 is -1, but point/set makes it a bone point"},
+                      Defect{"PointSetUnknown", set<int64_t>("/model/point/set", 5, 4),
+                             "/model/point/set: row 5 is 4, expected 0 to 3"},
+                      Defect{"ExponentUnknown", set<int64_t>("/model/spring/exponent", 0, 3),
+                             "/model/spring/exponent: row 0 is 3, expected 0 to 2"}),
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(
     Quantity, ModelDefect,
     ::testing::Values(
-        Defect{"StiffnessNegative",
-               [](const Spoiler& f) { f.set<double>("/model/spring/stiffness", 4, -1e-300); },
+        Defect{"StiffnessNegative", set<double>("/model/spring/stiffness", 4, -1e-300),
                "/model/spring/stiffness: row 4 is -1e-300 N/mm"},
-        Defect{"MassNegative", [](const Spoiler& f) { f.set<double>("/model/point/mass", 3, -1); },
+        Defect{"MassNegative", set<double>("/model/point/mass", 3, -1),
                "/model/point/mass: row 3 is -1 kg"},
-        Defect{"RestLengthNegative",
-               [](const Spoiler& f) { f.set<double>("/model/spring/rest_length", 2, -0.5); },
+        Defect{"RestLengthNegative", set<double>("/model/spring/rest_length", 2, -0.5),
                "/model/spring/rest_length: row 2 is -0.5 mm"},
-        Defect{"ReferenceZero",
-               [](const Spoiler& f) { f.set<double>("/model/spring/reference", 2, 0); },
+        Defect{"ReferenceZero", set<double>("/model/spring/reference", 2, 0),
                "/model/spring/reference: row 2 is 0 mm, expected a finite number above 0"},
-        Defect{"VolumeZero",
-               [](const Spoiler& f) { f.set<double>("/model/prism/rest_volume", 1, 0); },
+        Defect{"VolumeZero", set<double>("/model/prism/rest_volume", 1, 0),
                "/model/prism/rest_volume: row 1 is 0 mm³"}),
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(
     Consistency, ModelDefect,
     ::testing::Values(
-        Defect{"VolumeOfAnotherPrism",
-               [](const Spoiler& f) { f.set<double>("/model/prism/rest_volume", 1, 0.41); },
+        Defect{"VolumeOfAnotherPrism", set<double>("/model/prism/rest_volume", 1, 0.41),
                "/model/prism/rest_volume: row 1 is 0.41 mm³, but the prism's volume"},
-        Defect{"TransformNotRigid",
-               [](const Spoiler& f) { f.set<double>("/model/bone_transform", 16, 1.1); },
+        Defect{"TransformNotRigid", set<double>("/model/bone_transform", 16, 1.1),
                "/model/bone_transform: row 1 (bone mandible): "},
         Defect{
             "PointThatNothingHolds",
@@ -375,22 +372,19 @@ Defect wrong_index(const char* name, const char* array, int64_t row, int64_t val
 
 INSTANTIATE_TEST_SUITE_P(
     Contact, ContactDefect,
-    ::testing::Values(
-        wrong_index("TouchOfNoPoint", "/model/contact/point", 0, 999),
-        wrong_index("TouchOfNoBody", "/model/contact/body_row", 0, 1),
-        wrong_index("NoSuchBinding", "/model/contact/binding", 0, 2),
-        wrong_index("BodyOfNoBone", "/model/contact/body_bone", 0, 99),
-        wrong_index("HugeNet", "/model/contact/wall/net", 0, int64_t{1} << 40),
-        wrong_index("NetOfOneRow", "/model/contact/wall/net", 0, 1),
-        wrong_index("ControlOfNothing", "/model/contact/wall/begin", 3, 2),
-        wrong_index("ControlsBeyondTheirPoints", "/model/contact/wall/begin", 8, 9),
-        wrong_index("SideOfNoPoint", "/model/contact/wall/point", 5, -1),
-        Defect{"WeightNotFinite",
-               [](const Spoiler& f) { f.set<double>("/model/contact/wall/weight", 2, nan); },
-               "/model/contact/wall/weight: "},
-        Defect{"AreaBelowZero",
-               [](const Spoiler& f) { f.set<double>("/model/contact/wall/area", 1, -1.0); },
-               "/model/contact/wall/area: row 1 is -1 mm²"}),
+    ::testing::Values(wrong_index("TouchOfNoPoint", "/model/contact/point", 0, 999),
+                      wrong_index("TouchOfNoBody", "/model/contact/body_row", 0, 1),
+                      wrong_index("NoSuchBinding", "/model/contact/binding", 0, 2),
+                      wrong_index("BodyOfNoBone", "/model/contact/body_bone", 0, 99),
+                      wrong_index("HugeNet", "/model/contact/wall/net", 0, int64_t{1} << 40),
+                      wrong_index("NetOfOneRow", "/model/contact/wall/net", 0, 1),
+                      wrong_index("ControlOfNothing", "/model/contact/wall/begin", 3, 2),
+                      wrong_index("ControlsBeyondTheirPoints", "/model/contact/wall/begin", 8, 9),
+                      wrong_index("SideOfNoPoint", "/model/contact/wall/point", 5, -1),
+                      Defect{"WeightNotFinite", set<double>("/model/contact/wall/weight", 2, nan),
+                             "/model/contact/wall/weight: "},
+                      Defect{"AreaBelowZero", set<double>("/model/contact/wall/area", 1, -1.0),
+                             "/model/contact/wall/area: row 1 is -1 mm²"}),
     name_of);
 
 /// The small model with elements of a further term, whose name need not be known to be read.
@@ -415,20 +409,17 @@ TEST_P(ElementDefect, IsRefusedByName) {
 
 INSTANTIATE_TEST_SUITE_P(
     Elements, ElementDefect,
-    ::testing::Values(
-        wrong_index("ElementOfNoPoint", "/model/element/0/points", 3, 999),
-        wrong_index("ElementBelowPoints", "/model/element/1/points", 0, -1),
-        Defect{"PointTwice",
-               [](const Spoiler& f) { f.set<int64_t>("/model/element/0/points", 3, 1); },
-               "/model/element/0: element 1 has one of its points twice"},
-        Defect{"NumberNotFinite",
-               [](const Spoiler& f) { f.set<double>("/model/element/0/numbers", 1, nan); },
-               "/model/element/0/numbers: "},
-        Defect{"PointTooMany",
-               [](const Spoiler& f) {
-                 f.replace("/model/element/0/points", H5T_NATIVE_INT8, {0, 1, 2});
-               },
-               "/model/element/0"}),
+    ::testing::Values(wrong_index("ElementOfNoPoint", "/model/element/0/points", 3, 999),
+                      wrong_index("ElementBelowPoints", "/model/element/1/points", 0, -1),
+                      Defect{"PointTwice", set<int64_t>("/model/element/0/points", 3, 1),
+                             "/model/element/0: element 1 has one of its points twice"},
+                      Defect{"NumberNotFinite", set<double>("/model/element/0/numbers", 1, nan),
+                             "/model/element/0/numbers: "},
+                      Defect{"PointTooMany",
+                             [](const Spoiler& f) {
+                               f.replace("/model/element/0/points", H5T_NATIVE_INT8, {0, 1, 2});
+                             },
+                             "/model/element/0"}),
     name_of);
 
 class Acceptable : public ::testing::TestWithParam<Defect> {};
@@ -504,19 +495,17 @@ TEST_P(StepDefect, IsRefusedByName) {
   EXPECT_NE(text.find(GetParam().message), std::string::npos) << text;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Step, StepDefect,
-    ::testing::Values(
-        Defect{"NoPosition", [](const Spoiler& f) { f.remove("/step/0001/point/position"); },
-               "/step/0001/point/position: is missing"},
-        Defect{"NotInSequence", [](const Spoiler& f) { f.remove("/step/0000"); },
-               "/step: has 1 groups, but 0000 is missing"},
-        Defect{"NoLoad", [](const Spoiler& f) { f.remove_attribute("/step/0001", "load"); },
-               "/step/0001 attribute load: is missing"},
-        Defect{"TensionNotFinite",
-               [](const Spoiler& f) { f.set<double>("/step/0000/spring/tension", 3, nan); },
-               "/step/0000/spring/tension: row 3 holds nan"}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(Step, StepDefect,
+                         ::testing::Values(Defect{"NoPosition", remove("/step/0001/point/position"),
+                                                  "/step/0001/point/position: is missing"},
+                                           Defect{"NotInSequence", remove("/step/0000"),
+                                                  "/step: has 1 groups, but 0000 is missing"},
+                                           Defect{"NoLoad", remove_attribute("/step/0001", "load"),
+                                                  "/step/0001 attribute load: is missing"},
+                                           Defect{"TensionNotFinite",
+                                                  set<double>("/step/0000/spring/tension", 3, nan),
+                                                  "/step/0000/spring/tension: row 3 holds nan"}),
+                         name_of);
 
 TEST(BadFile, IsRefusedWithItsName) {
   const Folder folder;
