@@ -10,6 +10,7 @@
 #include "repose/imaging/isosurface.h"
 #include "repose/surface/component.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/read.h"
 #include "repose/surface/triangle_tree.h"
 
 namespace repose::imaging {
@@ -70,23 +71,6 @@ Cones cones_of(const Surface& surface, double passes) {
       add(loop, cones.openings);
   }
   return cones;
-}
-
-/// Vertices that coincide become one, so that borders are borders.
-Surface welded(const Surface& given) {
-  Surface surface{given.name, given.points, {}};
-  const std::vector<int64_t> first = coincident_points(given.points);
-  for (const auto& [a, b, c] : given.triangles)
-    if (!repeats_vertex({first[a], first[b], first[c]}))
-      surface.triangles.push_back({first[a], first[b], first[c]});
-  return surface;
-}
-
-void append(const Surface& part, Surface& whole) {
-  const auto shift = static_cast<int64_t>(whole.points.size());
-  whole.points.insert(whole.points.end(), part.points.begin(), part.points.end());
-  for (const auto& [a, b, c] : part.triangles)
-    whole.triangles.push_back({a + shift, b + shift, c + shift});
 }
 
 /// Makes `distance` negative but where {distance ≥ radius} is connected with the grid's corner:

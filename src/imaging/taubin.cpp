@@ -10,13 +10,6 @@ namespace {
 
 constexpr double lambda = 0.5, pass_band = 0.1, mu = -1 / (1 / lambda - pass_band);
 
-std::vector<char> on_border(const EdgeTable& edges, size_t points) {
-  std::vector<char> border(points, 0);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    if (edges[e].size() == 1) border[edges[e].front().low] = border[edges[e].front().high] = 1;
-  return border;
-}
-
 /// Moves all points that do not stay.
 void step(const VertexNeighbors& neighbors, const std::vector<char>& stays, double weight,
           const std::vector<Vec3>& from, std::vector<Vec3>& to) {
@@ -35,7 +28,7 @@ void step(const VertexNeighbors& neighbors, const std::vector<char>& stays, doub
 double smooth_taubin(Surface& surface, int64_t rounds, const Watch& watch) {
   const EdgeTable edges(surface.triangles);
   const VertexNeighbors neighbors(edges, surface.points.size());
-  const std::vector<char> stays = on_border(edges, surface.points.size());
+  const std::vector<char> stays = border_vertices(edges, surface.points.size());
   const std::vector<Vec3> before = surface.points;
   std::vector<Vec3> between(before.size());
   for (int64_t round = 0; round < rounds; ++round) {

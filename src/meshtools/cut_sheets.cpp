@@ -6,8 +6,10 @@
 #include <numbers>
 
 #include "repose/base/error.h"
+#include "repose/surface/component.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/intersections.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::meshtools {
 using namespace surface;
@@ -49,21 +51,12 @@ Surface plane_sheet(const CutPlane& plane, const Surface& bone, double offset) {
 /// where they are folded sharply.
 Surface offset_sheet(const Surface& sheet, double distance) {
   constexpr double min_cosine = 0.3;
-  const auto normal_of = [&](const Triangle& t) {
-    const auto& p = sheet.points;
-    return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).normalized();
-  };
-  std::vector<Vec3> normals(sheet.points.size(), Vec3::Zero());
-  for (const Triangle& t : sheet.triangles)
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 a = sheet.points[t[(k + 1) % 3]] - sheet.points[t[k]];
-      const Vec3 b = sheet.points[t[(k + 2) % 3]] - sheet.points[t[k]];
-      normals[t[k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal_of(t);
-    }
+  const std::vector<Vec3> normals = angle_normals(sheet);
   std::vector<double> cosine(sheet.points.size(), 1);
-  for (Vec3& n : normals) n.normalize();
   for (const Triangle& t : sheet.triangles)
-    for (const int64_t i : t) cosine[i] = std::min(cosine[i], normals[i].dot(normal_of(t)));
+    for (const int64_t i : t)
+      cosine[i] =
+          std::min(cosine[i], normals[i].dot(scaled_normal(corners(sheet, t)).normalized()));
   Surface moved = sheet;
   for (size_t i = 0; i < normals.size(); ++i)
     moved.points[i] += distance / std::max(cosine[i], min_cosine) * normals[i];

@@ -162,67 +162,34 @@ Surface region_of(const OuterSkin& outer, const Surface& given, const FaceReques
   return largest_component(part);
 }
 
-std::vector<Vec3> normals_of(const Surface& surface) {
-  std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
-  for (const Triangle& t : surface.triangles) {
-    const Corners p = corners(surface, t);
-    for (const int64_t v : t) normals[v] += (p[1] - p[0]).cross(p[2] - p[0]);
-  }
-  for (Vec3& normal : normals) normal.normalize();
-  return normals;
-}
-
 /// The given triangles near the face: no point of the others is within the tolerance of it.
 Surface part_near(const Surface& given, const TriangleTree& face, double tolerance) {
   Surface part{given.name, given.points, {}};
   for (const Triangle& triangle : given.triangles) {
-    const auto [a, b, c] = corners(given, triangle);
-    const double reach = tolerance + std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    if (face.any_within((a + b + c) / 3, reach * reach) >= 0) part.triangles.push_back(triangle);
+    const Corners at = corners(given, triangle);
+    const double reach = tolerance + longest_side(at);
+    if (face.any_within((at[0] + at[1] + at[2]) / 3, reach * reach) >= 0)
+      part.triangles.push_back(triangle);
   }
   return part;
 }
 
-/// Points of triangles no farther apart than `spacing`, with their areas.
-struct Sampled {
-  std::vector<Vec3> point;
-  std::vector<double> area;
-  std::vector<int64_t> nearest;  ///< triangle of the face when last looked for, -1 at first
-};
-
-Sampled sample(const Surface& surface, double spacing) {
-  Sampled samples;
-  for (const Triangle& triangle : surface.triangles) {
-    const auto [a, b, c] = corners(surface, triangle);
-    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
-    const double area = (b - a).cross(c - a).norm() / 2 / (n * n);
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; i + j < n; ++j)
-        for (int half = 0; half < (i + j + 1 < n ? 2 : 1); ++half) {
-          const double x = (i + (1.0 + half) / 3) / n, y = (j + (1.0 + half) / 3) / n;
-          samples.point.push_back(a + x * (b - a) + y * (c - a));
-          samples.area.push_back(area);
-        }
-  }
-  samples.nearest.assign(samples.point.size(), -1);
-  return samples;
-}
-
-/// Draws the vertices along their normals to the samples within the tolerance.
-void fit(Sampled& samples, double tolerance, const VertexNeighbors& neighbors, Surface& face) {
+/// Draws the vertices along their normals to the samples within the tolerance, which are nearest to
+/// the triangles `nearest` (when last looked for, -1 at first).
+void fit(const Samples& samples, double tolerance, const VertexNeighbors& neighbors,
+         std::vector<int64_t>& nearest, Surface& face) {
   const TriangleTree tree(face);
-  const std::vector<Vec3> normals = normals_of(face);
+  const std::vector<Vec3> normals = vertex_normals(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
   for (size_t s = 0; s < samples.point.size(); ++s) {
-    const auto nearest = tree.nearest(samples.point[s], tolerance * tolerance, samples.nearest[s]);
-    if (nearest.triangle < 0) continue;
-    samples.nearest[s] = nearest.triangle;
-    const Triangle& triangle = face.triangles[nearest.triangle];
-    const Vec3 share = barycentric(tree.corners_of(nearest.triangle), nearest.point);
+    const auto foot = tree.nearest(samples.point[s], tolerance * tolerance, nearest[s]);
+    if (foot.triangle < 0) continue;
+    nearest[s] = foot.triangle;
+    const Triangle& triangle = face.triangles[foot.triangle];
+    const Vec3 share = barycentric(tree.corners_of(foot.triangle), foot.point);
     for (int k = 0; k < 3; ++k) {
       const double part = samples.area[s] * std::max(share[k], 0.0);
-      offset[triangle[k]] += part * normals[triangle[k]].dot(samples.point[s] - nearest.point);
+      offset[triangle[k]] += part * normals[triangle[k]].dot(samples.point[s] - foot.point);
       weight[triangle[k]] += part;
     }
   }
@@ -280,11 +247,10 @@ void widen_angles(const VertexNeighbors& neighbors, Surface& face) {
 /// Moves vertices on folds to the middle of their neighbors until none is.
 void unfold(const VertexNeighbors& neighbors, Surface& face) {
   for (int round = 0; round < relaxations; ++round) {
-    const std::vector<Vec3> normals = normals_of(face), old = face.points;
+    const std::vector<Vec3> normals = vertex_normals(face), old = face.points;
     std::vector<char> moved(old.size(), 0);
     for (const Triangle& triangle : face.triangles) {
-      const Corners p = corners(face, triangle);
-      const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+      const Vec3 normal = scaled_normal(corners(face, triangle)).normalized();
       for (const int64_t v : triangle)
         if (normal.dot(normals[v]) < folded)
           for (const int64_t corner : triangle) moved[corner] = 1;
@@ -333,8 +299,10 @@ Face solvable_face(const Surface& given, const FaceRequest& request) {
   const VertexNeighbors neighbors = neighbors_of(face.skin);
   widen_angles(neighbors, face.skin);
   const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
-  Sampled samples = sample(near, request.edge / 2);
-  for (int round = 0; round < fits; ++round) fit(samples, request.tolerance, neighbors, face.skin);
+  const Samples samples = sample(near, request.edge / 2);
+  std::vector<int64_t> nearest(samples.point.size(), -1);
+  for (int round = 0; round < fits; ++round)
+    fit(samples, request.tolerance, neighbors, nearest, face.skin);
   unfold(neighbors, face.skin);
   measure(near, face);
   face.skin.name = given.name;

@@ -1,7 +1,6 @@
-#include <Eigen/Geometry>
-#include <cmath>
-
 #include "repose/meshtools/signed_distance.h"
+
+#include "repose/surface/component.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 
@@ -11,35 +10,21 @@ namespace {
 
 constexpr double on_border_of_triangle = 1e-9;  // barycentric
 
-double angle_at(const Vec3& corner, const Vec3& one, const Vec3& other) {
-  const Vec3 a = one - corner, b = other - corner;
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
 }  // namespace
 
 SignedDistance::SignedDistance(const Surface& surface)
     : surface_(surface),
       tree_(surface),
-      vertex_normal_(surface.points.size(), Vec3::Zero()),
-      side_(surface.triangles.size()),
-      vertex_on_border_(surface.points.size(), false) {
-  for (const Triangle& triangle : surface.triangles) {
-    const Vec3 p[3] = {surface.points[triangle[0]], surface.points[triangle[1]],
-                       surface.points[triangle[2]]};
-    face_normal_.push_back((p[1] - p[0]).cross(p[2] - p[0]).normalized());
-    for (int k = 0; k < 3; ++k)
-      vertex_normal_[triangle[k]] +=
-          angle_at(p[k], p[(k + 1) % 3], p[(k + 2) % 3]) * face_normal_.back();
-  }
+      vertex_normal_(angle_normals(surface)),
+      side_(surface.triangles.size()) {
+  for (const Triangle& triangle : surface.triangles)
+    face_normal_.push_back(scaled_normal(corners(surface, triangle)).normalized());
   const EdgeTable edges(surface.triangles);
+  vertex_on_border_ = border_vertices(edges, surface.points.size());
   for (int64_t e = 0; e < edges.edges(); ++e) {
     Feature side{Vec3::Zero(), edges[e].size() == 1};
     for (const HalfEdge& half : edges[e]) side.normal += face_normal_[half.triangle];
     for (const HalfEdge& half : edges[e]) side_[half.triangle][half.corner] = side;
-    if (!side.border) continue;
-    vertex_on_border_[edges[e].front().low] = true;
-    vertex_on_border_[edges[e].front().high] = true;
   }
 }
 
@@ -54,7 +39,7 @@ SignedDistance::Feature SignedDistance::feature_at(const DistanceTree::Nearest& 
   }
   if (small == 0) return {face_normal_[nearest.triangle], false};
   if (small == 1) return side_[nearest.triangle][(smallest + 1) % 3];
-  return {vertex_normal_[triangle[largest]], vertex_on_border_[triangle[largest]]};
+  return {vertex_normal_[triangle[largest]], vertex_on_border_[triangle[largest]] != 0};
 }
 
 SignedDistance::Answer SignedDistance::at(const Vec3& point) const {

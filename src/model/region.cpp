@@ -9,6 +9,7 @@
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/read.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::model {
 namespace {
@@ -109,12 +110,11 @@ Contains painted(const scene::PaintedRegion& region) {
                  region.property.empty()
                      ? fmt::format("{:g}", region.color)
                      : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
-  const auto tree = std::make_shared<surface::PointTree>(mesh.points);
-  const auto points = std::make_shared<std::vector<Vec3>>(mesh.points);
+  const auto tree = std::make_shared<surface::TriangleTree>(surface::tree_of_points(mesh.points));
   return [=](const Vec3& skin) {
     constexpr double beside = 10;  // mm, where the painted mesh is another one
-    const int64_t nearest = tree->nearest(skin);
-    return (*marks)[nearest] && (skin - (*points)[nearest]).norm() <= beside;
+    const auto vertex = tree->nearest(skin);
+    return (*marks)[vertex.triangle] && std::sqrt(vertex.squared) <= beside;
   };
 }
 

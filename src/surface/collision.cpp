@@ -7,6 +7,7 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 #include "triangle_distance.h"
 
 namespace repose::surface {
@@ -160,10 +161,6 @@ std::vector<std::pair<int64_t, int64_t>> pairs_within(const CollisionTree& a,
 }
 
 namespace {
-
-double longest_side(const Corners& t) {
-  return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
-}
 
 bool is_near(const Corners& t, const CollisionTree& other, double near) {
   const CollisionTree alone({"triangle", {t[0], t[1], t[2]}, {{0, 1, 2}}});

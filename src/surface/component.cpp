@@ -6,6 +6,7 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::surface {
 namespace {
@@ -64,6 +65,51 @@ double volume_of(const Surface& surface) {
   return surface.points.empty() ? 0 : six_volumes(surface.points, surface.triangles) / 6;
 }
 
+std::vector<Vec3> vertex_normals(const Surface& surface) {
+  std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
+  for (const Triangle& t : surface.triangles)
+    for (const int64_t v : t) normals[v] += scaled_normal(corners(surface, t));
+  for (Vec3& normal : normals) normal.normalize();
+  return normals;
+}
+
+std::vector<Vec3> angle_normals(const Surface& surface) {
+  std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
+  for (const Triangle& t : surface.triangles) {
+    const Corners at = corners(surface, t);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 a = at[(k + 1) % 3] - at[k], b = at[(k + 2) % 3] - at[k];
+      normals[t[k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * scaled_normal(at).normalized();
+    }
+  }
+  for (Vec3& normal : normals) normal.normalize();
+  return normals;
+}
+
+Samples sample(const Surface& surface, double spacing) {
+  Samples samples;
+  for (const Triangle& triangle : surface.triangles) {
+    const auto [a, b, c] = corners(surface, triangle);
+    const auto n = std::max(1, static_cast<int>(std::ceil(longest_side({a, b, c}) / spacing)));
+    const double area = (b - a).cross(c - a).norm() / 2 / (static_cast<double>(n) * n);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; i + j < n; ++j)
+        for (int half = 0; half < (i + j + 1 < n ? 2 : 1); ++half) {
+          const double x = (i + (1.0 + half) / 3) / n, y = (j + (1.0 + half) / 3) / n;
+          samples.point.push_back(a + x * (b - a) + y * (c - a));
+          samples.area.push_back(area);
+        }
+  }
+  return samples;
+}
+
+void append(const Surface& part, Surface& whole) {
+  const auto shift = static_cast<int64_t>(whole.points.size());
+  whole.points.insert(whole.points.end(), part.points.begin(), part.points.end());
+  for (const auto& [a, b, c] : part.triangles)
+    whole.triangles.push_back({a + shift, b + shift, c + shift});
+}
+
 Surface compact(std::string name, const std::vector<Vec3>& points,
                 std::vector<Triangle> triangles) {
   Surface found{std::move(name), {}, std::move(triangles)};
@@ -104,10 +150,7 @@ Surface components_above(const Surface& surface, double volume) {
   for (const Surface& part : components(surface)) {
     largest = std::max(largest, std::abs(volume_of(part)));
     if (std::abs(volume_of(part)) < volume) continue;
-    const auto shift = static_cast<int64_t>(kept.points.size());
-    kept.points.insert(kept.points.end(), part.points.begin(), part.points.end());
-    for (const auto& [a, b, c] : part.triangles)
-      kept.triangles.push_back({a + shift, b + shift, c + shift});
+    append(part, kept);
   }
   if (kept.triangles.empty())
     base::refuse("{}: no component of {:g} mm³ or more; the largest has {:.4g} mm³", surface.name,

@@ -9,7 +9,6 @@
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "soup.h"
-#include "stl.h"
 
 namespace repose::surface {
 namespace {
@@ -51,6 +50,13 @@ Content read_content(const std::filesystem::path& file) {
   if (content.bytes.starts_with("\xEF\xBB\xBF")) content.bytes.erase(0, 3);
   if (content.bytes.empty()) base::refuse("{}: the file is empty; export it again", file.string());
   return content;
+}
+
+size_t stl_size(const std::string& bytes) {
+  if (bytes.size() < stl_header_bytes) return 0;
+  uint32_t triangles = 0;
+  std::memcpy(&triangles, bytes.data() + 80, sizeof triangles);
+  return stl_header_bytes + stl_triangle_bytes * size_t{triangles};
 }
 
 Format recognize(const Content& content) {

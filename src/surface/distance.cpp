@@ -1,10 +1,6 @@
 #include "repose/surface/distance.h"
 
-#include <CGAL/Orthogonal_k_neighbor_search.h>
-#include <CGAL/Search_traits_3.h>
-#include <CGAL/Search_traits_adapter.h>
 #include <CGAL/intersections.h>
-#include <CGAL/property_map.h>
 #include <CGAL/version.h>
 #include <algorithm>
 #include <cmath>
@@ -184,31 +180,6 @@ bool DistanceTree::contains(const Vec3& query) const {
     if (sure) return odd;
   }
   throw base::InternalError("every ray from a point runs along an edge of the surface");
-}
-
-namespace {
-
-using Row = std::pair<Point3, int64_t>;
-using Traits = CGAL::Search_traits_adapter<Row, CGAL::First_of_pair_property_map<Row>,
-                                           CGAL::Search_traits_3<Kernel>>;
-using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
-
-}  // namespace
-
-struct PointTree::Tree {
-  Search::Tree rows;
-};
-
-PointTree::PointTree(const std::vector<Vec3>& points) : tree_(std::make_unique<Tree>()) {
-  for (size_t p = 0; p < points.size(); ++p)
-    tree_->rows.insert({to_cgal(points[p]), static_cast<int64_t>(p)});
-  tree_->rows.build();
-}
-
-PointTree::~PointTree() = default;
-
-int64_t PointTree::nearest(const Vec3& query) const {
-  return Search(tree_->rows, to_cgal(query), 1).begin()->first.second;
 }
 
 }  // namespace repose::surface

@@ -9,7 +9,6 @@
 #include "repose/base/error.h"
 #include "repose/base/text.h"
 #include "soup.h"
-#include "stl.h"
 
 /// STL and OBJ through CGAL's readers, which answer only yes or no and trust what they read:
 /// each file is brought into the plainest form of its format first.
@@ -127,15 +126,15 @@ Soup parse_stl_text(Content content) {
 
 Soup parse_stl_binary(Content content) {
   const std::string file = content.file.string();
-  const auto triangles = stl_triangles(content.bytes);
-  if (!triangles)
+  const size_t size = content.bytes.size(), promised = stl_size(content.bytes);
+  if (promised == 0)
     base::refuse("{}: truncated: {} bytes, and a binary STL has at least {}; export it again", file,
-                 content.bytes.size(), stl_header_bytes);
-  if (stl_size(content.bytes) != content.bytes.size())
+                 size, stl_header_bytes);
+  if (promised != size)
     base::refuse(
         "{}: truncated or damaged: {} bytes, but the {} triangles it promises take {}; "
         "export it again",
-        file, content.bytes.size(), *triangles, stl_size(content.bytes));
+        file, size, (promised - stl_header_bytes) / stl_triangle_bytes, promised);
   content.bytes.replace(0, 5, "plain");  // "solid" would have it read as text
   return read_with(read_stl, std::move(content.bytes), damaged_binary(file));
 }

@@ -16,6 +16,12 @@ struct Soup {
 
 enum class Format { ply, stl_text, stl_binary, obj, off };
 
+constexpr size_t stl_header_bytes = 84;    ///< 80 of text and the number of triangles
+constexpr size_t stl_triangle_bytes = 50;  ///< twelve floats and a 16-bit attribute
+
+/// The size in bytes that a binary STL promises; 0 for a file shorter than its header.
+size_t stl_size(const std::string& bytes);
+
 /// The format by content; the ending decides only where the content does not. Throws InputError
 /// when it is none of the known ones.
 Format recognize(const Content& content);

@@ -29,8 +29,10 @@ Vec3 closest_point(const Vec3& q, const Corners& t) {
 
 }  // namespace
 
+Vec3 scaled_normal(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]); }
+
 Vec3 barycentric(const Corners& t, const Vec3& point) {
-  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const Vec3 normal = scaled_normal(t);
   const double area = normal.squaredNorm();
   const double a = (t[2] - t[1]).cross(point - t[1]).dot(normal) / area;
   const double b = (t[0] - t[2]).cross(point - t[2]).dot(normal) / area;
@@ -48,6 +50,10 @@ int longest_edge(const Corners& t) {
     }
   }
   return longest;
+}
+
+double longest_side(const Corners& t) {
+  return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
 }
 
 double squared_distance(const Vec3& query, const Corners& triangle, Vec3* closest) {
@@ -223,6 +229,12 @@ void TriangleTree::refit(int64_t number) {
     if (box.low == nodes_[number].box.low && box.high == nodes_[number].box.high) return;
     nodes_[number].box = box;
   }
+}
+
+TriangleTree tree_of_points(const std::vector<Vec3>& points) {
+  Surface flat{"points", points, {}};
+  for (const int64_t p : base::all_rows(points.size())) flat.triangles.push_back({p, p, p});
+  return TriangleTree(flat);
 }
 
 }  // namespace repose::surface

@@ -36,7 +36,7 @@ class SignedDistance {
   DistanceTree tree_;
   std::vector<Vec3> face_normal_, vertex_normal_;  ///< [T], [P]
   std::vector<std::array<Feature, 3>> side_;       ///< [T] from corner k to the next
-  std::vector<bool> vertex_on_border_;             ///< [P]
+  std::vector<char> vertex_on_border_;             ///< [P]
 };
 
 }  // namespace repose::meshtools

@@ -12,6 +12,24 @@ double area_of(const Surface& surface);  ///< mm²
 /// cavity. For an open surface that of the cone over its rim from the first point.
 double volume_of(const Surface& surface);
 
+/// [points] unit normals, the sums of those of the triangles around by their areas.
+std::vector<Vec3> vertex_normals(const Surface& surface);
+
+/// [points] unit normals, the sums of those of the triangles around by their angles there.
+std::vector<Vec3> angle_normals(const Surface& surface);
+
+/// Points spread over a surface: the middles of equal parts of each triangle.
+struct Samples {
+  std::vector<Vec3> point;   ///< mm
+  std::vector<double> area;  ///< mm², of the part
+};
+
+/// Cuts each triangle n times along each side, into n² parts no longer than `spacing` mm.
+Samples sample(const Surface& surface, double spacing);
+
+/// Adds the points and triangles of a part to those of a whole.
+void append(const Surface& part, Surface& whole);
+
 /// These triangles with those of the points that they have, numbered as they come.
 Surface compact(std::string name, const std::vector<Vec3>& points, std::vector<Triangle> triangles);
 

@@ -47,18 +47,4 @@ class DistanceTree {
   std::unique_ptr<Tree> tree_;
 };
 
-/// Answers which of many points is nearest. Construction O(P log P), each question O(log P).
-class PointTree {
- public:
-  explicit PointTree(const std::vector<Vec3>& points);
-  ~PointTree();
-
-  /// Returns the row of the point closest to `query`.
-  int64_t nearest(const Vec3& query) const;
-
- private:
-  struct Tree;
-  std::unique_ptr<Tree> tree_;
-};
-
 }  // namespace repose::surface

@@ -77,6 +77,9 @@ class VertexNeighbors {
   std::vector<int64_t> begin_, vertex_;
 };
 
+/// [points] 1 at the ends of the edges of one triangle.
+std::vector<char> border_vertices(const EdgeTable& edges, size_t points);
+
 /// The triangles united that are connected by edges.
 UnionFind connected(const std::vector<Triangle>& triangles, const EdgeTable& edges);
 

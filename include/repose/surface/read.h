@@ -23,6 +23,10 @@ enum class Role {
 /// range. Never allocates more memory than a small multiple of the file's size.
 Surface read_surface(const std::filesystem::path& file);
 
+/// Gives triangles the first of the vertices that coincide with theirs (coincident_points), and
+/// drops those that then name a vertex twice. All points are kept.
+Surface welded(const Surface& raw);
+
 /// Welds coincident vertices (distance ≤ 1e-9 of the bounding diagonal: STL, or duplicates),
 /// drops isolated vertices and degenerate or duplicate triangles (a flat triangle inside the mesh
 /// is flipped away, so that no slit opens), and orients the result consistently: outwards where it

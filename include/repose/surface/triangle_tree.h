@@ -18,8 +18,12 @@ inline Corners corners(const Surface& surface, const Triangle& triangle) {
 /// Weights of a triangle's corners at the foot of a point in its plane; their sum is 1.
 Vec3 barycentric(const Corners& triangle, const Vec3& point);
 
+/// Normal of a triangle whose length is twice the area, mm².
+Vec3 scaled_normal(const Corners& triangle);
+
 /// k such that no edge is longer than that from corner k to the next.
 int longest_edge(const Corners& triangle);
+double longest_side(const Corners& triangle);  ///< mm
 
 /// The square of the distance from `query` to a point of the triangle that is, up to rounding, its
 /// closest (Ericson, Real-Time Collision Detection, 5.1.5). Where a thin triangle spoils the
@@ -120,5 +124,8 @@ class TriangleTree {
   std::vector<int64_t> leaf_of_;  ///< triangle → node
   std::vector<Node> nodes_;
 };
+
+/// Returns a tree that finds the nearest of many points: its triangles are these points.
+TriangleTree tree_of_points(const std::vector<Vec3>& points);
 
 }  // namespace repose::surface

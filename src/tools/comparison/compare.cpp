@@ -1,25 +1,14 @@
 #include "repose/tools/comparison/compare.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "repose/surface/component.h"
 
 namespace repose::tools::comparison {
 using namespace surface;
 using namespace imaging;
 namespace {
-
-/// The middles of the n² equal parts of a triangle cut n times along each side.
-template <class Visit>
-void visit_parts(const Vec3& a, const Vec3& b, const Vec3& c, int64_t n, Visit visit) {
-  const Vec3 u = (b - a) / static_cast<double>(n), v = (c - a) / static_cast<double>(n);
-  for (int64_t i = 0; i < n; ++i)
-    for (int64_t j = 0; i + j < n; ++j) {
-      const auto x = static_cast<double>(i), y = static_cast<double>(j);
-      visit(Vec3(a + (x + 1.0 / 3) * u + (y + 1.0 / 3) * v));
-      if (i + j + 1 < n) visit(Vec3(a + (x + 2.0 / 3) * u + (y + 2.0 / 3) * v));
-    }
-}
 
 using Absolute = std::vector<std::pair<double, double>>;  // |distance|, area; ascending
 
@@ -42,19 +31,13 @@ double area_within(const Absolute& sorted, double limit) {
 
 std::vector<Sample> sample_distances(const Surface& from, const SignedDistance& to, double spacing,
                                      const Watch& watch) {
+  const Samples points = sample(from, spacing);
+  const size_t count = points.point.size();
   std::vector<Sample> samples;
-  for (size_t t = 0; t < from.triangles.size(); ++t) {
-    const auto& [p, q, r] = from.triangles[t];
-    const Vec3 &a = from.points[p], &b = from.points[q], &c = from.points[r];
-    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    const auto n = std::max(int64_t{1}, static_cast<int64_t>(std::ceil(longest / spacing)));
-    const double area = (b - a).cross(c - a).norm() / 2 / static_cast<double>(n * n);
-    visit_parts(a, b, c, n, [&](const Vec3& point) {
-      const auto answer = to.at(point);
-      samples.push_back({point, area, answer.distance, answer.beyond_rim});
-    });
-    if (watch && t % 1024 == 0)
-      watch(static_cast<double>(t) / static_cast<double>(from.triangles.size()));
+  for (size_t s = 0; s < count; ++s) {
+    const auto answer = to.at(points.point[s]);
+    samples.push_back({points.point[s], points.area[s], answer.distance, answer.beyond_rim});
+    if (watch && s % 1024 == 0) watch(static_cast<double>(s) / static_cast<double>(count));
   }
   return samples;
 }

@@ -68,7 +68,7 @@ std::vector<Color> paints_of(const Held& held) {
 }  // namespace
 
 Paint::Paint(const std::filesystem::path& file) {
-  VertexValues mesh = read_vertex_values(file);
+  const VertexValues mesh = read_vertex_values(file);
   if (mesh.points.empty()) base::refuse("{}: it has no vertices", file.string());
   const Held held = held_by(mesh, file);
   const std::vector<Color> paints = paints_of(held);
@@ -81,14 +81,13 @@ Paint::Paint(const std::filesystem::path& file) {
         [&](const Color& a, const Color& b) { return apart(value, a) < apart(value, b); });
     paint_.push_back(static_cast<int>(nearest - paints.begin()));
   }
-  points_ = std::move(mesh.points);
-  tree_ = std::make_unique<PointTree>(points_);
+  tree_ = tree_of_points(mesh.points);
 }
 
 int Paint::at(const Vec3& point) const {
   constexpr double beside = 10;  // mm
-  const int64_t nearest = tree_->nearest(point);
-  return (points_[nearest] - point).norm() <= beside ? paint_[nearest] : -1;
+  const TriangleTree::Nearest vertex = tree_->nearest(point);
+  return std::sqrt(vertex.squared) <= beside ? paint_[vertex.triangle] : -1;
 }
 
 }  // namespace repose::tools::comparison

@@ -35,18 +35,6 @@ struct Sizing {
   }
 };
 
-Surface to_surface(const Complex& complex) {
-  CGAL::Surface_mesh<Point3> mesh;
-  CGAL::facets_in_complex_3_to_triangle_mesh(complex, mesh);
-  Surface result;
-  for (auto vertex : mesh.vertices()) result.points.push_back(from_cgal(mesh.point(vertex)));
-  for (auto face : mesh.faces()) {
-    const auto h = mesh.halfedge(face);
-    result.triangles.push_back({mesh.source(h), mesh.target(h), mesh.target(mesh.next(h))});
-  }
-  return result;
-}
-
 Surface mesh_bone(double (*distance)(const Vec3&), double edge, const char* name) {
   if (!(edge >= phantom_bone_edge_min && edge <= phantom_bone_edge_max))
     base::refuse("bone_edge: {} mm is not in {} … {} mm", edge, phantom_bone_edge_min,
@@ -61,9 +49,9 @@ Surface mesh_bone(double (*distance)(const Vec3&), double edge, const char* name
                           Criteria::Cell_criteria(0, 0));
   const Complex complex = CGAL::make_mesh_3<Complex>(
       domain, criteria, parameters::no_perturb(), parameters::no_exude(), parameters::manifold());
-  Surface bone = to_surface(complex);
-  bone.name = name;
-  return weld_and_orient(bone);  // CGAL leaves open which side is out
+  CGAL::Surface_mesh<Point3> mesh;
+  CGAL::facets_in_complex_3_to_triangle_mesh(complex, mesh);
+  return weld_and_orient(surface_of(mesh, name));  // CGAL leaves open which side is out
 }
 
 }  // namespace

@@ -191,15 +191,7 @@ class SkinMesher {
     flip_all();
   }
 
-  Surface surface() const {
-    Surface result;
-    for (Vertex vertex : mesh_.vertices()) result.points.push_back(from_cgal(mesh_.point(vertex)));
-    for (Mesh::Face_index face : mesh_.faces()) {
-      const Halfedge h = mesh_.halfedge(face);
-      result.triangles.push_back({mesh_.source(h), mesh_.target(h), mesh_.target(mesh_.next(h))});
-    }
-    return result;
-  }
+  Surface surface() const { return surface_of(mesh_, "phantom skin"); }
 
  private:
   Vec3 tip(Halfedge h) const { return from_cgal(mesh_.point(mesh_.target(h))); }
@@ -311,9 +303,7 @@ Surface make_phantom_skin(int64_t vertices) {
   SkinMesher mesher(strip(ring(mouth_curve, mouth), ring(rim_curve, border - mouth)));
   mesher.refine(vertices);
   for (int i = 0; i < sweeps; ++i) mesher.relax();
-  Surface skin = mesher.surface();
-  skin.name = "phantom skin";
-  return skin;
+  return mesher.surface();
 }
 
 }  // namespace repose::tools::phantom

@@ -7,19 +7,11 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::tools::range_scan {
 using namespace surface;
 namespace {
-
-double longest_side(const std::vector<Vec3>& points, const Triangle& t) {
-  return std::max({(points[t[1]] - points[t[0]]).norm(), (points[t[2]] - points[t[1]]).norm(),
-                   (points[t[0]] - points[t[2]]).norm()});
-}
-
-Vec3 normal_of(const std::vector<Vec3>& points, const Triangle& t) {
-  return (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
-}
 
 /// The corners of each square of four cells, in order around it; −1 for an empty one.
 template <class Visit>
@@ -79,7 +71,7 @@ void face_scanner(std::vector<Triangle>& triangles, const std::vector<Vec3>& poi
                   bool cylinder) {
   double facing = 0;
   for (const Triangle& t : triangles)
-    facing += normal_of(points, t).dot(to_scanner(points, t, cylinder));
+    facing += scaled_normal(base::pick(points, t)).dot(to_scanner(points, t, cylinder));
   if (facing >= 0) return;
   for (Triangle& t : triangles) std::swap(t[1], t[2]);
 }
@@ -88,8 +80,9 @@ void cut_steps(ScanMesh& mesh, const ScanOptions& options) {
   const double min_cosine = std::cos(options.steepest * M_PI / 180);
   const auto& points = mesh.surface.points;
   std::erase_if(mesh.surface.triangles, [&](const Triangle& t) {
-    const bool too_long = longest_side(points, t) > mesh.longest_edge;
-    const Vec3 normal = normal_of(points, t).normalized();
+    const Corners at = base::pick(points, t);
+    const bool too_long = longest_side(at) > mesh.longest_edge;
+    const Vec3 normal = scaled_normal(at).normalized();
     const bool steep = normal.dot(to_scanner(points, t, options.cylinder)) < min_cosine;
     mesh.cut_long += too_long;
     mesh.cut_steep += steep && !too_long;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "repose/base/error.h"
+#include "repose/surface/component.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 #include "repose/tools/registration/register.h"
@@ -18,8 +19,6 @@ using Mat6 = Eigen::Matrix<double, 6, 6>;
 constexpr double min_cosine = 0.5;  ///< between the normals of a pair
 constexpr double on_border = 1e-6;  ///< barycentric share
 constexpr int max_halvings = 6;
-
-Vec3 unit_normal(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
 
 struct Pair {
   Vec3 from, to, normal;  ///< moved sample, its closest point, the fixed surface's normal there
@@ -62,17 +61,13 @@ class Icp {
       border_edge_[half.triangle][half.corner] = true;
       border_vertex_[half.low] = border_vertex_[half.high] = true;
     }
-    std::vector<Vec3> normals(moving.points.size(), Vec3::Zero());
-    for (const auto& triangle : moving.triangles) {
-      const Corners t = corners(moving, triangle);
-      for (const int64_t vertex : triangle) normals[vertex] += (t[1] - t[0]).cross(t[2] - t[0]);
-    }
+    const std::vector<Vec3> normals = vertex_normals(moving);
     const auto count = static_cast<int64_t>(moving.points.size());
     const int64_t used = std::min(count, options.samples);
     for (int64_t i = 0; i < used; ++i) {
       const int64_t vertex = i * count / used;
       points_.push_back(moving.points[vertex]);
-      normals_.push_back(normals[vertex].normalized());
+      normals_.push_back(normals[vertex]);
     }
   }
 
@@ -108,7 +103,7 @@ class Icp {
   bool at_border(int64_t triangle, const Vec3& point) const {
     const Triangle& vertices = fixed_.triangles[triangle];
     const Corners t = corners(fixed_, vertices);
-    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    const Vec3 normal = scaled_normal(t);
     for (int k = 0; k < 3; ++k) {
       const Vec3 &a = t[(k + 1) % 3], &b = t[(k + 2) % 3];
       const double share = (a - point).cross(b - point).dot(normal) / normal.squaredNorm();
@@ -124,7 +119,7 @@ class Icp {
     for (size_t i = 0; i < points_.size(); ++i) {
       const Vec3 from = transform.apply(points_[i]);
       const auto nearest = tree_.nearest(from);
-      const Vec3 normal = unit_normal(corners(fixed_, fixed_.triangles[nearest.triangle]));
+      const Vec3 normal = scaled_normal(tree_.corners_of(nearest.triangle)).normalized();
       if (!((transform.rotation * normals_[i]).dot(normal) > min_cosine)) continue;
       if (at_border(nearest.triangle, nearest.point)) continue;
       pairs.push_back({from, nearest.point, normal, nearest.squared});

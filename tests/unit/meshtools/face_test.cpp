@@ -13,6 +13,7 @@
 #include "repose/meshtools/signed_distance.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::meshtools {
 using namespace surface;
@@ -60,11 +61,11 @@ TEST(DistanceVolume, is_the_distance_to_the_nearest_triangle) {
   EXPECT_LE(volume.origin.maxCoeff(), -12);
 }
 
-TEST(PointTree, finds_the_nearest_point) {
+TEST(TreeOfPoints, finds_the_nearest_point) {
   std::vector<Vec3> points;
   for (int i = 0; i < 50; ++i) points.push_back(Vec3(i * i, 0, 0));
-  EXPECT_EQ(PointTree(points).nearest(Vec3(10, 1, 0)), 3);
-  EXPECT_EQ(PointTree({Vec3::Zero()}).nearest(Vec3::Ones()), 0);
+  EXPECT_EQ(tree_of_points(points).nearest(Vec3(10, 1, 0)).triangle, 3);
+  EXPECT_EQ(tree_of_points({Vec3::Zero()}).nearest(Vec3::Ones()).triangle, 0);
 }
 
 TEST(OuterSkin, has_no_inner_wall_no_hole_and_no_thin_sheet) {

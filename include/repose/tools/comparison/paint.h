@@ -1,10 +1,10 @@
 #pragma once
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "repose/surface/distance.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::tools::comparison {
 
@@ -23,10 +23,9 @@ class Paint {
   int at(const Vec3& point) const;
 
  private:
-  std::vector<Vec3> points_;
   std::vector<std::string> names_;
-  std::vector<int> paint_;  // [points] row of names
-  std::unique_ptr<surface::PointTree> tree_;
+  std::vector<int> paint_;                     // [vertices] row of names
+  std::optional<surface::TriangleTree> tree_;  // of the vertices
 };
 
 }  // namespace repose::tools::comparison
