@@ -23,8 +23,6 @@ constexpr int max_pulls = 4;
 /// Passes over the edges end when one removes less than this share of the triangles.
 constexpr double idle_pass = 1e-3;
 
-Vec3 scaled_normal(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]); }
-
 bool has(const Triangle& triangle, int64_t vertex) {
   return std::find(triangle.begin(), triangle.end(), vertex) != triangle.end();
 }
@@ -65,41 +63,37 @@ bool cross(const Triangle& a, const Corners& a_corners, const Triangle& b,
 
 }  // namespace
 
-Collapser::Collapser(const Surface& surface, std::vector<bool> locked)
+Collapser::Collapser(const Surface& surface, const std::vector<char>& locked)
     : surface_(surface),
-      locked_(std::move(locked)),
       tree_(surface),
-      star_(surface.points.size()),
-      quadric_(surface.points.size()),
-      version_(surface.points.size(), 0),
-      changed_(surface.points.size(), 1),
       dead_(surface.triangles.size(), false),
       alive_(static_cast<int64_t>(surface.triangles.size())),
       origin_(surface.points[0]) {
+  for (const char at : locked) vertices_.push_back({.locked = at != 0});
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     Corners c = corners(surface, surface.triangles[t]);
     for (Vec3& corner : c) corner -= origin_;
     const Quadric plane = Quadric::of(c);
     for (const int64_t vertex : surface.triangles[t]) {
-      star_[vertex].push_back(static_cast<int64_t>(t));
-      quadric_[vertex] = quadric_[vertex] + plane;
+      vertices_[vertex].triangles.push_back(static_cast<int64_t>(t));
+      vertices_[vertex].quadric = vertices_[vertex].quadric + plane;
     }
   }
 }
 
 Collapser::Candidate Collapser::candidate(int64_t a, int64_t b) const {
-  if (locks(b)) std::swap(a, b);
-  const Quadric sum = quadric_[a] + quadric_[b];
+  if (vertices_[b].locked) std::swap(a, b);
+  const Quadric sum = vertices_[a].quadric + vertices_[b].quadric;
   const Vec3 middle = 0.5 * (surface_.points[a] + surface_.points[b]) - origin_;
-  const Vec3 at = locks(a) ? Vec3(surface_.points[a] - origin_) : sum.minimizer(middle);
+  const Vec3 at = vertices_[a].locked ? Vec3(surface_.points[a] - origin_) : sum.minimizer(middle);
   const double length = (surface_.points[a] - surface_.points[b]).squaredNorm();
   const double cost = std::max(sum.at(at), 0.0) + 1e-9 * length * length;
-  return {cost, a, b, version_[a], version_[b]};
+  return {cost, a, b, vertices_[a].version, vertices_[b].version};
 }
 
 std::vector<int64_t> Collapser::neighbors(int64_t vertex) const {
   std::vector<int64_t> found;
-  for (const int64_t t : star_[vertex])
+  for (const int64_t t : vertices_[vertex].triangles)
     for (const int64_t other : surface_.triangles[t])
       if (other != vertex) found.push_back(other);
   base::sort_unique(found);
@@ -108,9 +102,9 @@ std::vector<int64_t> Collapser::neighbors(int64_t vertex) const {
 
 /// Link condition: the neighbors that both ends share are the corners opposite the edge.
 bool Collapser::gather(int64_t kept, int64_t removed, Star& star) const {
-  for (const int64_t t : star_[kept])
+  for (const int64_t t : vertices_[kept].triangles)
     (has(surface_.triangles[t], removed) ? star.dying : star.staying).push_back(t);
-  for (const int64_t t : star_[removed])
+  for (const int64_t t : vertices_[removed].triangles)
     if (!has(surface_.triangles[t], kept)) star.staying.push_back(t);
   const auto a = neighbors(kept), b = neighbors(removed);
   std::vector<int64_t> both;
@@ -121,9 +115,9 @@ bool Collapser::gather(int64_t kept, int64_t removed, Star& star) const {
 /// Where the vertex that stays may go, best first: the quadric's minimizer, the middle, the ends.
 std::vector<Vec3> Collapser::placements(int64_t kept, int64_t removed) const {
   const Vec3 &a = surface_.points[kept], &b = surface_.points[removed];
-  if (locks(kept)) return {a};
+  if (vertices_[kept].locked) return {a};
   const Vec3 middle = 0.5 * (a + b);
-  const Quadric sum = quadric_[kept] + quadric_[removed];
+  const Quadric sum = vertices_[kept].quadric + vertices_[removed].quadric;
   return {origin_ + sum.minimizer(middle - origin_), middle, a, b};
 }
 
@@ -199,7 +193,8 @@ bool Collapser::attempt(const Candidate& c) {
         collapse(star, c.kept, c.removed, at);
         return true;
       }
-      if (locks(c.kept) || !tolerance_ || !outside.allFinite() || pull == max_pulls) break;
+      if (vertices_[c.kept].locked || !tolerance_ || !outside.allFinite() || pull == max_pulls)
+        break;
       at = pulled(c.kept, at, outside);
     }
   return false;
@@ -226,34 +221,34 @@ Vec3 Collapser::pulled(int64_t kept, const Vec3& at, const Vec3& outside) const 
 void Collapser::collapse(const Star& star, int64_t kept, int64_t removed, const Vec3& at) {
   ++steps_;
   surface_.points[kept] = at;
-  quadric_[kept] = quadric_[kept] + quadric_[removed];
+  vertices_[kept].quadric = vertices_[kept].quadric + vertices_[removed].quadric;
   for (const int64_t t : star.dying) {
     dead_[t] = true;
     tree_.remove(t);
     --alive_;
-    for (const int64_t vertex : surface_.triangles[t]) std::erase(star_[vertex], t);
+    for (const int64_t vertex : surface_.triangles[t]) std::erase(vertices_[vertex].triangles, t);
   }
   for (size_t i = 0; i < star.staying.size(); ++i) {
     surface_.triangles[star.staying[i]] = new_triangles_[i];
     tree_.exchange(star.staying[i], new_corners_[i]);
-    for (const int64_t vertex : new_triangles_[i]) changed_[vertex] = steps_;
+    for (const int64_t vertex : new_triangles_[i]) vertices_[vertex].changed = steps_;
   }
-  star_[kept] = star.staying;
-  star_[removed].clear();
-  ++version_[kept];
-  ++version_[removed];
+  vertices_[kept].triangles = star.staying;
+  vertices_[removed].triangles.clear();
+  ++vertices_[kept].version;
+  ++vertices_[removed].version;
 }
 
 int64_t Collapser::pass(int64_t target, uint64_t since, const std::function<void()>& report) {
   std::priority_queue<Candidate> queue;
   const auto offer = [&](int64_t a, int64_t b) {
-    if (!locks(a) || !locks(b)) queue.push(candidate(a, b));
+    if (!vertices_[a].locked || !vertices_[b].locked) queue.push(candidate(a, b));
   };
   for (size_t t = 0; t < surface_.triangles.size(); ++t) {
     const Triangle& triangle = surface_.triangles[t];
     for (int k = 0; k < 3 && !dead_[t]; ++k) {
       const int64_t a = triangle[k], b = triangle[(k + 1) % 3];
-      if (std::max(changed_[a], changed_[b]) > since) offer(a, b);
+      if (std::max(vertices_[a].changed, vertices_[b].changed) > since) offer(a, b);
     }
   }
   const int64_t before = alive_;
@@ -261,7 +256,8 @@ int64_t Collapser::pass(int64_t target, uint64_t since, const std::function<void
     const Candidate best = queue.top();
     queue.pop();
     if (tried % 256 == 0) report();
-    if (version_[best.kept] != best.kept_version || version_[best.removed] != best.removed_version)
+    if (vertices_[best.kept].version != best.kept_version ||
+        vertices_[best.removed].version != best.removed_version)
       continue;
     if (!attempt(best)) continue;
     for (const int64_t neighbor : neighbors(best.kept)) offer(best.kept, neighbor);

@@ -19,7 +19,7 @@ using surface::TriangleTree;
 class Collapser {
  public:
   /// Locked vertices are neither moved nor removed.
-  Collapser(const Surface& surface, std::vector<bool> locked);
+  Collapser(const Surface& surface, const std::vector<char>& locked);
 
   int64_t triangles() const { return alive_; }
 
@@ -37,12 +37,18 @@ class Collapser {
     uint32_t kept_version, removed_version;
     bool operator<(const Candidate& other) const { return cost > other.cost; }
   };
+  struct Vertex {
+    bool locked;
+    std::vector<int64_t> triangles = {};  ///< around it
+    Quadric quadric = {};
+    uint32_t version = 0;  ///< of its edges' costs
+    uint64_t changed = 1;  ///< the step that last changed its triangles
+  };
   /// The triangles around an edge: those that go with it, and those that stay.
   struct Star {
     std::vector<int64_t> dying, staying;
   };
 
-  bool locks(int64_t vertex) const { return locked_[vertex]; }
   Candidate candidate(int64_t a, int64_t b) const;
   std::vector<int64_t> neighbors(int64_t vertex) const;
   bool gather(int64_t kept, int64_t removed, Star& star) const;
@@ -58,13 +64,9 @@ class Collapser {
 
   Surface surface_;
   const Tolerance* tolerance_ = nullptr;
-  std::vector<bool> locked_;
   TriangleTree tree_;
-  std::vector<std::vector<int64_t>> star_;  ///< vertex → triangles
-  std::vector<Quadric> quadric_;
-  std::vector<uint32_t> version_;  ///< of a vertex: its edges' costs
-  std::vector<uint64_t> changed_;  ///< the step that last changed a vertex's star
-  std::vector<bool> dead_;
+  std::vector<Vertex> vertices_;
+  std::vector<bool> dead_;  ///< [triangles]
   int64_t alive_;
   uint64_t steps_ = 0;
   Vec3 origin_;

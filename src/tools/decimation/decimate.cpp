@@ -20,14 +20,6 @@ constexpr double measure_accuracy = 1e-5;
 /// First and last tolerance on the way to a count, as shares of the input's extent.
 constexpr double first_share = 5e-4, last_share = 0.1;
 
-std::vector<bool> border_vertices(const Surface& surface) {
-  std::vector<bool> at_border(surface.points.size(), false);
-  const EdgeTable edges(surface.triangles);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    if (edges[e].size() == 1) at_border[edges[e][0].low] = at_border[edges[e][0].high] = true;
-  return at_border;
-}
-
 int64_t nearest_vertex(const Surface& surface, const Vec3& point) {
   const auto nearer = [&](const Vec3& a, const Vec3& b) {
     return (a - point).squaredNorm() < (b - point).squaredNorm();
@@ -84,13 +76,13 @@ void collapse(Collapser& collapser, const Surface& surface, const DecimateOption
 Decimated decimate(const Surface& surface, const DecimateOptions& options,
                    const std::function<void(int64_t)>& report) {
   Decimated decimated;
-  std::vector<bool> locked = border_vertices(surface);
+  std::vector<char> locked = border_vertices(EdgeTable(surface.triangles), surface.points.size());
   for (const Vec3& landmark : options.landmarks) {
     const int64_t vertex = nearest_vertex(surface, landmark);
     locked[vertex] = true;
     decimated.landmark_distance.push_back((surface.points[vertex] - landmark).norm());
   }
-  Collapser collapser(surface, std::move(locked));
+  Collapser collapser(surface, locked);
   collapse(collapser, surface, options, report);
   decimated.surface = collapser.result();
   check_intersections(decimated.surface, surface);

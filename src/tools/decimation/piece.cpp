@@ -71,7 +71,7 @@ bool Piece::cut_to(const Corners& triangle, double margin, std::vector<Piece>& r
   const Vec3 middle = center();
   double size = 0;
   for (const Vec3& corner : corners()) size = std::max(size, (corner - middle).norm());
-  const Vec3 upright = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+  const Vec3 upright = scaled_normal(triangle);
   std::array<Vec3, 3> outward;
   for (int k = 0; k < 3; ++k) {
     outward[k] = (triangle[(k + 1) % 3] - triangle[k]).cross(upright).normalized();

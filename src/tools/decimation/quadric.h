@@ -17,7 +17,7 @@ struct Quadric {
 
   /// The plane of a triangle, times its area.
   static Quadric of(const Corners& t) {
-    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    const Vec3 normal = surface::scaled_normal(t);
     const double twice_area = normal.norm();
     if (!(twice_area > 0)) return {};
     const Vec3 n = normal / twice_area;
