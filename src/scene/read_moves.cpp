@@ -4,7 +4,6 @@
 
 #include "bone_names.h"
 #include "clinical_move.h"
-#include "landmark_fit.h"
 #include "repose/base/text.h"
 #include "repose/scene/transform_file.h"
 

@@ -46,6 +46,27 @@ Mat3 turn(const Vec3& axis, double angle) {
   return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
 }
 
+/// The least turn that takes direction `from` to `to`, and the middle of one pair to the other's.
+RigidMotion line_up(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+  const Vec3 a = from[1] - from[0], b = to[1] - to[0];
+  if (!(a.norm() > 0) || !(b.norm() > 0))
+    base::refuse("two landmarks in one place fix no turn; give two apart");
+  const Vec3 axis = a.cross(b).norm() > 0 ? a.cross(b).normalized() : a.unitOrthogonal();
+  const Mat3 rotation = turn(axis, std::atan2(a.cross(b).norm(), a.dot(b)));
+  Mat4 matrix = Mat4::Identity();
+  matrix.topLeftCorner<3, 3>() = rotation;
+  matrix.topRightCorner<3, 1>() = (to[0] + to[1] - rotation * (from[0] + from[1])) / 2;
+  return RigidMotion::from_matrix(matrix);
+}
+
+RigidFit with_residual(const RigidMotion& motion, const std::vector<Vec3>& from,
+                       const std::vector<Vec3>& to) {
+  RigidFit fit{motion, 0};
+  for (std::size_t i = 0; i < from.size(); ++i)
+    fit.residual = std::max(fit.residual, (motion.apply(from[i]) - to[i]).norm());
+  return fit;
+}
+
 }  // namespace
 
 RigidMotion::RigidMotion(const Mat3& rotation, const Vec3& translation)
@@ -127,10 +148,17 @@ RigidFit fit_rigid_motion(const std::vector<Vec3>& from, const std::vector<Vec3>
   if (!determines_rotation(from))
     base::refuse("a rigid fit needs at least three points that are not on a line; there are {}",
                  from.size());
-  RigidFit fit{RigidMotion::from_matrix(base::fit_similarity(from, to, false).matrix()), 0};
-  for (std::size_t i = 0; i < from.size(); ++i)
-    fit.residual = std::max(fit.residual, (fit.motion.apply(from[i]) - to[i]).norm());
-  return fit;
+  return with_residual(RigidMotion::from_matrix(base::fit_similarity(from, to, false).matrix()),
+                       from, to);
+}
+
+RigidFit fit_landmarks(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+  if (from.size() != to.size() || from.empty())
+    throw base::InternalError("landmarks to fit are not in pairs");
+  if (from.size() > 2) return fit_rigid_motion(from, to);
+  const bool one = from.size() == 1;
+  return with_residual(one ? RigidMotion::translation(to[0] - from[0]) : line_up(from, to), from,
+                       to);
 }
 
 }  // namespace repose::scene

@@ -52,6 +52,11 @@ struct RigidFit {
 /// fix a rotation (below). Throws InputError otherwise.
 RigidFit fit_rigid_motion(const std::vector<Vec3>& from, const std::vector<Vec3>& to);
 
+/// The motion that takes landmarks `from` to `to` (mm, equally many, at least one): one, the
+/// translation; two, middle to middle and the least turn that lines them up; more, the best rigid
+/// motion. Throws InputError where they do not fix a turn.
+RigidFit fit_landmarks(const std::vector<Vec3>& from, const std::vector<Vec3>& to);
+
 /// Returns whether points determine a rotation: at least three, and not all within 1e-6 of their
 /// extent of a line.
 bool determines_rotation(const std::vector<Vec3>& points);

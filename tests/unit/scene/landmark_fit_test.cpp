@@ -1,4 +1,4 @@
-#include "scene/landmark_fit.h"
+#include "repose/scene/rigid_motion.h"
 
 #include <gtest/gtest.h>
 
