@@ -12,6 +12,14 @@ namespace {
 using base::Range;
 using enum KeyKind;
 
+using Keys = std::vector<Key>;
+
+Keys joined(const std::vector<Keys>& parts) {
+  Keys all;
+  for (const Keys& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 /// A key whose value is one of some words.
 Key one_of(const std::string& path, const char* standard, std::vector<std::string> words,
            const char* sentence) {
@@ -23,7 +31,7 @@ Key one_of(const std::string& path, const char* standard, std::vector<std::strin
 }
 
 /// The keys of a surface taken from a volume, below `above`.
-std::vector<Key> volume_keys(const std::string& above) {
+Keys volume_keys(const std::string& above) {
   return {{above + ".volume", volume, "",
            "CT or label map to take the surface from: its largest component."},
           {.path = above + ".level",
@@ -47,24 +55,20 @@ std::vector<Key> volume_keys(const std::string& above) {
            Range::between(0, 1000)}};
 }
 
-std::vector<Key> surface_keys() {
-  std::vector<Key> rows{
-      {"skin", mesh, "required",
-       "Triangle mesh of the skin, open or closed, or what volume to take it from."}};
-  const std::vector<Key> of_skin = volume_keys("skin"), of_bone = volume_keys("bones[]");
-  rows.insert(rows.end(), of_skin.begin(), of_skin.end());
-  rows.push_back(
+Keys surface_keys() {
+  const Keys skin{{"skin", mesh, "required",
+                   "Triangle mesh of the skin, open or closed, or what volume to take it from."}};
+  const Keys bones{
       {"bones", list, "required",
-       "The bones, each a triangle mesh or taken from a volume; the list may be empty."});
-  rows.push_back({"bones[].name", text, "required",
-                  "The bone's name: printable ASCII, 64 characters at most."});
-  rows.push_back({"bones[].file", file, "", "Triangle mesh of the bone; or give volume."});
-  rows.insert(rows.end(), of_bone.begin(), of_bone.end());
-  return rows;
+       "The bones, each a triangle mesh or taken from a volume; the list may be empty."},
+      {"bones[].name", text, "required",
+       "The bone's name: printable ASCII, 64 characters at most."},
+      {"bones[].file", file, "", "Triangle mesh of the bone; or give volume."}};
+  return joined({skin, volume_keys("skin"), bones, volume_keys("bones[]")});
 }
 
 /// Keys of the attachment of tissue to bone.
-std::vector<Key> attach_keys() {
+Keys attach_keys() {
   return {one_of("tissue.released", "contact", {"fixed", "slide", "contact", "free"},
                  "What such tissue does then: as attach."),
           one_of("tissue.attach", "fixed", {"fixed", "slide", "contact", "free"},
@@ -80,7 +84,7 @@ std::vector<Key> attach_keys() {
            "mm", Range::between(0, 10)}};
 }
 
-std::vector<Key> tissue_keys() {
+Keys tissue_keys() {
   return {
       {"tissue", map, "required", "The soft tissue between skin and bone."},
       {"tissue.layers", integer, "required", "Point layers, skin and deepest included.", "",
@@ -132,7 +136,7 @@ std::vector<Key> tissue_keys() {
 }
 
 /// The keys of a part of space, below the item of a list.
-std::vector<Key> region_keys(const std::string& item) {
+Keys region_keys(const std::string& item) {
   return {{item + ".sphere", map, "", "The region as a sphere, or"},
           {item + ".sphere.center", vector, "required", "Its center.", "mm"},
           {item + ".sphere.radius", number, "required", "Its radius.", "mm", Range::above(0)},
@@ -147,7 +151,7 @@ std::vector<Key> region_keys(const std::string& item) {
           {item + ".radius", number, "", "How near to the curve.", "mm", Range::above(0)}};
 }
 
-std::vector<Key> contact_keys() {
+Keys contact_keys() {
   return {{"contact", map, "", "Tissue against bones and itself; without it as for a material."},
           one_of("contact.bones", "on", {"on", "off"},
                  "Free tissue stays out of bones, if it began outside; on for a material, off for "
@@ -172,7 +176,7 @@ std::vector<Key> contact_keys() {
 }
 
 /// Young's modulus and Poisson's ratio, below `above`.
-std::vector<Key> elasticity_keys(const std::string& above, const char* standard) {
+Keys elasticity_keys(const std::string& above, const char* standard) {
   return {{above + ".young", number, standard, "Young's modulus at small strains.", "N/mm²",
            Range::between(1e-9, 1e9)},
           {above + ".poisson", number, "", "Poisson's ratio; that of the material when not given.",
@@ -180,7 +184,7 @@ std::vector<Key> elasticity_keys(const std::string& above, const char* standard)
 }
 
 /// A part of the skin that is painted on a mesh, below the item of a list.
-std::vector<Key> painted_keys(const std::string& item) {
+Keys painted_keys(const std::string& item) {
   const std::string painted = item + ".painted";
   return {{painted, map, "", "A region painted on a mesh of the skin, and the tissue below it."},
           {painted + ".mesh", file, "required",
@@ -194,20 +198,15 @@ std::vector<Key> painted_keys(const std::string& item) {
 }
 
 /// The items of all lists of regions.
-std::vector<Key> regions_keys() {
-  std::vector<Key> rows;
-  const auto add = [&](const std::vector<Key>& more) {
-    rows.insert(rows.end(), more.begin(), more.end());
-  };
-  for (const char* item : {"teeth[]", "tissue.attach_regions[]", "tissue.unattached[]",
-                           "tissue.face[]", "tissue.material.regions[]"})
-    add(region_keys(item));
-  for (const char* item : {"tissue.face[]", "tissue.material.regions[]"}) add(painted_keys(item));
-  return rows;
+Keys regions_keys() {
+  return joined({region_keys("teeth[]"), region_keys("tissue.attach_regions[]"),
+                 region_keys("tissue.unattached[]"), region_keys("tissue.face[]"),
+                 region_keys("tissue.material.regions[]"), painted_keys("tissue.face[]"),
+                 painted_keys("tissue.material.regions[]")});
 }
 
-std::vector<Key> material_keys() {
-  std::vector<Key> rows{
+Keys material_keys() {
+  Keys rows{
       {"tissue.material", map, "",
        "The tissue as a neo-Hookean solid; excludes springs. The default, with the preset face, "
        "where neither is given."},
@@ -242,7 +241,7 @@ std::vector<Key> material_keys() {
   return rows;
 }
 
-std::vector<Key> spring_keys() {
+Keys spring_keys() {
   return {
       {"tissue.springs", map, "",
        "The tissue as the paper's springs; excludes material. Rules by set: default, layer, "
@@ -272,7 +271,7 @@ std::vector<Key> spring_keys() {
        .choices = {"initial"}}};
 }
 
-std::vector<Key> load_keys() {
+Keys load_keys() {
   return {{"gravity", vector, "", "Gravity field; needs tissue.mass or tissue.density.", "N/kg"},
           {"scan_gravity", vector, "",
            "Gravity field when the surfaces were recorded, for example lying in a CT; default: "
@@ -290,7 +289,7 @@ std::vector<Key> load_keys() {
 }
 
 /// The forms translate and rotate, below an entry of moves and below an item of a transform.
-std::vector<Key> form_keys(const std::string& above) {
+Keys form_keys(const std::string& above) {
   return {{above + ".landmark", map, "",
            "Form: puts a landmark of the bone in its place; a list of several pairs: the rigid "
            "motion that fits them best (see below)."},
@@ -306,7 +305,7 @@ std::vector<Key> form_keys(const std::string& above) {
 }
 
 /// The form clinical, below an entry of moves.
-std::vector<Key> clinical_keys() {
+Keys clinical_keys() {
   const std::string above = "moves[].clinical";
   const auto length = [&](const char* name, const char* sentence) {
     return Key{above + "." + name, number, "", sentence, "mm", Range::between(-30, 30)};
@@ -338,27 +337,24 @@ std::vector<Key> clinical_keys() {
        "of a chin."}};
 }
 
-std::vector<Key> move_keys() {
-  std::vector<Key> rows{
+Keys move_keys() {
+  const Keys entry{
       {"moves", list, "",
        "Rigid motions of bones. Each entry has one form, or a list of that form's values applied "
        "in order; several entries of one bone apply in the order of the file."},
       {"moves[].bone", texts, "required",
        "The name of a bone or a piece, or several, which all make the move."}};
-  const std::vector<Key> forms = form_keys("moves[]"), listed = form_keys("moves[].transform[]");
-  rows.insert(rows.end(), forms.begin(), forms.end());
-  const std::vector<Key> clinical = clinical_keys();
-  rows.insert(rows.end(), clinical.begin(), clinical.end());
-  rows.push_back({"moves[].transform", transform, "",
-                  "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four "
-                  "rows of four numbers, or a list of forms."});
-  rows.push_back({"moves[].transform[]", transform, "",
-                  "One form of such a list: a file, a matrix, or one of those below."});
-  rows.insert(rows.end(), listed.begin(), listed.end());
-  return rows;
+  const Keys transforms{
+      {"moves[].transform", transform, "",
+       "Form: a transform file of ITK or 3D Slicer (see below), a 4×4 matrix as four rows of four "
+       "numbers, or a list of forms."},
+      {"moves[].transform[]", transform, "",
+       "One form of such a list: a file, a matrix, or one of those below."}};
+  return joined(
+      {entry, form_keys("moves[]"), clinical_keys(), transforms, form_keys("moves[].transform[]")});
 }
 
-std::vector<Key> plan_keys() {
+Keys plan_keys() {
   return {
       {"plan", map, "",
        "Which pieces the plan moves and how far: attachment, border and contact follow from it, "
@@ -372,7 +368,7 @@ std::vector<Key> plan_keys() {
        "degrees"}};
 }
 
-std::vector<Key> solve_keys() {
+Keys solve_keys() {
   return {
       {"solve", map, "", "How the rest position is found."},
       one_of("solve.functional", "energy", {"energy", "force"}, "What is minimized."),
@@ -405,7 +401,7 @@ std::vector<Key> solve_keys() {
        .choices = {"auto"}}};
 }
 
-std::vector<Key> anatomy_keys() {
+Keys anatomy_keys() {
   return {
       {"anatomy", map, "", "Landmarks of the head, and what follows from them by default."},
       {"anatomy.landmarks", file, "required",
@@ -441,7 +437,7 @@ std::vector<Key> anatomy_keys() {
        "N/mm²", Range::between(1e-9, 1e9)}};
 }
 
-std::vector<Key> osteotomy_keys() {
+Keys osteotomy_keys() {
   return {
       {"landmarks", file, "",
        "Landmarks by name, for moves: JSON, {\"name\": [x, y, z], …}, or 3D Slicer's .mrk.json."},
@@ -470,7 +466,7 @@ std::vector<Key> osteotomy_keys() {
        "A point inside the piece, which chooses it in place of the sides of the cuts.", "mm"}};
 }
 
-std::vector<Key> collision_keys() {
+Keys collision_keys() {
   return {
       {"collision", map, "", "What is done about bones that touch on their way."},
       one_of("collision.mode", "report", {"report", "stop", "clamp"},
@@ -482,7 +478,7 @@ std::vector<Key> collision_keys() {
        Range::between(1e-4, 10)}};
 }
 
-std::vector<Key> instrument_keys() {
+Keys instrument_keys() {
   return {{"instruments", list, "",
            "Bodies pushed into the skin: each has one shape, where it is before the push."},
           {"instruments[].push", vector, "required", "How far and where to.", "mm"},
@@ -506,13 +502,13 @@ std::vector<Key> instrument_keys() {
           {"instruments[].mesh", file, "", "Shape: a closed triangle mesh."}};
 }
 
-std::vector<Key> tearing_keys() {
+Keys tearing_keys() {
   return {
       {"tearing", map, "", "Springs that a force pulls too hard tear; needs forces."},
       {"tearing.limit", number, "required", "Tension above which they do.", "N", Range::above(0)}};
 }
 
-std::vector<Key> incision_keys() {
+Keys incision_keys() {
   return {{"incisions", list, "", "Cuts in the skin along a path, made in the stressed face."},
           {"incisions[].path", curve, "required",
            "Where the cut runs, within 5 mm of the skin: points, or 3D Slicer's .mrk.json."},
@@ -525,16 +521,11 @@ std::vector<Key> incision_keys() {
 }  // namespace
 
 const std::vector<Key>& all_keys() {
-  static const std::vector<Key> table = [] {
-    std::vector<Key> rows;
-    for (const auto& part :
-         {surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(), load_keys(),
-          anatomy_keys(), osteotomy_keys(), move_keys(), plan_keys(), collision_keys(),
-          instrument_keys(), contact_keys(), regions_keys(), incision_keys(), tearing_keys(),
-          solve_keys()})
-      rows.insert(rows.end(), part.begin(), part.end());
-    return rows;
-  }();
+  static const Keys table =
+      joined({surface_keys(), tissue_keys(), attach_keys(), material_keys(), spring_keys(),
+              load_keys(), anatomy_keys(), osteotomy_keys(), move_keys(), plan_keys(),
+              collision_keys(), instrument_keys(), contact_keys(), regions_keys(), incision_keys(),
+              tearing_keys(), solve_keys()});
   return table;
 }
 

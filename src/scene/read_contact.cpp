@@ -2,8 +2,7 @@
 
 namespace repose::scene {
 
-std::vector<AttachRegion> read_attach_regions(const Value& list) {
-  std::vector<AttachRegion> regions;
+void read_attach_regions(const Value& list, std::vector<AttachRegion>& regions) {
   for (const Value& item : list.items()) {
     const Map map(item);
     AttachRegion& region = regions.emplace_back(
@@ -14,14 +13,10 @@ std::vector<AttachRegion> read_attach_regions(const Value& list) {
     if (region.gap > 0 && (region.attach == Attach::fixed || region.attach == Attach::slide))
       gap->refuse("goes with attach: contact or free, tissue that is not held; remove it");
   }
-  return regions;
 }
 
-std::vector<AttachRegion> read_teeth(const Value& list) {
-  std::vector<AttachRegion> regions;
-  for (const Value& item : list.items())
-    regions.push_back({read_region(Map(item)), Attach::slide, 0});
-  return regions;
+void read_regions(const Value& list, Attach how, std::vector<AttachRegion>& regions) {
+  for (const Value& item : list.items()) regions.push_back({read_region(Map(item)), how, 0});
 }
 
 Contact read_contact(const Value& value) {

@@ -87,16 +87,20 @@ std::vector<double> read_one_a_layer(const Value& value, int layers) {
   return numbers;
 }
 
+void require_increasing(const Value& value, const std::vector<double>& depths) {
+  for (std::size_t a = 1; a < depths.size(); ++a)
+    if (!(depths[a] > depths[a - 1]))
+      value.elements()[a].refuse("must be greater than the one before ({:g}), it is {:g}",
+                                 depths[a - 1], depths[a]);
+}
+
 std::vector<double> read_depths(const Value& value, int layers) {
   std::vector<double> depths = read_one_a_layer(value, layers);
   if (depths.front() != 0 || depths.back() != 1)
     value.refuse(
         "must begin with 0 (the skin) and end with 1 (the bone), it goes from {:g} to {:g}",
         depths.front(), depths.back());
-  for (int a = 1; a < layers; ++a)
-    if (!(depths[a] > depths[a - 1]))
-      value.elements()[a].refuse("must be greater than the one before ({:g}), it is {:g}",
-                                 depths[a - 1], depths[a]);
+  require_increasing(value, depths);
   return depths;
 }
 
@@ -107,10 +111,7 @@ std::vector<double> read_depths_mm(const Value& value, int layers) {
                  depths.size());
   if (depths.front() != 0)
     value.refuse("must begin with 0 (the skin), it begins with {:g}", depths.front());
-  for (std::size_t a = 1; a < depths.size(); ++a)
-    if (!(depths[a] > depths[a - 1]))
-      value.elements()[a].refuse("must be greater than the one before ({:g}), it is {:g}",
-                                 depths[a - 1], depths[a]);
+  require_increasing(value, depths);
   return depths;
 }
 
@@ -202,11 +203,9 @@ Tissue read_tissue(const Value& value) {
   set_choice<Attach>(tissue.attach, map, "attach");
   set_choice<Attach>(tissue.released, map, "released");
   if (const auto regions = map.find("unattached"))
-    for (const Value& item : regions->items())
-      tissue.attach_regions.push_back({read_region(Map(item)), Attach::contact, 0});
+    read_regions(*regions, Attach::contact, tissue.attach_regions);
   if (const auto regions = map.find("attach_regions"))
-    for (AttachRegion& region : read_attach_regions(*regions))
-      tissue.attach_regions.push_back(std::move(region));
+    read_attach_regions(*regions, tissue.attach_regions);
   const auto springs = map.find("springs"), material = map.find("material");
   if (springs && material)
     material->refuse("and tissue.springs exclude each other; remove one of them");
@@ -317,8 +316,7 @@ void read_surroundings(Scene& scene, const Map& map) {
   if (const auto mouth = map.find("mouth"))
     scene.incisions.push_back(read_mouth(*mouth, scene.tissue.layers));
   if (const auto teeth = map.find("teeth"))
-    for (AttachRegion& region : read_teeth(*teeth))
-      scene.tissue.attach_regions.push_back(std::move(region));
+    read_regions(*teeth, Attach::slide, scene.tissue.attach_regions);
   if (const auto contact = map.find("contact"))
     scene.contact = read_contact(*contact);
   else if (scene.tissue.material)

@@ -20,9 +20,9 @@ AnatomyPlan read_anatomy(const Value& value);
 /// where one of these landmarks is missing.
 void read_septum(const Value& anatomy, Scene& scene);
 
-/// Reads the items of tissue.attach_regions or, all of them to slide, of teeth.
-std::vector<AttachRegion> read_attach_regions(const Value& list);
-std::vector<AttachRegion> read_teeth(const Value& list);
+/// Adds the items of tissue.attach_regions or, all of them to be attached alike, of another list.
+void read_attach_regions(const Value& list, std::vector<AttachRegion>& regions);
+void read_regions(const Value& list, Attach how, std::vector<AttachRegion>& regions);
 Contact read_contact(const Value& value);
 
 /// Reads the points of a curve: a list, or a file of landmarks; two at least.
