@@ -63,7 +63,6 @@ class Recomputation {
         film_states_(adhesion) {}
 
   RecomputedStep run() {
-    elastic_ = claimed_.volume == VolumeTerm::paper ? claimed_.lambda : 1.0;
     points();
     springs();
     edges();
@@ -80,6 +79,7 @@ class Recomputation {
   }
 
  private:
+  double elastic() const { return claimed_.volume == VolumeTerm::paper ? claimed_.lambda : 1.0; }
   bool soft(int64_t i) const { return model_.points.set[i] == model::PointSet::soft_tissue; }
   template <size_t K>
   bool any_soft(const std::array<int64_t, K>& points) const {
@@ -109,7 +109,6 @@ class Recomputation {
   const std::vector<model::PointField>& fields_;
   const std::vector<Film>& films_;
   const std::vector<FilmState>& film_states_;
-  double elastic_ = 1;                  // weight of f
   double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;        // [N] Σ noise of the forces there, N
   std::vector<double> nodal_pressure_;  // [N] e/C of averaged volumes, N/mm², or empty
@@ -142,8 +141,8 @@ void Recomputation::points() {
     coordinate = std::max(coordinate, model_.points.position[i].lpNorm<Eigen::Infinity>());
     moved = std::max(moved, step_.displacement[i].norm());
   }
-  step_.position_scale = coordinate;
-  step_.displacement_scale = scale_of(moved, rounding * coordinate);
+  step_.scale.position = coordinate;
+  step_.scale.displacement = scale_of(moved, rounding * coordinate);
 }
 
 void Recomputation::springs() {
@@ -168,8 +167,8 @@ void Recomputation::springs() {
     if (soft(q)) step_.rows.residual_force[q] -= s.tension * s.direction;
   }
   step_.f_e.scale = scale_of(step_.f_e.value, uncertain);
-  step_.elongation_scale = scale_of(elongation, rounding * length);
-  step_.tension_scale = scale_of(tension, rounding * noise);
+  step_.scale.elongation = scale_of(elongation, rounding * length);
+  step_.scale.tension = scale_of(tension, rounding * noise);
 }
 
 double edge_energy(const model::Edges& edges, size_t j, const std::vector<Vec3>& x) {
@@ -261,9 +260,9 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
   step_.rows.stretch.push_back(state.stretch);
   const double stress = prisms.modulus[j] * (1 + std::abs(state.stretch.prod())) +
                         prisms.shear_modulus[j] * state.stretch.squaredNorm();
-  step_.stress_scale =
-      std::max(step_.stress_scale, std::abs(state.pressure) + state.von_mises + 1e-4 * stress);
-  step_.stretch_scale = std::max(step_.stretch_scale, state.stretch[0]);
+  step_.scale.stress =
+      std::max(step_.scale.stress, std::abs(state.pressure) + state.von_mises + 1e-4 * stress);
+  step_.scale.stretch = std::max(step_.scale.stretch, state.stretch[0]);
 }
 
 // Their energies are from the initial state on.
@@ -299,7 +298,7 @@ void Recomputation::adhesion() {
     const int64_t point = films_[f].point;
     const FilmState& state = film_states_[f];
     step_.f_e.value += state.energy;
-    uncertain += state.energy + step_.position_scale * state.force.norm();
+    uncertain += state.energy + step_.scale.position * state.force.norm();
     if (soft(point)) step_.rows.residual_force[point] += state.force;
     at_point_[point] += state.force.norm() + state.noise;
   }
@@ -334,11 +333,11 @@ void Recomputation::forces() {
     const double work = load.dot(step_.displacement[i]);
     step_.potential.value -= work;
     uncertain_work +=
-        rounding * load.norm() * (step_.displacement[i].norm() + step_.position_scale);
+        rounding * load.norm() * (step_.displacement[i].norm() + step_.scale.position);
   }
   step_.f_f.scale = scale_of(step_.f_f.value, uncertain_force);
   step_.potential.scale = scale_of(step_.potential.value, uncertain_work);
-  step_.force_scale = scale_of(step_.tension_scale, rounding * largest);
+  step_.scale.force = scale_of(step_.scale.tension, rounding * largest);
 }
 
 void Recomputation::prism(int64_t j) {
@@ -348,7 +347,7 @@ void Recomputation::prism(int64_t j) {
   const double v = model::prism_volume(corners.data()), v0 = prisms.rest_volume[j];
   const double change = v - v0, uncertain = rounding * (extent * extent * extent + v0);
   step_.rows.volume_ratio.push_back(v / v0);
-  step_.ratio_scale = std::max(step_.ratio_scale, 1 + scale_of(v / v0, rounding + uncertain / v0));
+  step_.scale.ratio = std::max(step_.scale.ratio, 1 + scale_of(v / v0, rounding + uncertain / v0));
   if (!any_soft(prisms.points[j])) return;
   const double kappa = claimed_.bulk_modulus;
   const double square_error = uncertain * (2 * std::abs(change) + uncertain);
@@ -377,19 +376,19 @@ void Recomputation::prism(int64_t j) {
 
 void Recomputation::prisms() {
   for (size_t j = 0; j < model_.prisms.points.size(); ++j) prism(static_cast<int64_t>(j));
-  step_.volume_error_max.scale = step_.ratio_scale;
+  step_.volume_error_max.scale = step_.scale.ratio;
 }
 
 void Recomputation::objective() {
   Recomputed f{smooth_force_, scale_of(smooth_force_, tolerance * step_.f_f.scale)};
   if (claimed_.functional == model::Functional::energy)
     f = {step_.f_e.value + step_.potential.value, step_.f_e.scale + step_.potential.scale};
-  step_.objective = {elastic_ * f.value, elastic_ * f.scale};
-  const double volume_weight = claimed_.volume == VolumeTerm::paper ? 1 - elastic_ : 0;
+  step_.objective = {elastic() * f.value, elastic() * f.scale};
+  const double volume_weight = claimed_.volume == VolumeTerm::paper ? 1 - elastic() : 0;
   step_.objective.value += volume_weight * step_.f_v.value;
   step_.objective.scale += volume_weight * step_.f_v.scale;
   if (std::isfinite(claimed_.contact_energy)) {
-    step_.objective.value += elastic_ * claimed_.contact_energy;
+    step_.objective.value += elastic() * claimed_.contact_energy;
     step_.objective.scale += std::abs(claimed_.contact_energy);
   }
   if (claimed_.volume != VolumeTerm::penalty) return;
@@ -417,17 +416,17 @@ void Recomputation::force_functional_gradient() {
     const Vec3 force = across * apart + (s.tangent - across) * along * u;
     const double stiffness = s.tangent + std::abs(across);
     const double noise = stiffness * (2 + (uncertain[p] + uncertain[q]) / rounding);
-    gradient_[q] += elastic_ * force;
-    gradient_[p] -= elastic_ * force;
-    for (const int64_t end : {p, q}) noise_[end] += elastic_ * noise;
+    gradient_[q] += elastic() * force;
+    gradient_[p] -= elastic() * force;
+    for (const int64_t end : {p, q}) noise_[end] += elastic() * noise;
   }
 }
 
 void Recomputation::gradient() {
   if (claimed_.functional == model::Functional::energy)
     for (size_t i = 0; i < x_.size(); ++i) {
-      gradient_[i] -= elastic_ * step_.rows.residual_force[i];
-      noise_[i] += elastic_ * at_point_[i];
+      gradient_[i] -= elastic() * step_.rows.residual_force[i];
+      noise_[i] += elastic() * at_point_[i];
     }
   else
     force_functional_gradient();

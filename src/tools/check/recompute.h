@@ -17,12 +17,14 @@ struct Recomputed {
 /// 12).
 struct RecomputedStep {
   model::StepRows rows;
-  std::vector<Vec3> displacement;                                           ///< [N] mm
-  double position_scale = 0, displacement_scale = 0, elongation_scale = 0;  ///< mm
-  double tension_scale = 0, force_scale = 0;                                ///< N
-  double ratio_scale = 0;
-  double stress_scale = 0;  ///< N/mm²
-  double stretch_scale = 0;
+  std::vector<Vec3> displacement;  ///< [N] mm
+  /// Sizes that differences of the arrays are measured against.
+  struct Scale {
+    double position = 0, displacement = 0, elongation = 0;  ///< mm
+    double tension = 0, force = 0;                          ///< N
+    double stress = 0;                                      ///< N/mm²
+    double ratio = 0, stretch = 0;
+  } scale;
   Recomputed f_e, potential, f_f, f_v, penalty, objective, gradient_max, volume_error_max;
   int64_t inverted_prisms = 0;  ///< v ≤ 0, of those with a soft-tissue point
 };
