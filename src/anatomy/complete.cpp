@@ -27,6 +27,19 @@ HeadFrame frame_of(const scene::AnatomyPlan& plan) {
   return frame;
 }
 
+/// Returns whether all of some landmarks are known; if not, remarks on the first that is missing
+/// and on the `effect`.
+bool all_known(const scene::AnatomyPlan& plan, std::initializer_list<const char*> names,
+               const char* effect, std::vector<std::string>& remarks) {
+  for (const char* name : names) {
+    if (find(plan.landmarks, name)) continue;
+    remarks.push_back(
+        fmt::format("{}: landmark {} is missing, so {}", plan.file.string(), name, effect));
+    return false;
+  }
+  return true;
+}
+
 bool has_mouth(const scene::Scene& scene) {
   return std::any_of(scene.incisions.begin(), scene.incisions.end(),
                      [](const scene::Incision& cut) { return cut.parts_lips(); });
@@ -55,10 +68,8 @@ void part_lips(const surface::Surface& skin, scene::Scene& scene,
         plan.file.string());
   scene.incisions.push_back({path, scene.tissue.layers, "mouth"});
   remarks.push_back(fmt::format(
-      "lips are parted along their crease by landmarks: {} points from ({:.1f}, {:.1f}, {:.1f}) to "
-      "({:.1f}, {:.1f}, {:.1f})",
-      path.size(), path.front().x(), path.front().y(), path.front().z(), path.back().x(),
-      path.back().y(), path.back().z()));
+      "lips are parted along their crease by landmarks: {} points from {:.1f} to {:.1f}",
+      path.size(), path.front(), path.back()));
 }
 
 /// Lowest and highest z of the vestibule along the axes of the head: between B and the nasal spine
@@ -75,16 +86,11 @@ std::array<double, 2> vestibule_height(const scene::AnatomyPlan& plan) {
 
 void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
   const scene::AnatomyPlan& plan = *scene.anatomy;
-  if (!plan.vestibule) return;
-  const char* needed[] = {"b_point", "nasal_spine", "upper_incisor_edge", "mouth_right",
-                          "mouth_left"};
-  for (const char* name : needed)
-    if (!find(plan.landmarks, name)) {
-      remarks.push_back(fmt::format(
-          "{}: landmark {} is missing, so the lips hold to teeth as to bone: no vestibule",
-          plan.file.string(), name));
-      return;
-    }
+  if (!plan.vestibule ||
+      !all_known(plan,
+                 {"b_point", "nasal_spine", "upper_incisor_edge", "mouth_right", "mouth_left"},
+                 "the lips hold to teeth as to bone: no vestibule", remarks))
+    return;
   const auto [front_right, back_left] = scene::vestibule_sides(plan);
   const auto [bottom, top] = vestibule_height(plan);
   const Vec3 low(front_right.x(), front_right.y(), bottom), high(back_left.x(), back_left.y(), top);
@@ -109,26 +115,20 @@ void add_vestibule(scene::Scene& scene, std::vector<std::string>& remarks) {
 
 /// Without the landmarks that tell the lips and the teeth apart lips do not adhere.
 void settle_adhesion(scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
-  if (!plan.vestibule || plan.adhesion == 0) return;
-  for (const char* name :
-       {"stomion", "mouth_right", "mouth_left", "upper_incisor_edge", "lower_incisor_edge"}) {
-    if (find(plan.landmarks, name)) continue;
-    remarks.push_back(fmt::format("{}: landmark {} is missing, so lips do not adhere to teeth",
-                                  plan.file.string(), name));
+  if (plan.vestibule && plan.adhesion != 0 &&
+      !all_known(
+          plan,
+          {"stomion", "mouth_right", "mouth_left", "upper_incisor_edge", "lower_incisor_edge"},
+          "lips do not adhere to teeth", remarks))
     plan.adhesion = 0;
-    return;
-  }
 }
 
 void remark_tone(const scene::Scene& scene, std::vector<std::string>& remarks) {
   const scene::AnatomyPlan& plan = *scene.anatomy;
-  if (!scene.tissue.material || plan.tone == 0) return;
-  for (const char* name : {"stomion", "mouth_right", "mouth_left", "subnasale", "b_soft"}) {
-    if (find(plan.landmarks, name)) continue;
-    remarks.push_back(fmt::format("{}: landmark {} is missing, so the ring muscle has no tone",
-                                  plan.file.string(), name));
+  if (!scene.tissue.material || plan.tone == 0 ||
+      !all_known(plan, {"stomion", "mouth_right", "mouth_left", "subnasale", "b_soft"},
+                 "the ring muscle has no tone", remarks))
     return;
-  }
   remarks.push_back(fmt::format(
       "ring muscle by landmarks: a tone of up to {:g} N/mm² between subnasale and B′", plan.tone));
 }
@@ -136,14 +136,11 @@ void remark_tone(const scene::Scene& scene, std::vector<std::string>& remarks) {
 /// Reports a head that is pitched in the scan, or whose level is not known.
 void remark_pitch(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
   constexpr double most = 6;  // degrees
-  for (const char* name :
-       {"condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"})
-    if (!find(plan.landmarks, name)) {
-      remarks.push_back(
-          fmt::format("{}: landmark {} is missing, so the level of the head is that of the scan",
-                      plan.file.string(), name));
-      return;
-    }
+  if (!all_known(
+          plan,
+          {"condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"},
+          "the level of the head is that of the scan", remarks))
+    return;
   const double pitch = std::asin(-plan.axes(1, 2)) * 180 / M_PI;
   if (std::abs(pitch) < most) return;
   remarks.push_back(fmt::format(

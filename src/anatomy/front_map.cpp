@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "repose/surface/edges.h"
+
 namespace repose::anatomy {
 namespace {
 
@@ -11,19 +13,14 @@ constexpr double nothing = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame, double spacing)
-    : spacing_(spacing) {
+FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame) {
   std::vector<Vec3> points;
   points.reserve(surface.points.size());
   for (const Vec3& p : surface.points) points.push_back(frame.to_frame(p));
-  Vec3 low = Vec3::Constant(nothing), high = -low;
-  for (const Vec3& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  low_ = {low.x() - spacing, low.z() - spacing};
-  columns_ = static_cast<int64_t>((high.x() - low.x()) / spacing) + 3;
-  rows_ = static_cast<int64_t>((high.z() - low.z()) / spacing) + 3;
+  const Eigen::AlignedBox3d box = surface::bounding_box(points);
+  low_ = {box.min().x() - spacing_, box.min().z() - spacing_};
+  columns_ = static_cast<int64_t>(box.sizes().x() / spacing_) + 3;
+  rows_ = static_cast<int64_t>(box.sizes().z() / spacing_) + 3;
   depth_.assign(columns_ * rows_, nothing);
   for (const Triangle& t : surface.triangles) draw(base::pick(points, t));
 }
@@ -80,30 +77,37 @@ std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double h
   return points;
 }
 
+std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, double from_z,
+                                  double to_z) {
+  std::vector<ProfilePoint> inside;
+  for (const ProfilePoint& p : profile)
+    if (p.y() >= from_z && p.y() <= to_z) inside.push_back(p);
+  return inside;
+}
+
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
-                                                double from_z, double to_z, int sign) {
+                                                int sign) {
   const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
   std::optional<ProfilePoint> best;
   double maximum = -nothing;
   for (const ProfilePoint& p : profile) {
     const double distance = sign * ahead.dot(p - a);
-    if (p.y() < from_z || p.y() > to_z || !(distance > maximum)) continue;
+    if (!(distance > maximum)) continue;
     maximum = distance;
     best = p;
   }
   return best;
 }
 
-std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile, double from_z,
-                                        double to_z) {
+std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile) {
   constexpr double flat = 0.25;  // mm
-  const auto best = farthest_from_chord(profile, {0, 0}, {0, 1}, from_z, to_z, 1);
+  const auto best = farthest_from_chord(profile, {0, 0}, {0, 1}, 1);
   if (!best) return best;
   double low = best->y(), high = low;
   for (const ProfilePoint& p : profile)
-    if (p.y() >= from_z && p.y() <= to_z && p.x() <= best->x() + flat) {
+    if (p.x() <= best->x() + flat) {
       low = std::min(low, p.y());
       high = std::max(high, p.y());
     }
@@ -116,12 +120,10 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z) {
   constexpr double end = 1;  // mm
-  const auto foremost = foremost_of(profile, from_z, to_z);
+  const std::vector<ProfilePoint> inside = between(profile, from_z, to_z);
+  const auto foremost = foremost_of(inside);
   if (!foremost || foremost->y() < to_z - end) return foremost;
-  std::vector<ProfilePoint> inside;
-  for (const ProfilePoint& p : profile)
-    if (p.y() >= from_z && p.y() <= to_z) inside.push_back(p);
-  return farthest_from_chord(inside, inside.front(), inside.back(), from_z, to_z, 1);
+  return farthest_from_chord(inside, inside.front(), inside.back(), 1);
 }
 
 }  // namespace repose::anatomy

@@ -14,8 +14,8 @@ using ProfilePoint = Eigen::Vector2d;
 /// frame the foremost y, mm. Holes and inner walls of a raw surface do not matter.
 class FrontMap {
  public:
-  /// Cells of `spacing` mm over all of the surface.
-  FrontMap(const surface::Surface& surface, const HeadFrame& frame, double spacing = 0.5);
+  /// Covers all of the surface.
+  FrontMap(const surface::Surface& surface, const HeadFrame& frame);
 
   /// The foremost y at a place of the frontal plane; nothing where no surface is behind it.
   std::optional<double> depth(double x, double z) const;
@@ -24,7 +24,7 @@ class FrontMap {
 
   double low_z() const { return low_.y(); }
   double high_z() const { return low_.y() + spacing_ * static_cast<double>(rows_); }
-  double spacing() const { return spacing_; }
+  double spacing() const { return spacing_; }  ///< mm, of the cells
 
   /// The foremost points within `half_width` of the midline between two heights, from below, at
   /// the middles of cells.
@@ -34,20 +34,22 @@ class FrontMap {
   void draw(const std::array<Vec3, 3>& corner);
   double& cell(int64_t column, int64_t row) { return depth_[row * columns_ + column]; }
 
-  double spacing_;
+  static constexpr double spacing_ = 0.5;
   Eigen::Vector2d low_;  // x, z of the lowest corner, mm
   int64_t columns_ = 0, rows_ = 0;
   std::vector<double> depth_;  // ∞ where there is nothing
 };
 
-/// The point of a profile between two heights that lies farthest in front of the line through `a`
-/// and `b` (behind it with sign −1); nothing where the profile has no point there.
+/// Returns the points of a profile between two heights.
+std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, double from_z,
+                                  double to_z);
+/// The point of a profile that lies farthest in front of the line through `a` and `b` (behind it
+/// with sign −1); nothing where the profile has no point.
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
-                                                double from_z, double to_z, int sign);
-/// The foremost point of a profile between two heights; of a flat stretch its middle.
-std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile, double from_z,
-                                        double to_z);
+                                                int sign);
+/// The foremost point of a profile; of a flat stretch its middle.
+std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile);
 /// The chin: the foremost point of a profile between two heights or, where the profile still comes
 /// forward at the upper one, the farthest in front of the chord between its ends.
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,

@@ -7,6 +7,7 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/component.h"
+#include "repose/surface/edges.h"
 #include "search.h"
 
 namespace repose::anatomy {
@@ -38,12 +39,8 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
         mandible.name, reach, min_reach, max_reach);
   constexpr double beside = 30;  // mm
   const Vec3 jaw = mean_of(mandible.points);
-  Vec3 minimum = skin.points.front(), maximum = minimum;
-  for (const Vec3& p : skin.points) {
-    minimum = minimum.cwiseMin(p);
-    maximum = maximum.cwiseMax(p);
-  }
-  if (((jaw - minimum).array() < -beside).any() || ((maximum - jaw).array() < -beside).any())
+  const Eigen::AlignedBox3d box = surface::bounding_box(skin.points);
+  if (((jaw - box.min()).array() < -beside).any() || ((box.max() - jaw).array() < -beside).any())
     base::refuse("{}: the mandible {} lies outside of it; give surfaces of one head in one frame",
                  skin.name, mandible.name);
 }

@@ -113,9 +113,9 @@ void require_unshifted(const Placed& head, const std::string& file) {
   if (shift.norm() > most && 2 * after < off)
     base::refuse(
         "{}: the landmarks lie {:.1f} mm from skin and bones in the mean, and {:.1f} mm when all "
-        "are moved by ({:.1f}, {:.1f}, {:.1f}) mm: they are of another scan or frame; give those "
+        "are moved by {:.1f} mm: they are of another scan or frame; give those "
         "of these surfaces, or propose them with repose-landmarks",
-        file, off, after, shift.x(), shift.y(), shift.z());
+        file, off, after, shift);
 }
 
 void require_own_jaws(const Placed& head, const std::string& file) {

@@ -13,16 +13,16 @@ constexpr double condyle_reach = 12;  // mm before and behind its top
 constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
 constexpr double dentate = 34;        // mm, height of a symphysis with teeth at least
 
-/// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell within the
-/// incisors' width that is no farther than `reach` from depth `y`.
-std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, double from_z, double to_z, double y,
-                               double reach) {
+/// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell from the
+/// height of `start` to `to_z`, within the incisors' width and `reach` of the depth of `start`.
+std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint& start,
+                               double to_z, double reach) {
   std::optional<Vec3> edge;
   for (double x = -incisors; x <= incisors; x += map.spacing()) {
     std::optional<Vec3> end;
-    for (double z = from_z; sign * (to_z - z) >= 0; z += sign * map.spacing()) {
+    for (double z = start.y(); sign * (to_z - z) >= 0; z += sign * map.spacing()) {
       const auto depth = map.depth(x, z);
-      if (depth && std::abs(*depth - y) <= reach)
+      if (depth && std::abs(*depth - start.x()) <= reach)
         end = Vec3(x, *depth, z);
       else if (end)
         break;
@@ -40,10 +40,10 @@ void search_symphysis(const FrontMap& map, Search& search) {
       search.lack(name, "MANDIBLE has no bone at the midline");
     return;
   }
-  const double low = profile.front().y(), front = foremost_of(profile, low, map.high_z())->x();
+  const double low = profile.front().y(), front = foremost_of(profile)->x();
   search.put("menton_bone", Vec3(0, profile.front().x(), low));
   const auto menton = *search.find("menton_bone");
-  if (const auto edge = tooth_edge(map, 1, menton.z() + 5, map.high_z(), front + 6, 12))
+  if (const auto edge = tooth_edge(map, 1, {front + 6, menton.z() + 5}, map.high_z(), 12))
     search.put("lower_incisor_edge", *edge);
   const auto edge = search.profile_point("lower_incisor_edge");
   if (!edge) return search.lack("lower_incisor_edge", "no bone above the chin at the midline");
@@ -58,7 +58,8 @@ void search_symphysis(const FrontMap& map, Search& search) {
   const auto pogonion = *search.profile_point("pogonion_bone");
   const double lowest_b = std::max(pogonion.y() + 0.1 * height, menton.z() + 0.35 * height);
   search.put("b_point",
-             farthest_from_chord(profile, pogonion, *edge, lowest_b, edge->y() - 0.2 * height, -1),
+             farthest_from_chord(between(profile, lowest_b, edge->y() - 0.2 * height), pogonion,
+                                 *edge, -1),
              "no bone between pogonion and the lower incisors");
 }
 
@@ -110,15 +111,15 @@ std::optional<double> nasal_floor(const FrontMap& map, const ProfilePoint& edge)
   return base::median(std::move(heights));
 }
 
-/// The point of a profile between two heights above `from` where a line from there touches it in
-/// front; nothing where the profile has no point there.
+/// The point of a profile above `from` where a line from there touches it in front; nothing where
+/// the profile has no point.
 std::optional<ProfilePoint> tangent_point(const std::vector<ProfilePoint>& profile,
-                                          const ProfilePoint& from, double from_z, double to_z) {
+                                          const ProfilePoint& from) {
   std::optional<ProfilePoint> best;
   double minimum = INFINITY;
   for (const ProfilePoint& p : profile) {
     const double slope = (p.x() - from.x()) / (p.y() - from.y());
-    if (p.y() < from_z || p.y() > to_z || !(slope < minimum)) continue;
+    if (!(slope < minimum)) continue;
     minimum = slope;
     best = p;
   }
@@ -138,23 +139,25 @@ void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search&
   std::optional<ProfilePoint> deepest;
   for (const ProfilePoint& p : profile)
     if (p.y() > *floor && p.y() < *floor + 25 && (!deepest || p.x() > deepest->x())) deepest = p;
-  search.put(
-      "nasal_spine",
-      farthest_from_chord(profile, edge, deepest.value_or(ProfilePoint(edge.x(), *floor + 10)),
-                          *floor - near, *floor + near, 1),
-      "SKULL has no bone at the nasal floor");
+  search.put("nasal_spine",
+             farthest_from_chord(between(profile, *floor - near, *floor + near), edge,
+                                 deepest.value_or(ProfilePoint(edge.x(), *floor + 10)), 1),
+             "SKULL has no bone at the nasal floor");
   const auto spine = search.profile_point("nasal_spine");
   if (spine)
-    search.put("a_point",
-               farthest_from_chord(profile, edge, *spine, edge.y() + 9, spine->y() - 4, -1),
-               "SKULL has no bone between the nasal spine and the upper incisors");
-  const auto bridge = foremost_of(profile, *floor + 15, *floor + 45);
+    search.put(
+        "a_point",
+        farthest_from_chord(between(profile, edge.y() + 9, spine->y() - 4), edge, *spine, -1),
+        "SKULL has no bone between the nasal spine and the upper incisors");
+  const auto bridge = foremost_of(between(profile, *floor + 15, *floor + 45));
   const auto brow =
-      bridge ? tangent_point(profile, *bridge, bridge->y() + 20, bridge->y() + 38) : std::nullopt;
+      bridge ? tangent_point(between(profile, bridge->y() + 20, bridge->y() + 38), *bridge)
+             : std::nullopt;
   if (!brow) return search.lack("nasion_bone", "SKULL ends below the glabella");
-  search.put("nasion_bone",
-             farthest_from_chord(profile, *bridge, *brow, bridge->y() + 5, brow->y() - 3, -1),
-             "SKULL ends below the glabella");
+  search.put(
+      "nasion_bone",
+      farthest_from_chord(between(profile, bridge->y() + 5, brow->y() - 3), *bridge, *brow, -1),
+      "SKULL ends below the glabella");
 }
 
 void search_upper_jaw(const FrontMap& map, Search& search) {
@@ -166,7 +169,7 @@ void search_upper_jaw(const FrontMap& map, Search& search) {
     const auto middle = map.foremost(0, lower->z() + above, midline);
     if (!middle || std::abs(*middle - lower->y()) > reach) continue;
     if (const auto edge =
-            tooth_edge(map, -1, lower->z() + above, lower->z() - 2 * least, *middle, reach / 2))
+            tooth_edge(map, -1, {*middle, lower->z() + above}, lower->z() - 2 * least, reach / 2))
       search.put("upper_incisor_edge", *edge);
   }
   const auto edge = search.profile_point("upper_incisor_edge");

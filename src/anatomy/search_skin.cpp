@@ -80,11 +80,12 @@ void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
     return;
   }
   const double top = nasion ? nasion->z() : spine->z() + 45;
-  search.put("pronasale", foremost_of(profile, spine->z() - 10, top), "SKIN has no nose");
+  search.put("pronasale", foremost_of(between(profile, spine->z() - 10, top)), "SKIN has no nose");
   const auto tip = search.profile_point("pronasale");
-  const auto brow = foremost_of(profile, top + 8, top + 30);
+  const auto brow = foremost_of(between(profile, top + 8, top + 30));
   if (!tip || !brow) return search.lack("nasion_soft", "SKIN ends below the glabella");
-  search.put("nasion_soft", farthest_from_chord(profile, *tip, *brow, top - 12, top + 12, -1),
+  search.put("nasion_soft",
+             farthest_from_chord(between(profile, top - 12, top + 12), *tip, *brow, -1),
              "SKIN ends below the glabella");
 }
 
@@ -98,25 +99,29 @@ void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& s
     return;
   }
   const double s = stomion->y(), low = gap > 0 ? s - gap : s - 2;  // where the lower lip begins
-  const auto first = foremost_of(profile, s + 2, s + 0.6 * (tip->y() - s));
+  const auto first = foremost_of(between(profile, s + 2, s + 0.6 * (tip->y() - s)));
   if (first)
-    search.put("subnasale",
-               farthest_from_chord(profile, *first, *tip, first->y() + 2, tip->y() - 3, -1), "");
+    search.put(
+        "subnasale",
+        farthest_from_chord(between(profile, first->y() + 2, tip->y() - 3), *first, *tip, -1), "");
   const auto base = search.profile_point("subnasale");
   if (base)
-    search.put("upper_lip", farthest_from_chord(profile, *stomion, *base, s + 2, base->y() - 3, 1),
+    search.put("upper_lip",
+               farthest_from_chord(between(profile, s + 2, base->y() - 3), *stomion, *base, 1),
                "SKIN has no upper lip");
   if (!base) search.lack("subnasale", "SKIN has no base of the nose");
   if (!chin) return search.lack("lower_lip", "the chin was not found");
-  const auto lip = foremost_of(profile, low - 12, low);
+  const auto lip = foremost_of(between(profile, low - 12, low));
   if (!lip) return search.lack("lower_lip", "SKIN has no lower lip");
-  search.put("b_soft", farthest_from_chord(profile, *chin, *lip, chin->y() + 3, lip->y() - 3, -1),
+  search.put("b_soft",
+             farthest_from_chord(between(profile, chin->y() + 3, lip->y() - 3), *chin, *lip, -1),
              "SKIN has no sulcus between lower lip and chin");
   const auto sulcus = search.profile_point("b_soft");
-  search.put("lower_lip",
-             farthest_from_chord(profile, sulcus.value_or(*chin), *stomion,
-                                 std::max(low - 14, sulcus ? sulcus->y() + 2 : 0), low, 1),
-             "SKIN has no lower lip");
+  search.put(
+      "lower_lip",
+      farthest_from_chord(between(profile, std::max(low - 14, sulcus ? sulcus->y() + 2 : 0), low),
+                          sulcus.value_or(*chin), *stomion, 1),
+      "SKIN has no lower lip");
 }
 
 void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::Surface& skin,
