@@ -42,7 +42,7 @@ void smooth_axis(Volume& volume, int axis, const std::vector<float>& weights) {
 
 /// Where a label lies, as a box of voxels grown by `margin`, in mm; nothing where it is nowhere.
 Volume around(const Volume& labels, int64_t label, int64_t margin) {
-  std::array<int64_t, 3> low = labels.size, high{-1, -1, -1};
+  std::array<int64_t, 3> low = labels.size, high{0, 0, 0};
   for (int64_t k = 0; k < labels.size[2]; ++k)
     for (int64_t j = 0; j < labels.size[1]; ++j)
       for (int64_t i = 0; i < labels.size[0]; ++i) {
@@ -50,25 +50,17 @@ Volume around(const Volume& labels, int64_t label, int64_t margin) {
         const std::array<int64_t, 3> here{i, j, k};
         for (int axis = 0; axis < 3; ++axis) {
           low[axis] = std::min(low[axis], here[axis]);
-          high[axis] = std::max(high[axis], here[axis]);
+          high[axis] = std::max(high[axis], here[axis] + 1);
         }
       }
-  if (high[0] < 0)
+  if (high[0] == 0)
     base::refuse("{}: no voxel has the label {}; it has {}", labels.name, label,
                  fmt::join(labels_of(labels), ", "));
-  Volume part{labels.name, {}, labels.axes, labels.origin, {}, labels.remarks};
   for (int axis = 0; axis < 3; ++axis) {
     low[axis] = std::max(int64_t{0}, low[axis] - margin);
-    high[axis] = std::min(labels.size[axis] - 1, high[axis] + margin);
-    part.size[axis] = high[axis] - low[axis] + 1;
-    part.origin += static_cast<double>(low[axis]) * labels.axes.col(axis);
+    high[axis] = std::min(labels.size[axis], high[axis] + margin);
   }
-  for (int64_t k = low[2]; k <= high[2]; ++k)
-    for (int64_t j = low[1]; j <= high[1]; ++j) {
-      const float* row = &labels.values[labels.index(0, j, k)];
-      part.values.insert(part.values.end(), row + low[0], row + high[0] + 1);
-    }
-  return part;
+  return block(labels, low, high);
 }
 
 Volume smooth_indicator(const Volume& labels, float label, double sigma) {

@@ -47,6 +47,21 @@ double otsu_level(const Volume& volume) {
   return minimum + (split + 1) * width;
 }
 
+Volume block(const Volume& volume, const std::array<int64_t, 3>& begin,
+             const std::array<int64_t, 3>& end) {
+  Volume part{volume.name, {}, volume.axes, volume.origin, {}, volume.remarks};
+  for (int axis = 0; axis < 3; ++axis) {
+    part.size[axis] = end[axis] - begin[axis];
+    part.origin += static_cast<double>(begin[axis]) * volume.axes.col(axis);
+  }
+  for (int64_t k = begin[2]; k < end[2]; ++k)
+    for (int64_t j = begin[1]; j < end[1]; ++j) {
+      const float* row = &volume.values[volume.index(0, j, k)];
+      part.values.insert(part.values.end(), row + begin[0], row + end[0]);
+    }
+  return part;
+}
+
 Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
   const Mat3 to_index = volume.axes.inverse();
   Vec3 first = Vec3::Constant(std::numeric_limits<double>::infinity()), last = -first;
@@ -65,17 +80,7 @@ Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
     if (end[axis] - begin[axis] < 2)
       base::refuse("{}: the box {:g} to {:g} mm lies beside it", volume.name, low, high);
   }
-  Volume part{volume.name, {}, volume.axes, volume.origin, {}, volume.remarks};
-  for (int axis = 0; axis < 3; ++axis) {
-    part.size[axis] = end[axis] - begin[axis];
-    part.origin += static_cast<double>(begin[axis]) * volume.axes.col(axis);
-  }
-  for (int64_t k = begin[2]; k < end[2]; ++k)
-    for (int64_t j = begin[1]; j < end[1]; ++j) {
-      const float* row = &volume.values[volume.index(0, j, k)];
-      part.values.insert(part.values.end(), row + begin[0], row + end[0]);
-    }
-  return part;
+  return block(volume, begin, end);
 }
 
 }  // namespace repose::imaging

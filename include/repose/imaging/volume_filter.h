@@ -11,6 +11,10 @@ std::array<float, 2> value_range(const Volume& volume);
 /// 1979), from a histogram of 1024 bins. Throws InputError where all values are equal.
 double otsu_level(const Volume& volume);
 
+/// The voxels from `begin` to before `end` along each axis.
+Volume block(const Volume& volume, const std::array<int64_t, 3>& begin,
+             const std::array<int64_t, 3>& end);
+
 /// The smallest block of voxels that holds the box from `low` to `high` (mm, LPS). Throws
 /// InputError where box and volume do not overlap in at least two voxels along each axis.
 Volume crop(const Volume& volume, const Vec3& low, const Vec3& high);
