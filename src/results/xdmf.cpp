@@ -28,10 +28,11 @@ std::string data_item(const std::string& h5, const std::string& path, int64_t ro
                      dimensions, escaped(h5), path);
 }
 
-/// Rows of a dataset of `all`.
+/// Rows of a dataset of `all`; 0: all there are.
 std::string rows_item(const std::string& h5, const std::string& path,
                       const std::array<int64_t, 3>& of, int columns, const char* type) {
   const auto [first, rows, all] = of;
+  if (all == 0) return data_item(h5, path, rows, columns, type);
   const bool flat = columns == 1;
   const std::string slab = flat ? fmt::format("{} 1 {}", first, rows)
                                 : fmt::format("{} 0 1 1 {} {}", first, rows, columns);
@@ -44,17 +45,14 @@ std::string rows_item(const std::string& h5, const std::string& path,
 
 std::string point_item(const XdmfBlock& block, const std::string& h5, const std::string& path,
                        int columns, const char* type) {
-  if (block.merged == 0) return data_item(h5, path, block.points, columns, type);
   return rows_item(h5, path, {block.first, block.points, block.merged}, columns, type);
 }
 
 /// Beside points that are rows of a dataset, corners are given so, too: VTK compares the text of
 /// both to see whether a mesh has moved, and reports an error where it has that of one only.
 std::string corner_item(const XdmfBlock& block, const std::string& h5) {
-  if (block.merged == 0)
-    return data_item(h5, block.connectivity, block.cells, block.cell.corners, integer);
-  return rows_item(h5, block.connectivity, {0, block.cells, block.cells}, block.cell.corners,
-                   integer);
+  return rows_item(h5, block.connectivity, {0, block.cells, block.merged > 0 ? block.cells : 0},
+                   block.cell.corners, integer);
 }
 
 std::string attribute(const XdmfBlock& block, const XdmfArray& array, const std::string& h5,
