@@ -21,7 +21,7 @@ std::vector<double> Skin::distances(const model::Model& model,
   std::vector<Vec3> displacement;
   for (size_t i = 0; i < position.size(); ++i)
     displacement.push_back(position[i] - model.points.position[i]);
-  const std::vector<Vec3> carried = adapt::Transfer(model, reference_).carry(displacement);
+  const std::vector<Vec3> carried = adapt::transfer(model, reference_, displacement);
   std::vector<double> distance;
   for (size_t v = 0; v < row_.size(); ++v)
     distance.push_back((reference_.points.position[row_[v]] + carried[row_[v]] - rest_[v]).norm());

@@ -119,7 +119,7 @@ class SequenceSolver {
     base::on_root(comm_, [&] {
       const Model& before = sequence_.last.model;
       const auto moved = sum(sequence_.last_position, before.points.position, -1);
-      all = sum(model.points.position, Transfer(before, model).carry(moved), 1);
+      all = sum(model.points.position, transfer(before, model, moved), 1);
     });
     return {base::scatter(comm_, all), true};
   }
@@ -129,8 +129,7 @@ class SequenceSolver {
     level.points = static_cast<int64_t>(position.size());
     if (level.resolution.edge == 0) level.resolution.edge = meshtools::even_edge(anatomy_.skin);
     const auto moved = sum(position, built.model.points.position, -1);
-    std::vector<Vec3> carried =
-        sum(fine_.points.position, Transfer(built.model, fine_).carry(moved), 1);
+    std::vector<Vec3> carried = sum(fine_.points.position, transfer(built.model, fine_, moved), 1);
     level.skin_change = sequence_.levels.empty() ? infinity : 0;
     for (size_t i = 0; i < sequence_.position.size(); ++i)
       if (fine_.points.layer[i] == 0)
@@ -149,33 +148,23 @@ class SequenceSolver {
   GridSequence sequence_;
 };
 
-/// Resolutions with edges `coarsening` times as long from level to level, down to `fewest` columns,
-/// and, where the scene lets them be any number, one layer fewer.
-std::vector<Resolution> resolutions_by(double coarsening, double fewest,
-                                       const model::Anatomy& anatomy) {
+}  // namespace
+
+std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t max_columns) {
+  constexpr double fewest = 150;  // columns
   const scene::Tissue& tissue = anatomy.scene.tissue;
   const int fewest_layers = std::min(3, tissue.layers);  // two are too stiff across to lead
   const bool free = layers_are_free(tissue);
   auto columns = static_cast<double>(anatomy.skin.points.size());
   Resolution resolution{meshtools::even_edge(anatomy.skin), tissue.layers};
+  const double finest = resolution.edge * std::sqrt(columns / static_cast<double>(max_columns));
   std::vector<Resolution> levels;
-  while ((columns /= coarsening * coarsening) >= fewest) {
-    resolution.edge *= coarsening;
+  while ((columns /= 4) >= fewest) {
+    resolution.edge *= 2;
     if (free) resolution.layers = std::max(fewest_layers, resolution.layers - 1);
-    levels.push_back(resolution);
+    if (resolution.edge >= finest) levels.push_back(resolution);
   }
   std::reverse(levels.begin(), levels.end());
-  return levels;
-}
-
-}  // namespace
-
-std::vector<Resolution> compared_resolutions(const model::Anatomy& anatomy, int64_t max_columns) {
-  std::vector<Resolution> levels = resolutions_by(2, 150, anatomy);
-  const double finest =
-      meshtools::even_edge(anatomy.skin) *
-      std::sqrt(static_cast<double>(anatomy.skin.points.size()) / static_cast<double>(max_columns));
-  std::erase_if(levels, [&](const Resolution& r) { return r.edge < finest; });
   return levels;
 }
 

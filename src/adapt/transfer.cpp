@@ -36,62 +36,60 @@ std::vector<double> depths_of(const Model& model) {
   return depths;
 }
 
+/// A place on the skin of a model.
+struct Place {
+  Triangle column;  // of the model
+  Vec3 weight;      // of each, sum 1
+};
+
+std::vector<Place> places_on(const surface::Surface& skin, const Model& to, size_t layers) {
+  const surface::DistanceTree tree(skin);
+  std::vector<Place> places;
+  for (size_t i = 0; i < to.points.position.size(); i += layers) {
+    const auto nearest = tree.nearest(to.points.position[i]);
+    const Triangle& columns = skin.triangles[nearest.triangle];
+    places.push_back(
+        {columns, surface::barycentric(base::pick(skin.points, columns), nearest.point)});
+  }
+  return places;
+}
+
+/// Values of the points of a model with layers at these depths, at a place and depth.
+Vec3 interpolate(const std::vector<Vec3>& values, const std::vector<double>& depths,
+                 const Place& place, double depth) {
+  size_t below = 1;
+  while (below + 1 < depths.size() && depths[below] < depth) ++below;
+  const double above = depths[below - 1];
+  const double share = std::clamp((depth - above) / (depths[below] - above), 0.0, 1.0);
+  Vec3 sum = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const size_t deeper = place.column[k] * depths.size() + below;
+    sum += place.weight[k] * (1 - share) * values[deeper - 1];
+    sum += place.weight[k] * share * values[deeper];
+  }
+  return sum;
+}
+
 }  // namespace
 
-Transfer::Transfer(const Model& from, const Model& to)
-    : to_(to), from_depths_(depths_of(from)), to_depths_(depths_of(to)) {
-  const surface::Surface skin = skin_of(from, layers_of(from));
-  const surface::DistanceTree tree(skin);
-  for (size_t i = 0; i < to.points.position.size(); i += to_depths_.size()) {
-    const auto nearest = tree.nearest(to.points.position[i]);
-    const auto& corner = skin.triangles[nearest.triangle];
-    const auto& x = skin.points;
-    places_.push_back(
-        {corner, surface::barycentric({x[corner[0]], x[corner[1]], x[corner[2]]}, nearest.point)});
-  }
-}
-
-Transfer::Stencil Transfer::stencil(const Place& place, double depth) const {
-  const size_t layers = from_depths_.size();
-  size_t below = 1;
-  while (below + 1 < layers && from_depths_[below] < depth) ++below;
-  const double above = from_depths_[below - 1];
-  const double share = std::clamp((depth - above) / (from_depths_[below] - above), 0.0, 1.0);
-  Stencil stencil{};
-  for (size_t k = 0; k < 3; ++k) {
-    const auto deeper = static_cast<int64_t>(place.column[k] * layers + below);
-    stencil.point[2 * k] = deeper - 1;
-    stencil.point[2 * k + 1] = deeper;
-    stencil.weight[2 * k] = place.weight[k] * (1 - share);
-    stencil.weight[2 * k + 1] = place.weight[k] * share;
-  }
-  return stencil;
-}
-
-bool Transfer::fixed(size_t point) const {
-  return to_.points.set[point] != model::PointSet::soft_tissue;
-}
-
-std::vector<Vec3> Transfer::carry(const std::vector<Vec3>& displacement) const {
-  const model::Points& points = to_.points;
-  std::vector<Vec3> found(points.position.size());
-  const size_t layers = to_depths_.size();
-  const auto at = [&](const Place& place, double depth) {
-    const Stencil from = stencil(place, depth);
-    Vec3 sum = Vec3::Zero();
-    for (size_t k = 0; k < from.point.size(); ++k)
-      sum += from.weight[k] * displacement[from.point[k]];
-    return sum;
-  };
-  const auto taken = [&](size_t i) -> Vec3 { return points.target[i] - points.position[i]; };
-  for (size_t c = 0; c < places_.size(); ++c) {
+std::vector<Vec3> transfer(const Model& from, const Model& to,
+                           const std::vector<Vec3>& displacement) {
+  const std::vector<double> from_depths = depths_of(from), depths = depths_of(to);
+  const size_t layers = depths.size();
+  const std::vector<Place> places = places_on(skin_of(from, layers_of(from)), to, layers);
+  std::vector<Vec3> found(to.points.position.size());
+  const auto fixed = [&](size_t i) { return to.points.set[i] != model::PointSet::soft_tissue; };
+  const auto taken = [&](size_t i) -> Vec3 { return to.points.target[i] - to.points.position[i]; };
+  for (size_t c = 0; c < places.size(); ++c) {
+    const auto at = [&](double depth) {
+      return interpolate(displacement, from_depths, places[c], depth);
+    };
     const size_t deepest = (c + 1) * layers - 1;
     Vec3 short_of = Vec3::Zero();
-    if (fixed(deepest)) short_of = taken(deepest) - at(places_[c], 1);
+    if (fixed(deepest)) short_of = taken(deepest) - at(1);
     for (size_t l = 0; l < layers; ++l) {
       const size_t i = c * layers + l;
-      found[i] =
-          fixed(i) ? taken(i) : Vec3(at(places_[c], to_depths_[l]) + to_depths_[l] * short_of);
+      found[i] = fixed(i) ? taken(i) : Vec3(at(depths[l]) + depths[l] * short_of);
     }
   }
   return found;

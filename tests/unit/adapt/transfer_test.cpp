@@ -30,7 +30,7 @@ template <class Field>
 void expect_carried(const model::Model& from, const model::Model& to, const Field& displacement) {
   std::vector<Vec3> given;
   for (const Vec3& x : from.points.position) given.push_back(displacement(x));
-  const std::vector<Vec3> carried = Transfer(from, to).carry(given);
+  const std::vector<Vec3> carried = transfer(from, to, given);
   ASSERT_EQ(carried.size(), to.points.position.size());
   for (size_t i = 0; i < carried.size(); ++i)
     EXPECT_LT((carried[i] - displacement(to.points.position[i])).norm(), 1e-12) << i;
@@ -50,7 +50,7 @@ TEST(Transfer, takes_fixed_points_where_they_go_and_what_is_above_in_proportion)
   const auto up = [](const Vec3&) -> Vec3 { return {0, 0, 1}; };
   const model::Model from = patch(1, 3, none), to = patch(2, 3, up);
   const std::vector<Vec3> carried =
-      Transfer(from, to).carry(std::vector<Vec3>(from.points.position.size(), Vec3::Zero()));
+      transfer(from, to, std::vector<Vec3>(from.points.position.size(), Vec3::Zero()));
   for (size_t i = 0; i < carried.size(); ++i)
     EXPECT_NEAR(carried[i].z(), to.points.layer[i] / 2.0, 1e-12) << i;
 }
