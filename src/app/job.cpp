@@ -68,7 +68,7 @@ void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
   const std::string adhesion = model::remark_on_adhesion(scene, job.local_model.global_metadata);
   if (!adhesion.empty()) report.remarks.push_back(adhesion);
   report.effective_modulus = job.local_model.effective_modulus;
-  job.building = describe_build(report);
+  job.building = describe_build(geometry.skin(), report);
   if (ranks > 1) job.building += report_row("built", "by {} ranks, each its part", ranks);
   job.warnings = std::move(report.warnings);
 }

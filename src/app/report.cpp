@@ -94,10 +94,10 @@ std::string describe_model(const model::Counts& c) {
          report_row("prisms", "{}", c.prisms);
 }
 
-std::string describe_build(const model::BuildReport& r) {
+std::string describe_build(const model::SkinMesh& skin, const model::BuildReport& r) {
   std::string text =
-      report_row("skin", "{} vertices, {} edges, {} triangles", r.skin_vertices, r.skin_edges,
-                 r.skin_triangles) +
+      report_row("skin", "{} vertices, {} edges, {} triangles", skin.points.size(),
+                 skin.edges.size(), skin.triangles.size()) +
       report_row("columns", "{} end in bone, {} end free ({} released), {} shortened", r.attached,
                  r.free_deep, r.released, r.shortened) +
       report_row("thickness", "{:.3g} … {:.3g} mm, median {:.3g} mm", r.thickness_min,

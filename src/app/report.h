@@ -24,8 +24,8 @@ std::string report_row(const std::string& name, fmt::format_string<Values...> fo
 /// Points, springs and prisms of a model, by set. Lines ending in a newline.
 std::string describe_model(const model::Counts& counts);
 
-/// Describes the built model: columns, thickness, attachment, remarks.
-std::string describe_build(const model::BuildReport& report);
+/// Describes the built model: skin, columns, thickness, attachment, remarks.
+std::string describe_build(const model::SkinMesh& skin, const model::BuildReport& report);
 /// Rows for the implausible properties of the anatomy.
 std::string describe_warnings(const std::vector<std::string>& warnings);
 /// An incision and how many points it doubled.

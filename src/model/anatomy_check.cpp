@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "head_frame.h"
+#include "head_directions.h"
 #include "repose/surface/distance.h"
 
 namespace repose::model {
@@ -34,7 +34,7 @@ struct Anatomical {
   const std::vector<surface::Surface>& bones;
   std::vector<BoneRole> roles;
   BoneGroup upper, lower;
-  std::optional<HeadFrame> frame;
+  std::optional<HeadDirections> directions;  ///< that axes, sides, fit, hinge and lips need
 };
 
 std::string names_of(const Anatomical& head, BoneRole role) {
@@ -74,18 +74,15 @@ std::string check_rest(const Anatomical& head) {
   return "";
 }
 
-double volume_of_box(const BoneGroup& group) { return group.box.volume(); }
-
 /// Exchanged bones and axes other than LPS exclude each other: one line tells of the first found.
 std::string check_axes(const Anatomical& head) {
-  if (!head.frame) return "";
   const double up = (head.upper.box.center() - head.lower.box.center()).z();
-  const Vec3& forward = head.frame->facing;
-  if (up < 0 && volume_of_box(head.lower) > volume_of_box(head.upper))
+  const Vec3& forward = head.directions->facing;
+  if (up < 0 && head.lower.box.volume() > head.upper.box.volume())
     return fmt::format(
         "{} lies above {} and is larger: their meshes seem to be exchanged; exchange the files",
         names_of(head, BoneRole::lower), names_of(head, BoneRole::upper));
-  if (head.frame->upward.z() < -along_axis)
+  if (head.directions->upward.z() < -along_axis)
     return fmt::format(
         "the head is upside down: {} lies above {}; +z must point up (LPS: +x left, +y back, +z "
         "up), turn all meshes",
@@ -94,7 +91,7 @@ std::string check_axes(const Anatomical& head) {
     return "the face looks towards +y: these are RAS coordinates, and a scene is in LPS (+x left, "
            "+y back, +z up); export the meshes in LPS, or change the signs of x and y in all of "
            "them and in the scene";
-  if (forward.y() > -along_axis || head.frame->upward.z() < along_axis)
+  if (forward.y() > -along_axis || head.directions->upward.z() < along_axis)
     return fmt::format(
         "the face looks along {:.2f} and not along −y: turn all meshes to LPS (+x left, +y back, "
         "+z up), or give moves along the head's own directions",
@@ -104,14 +101,13 @@ std::string check_axes(const Anatomical& head) {
 
 /// Landmarks whose names differ in the side tell left from right.
 std::string check_sides(const Anatomical& head) {
-  if (!head.frame) return "";
   for (const auto& [name, place] : head.scene.landmarks) {
     const size_t at = name.find("left");
     if (at == std::string::npos) continue;
     std::string other = name;
     const auto found = head.scene.landmarks.find(other.replace(at, 4, "right"));
     if (found == head.scene.landmarks.end()) continue;
-    if (head.frame->left.dot(place - found->second) > 0) continue;
+    if (head.directions->left.dot(place - found->second) > 0) continue;
     return fmt::format(
         "landmark {} lies on the right of {}: the head or its landmarks are mirrored; change the "
         "sign of x in one of them",
@@ -131,8 +127,7 @@ double gap_between(const BoneGroup& lower, const Anatomical& head) {
 }
 
 std::string check_fit(const Anatomical& head) {
-  if (!head.frame) return "";
-  const double aside = head.frame->left.dot(head.lower.box.center() - head.upper.box.center());
+  const double aside = head.directions->left.dot(head.lower.box.center() - head.upper.box.center());
   const std::string jaw = names_of(head, BoneRole::lower), skull = names_of(head, BoneRole::upper);
   constexpr const char* remedy = "check that both come from one scan and in one frame";
   if (std::abs(aside) > out_of_middle)
@@ -162,8 +157,7 @@ double degrees_of(const scene::RigidMotion& motion) {
 }
 
 std::string check_hinge(const Anatomical& head) {
-  if (!head.frame) return "";
-  const JawPoints jaw = jaw_points(head.lower, *head.frame);
+  const JawPoints jaw = jaw_points(head.lower, *head.directions);
   const Vec3 joints = (jaw.left_joint + jaw.right_joint) / 2;
   for (const size_t b : whole_jaws(head)) {
     const scene::RigidMotion& move = head.scene.moves[b];
@@ -171,7 +165,7 @@ std::string check_hinge(const Anatomical& head) {
     const Vec3 by = move.apply(joints) - joints;
     const double chin = (move.apply(jaw.chin) - jaw.chin).norm();
     const bool reversed = by.norm() > std::max(joint_slide, joint_over_chin * chin);
-    if (!reversed && head.frame->up.dot(by) < joint_up) continue;
+    if (!reversed && head.directions->up.dot(by) < joint_up) continue;
     return fmt::format(
         "'{}' turns about an axis far from its joints: they move {:.1f} mm and the chin {:.1f} mm; "
         "the hinge runs through both condyles, near {:.0f} and {:.0f}",
@@ -191,12 +185,12 @@ bool mouth_is_open(const Anatomical& head, const Vec3& incisor) {
 }
 
 std::string check_lips(const Anatomical& head) {
-  if (!head.frame) return "";
-  const JawPoints jaw = jaw_points(head.lower, *head.frame);
+  const JawPoints jaw = jaw_points(head.lower, *head.directions);
   if (mouth_is_open(head, jaw.incisor)) return "";
   double drop = 0;
   for (const size_t b : whole_jaws(head))
-    drop = std::max(drop, head.frame->up.dot(jaw.incisor - head.scene.moves[b].apply(jaw.incisor)));
+    drop = std::max(drop,
+                    head.directions->up.dot(jaw.incisor - head.scene.moves[b].apply(jaw.incisor)));
   if (drop < opening) return "";
   return fmt::format(
       "the lips are one skin, and the jaw opens by {:.0f} mm at its front teeth: the mouth stays "
@@ -205,14 +199,14 @@ std::string check_lips(const Anatomical& head) {
       drop);
 }
 
-/// The frame of a head by its landmarks where they tell it, otherwise by skin and bones.
-std::optional<HeadFrame> frame_of(const Anatomical& head) {
+/// The directions of a head by its landmarks where they tell them, otherwise by skin and bones.
+std::optional<HeadDirections> directions_of(const Anatomical& head) {
   const auto& plan = head.scene.anatomy;
   if (!plan || !plan->landmarks.contains("condyle_right_center") || head.upper.empty() ||
       head.lower.empty())
-    return head_frame(head.mesh, head.upper, head.lower);
+    return head_directions(head.mesh, head.upper, head.lower);
   const Vec3 left = plan->axes.row(0), forward = -plan->axes.row(1), up = plan->axes.row(2);
-  return HeadFrame{up, forward, left, forward, up};
+  return HeadDirections{up, forward, left, forward, up};
 }
 
 }  // namespace
@@ -223,11 +217,15 @@ std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRa
   Anatomical head{scene, range, mesh, bones, roles_of(scene), {}, {}, {}};
   head.upper = bones_of(BoneRole::upper, head.roles, bones);
   head.lower = bones_of(BoneRole::lower, head.roles, bones);
-  head.frame = frame_of(head);
+  head.directions = directions_of(head);
   std::vector<std::string> warnings;
-  for (const auto check :
-       {check_flatness, check_rest, check_axes, check_sides, check_fit, check_hinge, check_lips})
-    if (std::string warning = check(head); !warning.empty()) warnings.push_back(std::move(warning));
+  const auto run = [&](std::initializer_list<std::string (*)(const Anatomical&)> checks) {
+    for (const auto check : checks)
+      if (std::string warning = check(head); !warning.empty())
+        warnings.push_back(std::move(warning));
+  };
+  run({check_flatness, check_rest});
+  if (head.directions) run({check_axes, check_sides, check_fit, check_hinge, check_lips});
   return warnings;
 }
 

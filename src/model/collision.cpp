@@ -62,13 +62,12 @@ struct Mover {
   }
 };
 
-void check_end_state(Mover& a, Mover& b, BonePair& pair) {
-  const Mat4 pose = relative(a.motion, b.motion, 1);
-  if (!surface::touch(a.tree, b.tree, pose)) return;
-  pair.crossings = static_cast<int64_t>(
-      surface::pairs_within(a.tree, b.tree, pose, surface::contact_margin).size());
-  pair.depth = std::max(a.depth_of(b.surface.points, pose),
-                        b.depth_of(a.surface.points, relative(b.motion, a.motion, 1)));
+/// mm, by which two bones lie inside one another at a load; negative where they do not touch.
+double overlap(Mover& a, Mover& b, double load) {
+  const Mat4 pose = relative(a.motion, b.motion, load);
+  if (!surface::touch(a.tree, b.tree, pose)) return -1;
+  return std::max(a.depth_of(b.surface.points, pose),
+                  b.depth_of(a.surface.points, relative(b.motion, a.motion, load)));
 }
 
 /// Length (mm) that triangles which touch from the start shall have at most: small, but not so that
@@ -104,7 +103,11 @@ void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pai
     }
     load += caution * next.load;
   }
-  if (pair.contact()) check_end_state(a, b, pair);
+  if (!pair.contact()) return;
+  pair.depth = std::max(overlap(a, b, 1), 0.0);
+  const Mat4 end = relative(a.motion, b.motion, 1);
+  pair.crossings = static_cast<int64_t>(
+      surface::pairs_within(a.tree, b.tree, end, surface::contact_margin).size());
 }
 
 std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
@@ -127,14 +130,12 @@ void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Sc
   for (size_t i = 0; i < bones.size(); ++i)
     for (size_t j = i + 1; j < bones.size(); ++j) {
       if (move_alike(scene.moves[i], scene.moves[j])) continue;
-      BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
-      check_end_state(movers[i], movers[j], pair);
-      if (pair.depth > worth_saying)
+      if (const double depth = overlap(movers[i], movers[j], 1); depth > worth_saying)
         remarks.push_back(
             fmt::format("bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide "
                         "reports where they "
                         "meet, and collision: {{mode: clamp}} moves them no farther",
-                        scene.bones[i].name, scene.bones[j].name, pair.depth));
+                        scene.bones[i].name, scene.bones[j].name, depth));
     }
 }
 
@@ -149,18 +150,13 @@ void report_initial_overlaps(const std::vector<surface::Surface>& bones, const s
                              std::vector<std::string>& warnings) {
   constexpr double worth_saying = 2;  // mm: segmented teeth overlap by some tenths
   std::vector<Mover> movers = movers_of(bones, scene.moves);
-  const Mat4 as_they_are = Mat4::Identity();
   for (size_t i = 0; i < bones.size(); ++i)
-    for (size_t j = i + 1; j < bones.size(); ++j) {
-      if (!surface::touch(movers[i].tree, movers[j].tree, as_they_are)) continue;
-      const double depth = std::max(movers[i].depth_of(bones[j].points, as_they_are),
-                                    movers[j].depth_of(bones[i].points, as_they_are));
-      if (depth > worth_saying)
+    for (size_t j = i + 1; j < bones.size(); ++j)
+      if (const double depth = overlap(movers[i], movers[j], 0); depth > worth_saying)
         warnings.push_back(fmt::format(
             "bones '{}' and '{}' lie {:.1f} mm inside one another before they move: check that "
             "both come from one scan and in one frame, or separate their segmentations",
             scene.bones[i].name, scene.bones[j].name, depth));
-    }
 }
 
 CollisionReport follow_moves(const std::vector<surface::Surface>& bones,

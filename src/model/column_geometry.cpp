@@ -114,7 +114,7 @@ ColumnGeometry::ColumnGeometry(const scene::Scene& scene, const surface::Surface
   state_->require_free_cuts();
   const Counts counts = state_->count();
   require_held(scene, layout.mesh, layout.field, counts, layout.attachment);
-  report_columns(layout, counts.bone, layout.report);
+  report_columns(counts.bone, layout);
   if (adheres(scene)) state_->jaws = adhering_jaws(*scene.anatomy, layout);
   state_->prepare_cuts();
   if (scene.tissue.isotropic)

@@ -53,44 +53,43 @@ std::vector<double> pedicles(const scene::Scene& scene) {
 }
 
 /// Releases tissue near pieces that move differently, and reports where the pedicle limits it.
-void release_from_bones(const scene::Scene& scene, const MotionRange& range, const SkinMesh& mesh,
-                        const Columns& columns, const BoneField& field, Attachment& attachment) {
+void release_from_bones(const scene::Scene& scene, const MotionRange& range, ColumnLayout& layout) {
   const double distance = scene.tissue.release;
   const std::vector<double> pedicle = pedicles(scene);
   const std::vector<double> limits = release_near_other_pieces(
-      columns.deep, field, range, {distance, scene.tissue.released, pedicle, mesh.vertex_area},
-      attachment);
+      layout.columns.deep, layout.field, range,
+      {distance, scene.tissue.released, pedicle, layout.mesh.vertex_area}, layout.attachment);
   for (size_t b = 0; b < limits.size(); ++b)
     if (limits[b] < distance)
-      attachment.remarks.push_back(fmt::format(
+      layout.attachment.remarks.push_back(fmt::format(
           "pedicle by landmarks: tissue on '{}' is released within {:.1f} in place of {:g} mm of "
           "other pieces, so that {:g} % of it stays attached",
           scene.bones[b].name, std::max(limits[b], 0.0), distance, 100 * pedicle[b]));
 }
 
-/// Which columns are held as the rim; those released from bone, as do those near other pieces.
-std::vector<char> settle_rim(const scene::Scene& scene, const MotionRange& range,
-                             const SkinMesh& mesh, const Columns& columns, const BoneField& field,
-                             Attachment& attachment) {
-  std::vector<char> rim = rim_columns(mesh, scene.rim != scene::Rim::free);
+/// Chooses the columns that are held as the rim; those released from bone, as do those near other
+/// pieces.
+void settle_rim(const scene::Scene& scene, const MotionRange& range, ColumnLayout& layout) {
+  Attachment& attachment = layout.attachment;
+  std::vector<char>& rim = layout.rim;
+  rim = rim_columns(layout.mesh, scene.rim != scene::Rim::free);
   const auto let_go = [&] {
     for (size_t c = 0; c < rim.size(); ++c)
       if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
   };
   if (scene.rim == scene::Rim::fixed) let_go();
   const std::vector<int32_t> sliding = attachment.slides_on;
-  release_from_bones(scene, range, mesh, columns, field, attachment);
-  if (scene.rim != scene::Rim::automatic) return rim;
+  release_from_bones(scene, range, layout);
+  if (scene.rim != scene::Rim::automatic) return;
   const std::vector<char> border = rim;
   for (size_t c = 0; c < rim.size(); ++c) {
     const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
-    rim[c] = rim[c] && bone >= 0 && range.travel(columns.deep[c], bone) <= negligible_travel;
+    rim[c] = rim[c] && bone >= 0 && range.travel(layout.columns.deep[c], bone) <= negligible_travel;
   }
-  const bool held = std::ranges::any_of(rim, [](char layout) { return layout != 0; }) ||
+  const bool held = std::ranges::any_of(rim, [](char fixed) { return fixed != 0; }) ||
                     std::ranges::any_of(attachment.bone, [](int32_t bone) { return bone >= 0; });
   if (!held) rim = border;  // nothing else holds the tissue
   let_go();
-  return rim;
 }
 
 }  // namespace
@@ -101,25 +100,25 @@ ColumnLayout lay_out_columns(const scene::Scene& scene, const surface::Surface& 
   const MotionRange range(scene, bones);
   std::vector<Cut> cuts;
   SkinMesh mesh = mesh_with_paths(scene, skin, cuts);
-  BoneField field(bones);
-  require_same_place(mesh, skin.name, bones, field);
-  const std::vector<BoneField::Nearest> nearest = nearest_bone(mesh, field);
-  BuildReport report;
-  if (face_outwards(nearest, mesh))
+  ColumnLayout layout{std::move(mesh), std::move(cuts), BoneField(bones), {}, {}, {}, {}};
+  BuildReport& report = layout.report;
+  require_same_place(layout.mesh, skin.name, bones, layout.field);
+  const std::vector<BoneField::Nearest> nearest = nearest_bone(layout.mesh, layout.field);
+  if (face_outwards(nearest, layout.mesh))
     report.remarks.push_back(
         fmt::format("{}: its outside faced the bones, the skin was turned round", skin.name));
-  report.warnings = check_anatomy(scene, range, mesh, bones);
-  Columns columns = compute_columns(mesh, field, nearest, scene.tissue, skin.name);
-  open_gaps(mesh.points, scene, columns);
-  Attachment attachment = attach_columns(columns, field, scene);
-  std::vector<char> rim = settle_rim(scene, range, mesh, columns, field, attachment);
-  if (const std::string border = describe_near_border(scene, range, bones, mesh, field);
+  report.warnings = check_anatomy(scene, range, layout.mesh, bones);
+  layout.columns = compute_columns(layout.mesh, layout.field, nearest, scene.tissue, skin.name);
+  open_gaps(layout.mesh.points, scene, layout.columns);
+  layout.attachment = attach_columns(layout.columns, layout.field, scene);
+  settle_rim(scene, range, layout);
+  if (const std::string border =
+          describe_near_border(scene, range, bones, layout.mesh, layout.field);
       !border.empty())
     (scene.rim == scene::Rim::fixed ? report.warnings : report.remarks).push_back(border);
-  release_near_rim(columns.deep, rim, range, {scene.tissue.release, scene.tissue.released},
-                   attachment);
-  return {std::move(mesh),       std::move(cuts), std::move(field), std::move(columns),
-          std::move(attachment), std::move(rim),  std::move(report)};
+  release_near_rim(layout.columns.deep, layout.rim, range,
+                   {scene.tissue.release, scene.tissue.released}, layout.attachment);
+  return layout;
 }
 
 void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& bones,
@@ -137,15 +136,12 @@ void prepend_messages(const Anatomy& anatomy, BuildReport& report) {
   report.warnings.insert(report.warnings.begin(), anatomy.warnings.begin(), anatomy.warnings.end());
 }
 
-void report_columns(const ColumnLayout& layout, int64_t attached, BuildReport& report) {
+void report_columns(int64_t attached, ColumnLayout& layout) {
   const Columns& columns = layout.columns;
   const Attachment& attachment = layout.attachment;
-  report.skin_vertices = static_cast<int64_t>(layout.mesh.points.size());
-  report.skin_edges = static_cast<int64_t>(layout.mesh.edges.size());
-  report.skin_triangles = static_cast<int64_t>(layout.mesh.triangles.size());
+  BuildReport& report = layout.report;
   report.attached = attached;
-  report.free_deep =
-      report.skin_vertices - attached - std::count(layout.rim.begin(), layout.rim.end(), 1);
+  report.free_deep = std::ranges::count(layout.rim, 0) - attached;
   std::vector<double> sorted = columns.thickness;
   std::sort(sorted.begin(), sorted.end());
   report.thickness_min = sorted.front();

@@ -32,7 +32,7 @@ void add_bones(const scene::Scene& scene, const std::vector<surface::Surface>& b
 /// Puts an anatomy's remarks and warnings before those of the report.
 void prepend_messages(const Anatomy& anatomy, BuildReport& report);
 
-/// Into the report: what became of the columns, and how many points and bones they hold to.
-void report_columns(const ColumnLayout& layout, int64_t attached, BuildReport& report);
+/// Adds the columns, of which `attached` end in bone, to the layout's report.
+void report_columns(int64_t attached, ColumnLayout& layout);
 
 }  // namespace repose::model

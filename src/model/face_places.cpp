@@ -2,7 +2,7 @@
 #include <array>
 #include <cmath>
 
-#include "head_frame.h"
+#include "head_directions.h"
 #include "repose/model/build.h"
 
 namespace repose::model {
@@ -29,7 +29,7 @@ void add_nearest(const std::string& name, const Vec3& point, const std::vector<V
   if ((at - point).norm() <= farthest_skin) found.push_back({name, at});
 }
 
-void add_nose(const JawPoints& jaw, const HeadFrame& frame, const std::vector<Vec3>& skin,
+void add_nose(const JawPoints& jaw, const HeadDirections& frame, const std::vector<Vec3>& skin,
               std::vector<FacePlace>& found) {
   const Vec3* tip = nullptr;
   for (const Vec3& x : skin) {
@@ -53,8 +53,8 @@ std::vector<FacePlace> face_places(const Anatomy& anatomy) {
   if (!found.empty()) return found;
   const std::vector<BoneRole> roles = roles_of(anatomy.scene);
   const BoneGroup lower = bones_of(BoneRole::lower, roles, anatomy.bones);
-  const auto frame = head_frame(make_skin_mesh(anatomy.skin),
-                                bones_of(BoneRole::upper, roles, anatomy.bones), lower);
+  const auto frame = head_directions(make_skin_mesh(anatomy.skin),
+                                     bones_of(BoneRole::upper, roles, anatomy.bones), lower);
   if (!frame) return {};
   const JawPoints jaw = jaw_points(lower, *frame);
   const Vec3 lips = jaw.incisor + lip_forward * frame->forward;

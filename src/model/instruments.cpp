@@ -8,7 +8,6 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/defects.h"
-#include "repose/surface/distance.h"
 #include "repose/surface/read.h"
 
 namespace repose::model {
@@ -90,48 +89,40 @@ surface::Surface read_body(const scene::ClosedMesh& mesh) {
   return body;
 }
 
-struct PushedShape::Body {
-  scene::Instrument instrument;
-  Vec3 direction;
-  std::optional<surface::DistanceTree> mesh;
-
-  /// First part of the line in the mesh, no farther than the push before p.
-  std::optional<Stretch> in_mesh(const Vec3& p) const {
-    double enter = 0;
-    if (!mesh->contains(p)) {
-      const auto hit = mesh->first_hit(p, direction, instrument.push.norm());
-      if (!hit) return {};
-      enter = hit->distance;
-    }
-    const double beyond = enter + 1e-9 * (1 + enter);
-    const auto exit = mesh->first_hit(p + beyond * direction, direction, infinite);
-    if (!exit) return {};
-    return Stretch{enter, beyond + exit->distance};
-  }
-};
-
 PushedShape::PushedShape(const scene::Instrument& instrument)
-    : body_(std::make_unique<Body>(Body{instrument, instrument.push.normalized(), std::nullopt})) {
+    : instrument_(instrument), direction_(instrument.push.normalized()) {
   if (const auto* mesh = std::get_if<scene::ClosedMesh>(&instrument.shape))
-    body_->mesh.emplace(read_body(*mesh));
+    mesh_.emplace(read_body(*mesh));
   if (const auto* half = std::get_if<scene::HalfSpace>(&instrument.shape))
     if (!(half->normal.dot(instrument.push) > 0))
       base::refuse("a half-space must be pushed to the side of its normal; turn one of them round");
 }
-PushedShape::~PushedShape() = default;
-PushedShape::PushedShape(PushedShape&&) noexcept = default;
+
+/// First part of the line in the mesh, no farther than the push before p.
+std::optional<Stretch> PushedShape::in_mesh(const Vec3& p) const {
+  double enter = 0;
+  if (!mesh_->contains(p)) {
+    const auto hit = mesh_->first_hit(p, direction_, instrument_.push.norm());
+    if (!hit) return {};
+    enter = hit->distance;
+  }
+  const double beyond = enter + 1e-9 * (1 + enter);
+  const auto exit = mesh_->first_hit(p + beyond * direction_, direction_, infinite);
+  if (!exit) return {};
+  return Stretch{enter, beyond + exit->distance};
+}
 
 std::optional<Stretch> PushedShape::along(const Vec3& p) const {
-  const Vec3 before = p - body_->instrument.push;  // of the push, as the shape was
-  if (body_->mesh) return body_->in_mesh(before);
+  const Vec3 before = p - instrument_.push;  // of the push, as the shape was
+  if (mesh_) return in_mesh(before);
   return std::visit(
       [&](const auto& shape) -> std::optional<Stretch> {
         if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, scene::ClosedMesh>)
           return {};
         else
-          return line_and(shape, before, body_->direction);
+          return line_and(shape, before, direction_);
       },
-      body_->instrument.shape);
+      instrument_.shape);
 }
 
 namespace {
@@ -170,18 +161,6 @@ ColumnLoads hold_by_instruments(const scene::Scene& scene, const std::vector<Vec
       }
     }
   return loads;
-}
-
-struct MeshDepth::Tree {
-  explicit Tree(const surface::Surface& mesh) : tree(mesh) {}
-  surface::DistanceTree tree;
-};
-
-MeshDepth::MeshDepth(const surface::Surface& mesh) : tree_(std::make_unique<Tree>(mesh)) {}
-MeshDepth::~MeshDepth() = default;
-
-double MeshDepth::at(const Vec3& point) const {
-  return tree_->tree.contains(point) ? tree_->tree.nearest(point).distance : 0;
 }
 
 }  // namespace repose::model

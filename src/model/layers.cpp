@@ -53,51 +53,40 @@ void add_points(const SkinMesh& mesh, const std::vector<Vec3>& deep,
 }
 
 /// Adds the springs one set at a time.
-class SpringSets {
- public:
-  explicit SpringSets(Model& model) : model_(model) {}
-
-  void open(const char* kind, int64_t number) {
-    model_.spring_sets.push_back(fmt::format("{} {}", kind, number));
-  }
-  void add(int64_t p, int64_t q) {
-    Springs& springs = model_.springs;
-    const std::vector<Vec3>& x = model_.points.position;
-    springs.points.push_back({p, q});
-    springs.set.push_back(static_cast<int32_t>(model_.spring_sets.size()) - 1);
-    springs.rest_length.push_back((x[q] - x[p]).norm());
-  }
-
- private:
-  Model& model_;
-};
-
 void add_springs(const SkinMesh& mesh, int64_t layers, Model& model) {
-  SpringSets sets(model);
-  const auto columns = static_cast<int64_t>(mesh.points.size());
-  const auto edges = static_cast<int64_t>(mesh.edges.size());
+  Springs& springs = model.springs;
+  const std::vector<Vec3>& x = model.points.position;
+  const auto open = [&](const char* kind, int64_t number) {
+    model.spring_sets.push_back(fmt::format("{} {}", kind, number));
+  };
+  const auto add = [&](int64_t p, int64_t q) {
+    springs.points.push_back({p, q});
+    springs.set.push_back(static_cast<int32_t>(model.spring_sets.size()) - 1);
+    springs.rest_length.push_back((x[q] - x[p]).norm());
+  };
+  const int64_t columns = std::ssize(mesh.points), edges = std::ssize(mesh.edges);
   const int64_t rows = layers * edges + (layers - 1) * (columns + 2 * edges);
-  model.springs.points.reserve(rows);
-  model.springs.set.reserve(rows);
-  model.springs.rest_length.reserve(rows);
+  springs.points.reserve(rows);
+  springs.set.reserve(rows);
+  springs.rest_length.reserve(rows);
   for (int64_t a = 0; a < layers; ++a) {
-    sets.open("layer", a);
-    for (const auto& [c, d] : mesh.edges) sets.add(c * layers + a, d * layers + a);
+    open("layer", a);
+    for (const auto& [c, d] : mesh.edges) add(c * layers + a, d * layers + a);
   }
   for (int64_t a = 0; a + 1 < layers; ++a) {
-    sets.open("connecting", a);
-    for (int64_t c = 0; c < columns; ++c) sets.add(c * layers + a, c * layers + a + 1);
+    open("connecting", a);
+    for (int64_t c = 0; c < columns; ++c) add(c * layers + a, c * layers + a + 1);
   }
   for (int64_t a = 0; a + 1 < layers; ++a) {
-    sets.open("diagonal", a);
+    open("diagonal", a);
     for (const auto& [c, d] : mesh.edges) {
-      sets.add(c * layers + a, d * layers + a + 1);
-      sets.add(d * layers + a, c * layers + a + 1);
+      add(c * layers + a, d * layers + a + 1);
+      add(d * layers + a, c * layers + a + 1);
     }
   }
-  model.springs.stiffness.assign(rows, 0);
-  model.springs.exponent.assign(rows, 0);
-  model.springs.reference.assign(rows, 1);
+  springs.stiffness.assign(rows, 0);
+  springs.exponent.assign(rows, 0);
+  springs.reference.assign(rows, 1);
 }
 
 void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {

@@ -19,45 +19,16 @@ std::set<Edge> torn_edges(const std::vector<char>& torn, const Springs& springs)
   return edges;
 }
 
-/// Points that are held, and those that springs join to them.
-std::vector<char> joined_points(const Model& model, const std::vector<char>& torn) {
-  const size_t n = model.points.position.size();
-  std::vector<std::vector<int64_t>> neighbors(n);
-  for (size_t j = 0; j < torn.size(); ++j) {
-    if (torn[j]) continue;
-    const auto [p, q] = model.springs.points[j];
-    neighbors[p].push_back(q);
-    neighbors[q].push_back(p);
-  }
-  std::vector<char> joined(n, 0);
-  std::vector<int64_t> front;
-  for (size_t i = 0; i < n; ++i)
-    if (model.points.set[i] != PointSet::soft_tissue) {
-      joined[i] = 1;
-      front.push_back(static_cast<int64_t>(i));
-    }
-  while (!front.empty()) {
-    const int64_t i = front.back();
-    front.pop_back();
-    for (const int64_t k : neighbors[i])
-      if (!joined[k]) {
-        joined[k] = 1;
-        front.push_back(k);
-      }
-  }
-  return joined;
-}
-
 void refuse_torn_off(const Model& model, const std::vector<char>& torn, const std::string& what) {
-  const std::vector<char> joined = joined_points(model, torn);
-  const auto lost = std::find(joined.begin(), joined.end(), 0);
-  if (lost == joined.end()) return;
-  const auto row = lost - joined.begin();
-  const Vec3& x = model.points.position[row];
+  std::vector<Edge> left;
+  for (size_t j = 0; j < torn.size(); ++j)
+    if (!torn[j]) left.push_back(model.springs.points[j]);
+  const int64_t row = find_floating(model.points.set, {left});
+  if (row < 0) return;
   base::refuse(
       "{}: point {} at {:.4g} mm is torn off: no springs are left between it and what holds the "
       "tissue; give a higher limit or less force",
-      what, row, x);
+      what, row, model.points.position[row]);
 }
 
 /// Removes the rows of a group of arrays that are gone.

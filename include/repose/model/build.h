@@ -16,7 +16,6 @@ namespace repose::model {
 
 /// Report on the building of a model, for the end-of-run summary.
 struct BuildReport {
-  int64_t skin_vertices = 0, skin_edges = 0, skin_triangles = 0;
   int64_t attached = 0;   ///< columns that end in bone
   int64_t free_deep = 0;  ///< columns that end free: no bone near, unattached, or released
   int64_t released = 0;   ///< of those, released near a piece that moves differently

@@ -1,10 +1,10 @@
 #pragma once
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "repose/model/build.h"
 #include "repose/scene/scene.h"
+#include "repose/surface/distance.h"
 
 /// Rigid bodies pushed into the skin.
 namespace repose::model {
@@ -25,29 +25,30 @@ class PushedShape {
   /// Reads the file of a mesh. Throws InputError for one that is not closed, and for a half-space
   /// that is not pushed out of itself.
   explicit PushedShape(const scene::Instrument& instrument);
-  ~PushedShape();
-  PushedShape(PushedShape&&) noexcept;
 
   std::optional<Stretch> along(const Vec3& p) const;
 
  private:
-  struct Body;
-  std::unique_ptr<Body> body_;
+  std::optional<Stretch> in_mesh(const Vec3& p) const;
+
+  scene::Instrument instrument_;
+  Vec3 direction_;
+  std::optional<surface::DistanceTree> mesh_;
 };
 
 /// Measures how deep points are inside a closed mesh, by its triangles.
 class MeshDepth {
  public:
   /// Throws InputError for a mesh without area.
-  explicit MeshDepth(const surface::Surface& mesh);
-  ~MeshDepth();
+  explicit MeshDepth(const surface::Surface& mesh) : tree_(mesh) {}
 
   /// mm, 0 outside.
-  double at(const Vec3& point) const;
+  double at(const Vec3& point) const {
+    return tree_.contains(point) ? tree_.nearest(point).distance : 0;
+  }
 
  private:
-  struct Tree;
-  std::unique_ptr<Tree> tree_;
+  surface::DistanceTree tree_;
 };
 
 /// Finds the columns whose skin point an instrument to which the skin sticks sweeps over or ends

@@ -1,4 +1,4 @@
-#include "head_frame.h"
+#include "head_directions.h"
 
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ Vec3 farthest_along(const std::vector<Vec3>& points, const Vec3& direction) {
 }
 
 /// The axes of the coordinates that are nearest to what was found.
-void align_with_axes(HeadFrame& frame) {
+void align_with_axes(HeadDirections& frame) {
   double best = -std::numeric_limits<double>::infinity();
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) {
@@ -75,8 +75,8 @@ BoneGroup bones_of(BoneRole role, const std::vector<BoneRole>& roles,
   return group;
 }
 
-std::optional<HeadFrame> head_frame(const SkinMesh& mesh, const BoneGroup& upper,
-                                    const BoneGroup& lower) {
+std::optional<HeadDirections> head_directions(const SkinMesh& mesh, const BoneGroup& upper,
+                                              const BoneGroup& lower) {
   if (upper.empty() || lower.empty()) return {};
   Vec3 outward = Vec3::Zero();
   double area = 0;
@@ -88,7 +88,7 @@ std::optional<HeadFrame> head_frame(const SkinMesh& mesh, const BoneGroup& upper
   Vec3 skin = Vec3::Zero();
   for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
   const Vec3 bones = (upper.box.center() + lower.box.center()) / 2;
-  HeadFrame frame;
+  HeadDirections frame;
   frame.facing = outward.normalized();
   if (frame.facing.dot(skin - bones) < 0) frame.facing = -frame.facing;
   const Vec3 up = upper.box.center() - lower.box.center();
@@ -99,7 +99,7 @@ std::optional<HeadFrame> head_frame(const SkinMesh& mesh, const BoneGroup& upper
   return frame;
 }
 
-JawPoints jaw_points(const BoneGroup& lower, const HeadFrame& frame) {
+JawPoints jaw_points(const BoneGroup& lower, const HeadDirections& frame) {
   const double middle = frame.left.dot(lower.box.center());
   const auto side = [&](const Vec3& x) { return frame.left.dot(x) - middle; };
   const Vec3 joint = frame.up - frame.forward;

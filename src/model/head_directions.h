@@ -27,21 +27,21 @@ BoneGroup bones_of(BoneRole role, const std::vector<BoneRole>& roles,
                    const std::vector<surface::Surface>& bones);
 
 /// Directions of a head, unit vectors.
-struct HeadFrame {
+struct HeadDirections {
   Vec3 up, forward, left;  ///< along axes of the coordinates
   Vec3 facing, upward;     ///< as they are found: where the skin faces, and upward across that
 };
 
 /// Returns the directions of a head: up from the lower to the upper bones, forward where the skin
 /// faces. Empty where the skin is closed, or one of the groups is missing.
-std::optional<HeadFrame> head_frame(const SkinMesh& mesh, const BoneGroup& upper,
-                                    const BoneGroup& lower);
+std::optional<HeadDirections> head_directions(const SkinMesh& mesh, const BoneGroup& upper,
+                                              const BoneGroup& lower);
 
 /// Points of the jaw that a plan is judged by, on its surface.
 struct JawPoints {
   Vec3 left_joint, right_joint;  ///< the highest point at the back on either side
   Vec3 chin, incisor;            ///< foremost and low, foremost and high, near the middle
 };
-JawPoints jaw_points(const BoneGroup& lower, const HeadFrame& frame);
+JawPoints jaw_points(const BoneGroup& lower, const HeadDirections& frame);
 
 }  // namespace repose::model
