@@ -67,18 +67,6 @@ Convergence convergence_of(const model::Anatomy& anatomy, const model::Counts& o
   return found;
 }
 
-std::string describe_convergence(const GridSequence& sequence, double requested,
-                                 const std::string& limit) {
-  const Level& last = sequence.levels.back();
-  const std::string why = sequence.refusal.empty() ? limit : sequence.refusal;
-  return fmt::format(
-      "  {:<22} of these, the last; mesh and layers leave its skin {:.2g} mm from the continuum at "
-      "most, by its distance from the one before{}\n",
-      "solved model", last.discretization_error,
-      sequence.near_enough ? ""
-                           : fmt::format(": MORE THAN THE {:g} mm REQUESTED: {}", requested, why));
-}
-
 Discretization discretization_of(const std::vector<Vec3>& position, const GridSequence& sequence) {
   Discretization found;
   found.at_point.assign(position.size(), 0.0);

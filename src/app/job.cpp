@@ -175,8 +175,6 @@ void give_tone(MPI_Comm comm, Job& job) {
 /// Broadcasts rank 0's flags and counts to all ranks.
 void share(MPI_Comm comm, Job& job) {
   static_assert(std::is_trivially_copyable_v<scene::Solve>);
-  job.solid = job.local_model.part.solid;
-  job.has_contact = job.local_model.part.contact;
   job.remeshed = job.anatomy && job.anatomy->given_skin;
   for (const model::Body& body : job.local_model.global_metadata.contact.bodies)
     job.bodies.push_back(body.name);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace repose::app {
 namespace {
@@ -12,6 +14,8 @@ namespace {
 constexpr double worth_saying = 0.3;  // mm, of a component beside the largest one
 constexpr double unmoved = 0.1;       // mm
 constexpr double same_place = 25;     // mm
+constexpr double beside_stomion = 8;  // mm
+constexpr double closed = 0.1;        // mm
 
 /// "7.4 mm forward, 0.3 down", the largest component first and with its unit.
 std::string describe_shift(const Vec3& by) {
@@ -47,14 +51,28 @@ std::string place_of(const Vec3& at, double moved, const std::vector<model::Face
   return nearest ? fmt::format("{}, {}", nearest->name, where) : where;
 }
 
-}  // namespace
+/// The two points of the skin that one vertex became where the lips part, nearest to stomion.
+std::optional<std::pair<size_t, size_t>> parted_vertex(const Vec3& stomion,
+                                                       const std::vector<Vec3>& points) {
+  std::vector<size_t> near;
+  for (size_t i = 0; i < points.size(); ++i)
+    if ((points[i] - stomion).norm() < beside_stomion) near.push_back(i);
+  std::ranges::stable_sort(near, {}, [&](size_t i) { return (points[i] - stomion).squaredNorm(); });
+  for (size_t k = 0; k < near.size(); ++k)
+    for (size_t l = k + 1; l < near.size(); ++l)
+      if (points[near[k]] == points[near[l]]) return std::pair(near[k], near[l]);
+  return std::nullopt;
+}
 
+/// Row of the point nearest to a place; 0 without points.
 size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
   size_t nearest = 0;
   for (size_t i = 1; i < points.size(); ++i)
     if ((points[i] - place).squaredNorm() < (points[nearest] - place).squaredNorm()) nearest = i;
   return nearest;
 }
+
+}  // namespace
 
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
@@ -75,6 +93,22 @@ std::string describe_movement(const std::vector<model::FacePlace>& places, const
                       place_of(initial[farthest], largest, places, movement));
   text[0] = static_cast<char>(std::toupper(text[0]));
   return text + ".";
+}
+
+std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
+                          const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
+  for (const char* name : {"stomion", "upper_lip", "lower_lip"})
+    if (!landmarks.contains(name)) return "";
+  const auto pair = parted_vertex(landmarks.at("stomion"), initial);
+  if (!pair) return "";
+  const auto way = [&](size_t i) { return Vec3(moved[i] - initial[i]); };
+  const Vec3 upper = way(nearest_point(landmarks.at("upper_lip"), initial)),
+             lower = way(nearest_point(landmarks.at("lower_lip"), initial));
+  Vec3 apart = way(pair->first) - way(pair->second);
+  if (apart.dot(upper - lower) < 0) apart = -apart;  // the first one is of the lower lip
+  const double gap = apart.dot(up);
+  if (gap < closed) return "Lips closed. ";
+  return fmt::format("Lips {:.1f} mm apart at stomion, together before. ", gap);
 }
 
 std::string describe_trust(const solve::Summary& summary, double discretization) {

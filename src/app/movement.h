@@ -7,14 +7,18 @@
 
 namespace repose::app {
 
-/// Row of the point nearest to a place; 0 without points.
-size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points);
-
 /// Returns one sentence on how the face moved: each place's components along `axes` (rows left,
 /// back and up, unit vectors), the largest movement and where it is. `initial` and `moved` [points]
 /// of the skin, mm.
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
                               const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
+
+/// Returns how far parted lips are apart along `up`, a unit vector, in the middle of the mouth, in
+/// one sentence with a blank after it. Empty without the landmarks stomion, upper_lip and
+/// lower_lip, and where the skin is not parted within 8 mm of stomion. `initial` and `moved`
+/// [points] of the skin, mm.
+std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
+                          const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
 
 /// Returns how far the face is from rest and, where that was estimated (`discretization`, mm; else
 /// negative), from the continuum.

@@ -28,7 +28,7 @@ std::vector<solve::PlanPiece> find_pieces(const Job& job) {
 
 /// On rank 0.
 std::vector<solve::Stratum> find_strata(const Job& job) {
-  if (!job.solid || !job.anatomy || job.initial_equilibrium) return {};
+  if (!job.local_model.part.solid || !job.anatomy || job.initial_equilibrium) return {};
   const scene::Tissue& tissue = job.anatomy->scene.tissue;
   if (!tissue.material || tissue.turgor > 0 ||
       tissue.material->dilatation == scene::Dilatation::nodal)

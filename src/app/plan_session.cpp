@@ -185,7 +185,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
   });
   s.box.pieces.clear();
   base::broadcast(comm, s.box.translate, s.box.rotate);
-  s.settings = settings_of(s.job.requested, s.job.solid);
+  s.settings = settings_of(s.job.requested, s.job.local_model.part.solid);
   s.settings.initial_equilibrium = s.job.initial_equilibrium;
   s.settings.finds_other_rest = false;
   s.plan = plan_pieces(comm, s.job);
@@ -204,7 +204,6 @@ const std::vector<PlanSession::Piece>& PlanSession::pieces() const { return stat
 const scene::Plan& PlanSession::box() const { return state_->box; }
 double PlanSession::accuracy() const { return state_->settings.path.accuracy; }
 const model::Model& PlanSession::model() const { return state_->job.local_model.global_metadata; }
-const std::string& PlanSession::building() const { return state_->job.building; }
 
 const surface::Surface* PlanSession::given_skin() const {
   const auto& anatomy = state_->job.anatomy;

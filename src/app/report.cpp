@@ -309,13 +309,18 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
   return text + describe_stages(stages);
 }
 
-std::string describe_choice(const adapt::GridSequence& sequence, double requested) {
+std::string describe_choice(const adapt::GridSequence& sequence, double requested,
+                            const std::string* limit) {
   const double error = sequence.levels.back().discretization_error;
+  const bool near = limit ? sequence.near_enough : error <= requested;
+  const std::string why =
+      limit ? ": " + (sequence.refusal.empty() ? *limit : sequence.refusal) : "";
   return report_row(
       "solved model",
-      "of these, the last; its skin is {:.2g} mm from the scene's own at most, by its distance "
-      "from the one before{}",
-      error, error > requested ? fmt::format(": MORE THAN THE {:g} mm REQUESTED", requested) : "");
+      "of these, the last; {} {:.2g} mm from {} at most, by its distance from the one before{}",
+      limit ? "mesh and layers leave its skin" : "its skin is", error,
+      limit ? "the continuum" : "the scene's own",
+      near ? "" : fmt::format(": MORE THAN THE {:g} mm REQUESTED{}", requested, why));
 }
 
 std::string describe_sequence(const adapt::GridSequence& sequence) {

@@ -91,8 +91,10 @@ std::string describe_run(const solve::Summary& summary, const solve::Settings& s
 /// Lines of the closing table about a nested iteration; only rank 0 has them.
 std::string describe_sequence(const adapt::GridSequence& sequence);
 
-/// A line about the last coarse model where it was solved in place of the scene's own, to
-/// `requested` mm; only rank 0 has it.
-std::string describe_choice(const adapt::GridSequence& sequence, double requested);
+/// A line about the last model of a sequence where it was solved in place of the scene's own, to
+/// `requested` mm: its distance from the scene's own or, of a convergence study, whose `limit`
+/// (adapt::Convergence) keeps it from finer models, from the continuum. Only rank 0 has it.
+std::string describe_choice(const adapt::GridSequence& sequence, double requested,
+                            const std::string* limit);
 
 }  // namespace repose::app

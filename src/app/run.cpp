@@ -12,7 +12,6 @@
 #include <limits>
 #include <optional>
 
-#include "lip_gap.h"
 #include "movement.h"
 #include "phase.h"
 #include "plan_pieces.h"
@@ -207,13 +206,12 @@ Coarser Run::solve_coarser() {
       adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none,
                             discrete::gather_model(comm, job_.local_model), requested);
   Coarser coarser{describe_sequence(sequence), {}, {}};
-  const bool converging = !compare && !strategy_.preview && job_.solid;
+  const bool converging = !compare && !strategy_.preview && job_.local_model.part.solid;
   const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
   if (sequence.near_enough || last) {
     coarser.discretization_error = sequence.levels.back().discretization_error;
-    const double accuracy = settings.path.accuracy;
-    coarser.report += converging ? adapt::describe_convergence(sequence, accuracy, strategy_.limit)
-                                 : describe_choice(sequence, accuracy);
+    coarser.report +=
+        describe_choice(sequence, settings.path.accuracy, converging ? &strategy_.limit : nullptr);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
     settings.weights = sequence.last_settings.weights;
     job_.local_model = discrete::build_local_from_root(comm, std::move(sequence.last.model));

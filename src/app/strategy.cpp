@@ -84,7 +84,7 @@ void choose_coarse(const CoarseRequest& request, const std::string& conflict, co
   if (request.coarse == Coarse::none) return;
   if (conflict.empty()) {
     s.preview = request.coarse == Coarse::instead && !request.required;
-    if (request.coarse == Coarse::instead && request.required && job.solid) {
+    if (request.coarse == Coarse::instead && request.required && job.local_model.part.solid) {
       adapt::Convergence convergence = adapt::convergence_of(*job.anatomy, job.local_model.counts);
       s.resolutions = std::move(convergence.resolutions);
       s.limit = std::move(convergence.limit);
@@ -99,7 +99,7 @@ void choose_coarse(const CoarseRequest& request, const std::string& conflict, co
 
 /// Refuses what minimizes without regard to contact.
 void require_contact_kept(const Strategy& s, const Job& job) {
-  if (!job.has_contact) return;
+  if (!job.local_model.part.contact) return;
   const char* remedy = "leave contact and sliding instruments out of the scene";
   if (is_force(s))
     base::refuse(
@@ -116,9 +116,10 @@ void require_path(const std::string& conflict, const Strategy& s) {
 
 std::string describe_minimum(const Strategy& s, const Job& job) {
   const std::string minimized =
-      job.solid ? "the energy of a solid"
-                : fmt::format("the {} of springs, volume term {}",
-                              is_force(s) ? "forces" : "energy", word(s.settings.weights.volume));
+      job.local_model.part.solid
+          ? "the energy of a solid"
+          : fmt::format("the {} of springs, volume term {}", is_force(s) ? "forces" : "energy",
+                        word(s.settings.weights.volume));
   return fmt::format("{}, to {:g} mm", minimized, s.settings.path.accuracy);
 }
 
@@ -160,7 +161,7 @@ void choose_sensitivity(const base::Options& options, const Job& job, Strategy& 
   const auto cannot = [](const char* why) {
     base::refuse("-sensitivity: {}; leave the option out", why);
   };
-  if (!job.solid) cannot("it is of a material, and the tissue is springs");
+  if (!job.local_model.part.solid) cannot("it is of a material, and the tissue is springs");
   if (!job.anatomy) cannot("the input is a model, which does not state its scene");
   if (s.coarse == Coarse::instead) cannot("a coarser model takes the place of the scene's own");
   s.sensitivity = true;
@@ -184,7 +185,7 @@ Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& j
   scene::Solve requested = job.requested;
   override_by(options, requested);
   Strategy s;
-  s.settings = settings_of(requested, job.solid);
+  s.settings = settings_of(requested, job.local_model.part.solid);
   s.settings.stability = options.flag("stability");
   s.settings.finds_other_rest = !options.flag("skip_other_rest");
   s.settings.monitor = options.flag("monitor_mm");

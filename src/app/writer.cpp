@@ -18,7 +18,7 @@ Writer::Writer(MPI_Comm comm, const std::filesystem::path& name, const Job& job,
       coarser_(coarser),
       unsettled_(std::move(unsettled)),
       file_(open("", results::Kind::result)),
-      interval_(interval) {}
+      checkpoints_{interval} {}
 
 results::ResultFile Writer::open(const std::string& ending, results::Kind kind) const {
   return results::ResultFile(comm_, name_.string() + ending, job_.local_model.global_metadata,
@@ -40,8 +40,8 @@ void Writer::operator()(model::StepNumbers numbers, model::StepRows rows) {
   last_.rows.volume_ratio = rows.volume_ratio;
   last_.rows.point_fields = rows.point_fields;
   if (!makes_checkpoints() || !numbers.converged) return;
-  reached_ = {numbers, rows};
-  saved_ = false;
+  checkpoints_.reached = {numbers, rows};
+  checkpoints_.saved = false;
   if (due()) write_checkpoint(nullptr);
 }
 
@@ -55,8 +55,8 @@ void Writer::on_iterate(double load, const solve::StateSnapshot& snapshot) {
         [&](const auto& numbers, const auto& rows) { file_.append_provisional(numbers, rows); });
   begun_ = true;
   if (!makes_checkpoints()) return;
-  const bool news = !saved_ || load == 1;
-  if (reached_ && news && due()) write_checkpoint(load == 1 ? snapshot : nullptr);
+  const bool news = !checkpoints_.saved || load == 1;
+  if (checkpoints_.reached && news && due()) write_checkpoint(load == 1 ? snapshot : nullptr);
 }
 
 std::vector<Vec3> Writer::positions() const { return base::gather(comm_, last_.rows.position); }
@@ -92,7 +92,7 @@ void Writer::compare(model::StepNumbers& numbers, model::StepRows& rows) {
 }
 
 bool Writer::due() const {
-  bool due = MPI_Wtime() - last_saved_ > interval_;
+  bool due = MPI_Wtime() - checkpoints_.written > checkpoints_.interval;
   base::broadcast(comm_, due);
   return due;
 }
@@ -101,12 +101,12 @@ bool Writer::due() const {
 /// can go on from there or, should that lead astray, along the path.
 void Writer::write_checkpoint(const solve::StateSnapshot& snapshot) {
   results::ResultFile file = open(results::checkpoint_suffix, results::Kind::checkpoint);
-  file.append(reached_->numbers, reached_->rows);
-  if (snapshot && reached_->numbers.load < 1)
+  file.append(checkpoints_.reached->numbers, checkpoints_.reached->rows);
+  if (snapshot && checkpoints_.reached->numbers.load < 1)
     snapshot([&](const auto& numbers, const auto& rows) { file.append(numbers, rows); });
   file.commit();
-  saved_ = true;
-  last_saved_ = MPI_Wtime();
+  checkpoints_.saved = true;
+  checkpoints_.written = MPI_Wtime();
 }
 
 }  // namespace repose::app

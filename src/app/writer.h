@@ -38,7 +38,7 @@ class Writer {
   /// there was anything to save.
   bool save() { return file_.save(); }
 
-  bool makes_checkpoints() const { return interval_ > 0; }
+  bool makes_checkpoints() const { return checkpoints_.interval > 0; }
   const std::string& unsettled() const { return unsettled_; }
   /// Returns the estimated discretization error of the skin, on rank 0.
   const std::string& comparison() const { return comparison_; }
@@ -64,6 +64,12 @@ class Writer {
     model::StepNumbers numbers;
     model::StepRows rows;
   };
+  struct Checkpoints {
+    double interval;                   // s
+    double written = MPI_Wtime();      // the last one
+    std::optional<Step> reached = {};  // where they are made: the last rest position, …
+    bool saved = false;                // … and whether a checkpoint has it
+  };
   results::ResultFile open(const std::string& ending, results::Kind kind) const;
   void compare(model::StepNumbers& numbers, model::StepRows& rows);
   bool due() const;
@@ -75,11 +81,9 @@ class Writer {
   const Coarser& coarser_;
   std::string comparison_, unsettled_;
   results::ResultFile file_;
-  bool begun_ = false;           // the file holds a step of this run
-  Step last_;                    // the rows that reactions and those above need
-  std::optional<Step> reached_;  // where checkpoints are made: the last rest position, …
-  bool saved_ = false;           // … and whether a checkpoint has it
-  double interval_, last_saved_ = MPI_Wtime();
+  bool begun_ = false;  // the file holds a step of this run
+  Step last_;           // the rows that reactions and those above need
+  Checkpoints checkpoints_;
 };
 
 }  // namespace repose::app

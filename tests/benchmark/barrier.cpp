@@ -307,7 +307,7 @@ std::vector<Vec3> read_positions(const std::string& result, const model::Model& 
 base::Exit run(const base::Options& options) {
   check(PetscLogDefaultBegin());
   const app::Job job = app::read_job(comm, options.arguments()[0]);
-  if (!job.solid) base::refuse("tissue.springs: the barrier is for solids");
+  if (!job.local_model.part.solid) base::refuse("tissue.springs: the barrier is for solids");
   solve::Settings settings = app::settings_of(job.requested, true);
   settings.path.accuracy = options.number("accuracy");
   const model::Model model = discrete::gather_model(comm, job.local_model);

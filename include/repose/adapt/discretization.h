@@ -25,11 +25,6 @@ struct Convergence {
 Convergence convergence_of(const model::Anatomy& anatomy, const model::Counts& own,
                            int64_t max_unknowns = 5'000'000);
 
-/// Returns a row of the end-of-run summary about the last model of a convergence study, whose
-/// requested accuracy is `requested` mm and which `limit` (Convergence) keeps from finer ones.
-std::string describe_convergence(const GridSequence& sequence, double requested,
-                                 const std::string& limit);
-
 /// Estimated distances (mm) of the skin's rest position from that of an ever finer model.
 struct Discretization {
   double order = 1;              ///< with which differences fall when all lengths are halved

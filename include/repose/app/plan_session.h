@@ -60,7 +60,6 @@ class PlanSession {
   bool has_cuts() const;                       ///< incisions or parted lips
   std::vector<Vec3> initial() const;           ///< [N] mm
   int64_t points() const;                      ///< N, on all ranks
-  const std::string& building() const;         ///< report of the build
 
   /// Throws InputError where the plan is outside the box.
   Answer solve(const Request& request);

@@ -1,4 +1,4 @@
-#include "app/lip_gap.h"
+#include "app/movement.h"
 
 #include <gtest/gtest.h>
 
