@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Figures of the house: lines (of them comments, and blank) and public headers of each room,
-functions beyond a screen, functions with many parameters, and, with the programs' folder, the
-frames between main and TaoSolve.
+functions beyond a screen, functions with many parameters, data members of classes, and, with the
+programs' folder, the frames between main and TaoSolve.
 
     tests/program/house_figures.py [build/bin] [-tree FOLDER]
 
@@ -19,7 +19,7 @@ import tempfile
 
 import test_house
 from conftest import PROJECT
-from test_house import LONGEST, USUAL, functions, room_of, sources
+from test_house import LONGEST, USUAL, classes, functions, room_of, sources
 
 PARAMETERS = 5
 # A TaoSolve that tells how many frames of the program's own are above it.
@@ -88,7 +88,7 @@ def main():
     test_house.PROJECT = chosen.tree
     lines, comments, blank = (collections.Counter() for _ in range(3))
     headers = collections.Counter()
-    lengths, many = [], []
+    lengths, many, members = [], [], []
     for name, text in sources():
         public = name.startswith("include/")
         room = room_of(name)
@@ -97,6 +97,7 @@ def main():
         blank[room] += len(re.findall(r"^$", text, re.M)) - text.endswith("\n")
         headers[room] += public
         lengths += [length for _, length in functions(text)]
+        members += [number for _, number in classes(text)]
         many += [f"{name}:{line}" for line, n in parameters(text)
                  if n > PARAMETERS and declares(text, line)]
     print("| room | lines | comments | blank | public headers |\n|---|--:|--:|--:|--:|")
@@ -107,6 +108,7 @@ def main():
     print(f"{len(lengths)} functions: {sum(n > USUAL for n in lengths)} above {USUAL} lines, "
           f"{sum(n > LONGEST for n in lengths)} above {LONGEST}; "
           f"{len(many)} with more than {PARAMETERS} parameters.")
+    print(f"{len(members)} classes, of at most {max(members)} data members.")
     if chosen.programs:
         print(f"Frames between main and TaoSolve: {frames(chosen.programs)}.")
 

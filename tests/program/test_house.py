@@ -50,7 +50,7 @@ LIBRARIES = {
 }
 # No public header may show CGAL, and several rooms call it.
 SHARED = {"../surface/cgal.h", "../../surface/cgal.h"}
-MOST_HEADERS = 12
+MOST_HEADERS = MOST_MEMBERS = 12
 LONGEST, USUAL, USUAL_SHARE = 60, 35, 0.9
 WORDS = re.compile(r"\b(TO" r"DO|FIX" r"ME|XX" r"X|HA" r"CK)\b"
                    r"|(?<![\w.$})~*-])/(work|home|root|tmp|mnt|Users)/")
@@ -117,6 +117,26 @@ def functions(text):
         if "(" in head and not re.match(r"}|(if|for|while|switch|try|class|struct|enum)\b", head):
             found = [(b, n) for b, n in found if b < begin] + [(begin, end - begin + 1)]
     return [(begin + 1, length) for begin, length in found]
+
+
+def classes(text):
+    """(name, number of data members) of each class: members have names with a trailing underscore."""
+    text = re.sub(r"//.*", "", text)
+    found = []
+    for match in re.finditer(r"\b(?:class|struct) (\w+)[^;{}()=]*{", text):
+        depth, own = 1, ""  # what is outside all further braces
+        for char in text[match.end():]:
+            depth += {"{": 1, "}": -1}.get(char, 0)
+            if depth == 0:
+                break
+            own += char.replace("}", ";") if depth == 1 else ""
+        while re.search(r"<[^<>]*>", own):
+            own = re.sub(r"<[^<>]*>", "", own)
+        statements = re.sub(r"\b(public|protected|private):", "", own).split(";")
+        members = [re.findall(r"\b\w+_(?=\s*(?:=|,|$))", statement) for statement in statements
+                   if "(" not in statement.split("=")[0]]
+        found.append((match.group(1), sum(map(len, members))))
+    return found
 
 
 def python_functions(text):
@@ -228,6 +248,31 @@ Box::Box(int a,
 }  // namespace repose
 """
     assert functions(text) == [(3, 3), (7, 10)]
+
+
+def test_classes_have_few_data_members():
+    large = [(members, cls, name) for name, text in sources()
+             for cls, members in classes(text) if members > MOST_MEMBERS]
+    assert not large, large
+
+
+def test_data_members_are_counted():
+    text = """class Box {
+ public:
+  int area() const { return area_; }
+  static int count(int a_);
+
+ private:
+  struct Side {
+    double length_, width_;
+  };
+  Side& side_;
+  double low_ = 0, high_ = f(0);
+  std::vector<int> of_{3};  // a_;
+  std::function<bool(int)> ends_;
+};
+"""
+    assert classes(text) == [("Box", 5), ("Side", 2)]
 
 
 def test_headers_are_included_once():
