@@ -183,11 +183,11 @@ void NaturalRows::add_contact(Objective& objective, model::StepRows& rows) const
     least_gap[point] = std::min(least_gap[point], gap);
     sum[point] += pressure;
   };
-  mechanics::BodyContact& bodies = objective.body_contact();
+  mechanics::BodyContact& bodies = objective.contact().bodies();
   bodies.update_all_gaps(objective.positions().local());
   for (size_t c = 0; c < bodies.gaps().size(); ++c)
     add(bodies.pairs().point[c], bodies.gaps()[c], bodies.pressure(c));
-  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  mechanics::CutFaceContact& cut_faces = objective.contact().cut_faces();
   cut_faces.update_gaps(objective.positions().local());
   for (size_t w = 0; w < cut_faces.size(); ++w)
     add(cut_faces.point(w), cut_faces.gap(w), cut_faces.pressure(w));

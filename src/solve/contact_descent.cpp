@@ -61,13 +61,13 @@ Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
   constexpr double roughly = 0.1, finely = 0.004;  // mm
-  objective_.round_bodies(true);
+  objective_.contact().round_bodies(true);
   soften();
   const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy), false);
   harden(displacement);
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);
-  objective_.round_bodies(false);
+  objective_.contact().round_bodies(false);
   tangent_.forget_contact();
   return end;
 }

@@ -34,9 +34,9 @@ ContactGaps::ContactGaps(discrete::Objective& objective)
 
 void ContactGaps::linearize(Vec displacement) {
   objective_.positions().update(displacement);
-  objective_.place_bodies();
-  gaps_ =
-      objective_.body_contact().linear_gaps(objective_.positions().local(), farthest, smoothed_to);
+  objective_.contact().place_bodies();
+  gaps_ = objective_.contact().bodies().linear_gaps(objective_.positions().local(), farthest,
+                                                    smoothed_to);
   add_gaps();
 }
 
@@ -44,23 +44,23 @@ void ContactGaps::linearize(Vec displacement, double load, std::span<const Vec3>
   discrete::Positions& positions = objective_.positions();
   const double before = positions.load();
   positions.update(displacement);
-  objective_.place_bodies();
-  gaps_ = objective_.body_contact().linear_gaps(positions.local(), farthest, smoothed_to);
-  const std::vector<mechanics::RigidBody> bodies = objective_.body_contact().bodies();
+  objective_.contact().place_bodies();
+  gaps_ = objective_.contact().bodies().linear_gaps(positions.local(), farthest, smoothed_to);
+  const std::vector<mechanics::RigidBody> bodies = objective_.contact().bodies().bodies();
   positions.set_load(load);
-  objective_.place_bodies();
+  objective_.contact().place_bodies();
   positions.set_load(before);
   positions.update(displacement);
-  objective_.body_contact().carry(positions.local(), bodies, gaps_);
-  objective_.place_bodies();
+  objective_.contact().bodies().carry(positions.local(), bodies, gaps_);
+  objective_.contact().place_bodies();
   add_gaps();
   for (size_t k = touching_; k < gaps_.size(); ++k)
     for (const auto& [p, gradient] : gaps_[k].gradient) gaps_[k].gap += gradient.dot(travel[p]);
 }
 
 void ContactGaps::add_gaps() {
-  mechanics::BodyContact& bodies = objective_.body_contact();
-  mechanics::CutFaceContact& cuts = objective_.cut_face_contact();
+  mechanics::BodyContact& bodies = objective_.contact().bodies();
+  mechanics::CutFaceContact& cuts = objective_.contact().cut_faces();
   touching_ = gaps_.size();
   cuts.update_gaps(objective_.positions().local());
   std::ranges::copy(cuts.linear_gaps(farthest), std::back_inserter(gaps_));
@@ -199,12 +199,12 @@ void ContactGaps::set_multipliers(const std::vector<double>& to) {
 }
 
 void ContactGaps::give_multipliers() {
-  std::vector<double> bodies(objective_.body_contact().multipliers().size(), 0.0),
-      cut_faces(objective_.cut_face_contact().size(), 0.0);
+  std::vector<double> bodies(objective_.contact().bodies().multipliers().size(), 0.0),
+      cut_faces(objective_.contact().cut_faces().size(), 0.0);
   for (size_t k = 0; k < gaps_.size(); ++k)
     (k < touching_ ? bodies : cut_faces)[gaps_[k].constraint] = state_[k].multiplier;
-  objective_.body_contact().set_multipliers(bodies);
-  objective_.cut_face_contact().set_multipliers(cut_faces);
+  objective_.contact().bodies().set_multipliers(bodies);
+  objective_.contact().cut_faces().set_multipliers(cut_faces);
 }
 
 }  // namespace repose::solve

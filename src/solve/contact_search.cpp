@@ -25,14 +25,14 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
       other_(objective, tangent, penalty_, programs_, descent_) {}
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
-  objective_.body_contact().restore_released();
+  objective_.contact().bodies().restore_released();
   const ContactPressures before = penalty_.multipliers();
   predicted_ = true;
   descent_.stiffen(1);
   const bool found = programs_.predict(displacement, load, increment);
   tangent_.forget_contact();
   if (!found) {
-    objective_.round_bodies(false);
+    objective_.contact().round_bodies(false);
     penalty_.set_multipliers(before);
   }
   return found;
@@ -42,7 +42,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
 /// Collective.
 bool ContactSearch::release_overlapped(double accuracy) {
   discrete::Positions& positions = objective_.positions();
-  mechanics::BodyContact& contact = objective_.body_contact();
+  mechanics::BodyContact& contact = objective_.contact().bodies();
   contact.update_gaps(positions.local());
   const bool any = base::on_any_rank(positions.comm(), contact.release_overlapped(accuracy));
   if (any) tangent_.forget_contact();
@@ -55,7 +55,7 @@ bool ContactSearch::lead_out(Vec displacement, double accuracy) {
   discrete::Positions& positions = objective_.positions();
   programs_.evaluate(displacement);
   programs_.linearize(displacement);
-  const auto ways = objective_.body_contact().ways_out(positions.local(), accuracy);
+  const auto ways = objective_.contact().bodies().ways_out(positions.local(), accuracy);
   if (!base::on_any_rank(positions.comm(), !ways.empty())) return false;
   const bool found = programs_.step_with(ways, displacement);
   tangent_.forget_contact();
@@ -137,7 +137,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     outcome.reason =
         fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());
   outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
-                                            objective_.body_contact().count_released());
+                                            objective_.contact().bodies().count_released());
   if (outcome.converged && outcome.overlapped == 0 && may_have_other)
     other_.find(displacement, accuracy, outcome);
   return outcome;
@@ -146,7 +146,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
-  objective_.body_contact().restore_released();
+  objective_.contact().bodies().restore_released();
   descent_.stiffen(1);
   int64_t iterations = 0;
   const End end = programs_.run(displacement, accuracy, iterations);

@@ -33,7 +33,7 @@ double softness(const mechanics::LinearGap& other, const Mat3& compliance, const
 std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete::Tangent& tangent,
                                        Vec displacement) {
   constexpr double softest = 4;
-  const mechanics::BodyContact& contact = objective.body_contact();
+  const mechanics::BodyContact& contact = objective.contact().bodies();
   const auto position = objective.positions().local();
   const std::vector<Mat3> blocks = diagonal_blocks(tangent, displacement, position.size());
   std::vector<OtherSide> found;

@@ -28,7 +28,7 @@ double ExactPenetration::depth(size_t body, const mechanics::RigidBody& shape, c
 
 void ExactPenetration::measure_own(discrete::Objective& objective,
                                    std::vector<PenetrationDepth>& depths) {
-  const std::vector<mechanics::RigidBody>& bodies = objective.body_contact().bodies();
+  const std::vector<mechanics::RigidBody>& bodies = objective.contact().bodies().bodies();
   const model::ContactPairs& body_contact = part_.model.contact.pairs;
   for (size_t c = 0; c < body_contact.point.size(); ++c) {
     const int32_t body = body_contact.body[c];

@@ -19,7 +19,6 @@ Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver
     : function_(function),
       solver_(solver),
       watch_(watch),
-      may_leave_saddles_(&estimate.function == &function),
       distance_(std::make_unique<RestDistance>(function, estimate)),
       tao_(std::make_unique<TaoSearch>(function, solver)) {
   const bool solid = function.positions().part().solid;
@@ -64,7 +63,7 @@ Outcome Minimizer::run(Vec displacement, double accuracy) {
   constexpr int max_left = 20;  // saddles
   Outcome outcome = search_and_finish(displacement, accuracy);
   const auto leaves = [&] {
-    return may_leave_saddles_ && !outcome.stable && !outcome.stopped &&
+    return distance_->of_minimized() && !outcome.stable && !outcome.stopped &&
            leave_saddle(function_, solver_, displacement);
   };
   for (int n = 0; n < max_left && leaves(); ++n) {

@@ -30,7 +30,7 @@ void OtherRestSearch::begin(Vec prediction) {
 bool OtherRestSearch::presses_near_edge(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  mechanics::BodyContact& contact = objective_.body_contact();
+  mechanics::BodyContact& contact = objective_.contact().bodies();
   contact.update_gaps(positions.local());
   return base::on_any_rank(positions.comm(), !contact.other_sides(positions.local()).empty());
 }
@@ -112,7 +112,7 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   std::span<const mechanics::LinearGap> beyond;
   if (side) {
     const mechanics::LinearGap& gap = side->gap;
-    work = -gap.gap * gap.area * objective_.body_contact().multipliers()[gap.constraint];
+    work = -gap.gap * gap.area * objective_.contact().bodies().multipliers()[gap.constraint];
     beyond = {&gap, 1};
   }
   work = base::max_over_ranks(objective_.positions().comm(), work);

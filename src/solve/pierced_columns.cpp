@@ -58,7 +58,7 @@ PiercedColumns find_pierced_columns(discrete::Objective& objective) {
   const discrete::Part& part = positions.part();
   PiercedColumns found;
   if (!part.contact) return found;
-  const std::vector<mechanics::RigidBody>& moved = objective.body_contact().bodies();
+  const std::vector<mechanics::RigidBody>& moved = objective.contact().bodies().bodies();
   const auto now = positions.local();
   const std::vector<Vec3>& before = part.model.points.position;
   for (const int64_t i : second_deepest(positions.comm(), part)) {

@@ -17,7 +17,7 @@ Problem::Problem(discrete::Positions& positions, const mechanics::Weights& weigh
 }
 
 void Problem::reset() {
-  objective_.reset_contact();
+  objective_.contact().reset();
   tangent_.invalidate();
   elastic_solver_.reset();
   if (force_solver_) force_solver_->reset();

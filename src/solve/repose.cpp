@@ -9,7 +9,7 @@
 #include <limits>
 #include <optional>
 
-#include "contact_pressures.h"
+#include "contact_penalty.h"
 #include "contact_search.h"
 #include "exact_penetration.h"
 #include "pierced_columns.h"
@@ -225,7 +225,7 @@ std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
   if (!part.contact) return {};
   std::vector<ContactSummary> contacts(part.bodies.size() + 1);
-  mechanics::BodyContact& body_contact = objective.body_contact();
+  mechanics::BodyContact& body_contact = objective.contact().bodies();
   body_contact.update_gaps(objective.positions().local());
   for (size_t c = 0; c < body_contact.gaps().size(); ++c) {
     const double pressure = body_contact.pressure(c);
@@ -234,7 +234,7 @@ std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
     ++on.points;
     on.force -= pressure * body_contact.pairs().area[c] * body_contact.normal(c);
   }
-  mechanics::CutFaceContact& cut_faces = objective.cut_face_contact();
+  mechanics::CutFaceContact& cut_faces = objective.contact().cut_faces();
   cut_faces.update_gaps(objective.positions().local());
   for (size_t w = 0; w < cut_faces.size(); ++w) {
     if (cut_faces.pressure(w) == 0) continue;
@@ -329,7 +329,7 @@ void begin_near(const Start& start, const discrete::NaturalRows& natural, Vec gu
   if (!positions.part().contact) return;
   positions.set_load(1);
   positions.update(guess);
-  objective.place_bodies();
+  objective.contact().place_bodies();
   std::vector<Vec3> rows;
   for (const double p : start.pressure) rows.emplace_back(p, 0, 0);
   set_pressures(objective, natural.owned(rows));

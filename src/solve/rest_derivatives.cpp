@@ -49,8 +49,10 @@ class FrozenContact {
   FrozenContact(FrozenContact&&) = delete;
 
  private:
-  mechanics::BodyContact& body_contact() { return problem_.objective().body_contact(); }
-  mechanics::CutFaceContact& cut_face_contact() { return problem_.objective().cut_face_contact(); }
+  mechanics::BodyContact& body_contact() { return problem_.objective().contact().bodies(); }
+  mechanics::CutFaceContact& cut_face_contact() {
+    return problem_.objective().contact().cut_faces();
+  }
   void set(double stiffness, std::span<const double> pressing, std::span<const double> parting) {
     body_contact().set_stiffness(stiffness);
     cut_face_contact().set_stiffness(stiffness);
@@ -245,7 +247,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
   const base::VecHandle slope = positions.make_vector();
   std::optional<Adjoint> adjoint;
   positions.update(displacement);
-  objective.place_bodies();
+  objective.contact().place_bodies();
   {
     const FrozenContact frozen(problem);
     LinearResponse response(problem, displacement);

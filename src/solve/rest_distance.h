@@ -26,7 +26,8 @@ class RestDistance {
   /// yet, nothing where it is another function's.
   std::optional<double> preconditioned_step(Vec gradient);
 
-  Vec step() const { return newton_.step(); }  ///< H⁻¹ ∇Φ of the latest estimate
+  bool of_minimized() const { return of_minimized_; }  ///< the steps are
+  Vec step() const { return newton_.step(); }          ///< H⁻¹ ∇Φ of the latest estimate
   /// Returns whether the latest estimate met negative curvature.
   bool negative_curvature() const { return newton_.negative_curvature(); }
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "contact_pressures.h"
+#include "contact_penalty.h"
 #include "repose/base/agreement.h"
 #include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
@@ -54,7 +54,7 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
 /// there are any. Collective.
 bool flip_contacts(Problem& problem, Vec displacement, Vec step) {
   discrete::Positions& positions = problem.objective().positions();
-  mechanics::BodyContact& body_contact = problem.objective().body_contact();
+  mechanics::BodyContact& body_contact = problem.objective().contact().bodies();
   const double stiffness = body_contact.stiffness(), slight = 1e-9 * stiffness;
   const auto gaps_at = [&](Vec state) {
     positions.update(state);

@@ -26,8 +26,8 @@ void StoppingTest::begin(double accuracy, Criterion criterion, bool may_finish) 
   finishing_ = false;
 }
 
-/// A Newton method's steps go further, but one cut off by the trust region or negative curvature
-/// hardly comes to a convex place.
+/// Steps of a Newton method go further, but one that the trust region or negative curvature cut off
+/// rarely ends where the function is convex.
 bool StoppingTest::worth_estimating(const Iterate& at) const {
   if (softest_ == 0 || criterion_ == Criterion::gradient) return true;
   const double hopeful = method_ == Method::newton ? 20 : 2;

@@ -3,7 +3,7 @@
 
 namespace repose::solve {
 
-/// Methods by what an iteration knows of the distance to rest.
+/// Methods by what an iteration tells of the distance to rest.
 enum class Method {
   newton,          ///< its steps are Newton steps
   preconditioned,  ///< limited-memory BFGS that begins with the preconditioner

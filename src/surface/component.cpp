@@ -67,8 +67,10 @@ double volume_of(const Surface& surface) {
 
 std::vector<Vec3> vertex_normals(const Surface& surface) {
   std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
-  for (const Triangle& t : surface.triangles)
-    for (const int64_t v : t) normals[v] += scaled_normal(corners(surface, t));
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 normal = scaled_normal(corners(surface, t));
+    for (const int64_t v : t) normals[v] += normal;
+  }
   for (Vec3& normal : normals) normal.normalize();
   return normals;
 }
@@ -77,9 +79,10 @@ std::vector<Vec3> angle_normals(const Surface& surface) {
   std::vector<Vec3> normals(surface.points.size(), Vec3::Zero());
   for (const Triangle& t : surface.triangles) {
     const Corners at = corners(surface, t);
+    const Vec3 normal = scaled_normal(at).normalized();
     for (int k = 0; k < 3; ++k) {
       const Vec3 a = at[(k + 1) % 3] - at[k], b = at[(k + 2) % 3] - at[k];
-      normals[t[k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * scaled_normal(at).normalized();
+      normals[t[k]] += std::atan2(a.cross(b).norm(), a.dot(b)) * normal;
     }
   }
   for (Vec3& normal : normals) normal.normalize();

@@ -61,8 +61,8 @@ class BarrierSearch {
   BarrierSearch(solve::Problem& problem, const Parameters& parameters)
       : parameters_(parameters), problem_(problem) {
     constexpr double negligible = 1e-12;  // N/mm³, so that the barrier alone acts
-    objective_.body_contact().set_stiffness(negligible);
-    objective_.cut_face_contact().set_stiffness(negligible);
+    objective_.contact().bodies().set_stiffness(negligible);
+    objective_.contact().cut_faces().set_stiffness(negligible);
   }
 
   /// Finds the rest position. Returns how the search ended and its load steps.
@@ -89,9 +89,10 @@ class BarrierSearch {
   double evaluate() {
     double value = objective_.evaluate(displacement_, gradient_);
     const double reach = range_ - parameters_.standoff;
-    gaps_ = objective_.body_contact().linear_gaps(positions_.local(), reach);
+    gaps_ = objective_.contact().bodies().linear_gaps(positions_.local(), reach);
     touching_ = gaps_.size();
-    std::ranges::move(objective_.cut_face_contact().linear_gaps(reach), std::back_inserter(gaps_));
+    std::ranges::move(objective_.contact().cut_faces().linear_gaps(reach),
+                      std::back_inserter(gaps_));
     std::vector<Vec3> push(moved_.size(), Vec3::Zero());
     for (const LinearGap& gap : gaps_) {
       if (!(gap.gap + parameters_.standoff > 0)) return std::numeric_limits<double>::infinity();
@@ -140,11 +141,11 @@ class BarrierSearch {
     constexpr double steepest = 1.1, kept_share = 0.1,
                      tolerance_share = 0.05;  // a slope; of the distance
     constexpr int max_advances = 400;
-    const mechanics::BodyContact& loop = objective_.body_contact();
+    const mechanics::BodyContact& loop = objective_.contact().bodies();
     const model::ContactPairs& pairs = loop.pairs();
     double share = 1;
     for (size_t c = 0; c < pairs.point.size(); ++c) {
-      const RigidBody& body = objective_.body_contact().bodies()[pairs.body[c]];
+      const RigidBody& body = objective_.contact().bodies().bodies()[pairs.body[c]];
       const Vec3 now = positions_.local()[pairs.point[c]], from = body.beside(now),
                  path = next[pairs.body[c]].beside(now + moved_[pairs.point[c]]) - from;
       const double speed = steepest * path.norm(), standoff = parameters_.standoff;
@@ -175,7 +176,7 @@ class BarrierSearch {
       check(VecCopy(gradient_, before_));
       const bool convex = solve(before_, forcing);
       check(VecDot(gradient_, step_, &slope));
-      double share = feasible_share(objective_.body_contact().bodies()), trial = 0;
+      double share = feasible_share(objective_.contact().bodies().bodies()), trial = 0;
       check(VecCopy(displacement_, before_));
       for (int halvings = 0; halvings <= max_halvings; ++halvings, share /= 2) {
         check(VecWAXPY(displacement_, share, step_, before_));
@@ -196,11 +197,11 @@ class BarrierSearch {
     constexpr double longest = 20;                      // mm, as repose-solve
     const double load = positions_.load(),
                  whole = std::min(1 - load, longest / positions_.largest_travel());
-    const std::vector<RigidBody>& bodies = objective_.body_contact().bodies();
+    const std::vector<RigidBody>& bodies = objective_.contact().bodies().bodies();
     const auto place_at = [&](double to) {
       positions_.set_load(to);
       positions_.update(displacement_);
-      objective_.place_bodies();
+      objective_.contact().place_bodies();
     };
     place_at(load + whole);
     const std::vector<RigidBody> next = bodies;
@@ -212,7 +213,7 @@ class BarrierSearch {
     Objective::add_blocks(blocks_, path, push);
     for (const LinearGap& gap : std::span(gaps_).first(touching_)) {
       const auto& [p, normal] = gap.gradient.front();
-      const int32_t b = objective_.body_contact().pairs().body[gap.constraint];
+      const int32_t b = objective_.contact().bodies().pairs().body[gap.constraint];
       const Vec3 now = positions_.local()[p], carried = next[b].in_space(bodies[b].beside(now));
       push[p] -=
           stiffness() * gap.area * barrier(gap).curvature * normal.dot(carried - now) * normal;

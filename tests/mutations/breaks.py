@@ -117,6 +117,24 @@ BREAKS = [
         f"{SOLVE}|extremes",
     ),
     (
+        "an estimate is made however far rest is",
+        "return !far && !soon && !at.cut;",
+        "return !soon && !at.cut;",
+        r"^solve\.stopping",
+    ),
+    (
+        "a Newton step that does not finish is kept",
+        "if (end.error > 0.5 * before) {",
+        "if (end.error > 1e300) {",
+        r"^solve\.(stopping|minimizer)",
+    ),
+    (
+        "a rank without prisms decides alone",
+        "if (!objective_.positions().part().solid) return false;",
+        "if (!objective_.loops().solid()) return false;",
+        r"^solve\.on_idle_ranks",
+    ),
+    (
         "a trial step that says nothing is believed",
         "contraction_ = found <= trusted_contraction ? found : max_contraction;",
         "contraction_ = 0;",

@@ -30,11 +30,7 @@ class Objective : public Function {
   std::span<const std::array<int32_t, 2>> links() const { return links_; }
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
-  mechanics::BodyContact& body_contact() { return contact_.bodies(); }
-  mechanics::CutFaceContact& cut_face_contact() { return contact_.cut_faces(); }
-  void round_bodies(bool rounded) { contact_.round_bodies(rounded); }  ///< not collective
-  void place_bodies() { contact_.place_bodies(); }                     ///< not collective
-  void reset_contact() { contact_.reset(); }                           ///< not collective
+  Contact& contact() { return contact_; }
   /// Contact's value, at the last update, summed over ranks, N·mm.
   double contact_value();
   /// N, of what is touched on each owned point, at the last update. Not collective.

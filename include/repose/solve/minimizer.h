@@ -65,7 +65,6 @@ class Minimizer : public RestSearch {
   discrete::Function& function_;
   linear::TangentSolver& solver_;
   Watch watch_;
-  bool may_leave_saddles_;  // the estimate is of the function itself
   std::unique_ptr<RestDistance> distance_;
   std::unique_ptr<TaoSearch> tao_;
   std::unique_ptr<StoppingTest> test_;

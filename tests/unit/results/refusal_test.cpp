@@ -124,214 +124,216 @@ TEST_P(ModelDefect, IsRefusedByName) {
 const int64_t two = 2;
 const double three_numbers[3] = {0, nan, 0};
 
-INSTANTIATE_TEST_SUITE_P(
-    Header, ModelDefect,
-    ::testing::Values(
-        Defect{"NoFormat", remove_attribute("/", "format"), "/ attribute format: is missing"},
-        Defect{"OtherFormat",
-               [](const Spoiler& f) { f.set_attribute("/", "format", H5T_C_S1, 1, "x"); },
-               "/ attribute format: is \"x\", expected \"tissue-model\""},
-        Defect{"FormatIsANumber",
-               [](const Spoiler& f) { f.set_attribute("/", "format", H5T_NATIVE_INT64, 1, &two); },
-               "/ attribute format: holds 8-byte integers, expected strings"},
-        Defect{"OtherVersion",
-               [](const Spoiler& f) { f.set_attribute("/", "version", H5T_NATIVE_INT64, 1, &two); },
-               "/ attribute version: is 2, this program reads version 1"},
-        Defect{"NoModel", remove("/model"), "/model: is missing"},
-        Defect{"NoGravity", remove_attribute("/model", "gravity"),
-               "/model attribute gravity: is missing"},
-        Defect{"GravityOfTwo",
-               [](const Spoiler& f) {
-                 f.set_attribute("/model", "gravity", H5T_NATIVE_DOUBLE, 2, three_numbers);
-               },
-               "/model attribute gravity: has 2 values, expected 3"},
-        Defect{"GravityNotFinite",
-               [](const Spoiler& f) {
-                 f.set_attribute("/model", "gravity", H5T_NATIVE_DOUBLE, 3, three_numbers);
-               },
-               "/model attribute gravity: row 0 holds nan"}),
-    name_of);
+std::vector<Defect> header_defects() {
+  return {
+      Defect{"NoFormat", remove_attribute("/", "format"), "/ attribute format: is missing"},
+      Defect{"OtherFormat",
+             [](const Spoiler& f) { f.set_attribute("/", "format", H5T_C_S1, 1, "x"); },
+             "/ attribute format: is \"x\", expected \"tissue-model\""},
+      Defect{"FormatIsANumber",
+             [](const Spoiler& f) { f.set_attribute("/", "format", H5T_NATIVE_INT64, 1, &two); },
+             "/ attribute format: holds 8-byte integers, expected strings"},
+      Defect{"OtherVersion",
+             [](const Spoiler& f) { f.set_attribute("/", "version", H5T_NATIVE_INT64, 1, &two); },
+             "/ attribute version: is 2, this program reads version 1"},
+      Defect{"NoModel", remove("/model"), "/model: is missing"},
+      Defect{"NoGravity", remove_attribute("/model", "gravity"),
+             "/model attribute gravity: is missing"},
+      Defect{"GravityOfTwo",
+             [](const Spoiler& f) {
+               f.set_attribute("/model", "gravity", H5T_NATIVE_DOUBLE, 2, three_numbers);
+             },
+             "/model attribute gravity: has 2 values, expected 3"},
+      Defect{"GravityNotFinite",
+             [](const Spoiler& f) {
+               f.set_attribute("/model", "gravity", H5T_NATIVE_DOUBLE, 3, three_numbers);
+             },
+             "/model attribute gravity: row 0 holds nan"}};
+}
 
-INSTANTIATE_TEST_SUITE_P(Missing, ModelDefect, ::testing::ValuesIn([] {
-                           std::vector<Defect> defects;
-                           for (const char* path :
-                                {"/model/point/position", "/model/point/set", "/model/point/target",
-                                 "/model/point/layer", "/model/point/column", "/model/point/bone",
-                                 "/model/spring/points", "/model/spring/set",
-                                 "/model/spring/rest_length", "/model/spring/stiffness",
-                                 "/model/spring/exponent", "/model/spring/reference",
-                                 "/model/prism/points", "/model/prism/rest_volume",
-                                 "/model/spring_set", "/model/bone_surface/1/points",
-                                 "/model/bone_surface/0/triangles"})
-                             defects.push_back({path, remove(path), path});
-                           return defects;
-                         }()));
+INSTANTIATE_TEST_SUITE_P(Header, ModelDefect, ::testing::ValuesIn(header_defects()), name_of);
 
-INSTANTIATE_TEST_SUITE_P(
-    Shape, ModelDefect,
-    ::testing::Values(
-        Defect{"GroupForDataset",
-               [](const Spoiler& f) {
-                 f.remove("/model/point/mass");
-                 f.make_group("/model/point/mass");
-               },
-               "/model/point/mass: is a group or a type, expected a dataset"},
-        Defect{"DatasetForGroup",
-               [](const Spoiler& f) { f.replace("/model/point", H5T_NATIVE_INT, {3}); },
-               "/model/point/position: is missing"},
-        Defect{"TwoColumns",
-               [](const Spoiler& f) {
-                 f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {12, 2});
-               },
-               "/model/point/position: has shape [12,2], expected [rows,3]"},
-        Defect{
-            "OneDimension",
-            [](const Spoiler& f) { f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {36}); },
-            "/model/point/position: has shape [36], expected [rows,3]"},
-        Defect{"FewerRows",
-               [](const Spoiler& f) { f.replace("/model/point/layer", H5T_NATIVE_INT, {11}); },
-               "/model/point/layer: has shape [11], expected [12]"},
-        Defect{"ScalarDataset",
-               [](const Spoiler& f) { f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {}); },
-               "/model/point/position: has shape []"},
-        Defect{"NoPointAtAll",
-               [](const Spoiler& f) {
-                 f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {0, 3});
-                 f.replace("/model/point/target", H5T_NATIVE_DOUBLE, {0, 3});
-                 f.replace("/model/point/external_force", H5T_NATIVE_DOUBLE, {0, 3});
-                 for (const char* path : {"set", "layer", "column", "bone", "mass"})
-                   f.replace(std::string("/model/point/") + path, H5T_NATIVE_INT8, {0});
-               },
-               "/model/point/position: has no row"},
-        Defect{"TooLargeForTheMemory",
-               [](const Spoiler& f) {
-                 f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {hsize_t{1} << 50, 3});
-               },
-               "/model/point/position: is larger than the memory"},
-        Defect{"TransformsOfAnotherShape",
-               [](const Spoiler& f) {
-                 f.replace("/model/bone_transform", H5T_NATIVE_DOUBLE, {2, 3, 4});
-               },
-               "/model/bone_transform: has shape [2,3,4], expected [2,4,4]"}),
-    name_of);
+std::vector<Defect> missing_defects() {
+  std::vector<Defect> defects;
+  for (const char* path :
+       {"/model/point/position", "/model/point/set", "/model/point/target", "/model/point/layer",
+        "/model/point/column", "/model/point/bone", "/model/spring/points", "/model/spring/set",
+        "/model/spring/rest_length", "/model/spring/stiffness", "/model/spring/exponent",
+        "/model/spring/reference", "/model/prism/points", "/model/prism/rest_volume",
+        "/model/spring_set", "/model/bone_surface/1/points", "/model/bone_surface/0/triangles"})
+    defects.push_back({path, remove(path), path});
+  return defects;
+}
+
+INSTANTIATE_TEST_SUITE_P(Missing, ModelDefect, ::testing::ValuesIn(missing_defects()));
+
+std::vector<Defect> shape_defects() {
+  return {
+      Defect{"GroupForDataset",
+             [](const Spoiler& f) {
+               f.remove("/model/point/mass");
+               f.make_group("/model/point/mass");
+             },
+             "/model/point/mass: is a group or a type, expected a dataset"},
+      Defect{"DatasetForGroup",
+             [](const Spoiler& f) { f.replace("/model/point", H5T_NATIVE_INT, {3}); },
+             "/model/point/position: is missing"},
+      Defect{"TwoColumns",
+             [](const Spoiler& f) {
+               f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {12, 2});
+             },
+             "/model/point/position: has shape [12,2], expected [rows,3]"},
+      Defect{"OneDimension",
+             [](const Spoiler& f) { f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {36}); },
+             "/model/point/position: has shape [36], expected [rows,3]"},
+      Defect{"FewerRows",
+             [](const Spoiler& f) { f.replace("/model/point/layer", H5T_NATIVE_INT, {11}); },
+             "/model/point/layer: has shape [11], expected [12]"},
+      Defect{"ScalarDataset",
+             [](const Spoiler& f) { f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {}); },
+             "/model/point/position: has shape []"},
+      Defect{"NoPointAtAll",
+             [](const Spoiler& f) {
+               f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {0, 3});
+               f.replace("/model/point/target", H5T_NATIVE_DOUBLE, {0, 3});
+               f.replace("/model/point/external_force", H5T_NATIVE_DOUBLE, {0, 3});
+               for (const char* path : {"set", "layer", "column", "bone", "mass"})
+                 f.replace(std::string("/model/point/") + path, H5T_NATIVE_INT8, {0});
+             },
+             "/model/point/position: has no row"},
+      Defect{"TooLargeForTheMemory",
+             [](const Spoiler& f) {
+               f.replace("/model/point/position", H5T_NATIVE_DOUBLE, {hsize_t{1} << 50, 3});
+             },
+             "/model/point/position: is larger than the memory"},
+      Defect{"TransformsOfAnotherShape",
+             [](const Spoiler& f) {
+               f.replace("/model/bone_transform", H5T_NATIVE_DOUBLE, {2, 3, 4});
+             },
+             "/model/bone_transform: has shape [2,3,4], expected [2,4,4]"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Shape, ModelDefect, ::testing::ValuesIn(shape_defects()), name_of);
 
 const uint64_t too_large[12] = {uint64_t{1} << 63};
 const int32_t far_layer[12] = {-1};
 const long double precise[12] = {1};
 
-INSTANTIATE_TEST_SUITE_P(
-    Type, ModelDefect,
-    ::testing::Values(
-        Defect{"FloatsForIndices",
-               [](const Spoiler& f) { f.convert("/model/spring/points", H5T_NATIVE_DOUBLE); },
-               "/model/spring/points: holds 8-byte floating-point numbers, expected integers"},
-        Defect{"FloatsForSets",
-               [](const Spoiler& f) { f.convert("/model/point/set", H5T_NATIVE_FLOAT); },
-               "/model/point/set: holds 4-byte floating-point numbers, expected integers"},
-        Defect{"QuadruplePrecision",
-               [](const Spoiler& f) {
-                 f.replace("/model/point/mass", H5T_NATIVE_LDOUBLE, {12}, H5T_NATIVE_LDOUBLE,
-                           precise);
-               },
-               "/model/point/mass: holds 16-byte floating-point numbers"},
-        Defect{"StringsForNumbers",
-               [](const Spoiler& f) { f.replace("/model/point/mass", H5T_C_S1, {12}); },
-               "/model/point/mass: holds strings, expected numbers"},
-        Defect{"NumbersForNames",
-               [](const Spoiler& f) { f.replace("/model/spring_set", H5T_NATIVE_INT, {7}); },
-               "/model/spring_set: holds 4-byte integers, expected strings"},
-        Defect{"UnsignedBeyondSigned",
-               [](const Spoiler& f) {
-                 f.replace("/model/point/column", H5T_NATIVE_UINT64, {12}, H5T_NATIVE_UINT64,
-                           too_large);
-               },
-               "/model/point/column: value 0 is 9223372036854775808, expected at most"},
-        Defect{"WiderThanItsRange",
-               [](const Spoiler& f) {
-                 f.convert("/model/spring/exponent", H5T_NATIVE_INT64);
-                 f.set<int64_t>("/model/spring/exponent", 3, 258);
-               },
-               "/model/spring/exponent: row 3 is 258, expected -128 to 127"}),
-    name_of);
+std::vector<Defect> type_defects() {
+  return {Defect{"FloatsForIndices",
+                 [](const Spoiler& f) { f.convert("/model/spring/points", H5T_NATIVE_DOUBLE); },
+                 "/model/spring/points: holds 8-byte floating-point numbers, expected integers"},
+          Defect{"FloatsForSets",
+                 [](const Spoiler& f) { f.convert("/model/point/set", H5T_NATIVE_FLOAT); },
+                 "/model/point/set: holds 4-byte floating-point numbers, expected integers"},
+          Defect{"QuadruplePrecision",
+                 [](const Spoiler& f) {
+                   f.replace("/model/point/mass", H5T_NATIVE_LDOUBLE, {12}, H5T_NATIVE_LDOUBLE,
+                             precise);
+                 },
+                 "/model/point/mass: holds 16-byte floating-point numbers"},
+          Defect{"StringsForNumbers",
+                 [](const Spoiler& f) { f.replace("/model/point/mass", H5T_C_S1, {12}); },
+                 "/model/point/mass: holds strings, expected numbers"},
+          Defect{"NumbersForNames",
+                 [](const Spoiler& f) { f.replace("/model/spring_set", H5T_NATIVE_INT, {7}); },
+                 "/model/spring_set: holds 4-byte integers, expected strings"},
+          Defect{"UnsignedBeyondSigned",
+                 [](const Spoiler& f) {
+                   f.replace("/model/point/column", H5T_NATIVE_UINT64, {12}, H5T_NATIVE_UINT64,
+                             too_large);
+                 },
+                 "/model/point/column: value 0 is 9223372036854775808, expected at most"},
+          Defect{"WiderThanItsRange",
+                 [](const Spoiler& f) {
+                   f.convert("/model/spring/exponent", H5T_NATIVE_INT64);
+                   f.set<int64_t>("/model/spring/exponent", 3, 258);
+                 },
+                 "/model/spring/exponent: row 3 is 258, expected -128 to 127"}};
+}
 
-INSTANTIATE_TEST_SUITE_P(
-    NotFinite, ModelDefect,
-    ::testing::Values(Defect{"PositionNotFinite", set<double>("/model/point/position", 7, nan),
-                             "/model/point/position: row 2 holds nan"},
-                      Defect{"StiffnessInfinite",
-                             set<double>("/model/spring/stiffness", 4, INFINITY),
-                             "/model/spring/stiffness: row 4 holds inf"},
-                      Defect{"SurfacePointNotFinite",
-                             set<double>("/model/bone_surface/1/points", 4, nan),
-                             "/model/bone_surface/1/points: row 1 holds nan"}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(Type, ModelDefect, ::testing::ValuesIn(type_defects()), name_of);
 
-INSTANTIATE_TEST_SUITE_P(
-    Index, ModelDefect,
-    ::testing::Values(
-        Defect{"SpringBeyondThePoints", set<int64_t>("/model/spring/points", 5, 12),
-               "/model/spring/points: row 2 is 12, expected 0 to 11"},
-        Defect{"SpringOfOnePoint",
-               [](const Spoiler& f) {
-                 f.set<int64_t>("/model/spring/points", 6, 5);
-                 f.set<int64_t>("/model/spring/points", 7, 5);
-               },
-               "/model/spring/points: row 3 is (5, 5), expected two different points"},
-        Defect{"NegativeIndex", set<int64_t>("/model/prism/points", 6, -1),
-               "/model/prism/points: row 1 is -1, expected 0 to 11"},
-        Defect{"SkinBeyondThePoints", set<int64_t>("/model/skin/points", 0, 99),
-               "/model/skin/points: row 0 is 99"},
-        Defect{"SurfaceTriangleOutOfRange", set<int64_t>("/model/bone_surface/0/triangles", 2, 3),
-               "/model/bone_surface/0/triangles: row 0 is 3, expected 0 to 2"},
-        Defect{"LayerNegative", set<int64_t>("/model/point/layer", 0, -1),
-               "/model/point/layer: row 0 is -1"}),
-    name_of);
+std::vector<Defect> not_finite_defects() {
+  return {Defect{"PositionNotFinite", set<double>("/model/point/position", 7, nan),
+                 "/model/point/position: row 2 holds nan"},
+          Defect{"StiffnessInfinite", set<double>("/model/spring/stiffness", 4, INFINITY),
+                 "/model/spring/stiffness: row 4 holds inf"},
+          Defect{"SurfacePointNotFinite", set<double>("/model/bone_surface/1/points", 4, nan),
+                 "/model/bone_surface/1/points: row 1 holds nan"}};
+}
 
-INSTANTIATE_TEST_SUITE_P(
-    Set, ModelDefect,
-    ::testing::Values(Defect{"SpringSetUnknown", set<int64_t>("/model/spring/set", 1, 4),
-                             "/model/spring/set: row 1 is 4, expected 0 to 3"},
-                      Defect{"BoneUnknown", set<int64_t>("/model/point/bone", 1, 2),
-                             "/model/point/bone: row 1 is 2, expected -1 to 1"},
-                      Defect{"BonePointWithoutBone", set<int64_t>("/model/point/bone", 1, -1),
-                             "/model/point/bone: row 1 is -1, but point/set makes it a bone point"},
-                      Defect{"PointSetUnknown", set<int64_t>("/model/point/set", 5, 4),
-                             "/model/point/set: row 5 is 4, expected 0 to 3"},
-                      Defect{"ExponentUnknown", set<int64_t>("/model/spring/exponent", 0, 3),
-                             "/model/spring/exponent: row 0 is 3, expected 0 to 2"}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(NotFinite, ModelDefect, ::testing::ValuesIn(not_finite_defects()),
+                         name_of);
 
-INSTANTIATE_TEST_SUITE_P(
-    Quantity, ModelDefect,
-    ::testing::Values(
-        Defect{"StiffnessNegative", set<double>("/model/spring/stiffness", 4, -1e-300),
-               "/model/spring/stiffness: row 4 is -1e-300 N/mm"},
-        Defect{"MassNegative", set<double>("/model/point/mass", 3, -1),
-               "/model/point/mass: row 3 is -1 kg"},
-        Defect{"RestLengthNegative", set<double>("/model/spring/rest_length", 2, -0.5),
-               "/model/spring/rest_length: row 2 is -0.5 mm"},
-        Defect{"ReferenceZero", set<double>("/model/spring/reference", 2, 0),
-               "/model/spring/reference: row 2 is 0 mm, expected a finite number above 0"},
-        Defect{"VolumeZero", set<double>("/model/prism/rest_volume", 1, 0),
-               "/model/prism/rest_volume: row 1 is 0 mm³"}),
-    name_of);
+std::vector<Defect> index_defects() {
+  return {Defect{"SpringBeyondThePoints", set<int64_t>("/model/spring/points", 5, 12),
+                 "/model/spring/points: row 2 is 12, expected 0 to 11"},
+          Defect{"SpringOfOnePoint",
+                 [](const Spoiler& f) {
+                   f.set<int64_t>("/model/spring/points", 6, 5);
+                   f.set<int64_t>("/model/spring/points", 7, 5);
+                 },
+                 "/model/spring/points: row 3 is (5, 5), expected two different points"},
+          Defect{"NegativeIndex", set<int64_t>("/model/prism/points", 6, -1),
+                 "/model/prism/points: row 1 is -1, expected 0 to 11"},
+          Defect{"SkinBeyondThePoints", set<int64_t>("/model/skin/points", 0, 99),
+                 "/model/skin/points: row 0 is 99"},
+          Defect{"SurfaceTriangleOutOfRange", set<int64_t>("/model/bone_surface/0/triangles", 2, 3),
+                 "/model/bone_surface/0/triangles: row 0 is 3, expected 0 to 2"},
+          Defect{"LayerNegative", set<int64_t>("/model/point/layer", 0, -1),
+                 "/model/point/layer: row 0 is -1"}};
+}
 
-INSTANTIATE_TEST_SUITE_P(
-    Consistency, ModelDefect,
-    ::testing::Values(
-        Defect{"VolumeOfAnotherPrism", set<double>("/model/prism/rest_volume", 1, 0.41),
-               "/model/prism/rest_volume: row 1 is 0.41 mm³, but the prism's volume"},
-        Defect{"TransformNotRigid", set<double>("/model/bone_transform", 16, 1.1),
-               "/model/bone_transform: row 1 (bone mandible): "},
-        Defect{
-            "PointThatNothingHolds",
-            [](const Spoiler& f) {
-              for (const char* path : {"set", "rest_length", "stiffness", "exponent", "reference"})
-                f.replace(std::string("/model/spring/") + path, H5T_NATIVE_INT8, {0});
-              f.replace("/model/spring/points", H5T_NATIVE_INT8, {0, 2});
-            },
-            "/model/point: row 4 is soft tissue and no spring or edge holds it"}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(Index, ModelDefect, ::testing::ValuesIn(index_defects()), name_of);
+
+std::vector<Defect> set_defects() {
+  return {Defect{"SpringSetUnknown", set<int64_t>("/model/spring/set", 1, 4),
+                 "/model/spring/set: row 1 is 4, expected 0 to 3"},
+          Defect{"BoneUnknown", set<int64_t>("/model/point/bone", 1, 2),
+                 "/model/point/bone: row 1 is 2, expected -1 to 1"},
+          Defect{"BonePointWithoutBone", set<int64_t>("/model/point/bone", 1, -1),
+                 "/model/point/bone: row 1 is -1, but point/set makes it a bone point"},
+          Defect{"PointSetUnknown", set<int64_t>("/model/point/set", 5, 4),
+                 "/model/point/set: row 5 is 4, expected 0 to 3"},
+          Defect{"ExponentUnknown", set<int64_t>("/model/spring/exponent", 0, 3),
+                 "/model/spring/exponent: row 0 is 3, expected 0 to 2"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Set, ModelDefect, ::testing::ValuesIn(set_defects()), name_of);
+
+std::vector<Defect> quantity_defects() {
+  return {Defect{"StiffnessNegative", set<double>("/model/spring/stiffness", 4, -1e-300),
+                 "/model/spring/stiffness: row 4 is -1e-300 N/mm"},
+          Defect{"MassNegative", set<double>("/model/point/mass", 3, -1),
+                 "/model/point/mass: row 3 is -1 kg"},
+          Defect{"RestLengthNegative", set<double>("/model/spring/rest_length", 2, -0.5),
+                 "/model/spring/rest_length: row 2 is -0.5 mm"},
+          Defect{"ReferenceZero", set<double>("/model/spring/reference", 2, 0),
+                 "/model/spring/reference: row 2 is 0 mm, expected a finite number above 0"},
+          Defect{"VolumeZero", set<double>("/model/prism/rest_volume", 1, 0),
+                 "/model/prism/rest_volume: row 1 is 0 mm³"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Quantity, ModelDefect, ::testing::ValuesIn(quantity_defects()), name_of);
+
+std::vector<Defect> consistency_defects() {
+  return {
+      Defect{"VolumeOfAnotherPrism", set<double>("/model/prism/rest_volume", 1, 0.41),
+             "/model/prism/rest_volume: row 1 is 0.41 mm³, but the prism's volume"},
+      Defect{"TransformNotRigid", set<double>("/model/bone_transform", 16, 1.1),
+             "/model/bone_transform: row 1 (bone mandible): "},
+      Defect{"PointThatNothingHolds",
+             [](const Spoiler& f) {
+               for (const char* path : {"set", "rest_length", "stiffness", "exponent", "reference"})
+                 f.replace(std::string("/model/spring/") + path, H5T_NATIVE_INT8, {0});
+               f.replace("/model/spring/points", H5T_NATIVE_INT8, {0, 2});
+             },
+             "/model/point: row 4 is soft tissue and no spring or edge holds it"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Consistency, ModelDefect, ::testing::ValuesIn(consistency_defects()),
+                         name_of);
 
 /// The small model with a point that touches a bone, and two sides of a cut.
 model::Model touching_model() {
@@ -370,22 +372,23 @@ Defect wrong_index(const char* name, const char* array, int64_t row, int64_t val
           messages.back().c_str()};
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Contact, ContactDefect,
-    ::testing::Values(wrong_index("TouchOfNoPoint", "/model/contact/point", 0, 999),
-                      wrong_index("TouchOfNoBody", "/model/contact/body_row", 0, 1),
-                      wrong_index("NoSuchBinding", "/model/contact/binding", 0, 2),
-                      wrong_index("BodyOfNoBone", "/model/contact/body_bone", 0, 99),
-                      wrong_index("HugeNet", "/model/contact/wall/net", 0, int64_t{1} << 40),
-                      wrong_index("NetOfOneRow", "/model/contact/wall/net", 0, 1),
-                      wrong_index("ControlOfNothing", "/model/contact/wall/begin", 3, 2),
-                      wrong_index("ControlsBeyondTheirPoints", "/model/contact/wall/begin", 8, 9),
-                      wrong_index("SideOfNoPoint", "/model/contact/wall/point", 5, -1),
-                      Defect{"WeightNotFinite", set<double>("/model/contact/wall/weight", 2, nan),
-                             "/model/contact/wall/weight: "},
-                      Defect{"AreaBelowZero", set<double>("/model/contact/wall/area", 1, -1.0),
-                             "/model/contact/wall/area: row 1 is -1 mm²"}),
-    name_of);
+std::vector<Defect> contact_defects() {
+  return {wrong_index("TouchOfNoPoint", "/model/contact/point", 0, 999),
+          wrong_index("TouchOfNoBody", "/model/contact/body_row", 0, 1),
+          wrong_index("NoSuchBinding", "/model/contact/binding", 0, 2),
+          wrong_index("BodyOfNoBone", "/model/contact/body_bone", 0, 99),
+          wrong_index("HugeNet", "/model/contact/wall/net", 0, int64_t{1} << 40),
+          wrong_index("NetOfOneRow", "/model/contact/wall/net", 0, 1),
+          wrong_index("ControlOfNothing", "/model/contact/wall/begin", 3, 2),
+          wrong_index("ControlsBeyondTheirPoints", "/model/contact/wall/begin", 8, 9),
+          wrong_index("SideOfNoPoint", "/model/contact/wall/point", 5, -1),
+          Defect{"WeightNotFinite", set<double>("/model/contact/wall/weight", 2, nan),
+                 "/model/contact/wall/weight: "},
+          Defect{"AreaBelowZero", set<double>("/model/contact/wall/area", 1, -1.0),
+                 "/model/contact/wall/area: row 1 is -1 mm²"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Contact, ContactDefect, ::testing::ValuesIn(contact_defects()), name_of);
 
 /// The small model with elements of a further term, whose name need not be known to be read.
 class ElementDefect : public ::testing::TestWithParam<Defect> {};
@@ -407,20 +410,21 @@ TEST_P(ElementDefect, IsRefusedByName) {
   EXPECT_NE(text.find(GetParam().message), std::string::npos) << text;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Elements, ElementDefect,
-    ::testing::Values(wrong_index("ElementOfNoPoint", "/model/element/0/points", 3, 999),
-                      wrong_index("ElementBelowPoints", "/model/element/1/points", 0, -1),
-                      Defect{"PointTwice", set<int64_t>("/model/element/0/points", 3, 1),
-                             "/model/element/0: element 1 has one of its points twice"},
-                      Defect{"NumberNotFinite", set<double>("/model/element/0/numbers", 1, nan),
-                             "/model/element/0/numbers: "},
-                      Defect{"PointTooMany",
-                             [](const Spoiler& f) {
-                               f.replace("/model/element/0/points", H5T_NATIVE_INT8, {0, 1, 2});
-                             },
-                             "/model/element/0"}),
-    name_of);
+std::vector<Defect> elements_defects() {
+  return {wrong_index("ElementOfNoPoint", "/model/element/0/points", 3, 999),
+          wrong_index("ElementBelowPoints", "/model/element/1/points", 0, -1),
+          Defect{"PointTwice", set<int64_t>("/model/element/0/points", 3, 1),
+                 "/model/element/0: element 1 has one of its points twice"},
+          Defect{"NumberNotFinite", set<double>("/model/element/0/numbers", 1, nan),
+                 "/model/element/0/numbers: "},
+          Defect{"PointTooMany",
+                 [](const Spoiler& f) {
+                   f.replace("/model/element/0/points", H5T_NATIVE_INT8, {0, 1, 2});
+                 },
+                 "/model/element/0"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Elements, ElementDefect, ::testing::ValuesIn(elements_defects()), name_of);
 
 class Acceptable : public ::testing::TestWithParam<Defect> {};
 
@@ -451,35 +455,35 @@ hid_t variable_string() {
   return type;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Lossless, Acceptable,
-    ::testing::Values(
-        Defect{"NarrowIndices",
-               [](const Spoiler& f) { f.convert("/model/spring/points", H5T_NATIVE_INT16); }, ""},
-        Defect{"UnsignedIndices",
-               [](const Spoiler& f) { f.convert("/model/point/column", H5T_NATIVE_UINT64); }, ""},
-        Defect{"BigEndianIndices",
-               [](const Spoiler& f) { f.convert("/model/spring/points", H5T_STD_I32BE); }, ""},
-        Defect{"WideSets",
-               [](const Spoiler& f) { f.convert("/model/point/set", H5T_NATIVE_INT64); }, ""},
-        Defect{"SinglePrecision",
-               [](const Spoiler& f) { f.convert("/model/point/position", H5T_NATIVE_FLOAT); }, ""},
-        Defect{"WholeNumbersForReals",
-               [](const Spoiler& f) { f.convert("/model/spring/stiffness", H5T_NATIVE_INT64); },
-               ""},
-        Defect{"StringsOfVariableLength",
-               [](const Spoiler& f) {
-                 f.replace("/model/spring_set", variable_string(), {4}, variable_string(), names);
-               },
-               ""},
-        Defect{"NothingOptional",
-               [](const Spoiler& f) {
-                 for (const char* path : {"point/mass", "point/external_force", "skin",
-                                          "bone_surface", "bone_transform", "prism"})
-                   f.remove(std::string("/model/") + path);
-               },
-               ""}),
-    name_of);
+std::vector<Defect> lossless_defects() {
+  return {
+      Defect{"NarrowIndices",
+             [](const Spoiler& f) { f.convert("/model/spring/points", H5T_NATIVE_INT16); }, ""},
+      Defect{"UnsignedIndices",
+             [](const Spoiler& f) { f.convert("/model/point/column", H5T_NATIVE_UINT64); }, ""},
+      Defect{"BigEndianIndices",
+             [](const Spoiler& f) { f.convert("/model/spring/points", H5T_STD_I32BE); }, ""},
+      Defect{"WideSets", [](const Spoiler& f) { f.convert("/model/point/set", H5T_NATIVE_INT64); },
+             ""},
+      Defect{"SinglePrecision",
+             [](const Spoiler& f) { f.convert("/model/point/position", H5T_NATIVE_FLOAT); }, ""},
+      Defect{"WholeNumbersForReals",
+             [](const Spoiler& f) { f.convert("/model/spring/stiffness", H5T_NATIVE_INT64); }, ""},
+      Defect{"StringsOfVariableLength",
+             [](const Spoiler& f) {
+               f.replace("/model/spring_set", variable_string(), {4}, variable_string(), names);
+             },
+             ""},
+      Defect{"NothingOptional",
+             [](const Spoiler& f) {
+               for (const char* path : {"point/mass", "point/external_force", "skin",
+                                        "bone_surface", "bone_transform", "prism"})
+                 f.remove(std::string("/model/") + path);
+             },
+             ""}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Lossless, Acceptable, ::testing::ValuesIn(lossless_defects()), name_of);
 
 class StepDefect : public ::testing::TestWithParam<Defect> {};
 
@@ -495,17 +499,17 @@ TEST_P(StepDefect, IsRefusedByName) {
   EXPECT_NE(text.find(GetParam().message), std::string::npos) << text;
 }
 
-INSTANTIATE_TEST_SUITE_P(Step, StepDefect,
-                         ::testing::Values(Defect{"NoPosition", remove("/step/0001/point/position"),
-                                                  "/step/0001/point/position: is missing"},
-                                           Defect{"NotInSequence", remove("/step/0000"),
-                                                  "/step: has 1 groups, but 0000 is missing"},
-                                           Defect{"NoLoad", remove_attribute("/step/0001", "load"),
-                                                  "/step/0001 attribute load: is missing"},
-                                           Defect{"TensionNotFinite",
-                                                  set<double>("/step/0000/spring/tension", 3, nan),
-                                                  "/step/0000/spring/tension: row 3 holds nan"}),
-                         name_of);
+std::vector<Defect> step_defects() {
+  return {Defect{"NoPosition", remove("/step/0001/point/position"),
+                 "/step/0001/point/position: is missing"},
+          Defect{"NotInSequence", remove("/step/0000"), "/step: has 1 groups, but 0000 is missing"},
+          Defect{"NoLoad", remove_attribute("/step/0001", "load"),
+                 "/step/0001 attribute load: is missing"},
+          Defect{"TensionNotFinite", set<double>("/step/0000/spring/tension", 3, nan),
+                 "/step/0000/spring/tension: row 3 holds nan"}};
+}
+
+INSTANTIATE_TEST_SUITE_P(Step, StepDefect, ::testing::ValuesIn(step_defects()), name_of);
 
 TEST(BadFile, IsRefusedWithItsName) {
   const Folder folder;

@@ -31,6 +31,11 @@ struct Parts : testing::MovedBlock {
     sum.evaluate(x, gradient);
     return {x, gradient, last};
   }
+  NewtonFinish::End finish_from(double place) {
+    NewtonFinish finish(sum, distance);
+    at(place);
+    return finish.run(x, 0.01, 0, true);
+  }
   /// Returns whether a test ends the search at a place.
   bool ends(StoppingTest& test, double place) {
     at(place);
@@ -100,9 +105,7 @@ TEST(StoppingTest, GoesOnWithAccuracyZeroUntilNoForceIsLeft) {
 
 TEST(NewtonFinish, GoesToTheBottomOfAParabolaInOneStep) {
   Parts parts;
-  NewtonFinish finish(parts.sum, parts.distance);
-  parts.at(0.02);
-  const NewtonFinish::End end = finish.run(parts.x, 0.01, 0, true);
+  const NewtonFinish::End end = parts.finish_from(0.02);
   EXPECT_EQ(end.corrections, 1);
   EXPECT_LE(end.error, 0.01);
   EXPECT_NEAR(discrete::largest_block(parts.x), 0, 1e-4);
@@ -111,9 +114,7 @@ TEST(NewtonFinish, GoesToTheBottomOfAParabolaInOneStep) {
 
 TEST(NewtonFinish, LeavesAStateThatIsFar) {
   Parts parts;
-  NewtonFinish finish(parts.sum, parts.distance);
-  parts.at(5);
-  const NewtonFinish::End end = finish.run(parts.x, 0.01, 0, true);
+  const NewtonFinish::End end = parts.finish_from(5);
   EXPECT_EQ(end.corrections, 0);
   EXPECT_NEAR(end.error, 2 * distance(5), 1e-4);
   EXPECT_NEAR(discrete::largest_block(parts.x), distance(5), 1e-12);
