@@ -74,14 +74,18 @@ TEST(StoppingTest, EndsWithinTheAccuracyAndNotBefore) {
 }
 
 TEST(StoppingTest, MakesNoEstimateWhereTheForceSaysThatRestIsFar) {
+  constexpr int seldom = 20;  // evaluations from one estimate to the next at least
   Parts parts;
-  StoppingTest test(parts.sum, parts.distance, Method::newton, false);
+  StoppingTest test(parts.sum, parts.distance, Method::gradient, false);
   test.begin(1e-3, Criterion::distance, true);
   EXPECT_FALSE(parts.ends(test, 1));
+  for (int n = 0; n < seldom; ++n) parts.at(0.9);
   const int64_t assemblies = parts.curvatures.assemblies();
   EXPECT_FALSE(parts.ends(test, 0.9));
   EXPECT_EQ(parts.curvatures.assemblies(), assemblies);
   EXPECT_NEAR(test.error(), 2 * distance(0.9), 1e-6);
+  EXPECT_TRUE(parts.ends(test, 2e-4));
+  EXPECT_GT(parts.curvatures.assemblies(), assemblies);
 }
 
 TEST(StoppingTest, LeavesTheRestToNewtonStepsWhereTheyMayFinish) {
@@ -118,6 +122,17 @@ TEST(NewtonFinish, LeavesAStateThatIsFar) {
   EXPECT_EQ(end.corrections, 0);
   EXPECT_NEAR(end.error, 2 * distance(5), 1e-4);
   EXPECT_NEAR(discrete::largest_block(parts.x), distance(5), 1e-12);
+}
+
+TEST(NewtonFinish, TakesAStepBackThatLeadsFartherAway) {
+  // Newton's step of |x|^(4/3) is three times the way to rest.
+  Parts parts([](double x) {
+    const double root = std::cbrt(x);
+    return std::array{0.75 * x * root, root, 1 / (3 * root * root)};
+  });
+  const NewtonFinish::End end = parts.finish_from(0.005);
+  EXPECT_EQ(end.corrections, 0);
+  EXPECT_NEAR(discrete::largest_block(parts.x), distance(0.005), 1e-12);
 }
 
 }  // namespace stopping_test
