@@ -1,6 +1,7 @@
 #include "request.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "repose/base/error.h"
@@ -65,12 +66,17 @@ bool read_flag(const json& value, const char* name) {
   return value.get<bool>();
 }
 
+/// Numbers beyond int64_t, which rows are, would come out negative.
+bool is_row(const json& value) {
+  return value.is_number_unsigned() && std::in_range<int64_t>(value.get<uint64_t>());
+}
+
 void read_gradient_of(const json& value, Request& request) {
   if (!value.is_array() || value.empty())
     refuse_value("gradient_of", "a list of {\"point\": row, \"weight\": [x, y, z]}", value);
   for (const json& one : value) {
     require_known(one, "gradient_of", {"point", "weight"});
-    if (!one.contains("point") || !one["point"].is_number_unsigned() || !one.contains("weight"))
+    if (!one.contains("point") || !is_row(one["point"]) || !one.contains("weight"))
       refuse_value("gradient_of: point", "a row of the answer's points, from 0", one);
     request.gradient_of.emplace_back(one["point"].get<int64_t>(),
                                      read_vector(one, "gradient_of", "weight"));

@@ -108,6 +108,7 @@ def test_refusals_name_the_place_and_the_session_goes_on(session):
                     {"do": "solve", "plan": {"chin": {"translate": [0, 1]}}}, {"do": "write"},
                     {"do": "solve", "tangents": "yes"}, {"do": "solve", "gradient_of": []},
                     {"do": "solve", "gradient_of": [{"point": -1, "weight": [0, 0, 1]}]},
+                    {"do": "solve", "gradient_of": [{"point": 2**64 - 1, "weight": [0, 0, 1]}]},
                     {"do": "solve", "gradient_of": [{"point": 1}]}):
         with pytest.raises(repose.Refused) as refusal:
             session.ask(request)
