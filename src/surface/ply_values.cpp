@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "repose/base/error.h"
 #include "repose/base/text.h"
@@ -32,12 +33,14 @@ void PlyValues::read(const PlyElement& element,
 }
 
 double PlyValues::text_value(const PlyType& type) {
+  constexpr double largest = std::numeric_limits<uint32_t>::max();  // of PLY's integers
   constexpr auto blanks = " \t\v\f\r\n";
   const std::string& bytes = content_.bytes;
   const size_t begin = std::min(bytes.find_first_not_of(blanks, position_), bytes.size());
   position_ = std::min(bytes.find_first_of(blanks, begin), bytes.size());
   const auto number = base::parse_number(std::string_view(bytes).substr(begin, position_ - begin));
-  if (!number || (!type.is_real() && *number != std::floor(*number))) fail();
+  const auto is_integer = [](double n) { return n == std::floor(n) && std::abs(n) <= largest; };
+  if (!number || (!type.is_real() && !is_integer(*number))) fail();
   return *number;
 }
 

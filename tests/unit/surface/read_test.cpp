@@ -157,6 +157,11 @@ TEST_F(Read, indices_out_of_range) {
     EXPECT_NE(refused("bad.off", off_text(bad)).find("face 7"), std::string::npos);
     EXPECT_NE(refused("bad.off", off_binary(bad)).find("face 7"), std::string::npos);
   }
+  Surface beyond = cube();
+  beyond.triangles[7][1] = 2000000000;
+  EXPECT_NE(refused("bad.ply", with(ply_text(beyond), "2000000000", "1e308"))
+                .find("7 of 12 holds no number"),
+            std::string::npos);
   for (const std::string face : {"f 1 2 9", "f 1 2 0", "f 1 2 -9", "f 1 2 99999999999"})
     EXPECT_NE(refused("bad.obj", obj_text(cube()) + face + "\n"), "") << face;
   EXPECT_NE(refused("two.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n").find("face 0 has 2 corners"),
