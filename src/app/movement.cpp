@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "repose/surface/triangle_tree.h"
+
 namespace repose::app {
 namespace {
 
@@ -72,25 +74,38 @@ size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
   return nearest;
 }
 
+/// The movement of the skin's point nearest to a place, linear in its triangle.
+Vec3 movement_at(const Vec3& place, const surface::TriangleTree& tree,
+                 const surface::Surface& initial, const std::vector<Vec3>& moved) {
+  const auto nearest = tree.nearest(place);
+  const Triangle& corner = initial.triangles[nearest.triangle];
+  const Vec3 weight = surface::barycentric(surface::corners(initial, corner), nearest.point);
+  Vec3 movement = Vec3::Zero();
+  for (int k = 0; k < 3; ++k)
+    movement += weight[k] * (moved[corner[k]] - initial.points[corner[k]]);
+  return movement;
+}
+
 }  // namespace
 
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
-                              const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
+                              const surface::Surface& initial, const std::vector<Vec3>& moved) {
   size_t farthest = 0;
-  const auto moved_by = [&](size_t i) { return Vec3(moved[i] - initial[i]); };
-  for (size_t i = 1; i < initial.size(); ++i)
+  const auto moved_by = [&](size_t i) { return Vec3(moved[i] - initial.points[i]); };
+  for (size_t i = 1; i < moved.size(); ++i)
     if (moved_by(i).squaredNorm() > moved_by(farthest).squaredNorm()) farthest = i;
-  const double largest = initial.empty() ? 0 : moved_by(farthest).norm();
+  const double largest = moved.empty() ? 0 : moved_by(farthest).norm();
   if (largest < unmoved) return "The face does not move.";
   std::string text;
   std::vector<Vec3> movement;
+  const surface::TriangleTree tree(initial);
   for (const model::FacePlace& place : places) {
-    movement.push_back(moved_by(nearest_point(place.at, initial)));
+    movement.push_back(movement_at(place.at, tree, initial, moved));
     if (movement.back().norm() >= unmoved)
       text += fmt::format("{} {}; ", place.name, describe_shift(axes * movement.back()));
   }
   text += fmt::format("largest movement {:.1f} mm ({})", largest,
-                      place_of(initial[farthest], largest, places, movement));
+                      place_of(initial.points[farthest], largest, places, movement));
   text[0] = static_cast<char>(std::toupper(text[0]));
   return text + ".";
 }

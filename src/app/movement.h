@@ -8,10 +8,10 @@
 namespace repose::app {
 
 /// Returns one sentence on how the face moved: each place's components along `axes` (rows left,
-/// back and up, unit vectors), the largest movement and where it is. `initial` and `moved` [points]
-/// of the skin, mm.
+/// back and up, unit vectors), the largest movement and where it is. `initial`: the skin;
+/// `moved` [points] of it, mm.
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
-                              const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
+                              const surface::Surface& initial, const std::vector<Vec3>& moved);
 
 /// Returns how far parted lips are apart along `up`, a unit vector, in the middle of the mouth, in
 /// one sentence with a blank after it. Empty without the landmarks stomion, upper_lip and

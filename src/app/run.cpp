@@ -296,12 +296,13 @@ std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>
                                  const solve::Summary& summary, const Writer& writer) const {
   std::vector<model::FacePlace> places;
   if (job_.anatomy) places = model::face_places(*job_.anatomy);
-  const std::vector<Vec3>& before = skin.initial().points;
+  const surface::Surface& before = skin.initial();
   const scene::AnatomyPlan* head =
       job_.anatomy && job_.anatomy->scene.anatomy ? &*job_.anatomy->scene.anatomy : nullptr;
   const Mat3 axes = head ? head->axes : Mat3(Mat3::Identity());
   std::string text = describe_movement(places, axes, before, now) + " ";
-  if (job_.anatomy) text += describe_lips(job_.anatomy->scene.landmarks, axes.row(2), before, now);
+  if (job_.anatomy)
+    text += describe_lips(job_.anatomy->scene.landmarks, axes.row(2), before.points, now);
   return text + describe_trust(summary, writer.discretization_error()) + "\n" +
          describe_warnings(job_.warnings);
 }

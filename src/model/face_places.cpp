@@ -4,6 +4,7 @@
 
 #include "head_directions.h"
 #include "repose/model/build.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::model {
 namespace {
@@ -21,12 +22,11 @@ constexpr std::array<Named, 4> places = {{{"pogonion_soft", "chin"},
                                           {"upper_lip", "upper lip"},
                                           {"pronasale", "nose"}}};
 
-/// The vertex nearest to a point; nothing where none is near.
-void add_nearest(const std::string& name, const Vec3& point, const std::vector<Vec3>& skin,
+/// The point of the skin nearest to another; nothing where none is near.
+void add_nearest(const std::string& name, const Vec3& point, const surface::TriangleTree& skin,
                  std::vector<FacePlace>& found) {
-  const Vec3& at =
-      *std::ranges::min_element(skin, {}, [&](const Vec3& x) { return (x - point).squaredNorm(); });
-  if ((at - point).norm() <= farthest_skin) found.push_back({name, at});
+  const auto nearest = skin.nearest(point, farthest_skin * farthest_skin);
+  if (nearest.triangle >= 0) found.push_back({name, nearest.point});
 }
 
 void add_nose(const JawPoints& jaw, const HeadDirections& frame, const std::vector<Vec3>& skin,
@@ -46,7 +46,7 @@ void add_nose(const JawPoints& jaw, const HeadDirections& frame, const std::vect
 
 std::vector<FacePlace> face_places(const Anatomy& anatomy) {
   std::vector<FacePlace> found;
-  const std::vector<Vec3>& skin = anatomy.skin.points;
+  const surface::TriangleTree skin(anatomy.skin);
   for (const auto& [landmark, name] : places)
     if (const auto at = anatomy.scene.landmarks.find(landmark); at != anatomy.scene.landmarks.end())
       add_nearest(name, at->second, skin, found);
@@ -61,7 +61,7 @@ std::vector<FacePlace> face_places(const Anatomy& anatomy) {
   add_nearest("chin", jaw.chin + chin_forward * frame->forward, skin, found);
   add_nearest("lower lip", lips - lower_lip_down * frame->up, skin, found);
   add_nearest("upper lip", lips + upper_lip_up * frame->up, skin, found);
-  add_nose(jaw, *frame, skin, found);
+  add_nose(jaw, *frame, anatomy.skin.points, found);
   return found;
 }
 

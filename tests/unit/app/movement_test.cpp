@@ -41,5 +41,14 @@ TEST(LipGap, NeedsPartedLipsAndTheirLandmarks) {
   EXPECT_EQ(describe_lips(marks, up, {skin[0], skin[1], skin[2]}, {skin[0], skin[1], skin[2]}), "");
 }
 
+/// A place in the middle of an edge between a vertex that moves and one that does not.
+TEST(Movement, OfAPlaceIsLinearBetweenVertices) {
+  const surface::Surface triangle{"", {{0, 0, 0}, {4, 0, 0}, {0, 0, 4}}, {{0, 1, 2}}};
+  const std::vector<Vec3> moved = {{0, 0, 0}, {4, -6, 0}, {0, 0, 4}};
+  const std::string text =
+      describe_movement({{"chin", {2, 1, 0}}}, Mat3::Identity(), triangle, moved);
+  EXPECT_TRUE(text.starts_with("Chin 3.0 mm forward; largest movement 6.0 mm")) << text;
+}
+
 }  // namespace
 }  // namespace repose::app
