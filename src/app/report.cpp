@@ -149,6 +149,16 @@ std::string describe_pierced(const std::vector<std::string>& bodies,
       pierced.columns, pierced.depth, bodies[pierced.body], pierced.where);
 }
 
+std::string describe_skin_on_bone(const std::vector<std::string>& bodies,
+                                  const solve::SkinOnBone& found) {
+  if (found.points == 0 || bodies.empty()) return "";  // rank 0 has their names
+  return report_row(
+      "skin on bone",
+      "{} points of the skin press on bone, most on {} at {:.1f} mm: lips or cheeks that bones "
+      "catch may rest in several ways, more or less caught; move the bones less far together",
+      found.points, bodies[found.body], found.where);
+}
+
 namespace {
 
 /// Depths as the search sees them, then as they are.

@@ -21,6 +21,7 @@
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
 #include "rest_derivatives.h"
+#include "skin_on_bone.h"
 
 namespace repose::solve {
 
@@ -407,6 +408,7 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
       });
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
+  summary.skin_on_bone = find_skin_on_bone(searcher.objective());
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
   summary.unknowns = 3 * positions.part().unknowns.total;
   summary.evaluations = searcher.evaluations();

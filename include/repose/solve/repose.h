@@ -103,6 +103,14 @@ struct PiercedColumns {
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
 };
 
+/// Points of the skin that press on a bone, as lips between teeth do.
+struct SkinOnBone {
+  int64_t points = 0;
+  int32_t body = -1;          ///< of the model's contact: that under the largest pressure
+  double pressure = 0;        ///< N/mm², there
+  Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
+};
+
 /// Outcome of a solve, for the end-of-run summary.
 struct Summary {
   PathOutcome path;
@@ -117,6 +125,7 @@ struct Summary {
   std::vector<ContactSummary>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
   PiercedColumns pierced;
+  SkinOnBone skin_on_bone;
 };
 
 /// Where a search begins.

@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include "../model/patches.h"
+#include "rest.h"
+#include "solid_block.h"
+
+/// Columns that bone enters between their points, and skin that presses on bone.
+namespace repose {
+namespace bone_remarks_test {
+
+using model::PointSet;
+
+/// A block of 7 × 9 columns, 5 mm apart, of layers 3 mm apart, the skin at z = 0, only one of which
+/// is free; a plate of 16 × 16 × 2.8 mm, thinner than a layer, moves from `start`, from above the
+/// middle of the block. A corner of the skin is moved, too, because a path is followed only where a
+/// point moves.
+solve::Summary move_plate(const Vec3& start, const Vec3& motion, int free = 0) {
+  model::Model m = testing::solid_block(7, 9, 4, 0.45, 0, [&](int i, int j, int a) {
+    if (i + j + a == 0) return PointSet::held;
+    return a == free ? PointSet::soft_tissue : PointSet::boundary;
+  });
+  m.points.target[0] += Vec3(0.1, 0, 0);
+  m.bones = {"plate"};
+  m.bone_surfaces = {model::patches::box(Vec3(7, 12, 0) + start, Vec3(23, 28, 2.8) + start)};
+  m.bone_transform = {scene::RigidMotion::translation(motion).matrix()};
+  m.contact.bodies.push_back({"plate", 0});
+  m.contact.spacing = 0.25;
+  m.contact.stiffness = 0.05;
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    if (m.points.set[i] != PointSet::soft_tissue) continue;
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(25);
+  }
+  return testing::find_rest(m, testing::settings(1e-3)).summary;
+}
+
+/// A plate between the two deepest layers.
+solve::PiercedColumns push_plate(double start, double motion) {
+  return move_plate({start, 0, -8.9}, {motion, 0, 0}).pierced;
+}
+
+TEST(PiercedColumns, APlateBetweenTheDeepestPointsIsFound) {
+  const solve::PiercedColumns pierced = push_plate(-60, 60);
+  EXPECT_EQ(pierced.columns, 9);
+  EXPECT_EQ(pierced.body, 0);
+  EXPECT_NEAR(pierced.depth, 1.4 - 0.11, 0.03);  // the grid rounds the ridge of distances
+  EXPECT_NEAR(pierced.where.z(), -7.5, 1e-6);
+}
+
+TEST(PiercedColumns, APlateBesideTheBlockOrThereFromTheStartIsNot) {
+  EXPECT_EQ(push_plate(-60, 5).columns, 0);
+  EXPECT_EQ(push_plate(0, 0.5).columns, 0);
+}
+
+TEST(SkinOnBone, PointsUnderAPlateAreFound) {
+  const solve::SkinOnBone found = move_plate({0, 0, 0.5}, {0, 0, -1}).skin_on_bone;
+  EXPECT_EQ(found.points, 9);
+  EXPECT_EQ(found.body, 0);
+  EXPECT_GT(found.pressure, 0);
+  EXPECT_NEAR(found.where.z(), -0.5, 0.1);
+}
+
+TEST(SkinOnBone, DeepPointsAreNot) {
+  const solve::Summary summary = move_plate({0, 0, -12.3}, {0, 0, 1}, 3);
+  EXPECT_EQ(summary.contacts[0].points, 9);
+  EXPECT_EQ(summary.skin_on_bone.points, 0);
+}
+
+TEST(SkinOnBone, PointsThatABoneComesNearAreNot) {
+  EXPECT_EQ(move_plate({0, 0, 0.5}, {0, 0, -0.3}).skin_on_bone.points, 0);
+}
+
+}  // namespace bone_remarks_test
+}  // namespace repose
