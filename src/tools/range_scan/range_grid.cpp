@@ -72,8 +72,8 @@ void add_point(RangeGrid& grid, const Columns& columns, const PlyValues::Row& ro
   grid.points.push_back(point);
   if (columns.color[0] >= 0 && columns.color[1] >= 0 && columns.color[2] >= 0) {
     std::array<uint8_t, 3> color;
-    for (int part = 0; part < 3; ++part)
-      color[part] = static_cast<uint8_t>(std::clamp(number(columns.color[part]), 0.0, 255.0));
+    for (int part = 0; part < 3; ++part)  // what is no number becomes 0
+      color[part] = static_cast<uint8_t>(std::fmin(std::fmax(number(columns.color[part]), 0), 255));
     grid.data.colors.push_back(color);
   }
   for (size_t f = 0; f < columns.other.size(); ++f)
