@@ -3,7 +3,7 @@
 
 namespace repose::solve {
 
-/// Methods by what an iteration tells of the distance to rest.
+/// Methods of search, by the measure of the distance to rest that an iteration gives.
 enum class Method {
   newton,          ///< its steps are Newton steps
   preconditioned,  ///< limited-memory BFGS that begins with the preconditioner
