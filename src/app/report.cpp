@@ -149,16 +149,6 @@ std::string describe_pierced(const std::vector<std::string>& bodies,
       pierced.columns, pierced.depth, bodies[pierced.body], pierced.where);
 }
 
-std::string describe_skin_on_bone(const std::vector<std::string>& bodies,
-                                  const solve::SkinOnBone& found) {
-  if (found.points == 0 || bodies.empty()) return "";  // rank 0 has their names
-  return report_row(
-      "skin on bone",
-      "{} points of the skin press on bone, most on {} at {:.1f} mm: lips or cheeks that bones "
-      "catch may rest in several ways, more or less caught; move the bones less far together",
-      found.points, bodies[found.body], found.where);
-}
-
 namespace {
 
 /// Depths as the search sees them, then as they are.
@@ -207,6 +197,12 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
     if (on.points == 0) continue;
     text += report_row("contact", "{} points press on {} with {:.4g} N, {:.4g} N", on.points, name,
                        on.force, on.force.norm());
+    if (on.skin.points > 0)
+      text +=
+          report_row("skin on bone",
+                     "{} of them are of the skin, pressed most at {:.1f} mm: lips or cheeks that "
+                     "bones catch may rest in several ways; move the bones less far together",
+                     on.skin.points, on.skin.where);
   }
   return text + describe_penetration(bodies, s) + describe_other_rest(s.path.last);
 }

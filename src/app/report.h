@@ -47,10 +47,6 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
 std::string describe_pierced(const std::vector<std::string>& bodies,
                              const solve::PiercedColumns& pierced);
 
-/// Skin that presses on bone, whose rest position may be one of several; empty if there is none.
-std::string describe_skin_on_bone(const std::vector<std::string>& bodies,
-                                  const solve::SkinOnBone& found);
-
 /// Describes torn springs in two rows; empty without a limit.
 std::string describe_tearing(const solve::Tearing& tearing);
 

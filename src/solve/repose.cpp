@@ -21,7 +21,6 @@
 #include "repose/solve/problem.h"
 #include "repose/solve/stability.h"
 #include "rest_derivatives.h"
-#include "skin_on_bone.h"
 
 namespace repose::solve {
 
@@ -217,8 +216,17 @@ void add_inside(const discrete::Part& part, const model::ContactPairs& body_cont
 void combine_ranks(MPI_Comm comm, ContactSummary& on) {
   on.points = base::sum_over_ranks(comm, on.points);
   for (double& component : on.force) component = base::sum_over_ranks(comm, component);
+  on.skin.points = base::sum_over_ranks(comm, on.skin.points);
+  on.skin.pressure = base::max_over_ranks_with(comm, on.skin.pressure, on.skin.where);
   on.inside = base::sum_over_ranks(comm, on.inside);
   on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
+}
+
+void add_point(double pressure, const Vec3& where, SkinOnBone& skin) {
+  ++skin.points;
+  if (pressure <= skin.pressure) return;
+  skin.pressure = pressure;
+  skin.where = where;
 }
 
 /// At the objective's last update. Collective.
@@ -231,8 +239,12 @@ std::vector<ContactSummary> contacts_of(discrete::Objective& objective) {
   for (size_t c = 0; c < body_contact.gaps().size(); ++c) {
     const double pressure = body_contact.pressure(c);
     if (pressure == 0) continue;
-    ContactSummary& on = contacts[body_contact.pairs().body[c]];
+    const int32_t body = body_contact.pairs().body[c];
+    const int64_t point = body_contact.pairs().point[c];
+    ContactSummary& on = contacts[body];
     ++on.points;
+    if (part.model.points.layer[point] == 0 && body_contact.bodies()[body].bone() >= 0)
+      add_point(pressure, objective.positions().local()[point], on.skin);
     on.force -= pressure * body_contact.pairs().area[c] * body_contact.normal(c);
   }
   mechanics::CutFaceContact& cut_faces = objective.contact().cut_faces();
@@ -408,7 +420,6 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
       });
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
-  summary.skin_on_bone = find_skin_on_bone(searcher.objective());
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
   summary.unknowns = 3 * positions.part().unknowns.total;
   summary.evaluations = searcher.evaluations();

@@ -85,6 +85,13 @@ struct PenetrationDepth {
   Vec3 where = Vec3::Zero();               ///< mm, current place of the deepest point
 };
 
+/// Points of the skin that press on a bone, as lips between teeth do.
+struct SkinOnBone {
+  int64_t points = 0;
+  double pressure = 0;        ///< N/mm², the largest
+  Vec3 where = Vec3::Zero();  ///< mm, its place where the run ended
+};
+
 /// Contact of the tissue with one body.
 struct ContactSummary {
   int64_t points = 0;         ///< that press
@@ -92,6 +99,7 @@ struct ContactSummary {
   int64_t inside = 0;         ///< points that were inside the body at the start, and stay so
   double deepest = 0;         ///< mm, of these
   Vec3 where = Vec3::Zero();  ///< mm, the deepest one at the start
+  SkinOnBone skin;            ///< nothing where the body is no bone
   PenetrationDepth exact;     ///< into a rigid body's own triangles, at the last step
 };
 
@@ -100,14 +108,6 @@ struct PiercedColumns {
   int64_t columns = 0;
   int32_t body = -1;          ///< of the model's contact: that at the deepest place
   double depth = 0;           ///< mm, there
-  Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
-};
-
-/// Points of the skin that press on a bone, as lips between teeth do.
-struct SkinOnBone {
-  int64_t points = 0;
-  int32_t body = -1;          ///< of the model's contact: that under the largest pressure
-  double pressure = 0;        ///< N/mm², there
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
 };
 
@@ -125,7 +125,6 @@ struct Summary {
   std::vector<ContactSummary>
       contacts;  ///< a row a body of the model's contact, then the sides of cuts
   PiercedColumns pierced;
-  SkinOnBone skin_on_bone;
 };
 
 /// Where a search begins.

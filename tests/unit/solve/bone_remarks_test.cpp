@@ -55,9 +55,8 @@ TEST(PiercedColumns, APlateBesideTheBlockOrThereFromTheStartIsNot) {
 }
 
 TEST(SkinOnBone, PointsUnderAPlateAreFound) {
-  const solve::SkinOnBone found = move_plate({0, 0, 0.5}, {0, 0, -1}).skin_on_bone;
+  const solve::SkinOnBone found = move_plate({0, 0, 0.5}, {0, 0, -1}).contacts[0].skin;
   EXPECT_EQ(found.points, 9);
-  EXPECT_EQ(found.body, 0);
   EXPECT_GT(found.pressure, 0);
   EXPECT_NEAR(found.where.z(), -0.5, 0.1);
 }
@@ -65,11 +64,11 @@ TEST(SkinOnBone, PointsUnderAPlateAreFound) {
 TEST(SkinOnBone, DeepPointsAreNot) {
   const solve::Summary summary = move_plate({0, 0, -12.3}, {0, 0, 1}, 3);
   EXPECT_EQ(summary.contacts[0].points, 9);
-  EXPECT_EQ(summary.skin_on_bone.points, 0);
+  EXPECT_EQ(summary.contacts[0].skin.points, 0);
 }
 
 TEST(SkinOnBone, PointsThatABoneComesNearAreNot) {
-  EXPECT_EQ(move_plate({0, 0, 0.5}, {0, 0, -0.3}).skin_on_bone.points, 0);
+  EXPECT_EQ(move_plate({0, 0, 0.5}, {0, 0, -0.3}).contacts[0].skin.points, 0);
 }
 
 }  // namespace bone_remarks_test
