@@ -78,15 +78,23 @@ std::optional<std::pair<double, double>> deepest(const FrontMap& skin, double x,
   return best;
 }
 
-/// The crease on one side from a place, to x = `end` or, without it, to where it is shallower than
-/// `share` of `depth`.
+/// The crease on one side from a place, to a known corner of the mouth or, without it, to where it
+/// is shallower than `share` of `depth`.
 std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double depth, int side,
-                              std::optional<double> end) {
+                              const std::optional<Vec3>& end) {
+  constexpr double bow = 4;  // mm, height of the crease at its start over a line to the corner
   std::vector<Vec3> points;
   double shallow = 0, tilt = 0, z = from.z();
-  const double step = skin.spacing(), last = end ? std::abs(*end) : widest_half;
+  const double step = skin.spacing(), last = end ? std::abs(end->x()) : widest_half;
+  const auto expected = [&](double x) {
+    const double next = z + tilt * step;
+    if (!end) return next;
+    const double left = (last - x) / (last - std::abs(from.x()));
+    const double line = left * from.z() + (1 - left) * end->z();
+    return std::clamp(next, line - left * bow, line + left * bow);
+  };
   for (double x = std::abs(from.x()) + step; x <= last; x += step) {
-    const auto place = deepest(skin, side * x, z + tilt * step, climb);
+    const auto place = deepest(skin, side * x, expected(x), climb);
     if (!place) break;
     shallow = place->second < share * depth ? shallow + step : 0;
     if (!end && shallow > ending) break;
@@ -128,6 +136,54 @@ LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
   return crease;
 }
 
+/// Continues a side of a crease, whose end is given, to a distance from the midline, in parallel
+/// with the other side or, beyond that, level.
+std::vector<Vec3> mirrored(const FrontMap& skin, const std::vector<Vec3>& crease, const Vec3& end,
+                           double half) {
+  const auto height = [&](double x) {
+    const auto away = [&](const Vec3& point) { return std::abs(point.x() - x); };
+    return std::ranges::min_element(crease, {}, away)->z();
+  };
+  std::vector<Vec3> points;
+  const int side = end.x() < 0 ? -1 : 1;
+  for (double x = std::abs(end.x()) + skin.spacing(); x <= half; x += skin.spacing()) {
+    const double z = end.z() + height(-side * x) - height(-end.x());
+    const auto depth = skin.depth(side * x, z);
+    if (!depth) break;
+    points.emplace_back(side * x, *depth, z);
+  }
+  return points;
+}
+
+/// Continues a crease that ends nearer to the midline than the corners of a mouth can be.
+void extend(const FrontMap& skin, LipCrease& crease) {
+  constexpr double even = 0.7, nearest = 15;  // of the other side; mm
+  std::vector<Vec3>& points = crease.points;
+  const double right = -points.front().x(), left = points.back().x();
+  const double half = std::max({right, left, nearest});
+  if (std::min(right, left) >= even * half) return;
+  crease.lost = {right, left};
+  const auto on_the_right = mirrored(skin, points, points.front(), half),
+             on_the_left = mirrored(skin, points, points.back(), half);
+  points.insert(points.begin(), on_the_right.rbegin(), on_the_right.rend());
+  points.insert(points.end(), on_the_left.begin(), on_the_left.end());
+}
+
+/// The crease between lips that touch.
+LipCrease follow_touching(const FrontMap& skin, double z, const std::optional<Vec3>& right,
+                          const std::optional<Vec3>& left) {
+  const auto middle = deepest(skin, 0, z, arm);
+  if (!middle) return {};
+  LipCrease crease;
+  const Vec3 start(0, *skin.depth(0, middle->first), middle->first);
+  crease.points = follow_side(skin, start, middle->second, -1, right);
+  std::reverse(crease.points.begin(), crease.points.end());
+  crease.points.push_back(start);
+  const auto other = follow_side(skin, start, middle->second, 1, left);
+  crease.points.insert(crease.points.end(), other.begin(), other.end());
+  return crease;
+}
+
 }  // namespace
 
 std::optional<double> crease_depth(const FrontMap& skin, double x, double z) {
@@ -142,18 +198,11 @@ std::optional<double> open_mouth(const FrontMap& skin, double z) {
   return gap ? std::optional(gap->middle()) : std::nullopt;
 }
 
-LipCrease follow_crease(const FrontMap& skin, double z, std::optional<double> right,
-                        std::optional<double> left) {
-  if (const auto gap = middle_gap(skin, z)) return follow_gap(skin, *gap);
-  const auto middle = deepest(skin, 0, z, arm);
-  if (!middle) return {};
-  LipCrease crease;
-  const Vec3 start(0, *skin.depth(0, middle->first), middle->first);
-  crease.points = follow_side(skin, start, middle->second, -1, right);
-  std::reverse(crease.points.begin(), crease.points.end());
-  crease.points.push_back(start);
-  const auto other = follow_side(skin, start, middle->second, 1, left);
-  crease.points.insert(crease.points.end(), other.begin(), other.end());
+LipCrease follow_crease(const FrontMap& skin, double z, const std::optional<Vec3>& right,
+                        const std::optional<Vec3>& left) {
+  const auto gap = middle_gap(skin, z);
+  LipCrease crease = gap ? follow_gap(skin, *gap) : follow_touching(skin, z, right, left);
+  if (!right && !left && !crease.points.empty()) extend(skin, crease);
   return crease;
 }
 

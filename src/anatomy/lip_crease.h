@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,9 @@ struct LipCrease {
   std::vector<Vec3> points;  ///< in the frame, from the right corner to the left, every spacing
   bool open = false;         ///< the lips do not touch: the line runs through the middle of the gap
   double gap = 0;            ///< mm, the widest
+  /// mm from the midline to where it was lost, on the right and the left, where this is nearer to
+  /// the midline than a corner of the mouth can be; beyond, the line is a guess.
+  std::optional<std::array<double, 2>> lost{};
 };
 
 /// Returns how far, mm, the skin at a place lies behind the mean of that 4 mm above and below it;
@@ -21,10 +25,12 @@ std::optional<double> crease_depth(const FrontMap& skin, double x, double z);
 /// none wider than 1.5 mm.
 std::optional<double> open_mouth(const FrontMap& skin, double z);
 
-/// Follows the crease from the midline to both sides, beginning at height `z`, until it is
-/// shallower than a quarter of its depth in the middle over 2.5 mm, or to x = `right` and `left`
-/// where these are given.
-LipCrease follow_crease(const FrontMap& skin, double z, std::optional<double> right,
-                        std::optional<double> left);
+/// Follows the crease from the midline to both sides, beginning at height `z`, to the corners
+/// `right` and `left` where these are given, else until it is shallower than a quarter of its depth
+/// in the middle over 2.5 mm. If neither is given, a side on which it is lost at less than 0.7 of
+/// the other's distance from the midline, or 15 mm, is continued to that distance in parallel with
+/// the other.
+LipCrease follow_crease(const FrontMap& skin, double z, const std::optional<Vec3>& right,
+                        const std::optional<Vec3>& left);
 
 }  // namespace repose::anatomy

@@ -8,7 +8,6 @@ namespace repose::anatomy {
 namespace {
 
 constexpr double skin_midline = 1;  // mm, half width of the skin's profile
-constexpr double even = 0.7;        // of one corner's distance from the midline to the other's
 
 /// The height of the deepest crease of the skin near the edge of the upper incisors.
 std::optional<double> crease_height(const FrontMap& skin, double edge) {
@@ -39,13 +38,8 @@ double search_mouth(const FrontMap& skin, Search& search) {
     z = known->z();
   else if (edge)
     z = crease_height(skin, edge->z());
-  const auto x_of = [&](const char* name) {
-    const auto place = search.find(name);
-    return place ? std::optional(place->x()) : std::nullopt;
-  };
   LipCrease crease;
-  const auto known_right = x_of("mouth_right"), known_left = x_of("mouth_left");
-  if (z) crease = follow_crease(skin, *z, known_right, known_left);
+  if (z) crease = follow_crease(skin, *z, search.find("mouth_right"), search.find("mouth_left"));
   if (!z && edge) crease = follow_crease(skin, edge->z(), {}, {});
   if (crease.points.size() < 3) {
     for (const char* name : {"stomion", "mouth_right", "mouth_left"})
@@ -59,12 +53,15 @@ double search_mouth(const FrontMap& skin, Search& search) {
   search.put("stomion", Vec3(0, middle->y(), middle->z()));
   search.put("mouth_right", crease.points.front());
   search.put("mouth_left", crease.points.back());
-  const double right = -crease.points.front().x(), left = crease.points.back().x();
-  if (!known_right && !known_left && std::min(right, left) < even * std::max(right, left))
-    search.remark(fmt::format(
-        "the corners of the mouth lie {:.0f} mm right and {:.0f} mm left of the midline: "
-        "check them, and give the true ones (-landmarks)",
-        right, left));
+  if (crease.lost)
+    search.remark(
+        fmt::format("the crease between the lips is lost {:.0f} mm right and {:.0f} mm left of the "
+                    "midline; the "
+                    "corners of the mouth are put {:.0f} mm right and {:.0f} mm left of it: check "
+                    "them, and give "
+                    "the true ones (-landmarks)",
+                    (*crease.lost)[0], (*crease.lost)[1], -crease.points.front().x(),
+                    crease.points.back().x()));
   if (crease.open)
     search.remark(fmt::format(
         "the mouth is open in SKIN, by up to {:.1f} mm: stomion and corners are those of the gap",
@@ -173,8 +170,7 @@ std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame&
   else if (edge)
     z = crease_height(map, edge->z());
   if (!z) return {};
-  const LipCrease crease = follow_crease(map, *z, right ? std::optional(right->x()) : std::nullopt,
-                                         left ? std::optional(left->x()) : std::nullopt);
+  const LipCrease crease = follow_crease(map, *z, right, left);
   std::vector<Vec3> path;
   for (const Vec3& p : crease.points)
     if (path.empty() || p.x() - frame.to_frame(path.back()).x() >= apart)

@@ -41,6 +41,32 @@ TEST(LipCrease, OpenLipsAreThoseOfTheGapAndNotWhatIsSeenThroughIt) {
   for (const Vec3& point : crease.points) EXPECT_NEAR(point.y(), 0, 0.1);
 }
 
+TEST(LipCrease, ASideOnWhichItIsLostIsFollowedAsFarAsTheOther) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -2}, {50, 40});
+  add(skin, 0, {-50, -60}, {50, -4});
+  add(skin, 3, {-5, -4}, {24, -2});
+  add(skin, 0, {-50, -4}, {-5, -2});
+  add(skin, 0, {24, -4}, {50, -2});
+  const FrontMap map(skin, HeadFrame{});
+  const LipCrease crease = follow_crease(map, -3, {}, {});
+  ASSERT_TRUE(crease.lost);
+  EXPECT_NEAR((*crease.lost)[0], 5, 1);
+  EXPECT_NEAR((*crease.lost)[1], 24, 1);
+  EXPECT_NEAR(crease.points.front().x(), -crease.points.back().x(), 1);
+  EXPECT_FALSE(follow_crease(map, -3, Vec3(-20, 0, -3), Vec3(20, 0, -3)).lost);
+}
+
+TEST(LipCrease, KnownCornersLeadWhereThereIsNoCrease) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -60}, {50, 40});
+  const Vec3 right(-24, 0, -8), left(26, 0, 2);
+  const LipCrease crease = follow_crease(FrontMap(skin, HeadFrame{}), -3, right, left);
+  ASSERT_FALSE(crease.points.empty());
+  EXPECT_LT((crease.points.front() - right).norm(), 2);
+  EXPECT_LT((crease.points.back() - left).norm(), 2);
+}
+
 TEST(LipCrease, OpenLipsThatTouchAtTheSidesEndAtTheCornersOfTheirCrease) {
   surface::Surface skin;
   add(skin, 0, {-50, -3}, {50, 40});
@@ -73,7 +99,7 @@ TEST(LipCrease, ALowerLipFarBehindTheUpperOneIsNoOpenMouth) {
   add(skin, 14, {-50, -4}, {50, -3});
   const FrontMap map(skin, HeadFrame{});
   EXPECT_FALSE(open_mouth(map, -3));
-  const LipCrease crease = follow_crease(map, -3, -20, 20);
+  const LipCrease crease = follow_crease(map, -3, Vec3(-20, 0, -3), Vec3(20, 0, -3));
   EXPECT_FALSE(crease.open);
   ASSERT_FALSE(crease.points.empty());
   EXPECT_NEAR(crease.points.front().x(), -20, 1);
