@@ -5,7 +5,7 @@
 
 Upper row: bones (ivory), the pieces that move where they are (gray) and where they go (orange), planes
 of cuts (blue), landmarks with their short names. Lower row: the skin, the part that is solved (green),
-its border (black), the parting of the lips (red), boxes (blue). Needs what drivers/render.py needs, and
+its border (black), incisions and the parting of the lips (red), boxes (blue). Needs what drivers/render.py needs, and
 PyYAML; surfaces of a scene are files, not volumes.
 """
 
@@ -145,22 +145,28 @@ def bones_drawn(scene, file, parts, marks):
                    for shown in (render.actor(ball(at, 1.6), RED), name_tag(SHORT[name], at))]
 
 
-def skin_drawn(scene, skin, solved):
-    """The skin, before it what of it is solved and its border, before that lips and boxes."""
+def incisions_of(file):
+    """Points along each incision, from the markups that repose-solve -dry_run writes where there are any."""
+    lines = {}
+    for name, at in sorted(read_landmarks(file).items()) if file.exists() else []:
+        lines.setdefault(name.rsplit(" ", 1)[0], []).append(at)
+    return lines
+
+
+def skin_drawn(scene, skin, solved, incisions):
+    """The skin, before it what of it is solved and its border, before that incisions and boxes."""
     drawn = [render.actor(solved, GREEN), render.actor(tube(border(solved), 0.8), render.INK)]
     lines = [render.actor(tube(box_edges(box), 0.6), BLUE) for box in boxes_of(scene)]
-    mouth = scene.get("mouth")
-    if mouth and "path" in mouth:
-        lines.append(render.actor(tube(polyline(mouth["path"]), 1.0), RED))
+    lines += [render.actor(tube(polyline(path), 1.0), RED) for path in incisions.values()]
     return [render.actor(skin, render.SKIN)], drawn, lines
 
 
-def legend_of(scene):
+def legend_of(scene, incisions):
     """Titles of both rows, which name what is drawn."""
     planes = any(cut.get("planes") for cut in scene.get("osteotomies") or [])
-    lips = "path" in (scene.get("mouth") or {})
+    cut = " and ".join(sorted({"lips" if name.startswith("mouth") else "incisions" for name in incisions}))
     return (f"bones; moved pieces (orange){', cuts (blue)' if planes else ''}, landmarks",
-            f"solved skin (green), its border{', lips (red)' if lips else ''}")
+            f"solved skin (green), its border{f', {cut} (red)' if cut else ''}")
 
 
 def draw(rows, frame, legend, output):
@@ -217,11 +223,12 @@ def main():
         parts = parts_of(file, work)
         run(plan.program("repose-solve"), file, "-dry_run", "-output", work / "model")
         solved = render.read_mesh(work / "model_solved_skin.ply")
+        incisions = incisions_of(work / "model_incisions.mrk.json")
     skin = render.read_mesh(file.parent / scene["skin"])
     frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
                             for mesh in (*(mesh for mesh, _ in parts), solved)])
-    draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved)),
-         frame, legend_of(scene), chosen.output)
+    draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved, incisions)),
+         frame, legend_of(scene, incisions), chosen.output)
     print(chosen.output)
 
 

@@ -86,7 +86,7 @@ std::vector<base::Option> run_options() {
       {"allow_folded", OptionKind::flag, "", "Accept inverted elements (else exit status 2)."},
       {"dry_run", OptionKind::flag, "",
        "Build and report the model and how it would be solved; solve nothing. With -output, write "
-       "NAME_solved_skin.ply."},
+       "NAME_solved_skin.ply, and where it is cut NAME_incisions.mrk.json."},
       {"restart", OptionKind::path, "",
        "Go on from the last step of this result of the same model."},
       {.name = "checkpoint_interval",

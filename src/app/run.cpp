@@ -20,6 +20,7 @@
 #include "repose/adapt/given_skin.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
+#include "repose/base/whole_file.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/results/given_skin.h"
 #include "repose/results/model_file.h"
@@ -27,6 +28,7 @@
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/results/run_files.h"
+#include "repose/scene/landmarks.h"
 #include "repose/solve/supported.h"
 #include "repose/surface/write.h"
 #include "self_contact.h"
@@ -342,14 +344,30 @@ base::Exit Run::solve() {
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
 
-/// Writes the skin that a job solves, with its border, to NAME_solved_skin.ply. Collective.
+/// The points of incisions, named so that those of each sort along it.
+std::map<std::string, Vec3> incision_points(const std::vector<scene::Incision>& incisions) {
+  std::map<std::string, Vec3> points;
+  for (const scene::Incision& incision : incisions)
+    for (size_t i = 0; i < incision.path.size(); ++i)
+      points[fmt::format("{} {:04}", incision.name, i + 1)] = incision.path[i];
+  return points;
+}
+
+/// Writes the skin that a job solves, with its border, to NAME_solved_skin.ply, and where it is cut
+/// to NAME_incisions.mrk.json. Returns rows of the report, on rank 0. Collective.
 std::string write_solved_skin(const Job& job, const std::string& name) {
-  const std::string file = name + "_solved_skin.ply";
+  std::string rows;
   base::on_root(comm, [&] {
     if (!job.anatomy) base::refuse("-output: a model file has no skin to write with -dry_run");
-    surface::write_surface(file, job.anatomy->skin);
+    const std::string skin = name + "_solved_skin.ply", cuts = name + "_incisions.mrk.json";
+    surface::write_surface(skin, job.anatomy->skin);
+    rows = report_row("solved skin", skin);
+    if (job.anatomy->scene.incisions.empty()) return;
+    base::write_whole_file(cuts,
+                           scene::markups_text(incision_points(job.anatomy->scene.incisions)));
+    rows += report_row("its incisions", cuts);
   });
-  return report_row("solved skin", file);
+  return rows;
 }
 
 /// Reads and builds the job, chooses its strategy and prints both. Collective.

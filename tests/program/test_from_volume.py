@@ -163,12 +163,18 @@ def propose(folder, environment, *arguments):
     if can_draw():
         assert (folder / "plan/proposal.png").stat().st_size > 50000, result.stdout
         assert "plan/proposal.png" in result.stdout
-    marks = json.loads((folder / "plan/landmarks.mrk.json").read_text())["markups"][0]
-    solved = runner(folder, environment)("repose-solve", "plan/scene.yaml", "-dry_run")
+    solved = runner(folder, environment)("repose-solve", "plan/scene.yaml", "-dry_run", "-output", "plan/model")
     assert (solved.returncode, solved.stderr) == (0, ""), solved
     assert "  warning" not in solved.stdout
-    return (folder / "plan/scene.yaml").read_text(), solved.stdout, {
-        entry["label"]: np.array(entry["position"]) for entry in marks["controlPoints"]}
+    place, lips = points_of(folder / "plan/landmarks.mrk.json"), points_of(folder / "plan/model_incisions.mrk.json")
+    for name, at in (("mouth_right", min(lips)), ("mouth_left", max(lips))):
+        assert np.linalg.norm(lips[at] - place[name]) < 3, "lips are parted from corner to corner"
+    return (folder / "plan/scene.yaml").read_text(), solved.stdout, place
+
+
+def points_of(markups):
+    entries = json.loads(markups.read_text())["markups"][0]["controlPoints"]
+    return {entry["label"]: np.array(entry["position"]) for entry in entries}
 
 
 @pytest.mark.parametrize("written", [ct_of, segmentation_of])
