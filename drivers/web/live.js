@@ -54,7 +54,7 @@ class Planner {
   }
 
   makeView(arrays) {
-    this.viewer = new FaceViewer(byId("view"));
+    this.viewer = new FaceViewer(byId("view"), this.head.axes);
     this.skin = this.viewer.add({name: "skin", triangles: this.triangles,
                                  states: [this.initial, this.initial.slice(), null]});
     this.bones = this.head.bones.map((name, row) => {
@@ -104,7 +104,9 @@ class Planner {
       input.addEventListener("change", () => {
         const plan = copyOf(this.plan), value = Number(input.value);
         if (!Number.isFinite(value) || input.value === "") return this.showNumbers();
-        plan[this.chosen][key][axis] = sign * Math.min(Math.max(value, -range), range);
+        const {axes, box} = this.head, along = alongHead(axes, plan[this.chosen][key]);
+        along[axis] = sign * value;
+        plan[this.chosen][key] = within(box[key], alongScan(axes, along));
         this.change(plan);
       });
       return input;
@@ -180,18 +182,18 @@ class Planner {
 
   showNumbers() {
     NUMBERS.forEach(([, key, axis, sign], k) => {
-      this.inputs[k].value = String(Number((sign * this.plan[this.chosen][key][axis]).toFixed(2)));
+      const along = alongHead(this.head.axes, this.plan[this.chosen][key]);
+      this.inputs[k].value = String(Number((sign * along[axis]).toFixed(2)));
     });
   }
 
   // The gizmo has moved its handle: the plan follows, within the box.
   dragged() {
     const {centroid} = this.pieces.get(this.chosen), {box} = this.head;
-    const clamp = (values, range) => values.map((v, a) => Math.min(Math.max(v, -range[a]), range[a]));
     const plan = copyOf(this.plan);
     plan[this.chosen] = {
-      translate: clamp(this.handle.position.toArray().map((x, a) => x - centroid[a]), box.translate),
-      rotate: clamp(rotationOf(this.handle.quaternion), box.rotate)};
+      translate: within(box.translate, this.handle.position.toArray().map((x, a) => x - centroid[a])),
+      rotate: within(box.rotate, rotationOf(this.handle.quaternion))};
     this.change(plan, false);
   }
 
@@ -343,11 +345,12 @@ class Planner {
     const position = hit.state === KEPT ? this.kept : hit.state === NOW ? this.position
       : this.initial;
     const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
-    return shiftInWords(shift);
+    return shiftInWords(alongHead(this.head.axes, shift));
   }
 
   drawProfile() {
-    const profile = position => profileOf(position, this.triangles, this.viewer.center.x);
+    const {axes} = this.head, middle = alongHead(axes, this.viewer.center.toArray())[0];
+    const profile = position => profileOf(turned(axes, position), this.triangles, middle);
     this.profileBefore ??= profile(this.initial);
     const said = drawProfiles(byId("profile"), this.profileBefore, profile(this.position));
     byId("measured").textContent = said && `; ${said}`;

@@ -8,6 +8,22 @@ const NUMBERS = [
   ["yaw, front to the left", "rotate", 2, 1, "°"], ["roll, left side up", "rotate", 1, -1, "°"]];
 const DEGREE = Math.PI / 180;
 
+// A vector along the axes of the head, its rows, and back.
+const alongHead = (axes, v) => axes.map(row => row.reduce((sum, x, a) => sum + x * v[a], 0));
+const alongScan = (axes, v) => [0, 1, 2].map(a => axes.reduce((sum, row, k) => sum + row[a] * v[k], 0));
+
+// Positions along the axes of the head.
+function turned(axes, position) {
+  const along = new Float32Array(position.length);
+  for (let i = 0; i < position.length; i += 3)
+    for (let k = 0; k < 3; ++k)
+      along[i + k] = axes[k][0] * position[i] + axes[k][1] * position[i + 1] + axes[k][2] * position[i + 2];
+  return along;
+}
+
+// Each component as near to its value as its range either way allows.
+const within = (range, values) => values.map((v, a) => Math.min(Math.max(v, -range[a]), range[a]));
+
 const zero = () => ({translate: [0, 0, 0], rotate: [0, 0, 0]});
 const copyOf = plan => JSON.parse(JSON.stringify(plan));
 

@@ -1,7 +1,8 @@
 // A 3D view of a face and its bones in one or several states (before, after, another plan), for
 // report.py and other pages. Needs three.js beside it (window.THREE) and viewer.css; no network.
 //
-//   const viewer = new FaceViewer(element);       // throws where the browser has no WebGL 2
+//   const viewer = new FaceViewer(element, axes); // throws where the browser has no WebGL 2; axes: rows left,
+//                                                 // back and up of the head, by which it is looked at; or none
 //   const skin = viewer.add({name: "skin", triangles, states: [before, after]});
 //   viewer.add({name: "mandible", kind: "bone", triangles, states: [before, after]});
 //   // further keys: colors (Uint8Array, 3 a vertex), uv (2 a vertex), oriented (triangles are
@@ -141,13 +142,13 @@ class FaceSurface {
 class FaceViewer {
   static MIXED = 9;  // the state that mix() fills
 
-  constructor(element) {
-    this.element = element;
+  constructor(element, axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
+    Object.assign(this, {element, axes});
     element.classList.add("face-viewer");
     const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true,
                                               preserveDrawingBuffer: true});
     const scene = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 1, 4000);
-    camera.up.set(0, 0, 1);
+    camera.up.set(...axes[2]);
     element.append(renderer.domElement);
     const controls = new THREE.OrbitControls(camera, renderer.domElement);
     Object.assign(controls, {enableDamping: false, zoomToCursor: true, screenSpacePanning: true});
@@ -282,7 +283,9 @@ class FaceViewer {
 
   look(view) {
     const {camera, controls} = this.three;
-    const direction = new THREE.Vector3(...REPOSE_LOOKS[view]).normalize();
+    const direction = new THREE.Vector3();
+    REPOSE_LOOKS[view].forEach((x, a) => direction.addScaledVector(new THREE.Vector3(...this.axes[a]), x));
+    direction.normalize();
     camera.position.copy(this.center).addScaledVector(direction, 2000);
     camera.zoom = 1;
     controls.target.copy(this.center);

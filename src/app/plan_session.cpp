@@ -212,6 +212,11 @@ const surface::Surface* PlanSession::given_skin() const {
 
 bool PlanSession::has_cuts() const { return !state_->job.cuts.empty(); }
 
+Mat3 PlanSession::axes() const {
+  const auto& anatomy = state_->job.anatomy;
+  return anatomy && anatomy->scene.anatomy ? anatomy->scene.anatomy->axes : Mat3::Identity();
+}
+
 std::vector<Vec3> PlanSession::initial() const {
   State& s = *state_;
   const discrete::NaturalRows natural(s.comm, s.part());

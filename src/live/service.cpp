@@ -163,6 +163,7 @@ void Service::describe(Reply& reply) {
   if (base::rank(comm_) > 0) return;
   const model::Model& model = session_->model();
   head["points"] = initial.size();
+  for (int row = 0; row < 3; ++row) head["axes"].push_back(write_vector(session_->axes().row(row)));
   head["bones"] = model.bones;
   head["cuts"] = session_->has_cuts();
   surface::Surface skin{"skin", visible(initial), {}};

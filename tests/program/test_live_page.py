@@ -59,6 +59,12 @@ const exact = async () => { while (mark().className !== "exact") await sleep(30)
   gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   found.angles = document.getElementById("angles").textContent;
   found.colors = new Set(new Uint32Array(pixel.buffer)).size;
+  planner.head.axes = [[1, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]];
+  document.getElementById("reset").click();
+  planner.inputs[0].value = 2;
+  planner.inputs[0].dispatchEvent(new Event("change"));
+  found.typed = planner.plan.chin.translate;
+  found.numbers = planner.inputs.map(input => Number(input.value));
   found.wide = document.documentElement.scrollWidth - innerWidth;
   found.loaded = performance.getEntriesByType("resource").map(one => new URL(one.name).host)
     .filter(host => host !== location.host);
@@ -168,6 +174,7 @@ def test_a_bone_is_dragged_and_the_face_follows(live, served):
     assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
     assert found["during"] == "preview" and found["undone"]
     assert 0.5 < abs(found["dragged"]) < 2 and 0 < found["off"] < 0.5
+    assert found["typed"] == pytest.approx([0, -1.6, -1.2]) and found["numbers"] == [2, 0, 0, 0, 0, 0]
     angles = [float(one) for one in re.findall(r"(?:angle by the tip|angle) ([\d.]+)° \(before", found["angles"])]
     assert len(angles) == 2 and all(80 < one < 180 for one in angles), found["angles"]
     assert found["colors"] > 1000 and found["wide"] <= 0 and found["loaded"] == []

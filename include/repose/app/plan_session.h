@@ -58,6 +58,7 @@ class PlanSession {
   const model::Model& model() const;           ///< its skin, its bones and names, on rank 0
   const surface::Surface* given_skin() const;  ///< in whose place another is solved, or null
   bool has_cuts() const;                       ///< incisions or parted lips
+  Mat3 axes() const;                           ///< rows: left, back and up of the head in the scan
   std::vector<Vec3> initial() const;           ///< [N] mm
   int64_t points() const;                      ///< N, on all ranks
 
