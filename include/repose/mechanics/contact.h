@@ -69,7 +69,7 @@ class BodyContact {
   /// Evaluates the gaps that may act, for all functions below.
   void update_gaps(std::span<const Vec3> position);
   /// Evaluates all gaps: by the exact distance (RigidBody::outside) where RigidBody::lower_bound
-  /// shows them to be above 1 mm.
+  /// shows them to be above 1 mm and the point to be outside the body.
   void update_all_gaps(std::span<const Vec3> position);
   /// Evaluates one gap as update_all_gaps() does.
   double measure_gap(size_t c, std::span<const Vec3> position);
@@ -78,8 +78,8 @@ class BodyContact {
   void for_each_block(bool exact, Visit&& visit) const {
     for (const size_t c : acting_) visit(pairs_.point[c], block(c, exact, now(c)));
   }
-  /// The gaps below `reach` mm, to first order about the positions; those above `smoothed_to` mm,
-  /// without multipliers, may be those of the exact distance (RigidBody::outside).
+  /// The gaps below `reach` mm, to first order about the positions; those above `smoothed_to` mm of
+  /// points outside, without multipliers, may be those of the exact distance (RigidBody::outside).
   std::vector<LinearGap> linear_gaps(std::span<const Vec3> position, double reach,
                                      double smoothed_to = std::numeric_limits<double>::infinity());
   /// Takes gaps made by linear_gaps to where the bodies have moved since they were at `before`:

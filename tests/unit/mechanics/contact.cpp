@@ -172,6 +172,29 @@ TEST(BodyContact, StatesDistancesBeyondAMillimeterExactly) {
   EXPECT_EQ(loop.gaps()[2], 6);
 }
 
+TEST(BodyContact, MeasuresPointsThatBeganDeepInsideAMeshFromTheSideTheyAreOn) {
+  constexpr double began = -2.5;  // mm
+  const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
+  model::ContactPairs pairs;
+  pairs.point = {0, 1, 2};
+  pairs.body = {0, 0, 0};
+  pairs.binding.assign(3, model::Binding::touches);
+  pairs.area = {1, 1, 1};
+  pairs.offset.assign(3, began);
+  const std::vector<Vec3> position = {{4.8, 0, 0}, {5, 0, 0}, {6, 0, 0}};
+  BodyContact all(pairs, 0.7, {body}), near = all;
+  all.update_all_gaps(position);
+  const std::vector<LinearGap> gaps = near.linear_gaps(position, 5, 1);
+  ASSERT_EQ(gaps.size(), position.size());
+  for (size_t c = 0; c < gaps.size(); ++c) {
+    const double expected = position[c].x() - 5 - began;
+    EXPECT_NEAR(all.gaps()[c], expected, 1e-6);
+    EXPECT_NEAR(gaps[c].gap, expected, 1e-6);
+    EXPECT_LT((all.normal(c) - Vec3::UnitX()).norm(), 1e-6);
+    EXPECT_LT((gaps[c].gradient[0].second - Vec3::UnitX()).norm(), 1e-6);
+  }
+}
+
 /// Two sides of a bent cut, 5 × 4 controls of which the first and the last of a column are means of
 /// two points, the first side `distance` mm from the second and slid along it by more than a patch.
 struct Facing {
