@@ -37,7 +37,7 @@ std::vector<int64_t> ColumnLevel::find_columns() {
     const int64_t k = pattern_.find(i, i);
     diagonal.push_back(k);
     const bool goes_on = i > 0 && place_[i].column == place_[i - 1].column &&
-                         place_[i].layer == place_[i - 1].layer + 1 && k > pattern_.begin[i] &&
+                         place_[i].layer - 1 == place_[i - 1].layer && k > pattern_.begin[i] &&
                          pattern_.column[k - 1] == i - 1;
     if (!goes_on) columns_.push_back(i);
   }

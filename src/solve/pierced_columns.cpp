@@ -39,7 +39,7 @@ std::vector<int64_t> second_deepest(MPI_Comm comm, const discrete::Part& part) {
   const int64_t last = base::max_over_ranks(comm, deepest);
   std::vector<int64_t> rows;
   for (int64_t i = 0; i + 1 < part.owned_points; ++i)
-    if (points.layer[i + 1] == last && points.layer[i] + 1 == last &&
+    if (points.layer[i + 1] == last && points.layer[i] == last - 1 &&
         points.column[i] == points.column[i + 1])
       rows.push_back(i);
   return rows;

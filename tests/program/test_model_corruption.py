@@ -237,6 +237,15 @@ def test_a_row_that_is_wrong_beside_others_is_refused(run, tmp_path, case, ranks
     assert [word for word in words if word not in result.stderr] == [], result.stderr
 
 
+def test_all_points_may_have_the_largest_layer_number(run, tmp_path):
+    with h5py.File(tmp_path / "model.h5", "w") as file:
+        springs(file)
+        file["model/point/layer"][...] = largest(file["model/point/layer"])
+        file["model/point/column"][...] = 0
+    result = run("repose-solve", "model.h5", "-output", "out")
+    assert (result.returncode, result.stderr) == (0, ""), result
+
+
 def chain(file, held):
     """A chain of springs through points in such an order that all ranks hold parts of it."""
     points = 30
