@@ -302,7 +302,8 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
                      std::isfinite(error) ? fmt::format("{:.3g} mm reached", error) : "not known",
                      settings.path.accuracy);
   text += report_row("rest position", s.path.last.stable ? "a minimum (no negative curvature met)"
-                                                         : "NOT A MINIMUM: negative curvature");
+                                      : s.path.last.stopped ? "not known: the search was stopped"
+                                                            : "NOT A MINIMUM: negative curvature");
   if (s.initial_spectrum) text += report_row("at the start", stability(*s.initial_spectrum));
   if (s.final_spectrum) text += report_row("where it ended", stability(*s.final_spectrum));
   text += report_row("objective", "{:.12g} {}", s.last.objective,

@@ -54,7 +54,15 @@ void Positions::set_motion(int32_t bone, const scene::RigidMotion& motion) {
 }
 
 double Positions::largest_travel() const {
-  return base::max_over_ranks(comm_, motion_.largest_travel(part_.model));
+  const model::ContactPairs& pairs = part_.model.contact.pairs;
+  std::vector<model::PrescribedMotion::Beside> beside;
+  double pushed = 0;
+  for (size_t c = 0; c < pairs.point.size(); ++c) {
+    const mechanics::RigidBody& body = part_.bodies[pairs.body[c]];
+    if (body.bone() >= 0) beside.push_back({body.bone(), pairs.point[c]});
+    pushed = std::max(pushed, body.push().norm());
+  }
+  return base::max_over_ranks(comm_, std::max(pushed, motion_.largest_travel(part_.model, beside)));
 }
 
 void Positions::scatter_to_local(Vec in, std::span<Vec3> out) const {

@@ -91,7 +91,7 @@ Mat4 PrescribedMotion::bone_matrix(int32_t bone, double load) const {
   return motion_[bone].matrix(load);
 }
 
-double PrescribedMotion::largest_travel(const Model& model) const {
+double PrescribedMotion::largest_travel(const Model& model, std::span<const Beside> beside) const {
   std::vector<std::array<Mat4, parts + 1>> stations(motion_.size());
   for (std::size_t b = 0; b < motion_.size(); ++b)
     for (int part = 0; part <= parts; ++part)
@@ -105,6 +105,8 @@ double PrescribedMotion::largest_travel(const Model& model) const {
                             : (points.target[i] - points.position[i]).norm();
     largest = std::max(largest, path);
   }
+  for (const auto& [bone, point] : beside)
+    largest = std::max(largest, path_length(stations[bone], points.position[point]));
   return largest;
 }
 

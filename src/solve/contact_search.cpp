@@ -66,6 +66,8 @@ Outcome ContactSearch::stopped(Vec displacement, Outcome outcome) {
   outcome.converged = false;
   outcome.stopped = true;
   outcome.reason = stopped_reason;
+  outcome.stable = !programs_.reduced();
+  outcome.displacement_error = std::numeric_limits<double>::infinity();
   outcome.objective = programs_.evaluate(displacement);
   outcome.gradient_max = programs_.largest_force();
   return outcome;
@@ -82,17 +84,29 @@ bool ContactSearch::leave_lower_saddle(Vec displacement, double& latest) {
   return leave_saddle(objective_, solver_, displacement);
 }
 
+/// Searches for another rest position where one at load 1 is found. Collective.
+Outcome ContactSearch::with_other(Vec displacement, double accuracy, Outcome outcome) {
+  outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
+                                            objective_.contact().bodies().count_released());
+  if (finds_other_ && outcome.converged && outcome.overlapped == 0 &&
+      objective_.positions().load() == 1)
+    other_.find(displacement, accuracy, outcome);
+  return outcome;
+}
+
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
+  other_.begin(displacement);
+  Outcome outcome;
+  if (!std::exchange(predicted_, false)) outcome = descent_.finish(displacement, accuracy);
+  if (!outcome.converged) outcome = search(displacement, accuracy);
+  return with_other(displacement, accuracy, std::move(outcome));
+}
+
+/// Searches through rounded bodies. Collective.
+Outcome ContactSearch::search(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
   constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
   Outcome outcome;
-  if (!predicted_) {
-    outcome = descent_.finish(displacement, accuracy);
-    if (outcome.converged) return outcome;
-  }
-  const bool may_have_other =
-      std::exchange(predicted_, false) && finds_other_ && objective_.positions().load() == 1;
-  other_.begin(displacement);
   int times = 1;  // stiffness of the penalty
   descent_.stiffen(times);
   int64_t iterations = 0;
@@ -136,16 +150,13 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason =
         fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());
-  outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
-                                            objective_.contact().bodies().count_released());
-  if (outcome.converged && outcome.overlapped == 0 && may_have_other)
-    other_.find(displacement, accuracy, outcome);
   return outcome;
 }
 
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   const base::VecHandle guess = objective_.positions().make_vector();
   check(VecCopy(displacement, guess));
+  other_.begin(displacement);
   objective_.contact().bodies().restore_released();
   descent_.stiffen(1);
   int64_t iterations = 0;
@@ -154,7 +165,7 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   if (end == End::reached) {
     Outcome outcome = descent_.finish_reached(displacement, accuracy, iterations);
     outcome.iterations += iterations;
-    if (outcome.converged) return outcome;
+    if (outcome.converged) return with_other(displacement, accuracy, std::move(outcome));
   }
   penalty_.set_multipliers({});
   check(VecCopy(guess, displacement));

@@ -160,7 +160,8 @@ bool LoadPath::follows(const Attempt& now, const std::optional<Attempt>& coarser
 void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   const Stopwatch watch;
   objective_.positions().set_load(result_.load);
-  result_.last = search_.run(displacement, settings_.accuracy);
+  result_.last = settings_.start_load > 0 ? search_.run_near(displacement, settings_.accuracy)
+                                          : search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   require_value(result_.last, result_.load);
   refuse_overlap();

@@ -77,6 +77,16 @@ def test_any_minimizer_ends_at_the_position_of_less_energy_and_reports_the_other
         assert distance == pytest.approx(0.27, abs=0.05)
 
 
+@pytest.mark.parametrize("options", [(), ("-skip_other_rest",)])
+def test_a_restart_that_refines_a_result_stays_at_its_rest_position(folder, environment, options):
+    run = runner(folder, environment)
+    assert run("repose-solve", "head_le_fort.yaml", "-output", "rough").returncode == 0
+    done = run("repose-solve", "head_le_fort.yaml", "-restart", "rough.h5", "-accuracy", 0.001, "-output", "fine",
+               *options)
+    assert (done.returncode, done.stderr) == (0, ""), done
+    assert last(folder / "fine.h5")["objective"] == pytest.approx(13.3233, abs=5e-4)
+
+
 def test_requested_load_steps_change_no_bit_of_the_face(folder, environment):
     run = runner(folder, environment)
     faces = []

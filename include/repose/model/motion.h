@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "repose/model/model.h"
@@ -27,8 +28,14 @@ class PrescribedMotion {
   /// Returns whether the points of a bone move on straight lines because no rigid motion takes them
   /// to their targets.
   bool straight(int32_t bone) const { return straight_[bone]; }
-  /// Largest path length of any point between load 0 and 1, mm (chord of the screw over 16 parts).
-  double largest_travel(const Model& model) const;
+  /// A bone and a row of a point.
+  struct Beside {
+    int32_t bone;
+    int64_t point;
+  };
+  /// Largest path length between load 0 and 1, mm (chord of the screw over 16 parts), of any point
+  /// that is not unknown and of any place of a bone where it has a point beside it.
+  double largest_travel(const Model& model, std::span<const Beside> beside = {}) const;
 
  private:
   bool follows_screw(const Model& model, int64_t row) const;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -109,6 +110,7 @@ TEST(PrescribedMotion, OtherPointsStayOrGoStraight) {
 // A point at distance r from the axis of a turn by θ travels the arc r θ; 16 chords of it are
 // r · 32 sin(θ / 32).
 TEST(PrescribedMotion, LargestTravelIsAlongTheArc) {
+  using Beside = PrescribedMotion::Beside;
   Model model =
       with_targets({{10, 0, 0}, {20, 0, 0}, {0, 5, 3}}, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}});
   model.bone_transform = {scene::RigidMotion::rotation({0, 0, 1}, {0, 0, 0}, 180).matrix()};
@@ -116,8 +118,10 @@ TEST(PrescribedMotion, LargestTravelIsAlongTheArc) {
               20 * 32 * std::sin(std::numbers::pi / 32), 1e-10);
   add_point(model, PointSet::held, -1, {0, 0, 0}, {0, 100, 0});
   EXPECT_NEAR(PrescribedMotion(model).largest_travel(model), 100, 1e-12);
-  add_point(model, PointSet::soft_tissue, -1, {0, 0, 0}, {0, 500, 0});
+  add_point(model, PointSet::soft_tissue, -1, {40, 0, 0}, {0, 500, 0});
   EXPECT_NEAR(PrescribedMotion(model).largest_travel(model), 100, 1e-12);
+  EXPECT_NEAR(PrescribedMotion(model).largest_travel(model, std::array{Beside{0, 4}}),
+              40 * 32 * std::sin(std::numbers::pi / 32), 1e-10);
 }
 
 TEST(PrescribedMotion, NothingPrescribedTravelsNowhere) {
