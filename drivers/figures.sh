@@ -15,14 +15,14 @@ cd "${2:-figures}"
 
 solve() { "$bin/repose-solve" "$1" -output "$2" >"$2.log"; }
 render() {
-  "$project/drivers/render.py" "$1" -output "$2.png" -views three-quarter "${@:3}"
+  "$project/drivers/render.py" "$1" -output "$2.png" -views "$3" "${@:4}"
 }
 
-solve "$project/meshes/head_split.yaml" split && render split fig6_split
-solve "$project/meshes/head_jaw_advance.yaml" advance && render advance fig7_jaw_forward
-solve "$project/meshes/head_genioplasty.yaml" chin && render chin fig7_chin_forward
+solve "$project/meshes/head_split.yaml" split && render split fig6_split three-quarter
+solve "$project/meshes/head_jaw_advance.yaml" advance && render advance fig7_jaw_forward three-quarter
+solve "$project/meshes/head_genioplasty.yaml" chin && render chin fig7_chin_forward three-quarter
 solve "$project/meshes/head_instrument.yaml" instrument
-render instrument fig8_instrument -scene "$project/meshes/head_instrument.yaml"
+render instrument fig8_instrument three-quarter-left -scene "$project/meshes/head_instrument.yaml"
 for turgor in 02 05 10 20; do
   sed -E "s|turgor: [0-9.]+|turgor: 0.$turgor|; s|: head_|: $project/meshes/head_|" \
     "$project/meshes/head_springs_incision.yaml" >"turgor_$turgor.yaml"

@@ -19,6 +19,7 @@ a way to see it:
 -solved_skin shows the skin that was solved, where that is a remeshed part of the scene's.
 -film draws the columns along the load steps, between which it moves evenly, into an animated GIF.
 -scene shows the instruments of the scene, which the result does not hold; it needs PyYAML.
+-views takes three-quarter-left, too, which shows the patient's left side.
 Needs VTK and h5py, and no display: pip install vtk h5py, with apt-get install libegl1
 libgl1-mesa-dri; or, without pip, apt-get install --no-install-recommends python3-paraview
 python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
@@ -38,7 +39,8 @@ if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_scr
 
 # Where the camera stands as seen from the head: +x patient left, +y posterior, +z up. A profile
 # looks to the right.
-VIEWS = {"front": (0, -1, 0), "three-quarter": (-0.65, -0.75, 0.1), "profile": (-1, 0, 0)}
+VIEWS = {"front": (0, -1, 0), "three-quarter": (-0.65, -0.75, 0.1), "profile": (-1, 0, 0),
+         "three-quarter-left": (0.65, -0.75, 0.1)}
 COLORED = ("movement", "advance", "stress", "region")
 COLUMNS = ("before", "after", *COLORED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
@@ -74,7 +76,7 @@ def arguments():
     parser.add_argument("name")
     parser.add_argument("other", nargs="?")
     parser.add_argument("-output")
-    parser.add_argument("-views", default=",".join(VIEWS))
+    parser.add_argument("-views", default="front,three-quarter,profile")
     parser.add_argument("-columns", default="before,after,movement,bones")
     parser.add_argument("-step", default="last")
     parser.add_argument("-film")
@@ -570,10 +572,18 @@ def scales(drawn):
     return {column: colors(column, np.concatenate(values)) for column, values in numbers.items()}
 
 
+def instrument_points(result):
+    """Points of each instrument before and after its push."""
+    shapes = [(vtk_to_numpy(shape.GetPoints().GetData()), push)
+              for shape, push in result.instruments]
+    return [points + share * push for points, push in shapes for share in (0, 1)]
+
+
 def picture(drawn, views, tables, title=""):
-    """A sheet of one row a view, cropped to the skin, and one column a panel."""
+    """A sheet of one row a view, cropped to skin and instruments, and one column a panel."""
     margin, wide, result = 1.05, COLUMN, drawn[0].result
-    frames = [extent(np.concatenate([result.before, result.skin(-1)]), view) for view in views]
+    shown = np.concatenate([result.before, result.skin(-1), *instrument_points(result)])
+    frames = [extent(shown, view) for view in views]
     scale = wide / (2 * margin * max(across for _, across, _ in frames))  # pixels per mm
     rows = [2 * margin * up * scale for _, _, up in frames]
     bars = BAR if tables else 0
