@@ -51,7 +51,7 @@ def without_contact(scene, poisson):
 def rows_of(scene, poisson, chosen):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        for file in scene.parent.glob("*.ply"):
+        for file in (*scene.parent.glob("*.ply"), *scene.parent.glob("*_landmarks.json")):
             (folder / file.name).symlink_to(file.resolve())
         (folder / "scene.yaml").write_text(without_contact(scene, poisson))
         solve = [chosen.bin / "repose-solve"]
