@@ -64,7 +64,7 @@ def rows_of(scene, poisson, chosen):
                           *WAYS[way]], folder)
             here, counted = last(folder / "out.h5"), events(folder / "log")
             first = (solved.seconds, here) if first is None else first
-            message = f"{apart(first[1], here):.1g}" if solved.status == 0 else "time was up"
+            message = f"{apart(first[1], here):.1g}" if solved.status == 0 else "not converged"
             products, made, applied = (counted.get(event, (0,))[0]
                                        for event in ("RpHessianAction", "PCRenew", "PCApply"))
             yield (f"| {unknowns} | {poisson} | {way} | {solved.evaluations[0]} | "
