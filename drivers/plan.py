@@ -9,9 +9,9 @@ VOLUME is a CT or a segmentation of 3D Slicer (.seg.nrrd), whose segments' names
 skull, maxilla and mandible; LABELS a label map or segmentation of the bones of a CT. Without it skull
 and jaw are taken apart where they touch least. Writes into the folder plan: surfaces, landmarks,
 scene.yaml to edit, pictures of both (landmarks.svg, proposal.png), and the solved face with a picture
-and its planning sheet (face.html). Operations: Le Fort I, sagittal split, genioplasty, jaw; each with
-movements in mm (forward, back, up, down, left, right) and degrees (open, close, yaw, roll), along the axes
-of the head, whatever those of the scan (docs/guide/anatomy.md).
+and its planning sheet (face.html). Operations: Le Fort I, sagittal split, genioplasty, jaw, or several of
+them; each with movements in mm (forward, back, up, down, left, right) and degrees (open, close, yaw, roll,
+pitch), along the axes of the head, whatever those of the scan (docs/guide/anatomy.md).
 
   -level HU    of the skin in a CT (-300)
   -apart SKULL JAW    points in the two bones of a CT without LABELS, in the place of those that are
@@ -37,21 +37,21 @@ except ImportError as missing:
     sys.exit(f"plan.py: {missing.name} is missing: apt-get install python3-numpy")
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from planning.operation import NotUnderstood, read_operations, summarize  # noqa: E402
+
 TEETH = r"(teeth|tooth|dent)"
 ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
          "maxilla": r"maxill|upper.?jaw", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
 OUTSIDE = r"table|head.?rest|background|^air$"
-# Words of an operation → bone, piece that is cut from it, and template; the first that is found.
-OPERATIONS = {r"le ?fort|maxill": ("skull", "maxilla", "le_fort_1"),
-              r"genio|chin": ("mandible", "chin", "genioplasty"),
-              r"split|bsso": ("mandible", "jaw", "sagittal_split"),
-              r"jaw|mandib|open": ("mandible", None, None)}
+# Operation → bone, piece that is cut from it, and template.
+OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
+               "sagittal split": ("mandible", "jaw", "sagittal_split"),
+               "jaw": ("mandible", None, None),
+               "genioplasty": ("mandible", "chin", "genioplasty")}
 CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
-# Word of a movement → key of a clinical move, and its sign.
-MOVES = {"forward": ("advance", 1), "advance": ("advance", 1), "back": ("set_back", 1), "setback": ("set_back", 1),
-         "up": ("impaction", 1), "impact": ("impaction", 1), "down": ("lower", 1), "left": ("left", 1),
-         "right": ("left", -1), "open": ("open", 1), "close": ("open", -1), "yaw": ("yaw", 1), "roll": ("roll", 1)}
+PROPOSED = "Proposed by drivers/plan.py"
 # Template → back and up of the head in each direction in which its piece moves towards what it is cut from.
 INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
 
@@ -191,28 +191,12 @@ def extract_bones(volume, options, folder):
     (folder / "bone_2.ply").rename(folder / "mandible.ply")
 
 
-def movements(text):
-    """(number, word) of each movement in the text, in its order."""
-    known = "|".join(MOVES)
-    before = rf"({known})\w*\D{{0,20}}?([\d.]+)\s*(?:mm|°|deg\w*)"
-    after = rf"([\d.]+)\s*(?:mm|°|deg\w*)?\s*(?:of |to the )?({known})"
-    text = text.lower().replace("-", "")
-    found = [(float(n), word) for n, word in re.findall(after, text)]
-    return found or [(float(n), word) for word, n in re.findall(before, text)]
-
-
-def read_operation(text):
-    """Bone, piece, template and clinical move {key: mm or degrees} of the operation that a text names."""
-    named = [operation for words, operation in OPERATIONS.items() if re.search(words, text.lower())]
-    if not named:
-        refuse(f"-operation {text!r}: name Le Fort I, sagittal split, genioplasty or jaw")
-    move = {}
-    for number, word in movements(text):
-        key, sign = MOVES[word]
-        move[key] = move.get(key, 0) + sign * number
-    if not move:
-        refuse(f"-operation {text!r}: give a movement, such as 5 mm forward or 8 degrees open")
-    return *named[0], move
+def read_or_refuse(text):
+    """Returns the operations that a text names."""
+    try:
+        return read_operations(text)
+    except NotUnderstood as reason:
+        refuse(f"-operation {text!r}: {reason}")
 
 
 def kerf_of(template, move):
@@ -223,21 +207,44 @@ def kerf_of(template, move):
     return min(20, max([0.5, *(way + 1 for way in inwards)]))
 
 
-def scene_text(options, bones):
-    bone, piece, template, move = read_operation(options.operation)
-    lines = [f"# {options.operation}. Proposed by drivers/plan.py: check landmarks.svg and proposal.png. After an edit:",
+def format_move(bones, move, pivot):
+    """Returns an entry of a scene's moves; the pivot only matters to rotations, None is the default."""
+    clinical = [f"{key}: {number:g}" for key, number in move.items()]
+    if pivot and move.keys() & {"yaw", "roll", "pitch"}:
+        clinical.append(f"pivot: {pivot}")
+    return f"  - {{bone: {bones}, clinical: {{{', '.join(clinical)}}}}}"
+
+
+def format_cuts_and_moves(operations, bones):
+    """Returns the lines of a scene's osteotomies and of its moves. A chin goes with the jaw that it is cut from."""
+    named = {operation.name for operation in operations}
+    jaw = "jaw" if "sagittal split" in named else "mandible"
+    cuts, moves = [], []
+    for name, move in operations:
+        bone, piece, template = OSTEOTOMIES[name]
+        moving = piece or bone
+        if template and piece not in bones:  # a segmented piece needs no cut
+            cuts.append(f"  - {{bone: {jaw if piece == 'chin' else bone}, piece: {piece}, template: {template}, "
+                        f"kerf: {kerf_of(template, move):.3g}}}")
+        if moving == jaw and "genioplasty" in named:
+            moves.append(format_move(f"[{jaw}, chin]", move, "lower_incisor_edge"))
+        else:
+            moves.append(format_move(moving, move, "upper_incisor_edge" if piece in bones else None))
+    return cuts, moves
+
+
+def scene_text(operations, edge, bones):
+    lines = [f"# {summarize(operations)}.", f"# {PROPOSED}: check landmarks.svg and proposal.png. After an edit:",
              "# repose-solve scene.yaml. Moves are in mm and degrees along the axes of the head.",
              "skin: skin.ply", "bones:"]
     lines += [f"  - {{name: {name}, file: {name}.ply}}" for name in bones]
-    lines += [f"tissue: {{layers: 4, edge: {options.edge:g}}}",
+    lines += [f"tissue: {{layers: 4, edge: {edge:g}}}",
               "anatomy: {landmarks: landmarks.mrk.json}   # lips are parted, and free of the teeth"]
-    if template and piece not in bones:  # a segmented piece needs no cut
-        lines += [f"osteotomies:   # kerf: mm, the saw{' and bone taken out' if template in INWARDS else ''}",
-                  f"  - {{bone: {bone}, piece: {piece}, template: {template}, kerf: {kerf_of(template, move):.3g}}}"]
-    clinical = [f"{key}: {number:g}" for key, number in move.items()]
-    if piece == "maxilla" and piece in bones and move.keys() & {"yaw", "roll"}:
-        clinical.append("pivot: upper_incisor_edge")
-    return "\n".join([*lines, "moves:", f"  - {{bone: {piece or bone}, clinical: {{{', '.join(clinical)}}}}}"]) + "\n"
+    cuts, moves = format_cuts_and_moves(operations, bones)
+    if cuts:
+        taken_out = any(OSTEOTOMIES[operation.name][2] in INWARDS for operation in operations)
+        lines += [f"osteotomies:   # kerf: mm, the saw{' and bone taken out' if taken_out else ''}", *cuts]
+    return "\n".join([*lines, "moves:", *moves]) + "\n"
 
 
 def arguments():
@@ -271,7 +278,8 @@ def main():
         if not file.exists():
             refuse(f"{file}: no such file or folder")
     alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
-    read_operation(options.operation)
+    operations = read_or_refuse(options.operation)
+    print(f"understood: {summarize(operations)}", flush=True)
     folder.mkdir(parents=True, exist_ok=True)
     segmented = volume.name.endswith(".seg.nrrd")
     if alone:
@@ -288,7 +296,7 @@ def main():
         folder / "mandible.ply", "-output", folder / "landmarks")
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
-    scene.write_text(scene_text(options, bones))
+    scene.write_text(scene_text(operations, options.edge, bones))
     if options.propose:
         run(program("repose-solve"), scene, "-dry_run")
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")

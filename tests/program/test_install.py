@@ -44,8 +44,8 @@ def test_everything_is_there(prefix):
     for header in headers.rglob("*.h"):
         assert (prefix / "include" / header.relative_to(headers)).is_file()
     shared = prefix / "share/repose"
-    for name in ("report.py", "sheet/page.py", "web/viewer.js", "live.py", "map.py", "render.py",
-                 "repose.slurm", "slicer/ReposeLive.py", "slicer/Repose.xml", f"meshes/{SCENE}"):
+    for name in ("report.py", "sheet/page.py", "planning/operation.py", "web/viewer.js", "live.py", "map.py",
+                 "render.py", "repose.slurm", "slicer/ReposeLive.py", "slicer/Repose.xml", f"meshes/{SCENE}"):
         assert (shared / name).is_file(), name
     assert os.access(shared / "slicer/Repose", os.X_OK) and os.access(shared / "report.py", os.X_OK)
 
