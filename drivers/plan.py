@@ -28,6 +28,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import time
 import zlib
 
@@ -52,6 +53,11 @@ OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
 CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
 PROPOSED = "Proposed by drivers/plan.py"
+# Files of a run in its folder, which the next run removes.
+WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "mandible.ply", "bone_1.ply", "bone_2.ply", "bone_1.mrk.json",
+           "bone_2.mrk.json", "landmarks.mrk.json", "landmarks.svg", "scene.yaml", "proposal.png", "face.h5",
+           "face_skin.xdmf", "face_tissue.xdmf", "face_bones.xdmf", "face_blocks.xdmf", "face_given_skin.vtp",
+           "face.png", "face.html")
 # Template → back and up of the head in each direction in which its piece moves towards what it is cut from.
 INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
 
@@ -155,22 +161,38 @@ def bounds(file):
     return points.min(0), points.max(0), points
 
 
-def extract_labels(labels, folder):
-    """A mesh of each label; without names the largest is the skull, and that before and below its
+def begin_run(folder, operations, inputs):
+    """Makes the folder of a run, without the files that an earlier run wrote into it, except inputs of this one.
+    Refuses files of these names in a folder without a scene of this program."""
+    scene, inputs = folder / "scene.yaml", {file.resolve() for file in inputs}
+    old = [file for file in (folder / name for name in WRITTEN) if file.exists() and file.resolve() not in inputs]
+    if old and not (scene.is_file() and PROPOSED in scene.read_text(errors="replace")):
+        refuse(f"{old[0]} exists, and {scene} was not written by this program: give another folder by -output")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        refuse(f"{folder}: {reason.strerror}")
+    for file in old:
+        file.unlink()
+    if old:
+        print(f"removed from {folder}: {len(old)} files of an earlier run", flush=True)
+    scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, whose run has not ended.\n")
+
+
+def extract_labels(labels, folder, work):
+    """Writes a mesh of each bone; without names the largest label is the skull, and that before and below its
     middle the mandible."""
     if labels.name.endswith(".seg.nrrd"):
         segmentation = Segmentation(labels)
-        map_file = folder / "segment.nrrd"
+        map_file = work / "segment.nrrd"
         for role, names in segmentation.roles().items():
             print(f"{role}: {', '.join(names)}", flush=True)
             segmentation.write(names, map_file)
             run(program("repose-isosurface"), map_file, "-label", 1, "-largest", "-voxel", 2, "-output",
                 folder / f"{role}.ply")
-        map_file.unlink(missing_ok=True)
         return
-    run(program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output",
-        folder / "label.ply")
-    meshes = {file: bounds(file) for file in folder.glob("label_*.ply")}
+    run(program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output", work / "label.ply")
+    meshes = {file: bounds(file) for file in work.glob("label_*.ply")}
     size = {file: (high - low).prod() for file, (low, high, _) in meshes.items()}
     skull = max(size, key=size.get)
     middle = (meshes[skull][0] + meshes[skull][1]) / 2
@@ -280,12 +302,13 @@ def main():
     alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)
-    folder.mkdir(parents=True, exist_ok=True)
+    begin_run(folder, operations, [*options.volumes, *(options.apart or [])])
     segmented = volume.name.endswith(".seg.nrrd")
     if alone:
         extract_bones(volume, options, folder)
     else:
-        extract_labels(labels, folder)
+        with tempfile.TemporaryDirectory(prefix="labels_", dir=folder) as work:
+            extract_labels(labels, folder, pathlib.Path(work))
     if not segmented:
         run(program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
             "-largest", "-output", folder / "skin.ply")

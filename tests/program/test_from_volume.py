@@ -196,6 +196,44 @@ def test_what_cannot_be_planned_is_refused_in_one_line(tmp_path, environment, ar
     assert not (tmp_path / "plan").exists()
 
 
+@pytest.fixture
+def rerun(tmp_path, environment):
+    """rerun(scene, *options) → (result, names in the folder) of a run whose first program fails, in a folder with the
+    files of an earlier run and others."""
+    program = tmp_path / "bin/repose-isosurface"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\nexit 1\n")
+    program.chmod(0o755)
+    (tmp_path / "plan").mkdir()
+    for name in (*plan.WRITTEN, "notes.txt", "label_3.ply"):
+        (tmp_path / "plan" / name).write_text(name)
+    (tmp_path / "ct.mhd").touch()
+
+    def run(scene, *options):
+        (tmp_path / "plan/scene.yaml").write_text(scene)
+        result = finish([SCRIPT, "ct.mhd", "-operation", "jaw, 5 mm forward", *options], tmp_path,
+                        environment | {"REPOSE_BUILD": str(tmp_path)}, 60)
+        assert result.returncode == 1 and result.stderr.count("\n") == 1, result
+        return result, {path.name for path in (tmp_path / "plan").iterdir()}
+    return run
+
+
+@pytest.mark.parametrize("options, kept", [
+    ([], set()), (["-apart", "plan/bone_1.mrk.json", "plan/bone_2.mrk.json"], {"bone_1.mrk.json", "bone_2.mrk.json"})])
+def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept):
+    result, names = rerun(scene_of("Le Fort I, 5 mm forward"), *options)
+    assert "repose-isosurface ended" in result.stderr and "of an earlier run" in result.stdout
+    assert names == {"scene.yaml", "notes.txt", "label_3.ply"} | kept
+    result, names = rerun("# " + plan.PROPOSED)
+    assert names == {"scene.yaml", "notes.txt", "label_3.ply"}, "a run that failed is no obstacle"
+
+
+def test_files_of_others_are_not_removed(rerun):
+    result, names = rerun("skin: skin.ply\n")
+    assert "scene.yaml was not written by this program" in result.stderr
+    assert names == {*plan.WRITTEN, "notes.txt", "label_3.ply"}
+
+
 ORIGIN, SPACING, SIZE = (-80.0, -122.0, -76.0), 2.0, (81, 118, 104)
 
 
@@ -263,6 +301,7 @@ def propose(folder, environment, *arguments):
     if can_draw():
         assert (folder / "plan/proposal.png").stat().st_size > 50000, result.stdout
         assert "plan/proposal.png" in result.stdout
+    assert {path.name for path in (folder / "plan").iterdir()} < set(plan.WRITTEN)
     solved = runner(folder, environment)("repose-solve", "plan/scene.yaml", "-dry_run", "-output", "plan/model")
     assert (solved.returncode, solved.stderr) == (0, ""), solved
     assert "  warning" not in solved.stdout
@@ -325,6 +364,7 @@ def test_a_face_is_solved_with_its_planning_sheet(parts, tmp_path, environment):
                      "-ranks", "1"], tmp_path, environment | {"REPOSE_BUILD": "build"}, 240)
     assert (result.returncode, result.stderr) == (0, ""), result
     assert "plan/face.html" in result.stdout
+    assert {path.name for path in (tmp_path / "plan").iterdir()} < set(plan.WRITTEN)
     assert last(tmp_path / "plan/face.h5")["converged"] == 1
     sheet = (tmp_path / "plan/face.html").read_text()
     assert "Not all landmarks were given" not in sheet
