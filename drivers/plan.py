@@ -161,6 +161,9 @@ def bounds(file):
     return points.min(0), points.max(0), points
 
 
+EDITED = ("scene.yaml", "landmarks.mrk.json")  # by people: the next run renames them
+
+
 def begin_run(folder, operations, inputs):
     """Makes the folder of a run, without the files that an earlier run wrote into it, except inputs of this one.
     Refuses files of these names in a folder without a scene of this program."""
@@ -173,9 +176,13 @@ def begin_run(folder, operations, inputs):
     except OSError as reason:
         refuse(f"{folder}: {reason.strerror}")
     for file in old:
-        file.unlink()
+        if file.name in EDITED:
+            file.replace(file.with_name(f"old_{file.name}"))
+        else:
+            file.unlink()
     if old:
-        print(f"removed from {folder}: {len(old)} files of an earlier run", flush=True)
+        print(f"removed from {folder}: files of an earlier run; {' and '.join(EDITED)} are renamed to old_…",
+              flush=True)
     scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, whose run has not ended.\n")
 
 

@@ -220,12 +220,14 @@ def rerun(tmp_path, environment):
 
 @pytest.mark.parametrize("options, kept", [
     ([], set()), (["-apart", "plan/bone_1.mrk.json", "plan/bone_2.mrk.json"], {"bone_1.mrk.json", "bone_2.mrk.json"})])
-def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept):
+def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept, tmp_path):
     result, names = rerun(scene_of("Le Fort I, 5 mm forward"), *options)
     assert "repose-isosurface ended" in result.stderr and "of an earlier run" in result.stdout
-    assert names == {"scene.yaml", "notes.txt", "label_3.ply"} | kept
+    assert names == {"scene.yaml", "old_scene.yaml", "old_landmarks.mrk.json", "notes.txt", "label_3.ply"} | kept
+    assert scene_of("Le Fort I, 5 mm forward") in (tmp_path / "plan/old_scene.yaml").read_text(), "edits are kept"
     result, names = rerun("# " + plan.PROPOSED)
-    assert names == {"scene.yaml", "notes.txt", "label_3.ply"}, "a run that failed is no obstacle"
+    assert names == {"scene.yaml", "old_scene.yaml", "old_landmarks.mrk.json", "notes.txt", "label_3.ply"}, (
+        "a run that failed is no obstacle")
 
 
 def test_files_of_others_are_not_removed(rerun):
