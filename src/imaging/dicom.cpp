@@ -136,7 +136,7 @@ Volume read_dicom(const std::filesystem::path& folder, const Watch& watch) {
     volume.axes.col(2) = common_step(slices);
   }
   for (int64_t s = 0; s < count; ++s) {
-    check_stored_bytes(slices[s].file, ImageFormat::dicom, slices[s].header.bytes);
+    check_stored_bytes(slices[s].file, ImageFormat::dicom, slices[s].header);
     const auto values = read_image(slices[s].file, ImageFormat::dicom).values;
     volume.values.insert(volume.values.end(), values.begin(), values.end());
     if (watch) watch(static_cast<double>(s + 1) / static_cast<double>(count));

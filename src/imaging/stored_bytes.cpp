@@ -7,10 +7,10 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
-#include <regex>
 #include <string>
 #include <vector>
 
+#include "meta_image.h"
 #include "repose/base/error.h"
 #include "repose/base/text.h"
 
@@ -23,74 +23,6 @@ constexpr float farthest = 1e7f;       // mm, whose squares ITK can add up
 constexpr std::string_view implicit_little_endian = "1.2.840.10008.1.2",
                            explicit_little_endian = "1.2.840.10008.1.2.1",
                            explicit_big_endian = "1.2.840.10008.1.2.2";
-
-/// Returns the number of bytes in a zlib or gzip stream, or several in a row, from `offset` on; of
-/// a damaged one those before the damage.
-int64_t unpacked_bytes(const std::filesystem::path& file, int64_t offset) {
-  constexpr int any_header = 47;  // zlib's code for: zlib or gzip, found out
-  std::ifstream in(file, std::ios::binary);
-  in.seekg(offset);
-  std::vector<char> packed(1 << 16), unpacked(1 << 18);
-  z_stream stream{};
-  if (inflateInit2(&stream, any_header) != Z_OK) throw base::InternalError("zlib does not start");
-  int64_t total = 0;
-  int status = Z_OK;
-  while (status == Z_OK || status == Z_STREAM_END) {
-    if (stream.avail_in == 0) {
-      in.read(packed.data(), static_cast<std::streamsize>(packed.size()));
-      stream.next_in = reinterpret_cast<Bytef*>(packed.data());
-      stream.avail_in = static_cast<uInt>(in.gcount());
-      if (stream.avail_in == 0) break;
-    }
-    if (status == Z_STREAM_END) inflateReset(&stream);
-    stream.next_out = reinterpret_cast<Bytef*>(unpacked.data());
-    stream.avail_out = static_cast<uInt>(unpacked.size());
-    status = inflate(&stream, Z_NO_FLUSH);
-    total += static_cast<int64_t>(unpacked.size() - stream.avail_out);
-    if (status == Z_BUF_ERROR) status = Z_OK;
-  }
-  inflateEnd(&stream);
-  return total;
-}
-
-int64_t size_of(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  return error ? 0 : static_cast<int64_t>(size);
-}
-
-/// Location of the voxels stated by a MetaImage header.
-struct MetaHeader {
-  std::string data;  ///< LOCAL, or a file's name
-  bool compressed = false;
-  int64_t bytes = 0;  ///< of the header, up to the voxels
-};
-
-MetaHeader meta_header(const std::filesystem::path& file) {
-  MetaHeader header;
-  std::ifstream in(file, std::ios::binary);
-  for (std::string line; header.data.empty() && std::getline(in, line);) {
-    const auto found = base::words(line);
-    if (found.size() < 3 || found[1] != "=") continue;
-    if (found[0] == "CompressedData") header.compressed = base::lower(found[2]) == "true";
-    if (found[0] == "ElementDataFile") header.data = found[2];
-  }
-  header.bytes = in.tellg();
-  return header;
-}
-
-/// The bytes of voxels in a MetaImage; −1 where they lie in several files.
-int64_t meta_bytes(const std::filesystem::path& file) {
-  const MetaHeader header = meta_header(file);
-  const bool local = base::lower(header.data) == "local";
-  const auto data = local ? file : file.parent_path() / header.data;
-  if (header.data.find('%') != std::string::npos || header.data == "LIST") return -1;
-  if (!local && size_of(data) == 0)
-    base::refuse("{}: its voxels should be in {}, which is missing or empty; copy that file, too",
-                 file.string(), data.string());
-  const int64_t offset = local ? header.bytes : 0;
-  return header.compressed ? unpacked_bytes(data, offset) : size_of(data) - offset;
-}
 
 /// A DICOM file's transfer syntax, the element (0002, 0010); empty where it is not found.
 std::string transfer_syntax(const std::filesystem::path& file) {
@@ -141,48 +73,52 @@ DicomElement next_element(std::ifstream& in, bool implicit) {
 }
 
 int64_t stored_bytes(const std::filesystem::path& file, ImageFormat format) {
-  if (format == ImageFormat::meta) return meta_bytes(file);
   if (format == ImageFormat::nrrd) return -1;
-  if (format == ImageFormat::dicom) return is_packed_dicom(file) ? -1 : size_of(file);
+  if (format == ImageFormat::dicom) return is_packed_dicom(file) ? -1 : file_bytes(file);
   const bool packed = base::lower(file.extension().string()) == ".gz";
-  const int64_t all = packed ? unpacked_bytes(file, 0) : size_of(file);
+  const int64_t all = packed ? unpacked_bytes(file, 0) : file_bytes(file);
   return all - nifti_header;
-}
-
-/// The values of a key in a MetaImage's header. ITK takes ':' for '=', several of them for one, and
-/// reads on behind a data file's name.
-std::vector<std::string> meta_values(const std::string& header, std::string_view key) {
-  std::vector<std::string> values;
-  for (size_t at = header.find(key); at != std::string::npos; at = header.find(key, at + 1)) {
-    const std::string text = header.substr(at + key.size(), 1000);
-    const std::string line = text.substr(0, text.find('\n'));
-    values.push_back(line.substr(std::min(line.find_first_not_of(" \t:="), line.size())));
-  }
-  return values;
-}
-
-void check_dimensions(const std::filesystem::path& file, const std::string& value) {
-  constexpr int64_t maximum = 10;
-  const auto words = base::words(value);
-  const auto number = words.size() == 1 ? base::parse_integer(words[0]) : std::nullopt;
-  if (!number || *number < 1 || *number > maximum)
-    base::refuse("{}: its NDims is {}, not 1 to {}; mend the header", file.string(),
-                 base::quote(value), maximum);
-}
-
-/// ITK formats the name with sprintf, into a buffer of fixed size, for each of several files.
-void check_data_file(const std::filesystem::path& file, const std::string& value) {
-  static const std::regex one_number("[^%]{0,200}%[0-9]{0,2}d[^%]{0,200}");
-  if (value.find('%') != std::string::npos && !std::regex_match(value, one_number))
-    base::refuse(
-        "{}: its ElementDataFile is {}; a name may hold one number such as %03d and no other %; "
-        "rename the data file or mend the header",
-        file.string(), base::quote(value));
 }
 
 }  // namespace
 
-void check_stored_bytes(const std::filesystem::path& file, ImageFormat format, int64_t bytes) {
+int64_t unpacked_bytes(const std::filesystem::path& file, int64_t offset) {
+  constexpr int any_header = 47;  // zlib's code for: zlib or gzip, found out
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(offset);
+  std::vector<char> packed(1 << 16), unpacked(1 << 18);
+  z_stream stream{};
+  if (inflateInit2(&stream, any_header) != Z_OK) throw base::InternalError("zlib does not start");
+  int64_t total = 0;
+  int status = Z_OK;
+  while (status == Z_OK || status == Z_STREAM_END) {
+    if (stream.avail_in == 0) {
+      in.read(packed.data(), static_cast<std::streamsize>(packed.size()));
+      stream.next_in = reinterpret_cast<Bytef*>(packed.data());
+      stream.avail_in = static_cast<uInt>(in.gcount());
+      if (stream.avail_in == 0) break;
+    }
+    if (status == Z_STREAM_END) inflateReset(&stream);
+    stream.next_out = reinterpret_cast<Bytef*>(unpacked.data());
+    stream.avail_out = static_cast<uInt>(unpacked.size());
+    status = inflate(&stream, Z_NO_FLUSH);
+    total += static_cast<int64_t>(unpacked.size() - stream.avail_out);
+    if (status == Z_BUF_ERROR) status = Z_OK;
+  }
+  inflateEnd(&stream);
+  return total;
+}
+
+int64_t file_bytes(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  return error ? 0 : static_cast<int64_t>(size);
+}
+
+void check_stored_bytes(const std::filesystem::path& file, ImageFormat format,
+                        const Image& header) {
+  const int64_t bytes = header.bytes;
+  if (format == ImageFormat::meta) return check_meta_voxels(file, header);
   const int64_t stored = stored_bytes(file, format);
   if (stored >= 0 && stored < bytes)
     base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it again",
@@ -199,7 +135,7 @@ void check_dicom_lengths(const std::filesystem::path& file) {
   const std::string syntax = transfer_syntax(file);
   const bool implicit = syntax == implicit_little_endian;
   const bool known = implicit || syntax == explicit_little_endian;
-  const int64_t size = size_of(file);
+  const int64_t size = file_bytes(file);
   for (int64_t at = preamble; at + 8 <= size;) {
     in.clear();
     in.seekg(at);
@@ -246,16 +182,6 @@ void check_nifti_header(const std::filesystem::path& file) {
       base::refuse(
           "{}: srow_{}[{}] of its orientation is {:g}, expected at most {:g} mm; mend the header",
           file.string(), "xyz"[entry / 4], entry % 4, mm, farthest);
-}
-
-void check_meta_header(const std::filesystem::path& file) {
-  std::string begin(size_t{1} << 16, '\0');
-  std::ifstream in(file, std::ios::binary);
-  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  begin.resize(static_cast<size_t>(in.gcount()));
-  for (const std::string& value : meta_values(begin, "NDims")) check_dimensions(file, value);
-  for (const std::string& value : meta_values(begin, "ElementDataFile"))
-    check_data_file(file, value);
 }
 
 }  // namespace repose::imaging

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meta_image.h"
 #include "repose/base/error.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
@@ -48,7 +49,7 @@ Volume read_file(const std::filesystem::path& file) {
                 origin_of(image),
                 {},
                 {}};
-  check_stored_bytes(file, format, image.bytes);
+  check_stored_bytes(file, format, image);
   volume.values = read_image(file, format).values;
   return volume;
 }

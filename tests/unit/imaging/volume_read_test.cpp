@@ -49,6 +49,73 @@ TEST(VolumeRead, RefusesAMetaImageWhoseDataFileIsAFormat) {
   EXPECT_EQ(volume.size, (std::array<int64_t, 3>{3, 3, 3}));
 }
 
+/// A header of 3 × 3 × 3 voxels whose data are elsewhere.
+std::string meta_beside(const std::string& data) {
+  const std::string text = meta("3", data);
+  return text.substr(0, text.find('\7'));
+}
+
+void write_slices(const test::Folder& folder, int count) {
+  for (int slice = 0; slice < count; ++slice)
+    folder.write(fmt::format("my s{}.raw", slice), std::string(2 * 3 * 3, '\7'));
+}
+
+const char *const all_listed = "LIST\nmy s0.raw\nmy s1.raw\nmy s2.raw", *const numbered =
+                                                                            "my s%d.raw 0 2 1";
+
+TEST(VolumeRead, ReadsAMetaImageOfSeveralFiles) {
+  const test::Folder folder;
+  write_slices(folder, 3);
+  for (const char* data : {all_listed, numbered, "LIST 2\nmy s2.raw\nmy s1.raw\nmy s0.raw\n"}) {
+    const Volume volume = read_volume(folder.write("a.mhd", meta_beside(data)));
+    EXPECT_EQ(volume.values, std::vector<float>(27, 0x0707)) << data;
+  }
+}
+
+TEST(VolumeRead, RefusesAMetaImageWithAMissingOrShortSlice) {
+  const test::Folder folder;
+  write_slices(folder, 2);
+  const auto refusal = [&](const std::string& data) {
+    return test::refusal([&] { read_volume(folder.write("a.mhd", meta_beside(data))); });
+  };
+  const auto says = [](const std::string& text, const std::string& words) {
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  };
+  says(refusal(numbered), "my s2.raw, which is missing");
+  says(refusal(all_listed), "my s2.raw, which is missing");
+  says(refusal("LIST\nmy s0.raw\nmy s1.raw\n"), "names 2 files, its DimSize 3");
+  says(refusal("LIST\nmy s0.raw\nmy s1.raw\nmy s1.raw\nmy s1.raw\n"), "names more than 3 files");
+  says(refusal("my s%d.raw 0 1 1"), "names 2 files, its DimSize 3");
+  says(refusal("my s%d.raw 0 8 1"), "names more than 3 files");
+  says(refusal("s%d.raw 0 2"), "the first number, the last and the step");
+  says(refusal("s%d.raw 0 2 0"), "the first number, the last and the step");
+  folder.write("my s2.raw", std::string(17, '\7'));
+  says(refusal(numbered), "truncated: 17 of the 18 bytes");
+  says(refusal(all_listed), "truncated: 17 of the 18 bytes");
+}
+
+TEST(VolumeRead, TakesTheWholeLineAsTheNameOfAMetaImagesData) {
+  const test::Folder folder;
+  folder.write("my data.raw", std::string(54, '\7'));
+  for (const char* line : {"ElementDataFile = my data.raw", "ElementDataFile=my data.raw",
+                           "ElementDataFile : my data.raw \r"}) {
+    std::string text = meta_beside("");
+    text.replace(text.find("ElementDataFile"), std::string::npos, line);
+    const Volume volume = read_volume(folder.write("a.mhd", text + "\n"));
+    EXPECT_EQ(volume.values, std::vector<float>(27, 0x0707)) << line;
+  }
+}
+
+TEST(VolumeRead, RefusesAMetaImageOfANegativeSize) {
+  const test::Folder folder;
+  std::string text = meta("3");
+  text.replace(text.find("3 3 3"), 5, "-4 3 3");
+  EXPECT_NE(test::refusal([&] {
+              read_volume(folder.write("a.mha", text));
+            }).find("its DimSize is '-4 3 3'; each number must be ≥ 1"),
+            std::string::npos);
+}
+
 TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsHugeOrNotFinite) {
   const test::Folder folder;
   const std::string sound = fuzz::niftis()[1];
