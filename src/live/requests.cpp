@@ -103,7 +103,7 @@ bool Requests::superseded(const std::function<bool(const std::string&)>& overtak
   bool superseded = false;
   if (base::rank(comm_) == 0) {
     const std::lock_guard lock(mutex_);
-    superseded = ended_ || std::ranges::any_of(lines_, overtakes);
+    superseded = std::ranges::any_of(lines_, overtakes);
   }
   base::broadcast(comm_, superseded);
   return superseded;

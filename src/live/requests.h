@@ -21,8 +21,8 @@ class Requests {
   /// The next line, the same on all ranks; nothing once the input has ended. Waits without load.
   /// Collective.
   std::optional<std::string> next();
-  /// Returns whether the input has ended or a line waits that `overtakes` the present request.
-  /// Collective.
+  /// Returns whether a line waits that `overtakes` the present request; the end of the input does
+  /// not. Collective.
   bool superseded(const std::function<bool(const std::string&)>& overtakes);
 
  private:

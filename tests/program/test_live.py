@@ -189,6 +189,16 @@ def test_malformed_lines_and_the_end_of_the_input(environment):
     assert talk(environment, b"") == (0, b"")
 
 
+def test_a_solve_is_answered_after_the_end_of_the_input(environment):
+    solve = b'{"id": 1, "do": "solve", "plan": {"chin": {"translate": [0, -2, 0]}}}\n'
+    status, message = talk(environment, solve)
+    head = json.loads(message.partition(b"\n")[0])
+    assert status == 0 and head["ok"] and head["converged"], head.get("error")
+    status, message = talk(environment, solve + b'{"id": 2, "do": "quit"}\n')
+    first, second = (json.loads(line) for line in message.splitlines())
+    assert not first["ok"] and "a later request overtook it" in first["error"] and second["ok"]
+
+
 def test_a_closed_pipe_ends_the_program(environment):
     process = subprocess.Popen([programs() / "repose-live", SCENE], stdin=subprocess.PIPE,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE,

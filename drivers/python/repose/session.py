@@ -281,6 +281,7 @@ class Session:
         process = self._process
         if process.poll() is None:
             try:
+                process.stdin.write(b'{"id": 0, "do": "quit"}\n')  # ends a solve under way
                 process.stdin.close()
                 process.wait(timeout=20)
             except (OSError, subprocess.TimeoutExpired):
