@@ -181,8 +181,19 @@ void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job
   refuse_unless(!s.tangents.pieces.empty(), "no bone moves, and the scene has no plan.pieces");
 }
 
+/// Refuses options of the volume of springs, which a solid would ignore.
+void refuse_for_solid(const base::Options& options) {
+  for (const char* name : {"bulk_modulus", "lambda"})
+    if (options.has(name))
+      base::refuse(
+          "-{} is of springs, and the tissue is a solid, which keeps its volume by "
+          "tissue.material.poisson; leave the option out",
+          name);
+}
+
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
   scene::Solve requested = job.requested;
+  if (job.local_model.part.solid) refuse_for_solid(options);
   override_by(options, requested);
   Strategy s;
   s.settings = settings_of(requested, job.local_model.part.solid);

@@ -268,7 +268,15 @@ Plan read_plan(const Value& value, const Scene& scene) {
   return plan;
 }
 
-Solve read_solve(const Value& value) {
+/// Keys of the volume of springs, which a solid would ignore.
+void refuse_for_solid(const std::optional<Value>& value) {
+  if (value)
+    value->refuse(
+        "is of tissue.springs, and the tissue is a solid, which keeps its volume by "
+        "tissue.material.poisson; remove it");
+}
+
+Solve read_solve(const Value& value, bool solid) {
   const Map map(value);
   Solve solve;
   set_choice<Functional>(solve.functional, map, "functional");
@@ -277,8 +285,11 @@ Solve read_solve(const Value& value) {
     set_choice<VolumeTerm>(solve.volume, term, "form");
     set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
     set(solve.poisson, term, "poisson", &Value::number);
+    for (const char* key : {"bulk_modulus", "poisson"})
+      if (solid) refuse_for_solid(term.find(key));
   }
   set(solve.lambda, map, "lambda", &Value::number);
+  if (solid) refuse_for_solid(map.find("lambda"));
   set(solve.accuracy, map, "accuracy", &Value::number);
   if (const auto steps = map.find("load_steps"))
     solve.load_steps = steps->is_word("auto") ? 0 : steps->integer();
@@ -383,7 +394,8 @@ Scene read_scene(const std::filesystem::path& file, const SceneChanges& changes)
   if (const auto moves = map.find("moves")) read_moves(*moves, scene.landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto plan = map.find("plan")) scene.plan = read_plan(*plan, scene);
-  if (const auto solve = map.find("solve")) scene.solve = read_solve(*solve);
+  if (const auto solve = map.find("solve"))
+    scene.solve = read_solve(*solve, scene.tissue.material.has_value());
   return scene;
 }
 

@@ -184,6 +184,10 @@ CASES = {
     "volume term of springs for a solid": (
         lambda i: i.scene("  accuracy: 0.1", "  volume: {form: penalty}"),
         ["scene.yaml: solve.volume", "tissue.springs"]),
+    "bulk modulus of springs for a solid": (
+        lambda i: i.option("-bulk_modulus", "1000"), ["-bulk_modulus is of springs", "solid"]),
+    "weight of springs' volume for a solid": (
+        lambda i: i.option("-lambda", "0.3"), ["-lambda is of springs", "solid"]),
     "force functional of a solid": (
         lambda i: i.scene("  accuracy: 0.1", "  functional: force"), ["scene.yaml", "force"]),
     "law that is not modeled": (
