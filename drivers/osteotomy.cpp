@@ -13,6 +13,7 @@
 #include "repose/base/program.h"
 #include "repose/meshtools/osteotomy.h"
 #include "repose/model/build.h"
+#include "repose/scene/bone_name.h"
 #include "repose/surface/component.h"
 #include "repose/surface/read.h"
 
@@ -97,6 +98,12 @@ Parts parts_of_scene(const base::Options& options, const std::filesystem::path& 
 
 Parts parts_of_bone(const base::Options& options, const std::filesystem::path& input) {
   if (options.flag("moved")) base::refuse("-moved needs a scene, whose moves it makes");
+  const std::string piece = options.text("piece");
+  if (!scene::is_bone_name(piece) || piece == "rest")
+    base::refuse(
+        "-piece {} must be 1 to 64 printable ASCII characters without '/', and not rest, the name "
+        "of what is left",
+        base::quote(piece));
   const meshtools::Osteotomy plan = plan_of(options);
   meshtools::Pieces pieces =
       meshtools::cut_bone(surface::load_surface(input, surface::Role::bone), plan);

@@ -3,14 +3,19 @@
 #include <algorithm>
 
 #include "repose/base/text.h"
+#include "repose/scene/bone_name.h"
 
 namespace repose::scene {
 
+bool is_bone_name(std::string_view text) {
+  const auto allowed = [](char c) { return c >= ' ' && c <= '~' && c != '/'; };
+  return !text.empty() && text.size() <= 64 && std::ranges::all_of(text, allowed);
+}
+
 std::string read_new_name(const Value& value, const std::vector<BoneEntry>& bones) {
   std::string name = value.text();
-  const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
-  if (name.size() > 64 || !std::all_of(name.begin(), name.end(), printable))
-    value.refuse("{} must be printable ASCII, 64 characters at most", base::quote(name));
+  if (!is_bone_name(name))
+    value.refuse("{} must be 1 to 64 printable ASCII characters without '/'", base::quote(name));
   for (const BoneEntry& other : bones)
     if (other.name == name)
       value.refuse("{} is the name of two bones; rename one", base::quote(name));

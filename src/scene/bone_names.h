@@ -8,7 +8,7 @@
 /// Names of bones in a scene file.
 namespace repose::scene {
 
-/// A name that no bone has yet: printable ASCII, 64 characters at most.
+/// A name that no bone has yet: see is_bone_name().
 std::string read_new_name(const Value& value, const std::vector<BoneEntry>& bones);
 
 /// The row of the bone named so among at least one; `value` is refused, with the nearest name,

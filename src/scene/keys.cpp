@@ -62,7 +62,7 @@ Keys surface_keys() {
       {"bones", list, "required",
        "The bones, each a triangle mesh or taken from a volume; the list may be empty."},
       {"bones[].name", text, "required",
-       "The bone's name: printable ASCII, 64 characters at most."},
+       "The bone's name: 1 to 64 printable ASCII characters without '/'."},
       {"bones[].file", file, "", "Triangle mesh of the bone; or give volume."}};
   return joined({skin, volume_keys("skin"), bones, volume_keys("bones[]")});
 }

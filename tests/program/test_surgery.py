@@ -200,6 +200,12 @@ BAD_BONES = {
         lambda f: [crossed_bone(f), *PLANE_OPTIONS], ["crossed.ply", "intersects itself"]),
     "a scene with options": (lambda f: ["head_split.yaml", "-kerf", "1"], ["-kerf"]),
     "a scene without osteotomies": (lambda f: ["head_jaw_advance.yaml"], ["no osteotomies"]),
+    "a piece outside the folder": (
+        lambda f: ["head_mandible.ply", *PLANE_OPTIONS, "-piece", "../x"], ["-piece '../x'", "'/'"]),
+    "a piece without a name": (
+        lambda f: ["head_mandible.ply", *PLANE_OPTIONS, "-piece", ""], ["-piece"]),
+    "a piece named as the rest": (
+        lambda f: ["head_mandible.ply", *PLANE_OPTIONS, "-piece", "rest"], ["-piece 'rest'"]),
     "a missing bone": (lambda f: ["nowhere.ply", *PLANE_OPTIONS], ["nowhere.ply"]),
     "a cutter that is no mesh": (
         lambda f: ["head_mandible.ply", "-surface", "head_split.yaml"], ["head_split.yaml"]),

@@ -84,15 +84,15 @@ TEST(Scene, PlanRefusesWhatItDoesNotHold) {
 TEST(Scene, TableHasTheDefaultsOfTheCode) {
   const Scene plain = read(minimal);
   const auto standard = [](const char* path) { return find_key(path).standard; };
-  const Scene spelled = read(fmt::format(
-      "{}boundary: {{rim: {}}}\nsolve: {{functional: {}, lambda: {}, "
-      "accuracy: {}, load_steps: {}}}\n",
-      minimal, standard("boundary.rim"), standard("solve.functional"), standard("solve.lambda"),
-      standard("solve.accuracy"), standard("solve.load_steps")));
+  const Scene spelled = read(
+      fmt::format("{}boundary: {{rim: {}}}\nsolve: {{functional: {}, accuracy: {}, load_steps: "
+                  "{}}}\n",
+                  minimal, standard("boundary.rim"), standard("solve.functional"),
+                  standard("solve.accuracy"), standard("solve.load_steps")));
   EXPECT_EQ(plain.rim, spelled.rim);
   EXPECT_EQ(plain.solve.functional, spelled.solve.functional);
   EXPECT_EQ(plain.solve.volume, spelled.solve.volume);
-  EXPECT_EQ(plain.solve.lambda, spelled.solve.lambda);
+  EXPECT_EQ(base::parse_number(standard("solve.lambda")), plain.solve.lambda);
   EXPECT_EQ(plain.solve.accuracy, spelled.solve.accuracy);
   EXPECT_EQ(plain.solve.load_steps, spelled.solve.load_steps);
   const Tissue& tissue = plain.tissue;
@@ -433,6 +433,9 @@ TEST(SceneRefuses, NumbersOutOfRangeOrNone) {
       {"skin: face.ply\nbones: []\ntissue: {layers: 2.5}\n", "it is '2.5'", true},
       tissue("material: face", "must be a map, it is 'face'; write material: {preset: face}"),
       {"solve: {lambda: 1.5}\n", "solve.lambda must be a number, > 0 and ≤ 1, it is '1.5'"},
+      {"solve: {lambda: 0.3}\n", "6:17: solve.lambda is of tissue.springs"},
+      {"solve: {volume: {bulk_modulus: 9}}\n", "solve.volume.bulk_modulus is of tissue.springs"},
+      {"solve: {volume: {poisson: 0.4}}\n", "solve.volume.poisson is of tissue.springs"},
       {"solve: {accuracy: 0}\n", "solve.accuracy must be a number of mm, 1e-12 … 100, it is '0'"},
       {"solve: {load_steps: 0}\n",
        "solve.load_steps must be a whole number, 1 … 100000, or auto, it is '0'"},
@@ -527,7 +530,13 @@ TEST(SceneRefuses, BonesAndMoves) {
       {"skin: face.ply\nbones: [{name: \"\", file: skull.ply}]\ntissue: {layers: 4}\n",
        "2:16: bones[0].name must be a text", true},
       {"skin: face.ply\nbones: [{name: Schädel, file: skull.ply}]\ntissue: {layers: 4}\n",
-       "must be printable ASCII", true},
+       "must be 1 to 64 printable ASCII", true},
+      {"skin: face.ply\nbones: [{name: a/b, file: skull.ply}]\ntissue: {layers: 4}\n",
+       "2:16: bones[0].name 'a/b' must be 1 to 64 printable ASCII characters without '/'", true},
+      {"skin: face.ply\nbones: [{name: \"a\\0b\", file: skull.ply}]\ntissue: {layers: 4}\n",
+       "must be 1 to 64 printable ASCII characters", true},
+      {"osteotomies: [{bone: skull, piece: ../x, surface: face.ply}]\n",
+       "6:36: osteotomies[0].piece '../x' must be 1 to 64 printable ASCII characters without '/'"},
       {"moves: [{bone: mandibel, translate: [0, 0, 1]}]\n",
        "6:16: moves[0].bone 'mandibel' is no bone of the scene; the nearest is 'mandible'"},
       {"skin: face.ply\nbones:\ntissue: {layers: 4}\nmoves: []\n", "bones lists no bone; give at",
