@@ -27,6 +27,7 @@ constexpr double joint_way = 97;        // mm from the chin, at least; angles of
 constexpr double alike = 0.9;           // of the ways on both sides
 constexpr double closed_volume = 1000;  // mm³, of a skull at the middle, behind the teeth
 constexpr double coarser = 2;           // voxels that noise or metal is averaged over
+constexpr double head_extent[] = {5, 2000};        // of a volume with a head; beyond, not in mm
 constexpr double level_step = 40, max_steps = 40;  // HU
 constexpr double spacing[] = {25, 10};             // of points in skull and jaw
 constexpr double apart = 14;                       // skull's points from the jaw
@@ -259,9 +260,22 @@ Proposal propose(const Volume& volume, double level) {
           std::max(right, left)};
 }
 
+/// Refuses a volume whose sides are all too short, or all too long, for a head in mm.
+void require_millimeters(const Volume& volume) {
+  Vec3 sides;
+  for (int axis = 0; axis < 3; ++axis)
+    sides[axis] = static_cast<double>(volume.size[axis]) * volume.spacing(axis);
+  if (sides.maxCoeff() < head_extent[0] || sides.minCoeff() > head_extent[1])
+    base::refuse(
+        "{}: is {:.3g} × {:.3g} × {:.3g} mm large, which no CT of a head is; give its spacing in "
+        "mm (m and µm are read as mm)",
+        volume.name, sides[0], sides[1], sides[2]);
+}
+
 }  // namespace
 
 std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level) {
+  require_millimeters(volume);
   Proposal found = propose(volume, level);
   if (found.least < joint_way || found.least < alike * found.most) {
     Proposal smoother = propose(coarsen(volume, coarser), level);
@@ -269,8 +283,9 @@ std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double lev
   }
   if (found.least < joint_way)
     base::refuse(
-        "{}: the jaw was not found, because it is part of the skull at every level or lacks its "
-        "condyles; give points in skull and jaw (-apart)",
+        "{}: the jaw was not found, because it is part of the skull at every level, lacks its "
+        "condyles or is turned: the head must look along −y, its top along z (LPS); give points in "
+        "skull and jaw (-apart), or mend the volume's direction",
         volume.name);
   return std::move(found.points);
 }

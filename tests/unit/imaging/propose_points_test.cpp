@@ -101,6 +101,11 @@ TEST(ProposePoints, a_fused_jaw_and_a_skull_alone_are_refused) {
   EXPECT_NE(refused(skull).find("jaw"), std::string::npos);
   EXPECT_NE(refused(sampled(20, Mat3::Identity(), [](const Vec3&) { return 0; })).find("226"),
             std::string::npos);
+  for (const double unit : {0.001, 1000.0})
+    EXPECT_NE(refused(sampled(20, unit * Mat3::Identity(), [](const Vec3&) { return 1000; }))
+                  .find("give its spacing in mm"),
+              std::string::npos)
+        << unit;
 }
 
 }  // namespace propose_points_test
