@@ -4,6 +4,7 @@ each single one wrong after a change in its seventh digit."""
 import subprocess
 
 import h5py
+import meshio
 import numpy as np
 import pytest
 
@@ -307,6 +308,32 @@ def test_a_checkpoint_is_no_end(run, tmp_path):
     with h5py.File(file, "r+") as h5:
         h5.attrs["checkpoint"] = 1
     assert run("repose-check", file).returncode == 0
+
+
+FAR = """skin: far_skin.ply
+bones:
+  - {name: skull, file: far_skull.ply}
+  - {name: mandible, file: far_mandible.ply}
+tissue: {layers: 4}
+contact: {}
+moves: [{bone: mandible, translate: [0, -2, 0]}]
+solve: {accuracy: 1}
+"""
+
+
+def test_a_head_far_from_the_origin_agrees(run, tmp_path):
+    """9000 km away, where coordinates are rounded to 2e-9 mm."""
+    made = run("repose-phantom", "-skin_vertices", 2000, "-output", "head")
+    assert made.returncode == 0, made
+    for name in ("skin", "skull", "mandible"):
+        mesh = meshio.read(tmp_path / f"head_{name}.ply")
+        mesh.points = mesh.points.astype(float) + [9e6, -9e6, 9e6]
+        mesh.write(tmp_path / f"far_{name}.ply", binary=True)
+    (tmp_path / "far.yaml").write_text(FAR)
+    solved = run("repose-solve", "far.yaml")
+    assert solved.returncode == 0, solved
+    result = run("repose-check", "far.h5")
+    assert (result.returncode, result.stderr) == (0, ""), result
 
 
 def test_a_reader_that_goes_away_is_no_fault(run, environment, tmp_path):

@@ -97,6 +97,19 @@ def test_a_result_that_is_wrong_about_contact_is_refused(good, tmp_path, environ
     refused(good, tmp_path, environment, *SPOILED[case])
 
 
+def test_a_state_that_is_not_converged_may_press_across_gaps(good, tmp_path, environment):
+    def state_with(converged):
+        def change(h5):
+            last_step(h5).attrs.update(converged=converged, displacement_error=0.0)
+        return change
+
+    refused(good, tmp_path, environment, state_with(1), "pressure is where gaps are closed")
+    with h5py.File(tmp_path / "spoiled.h5", "r+") as h5:
+        state_with(0)(h5)
+    result = runner(tmp_path, environment)("repose-check", "spoiled.h5")
+    assert (result.returncode, result.stderr) == (0, ""), result
+
+
 @pytest.fixture(scope="module")
 def parted(tmp_path_factory, environment):
     """A result with a cut through the skin."""

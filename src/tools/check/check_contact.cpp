@@ -305,7 +305,8 @@ void Claims::check_pressures(const std::vector<double>& gap, const std::vector<d
     if (pressure[i] > 0) across = std::max(across, gap[i]);
   }
   comparison_.statement("contact only presses", pull <= 0);
-  comparison_.statement("pressure is where gaps are closed", across <= slack_of(numbers_));
+  if (numbers_.converged)  // an interrupted search has the pressure of gaps it is about to close
+    comparison_.statement("pressure is where gaps are closed", across <= slack_of(numbers_));
 }
 
 void Claims::check_forces(const std::vector<double>& pressure, const std::vector<double>& force) {

@@ -35,7 +35,10 @@ double extent_of(const std::array<Vec3, 6>& corners) {
 }
 
 // v is affine in each corner, so its difference quotients are its derivatives, whatever the step.
+// They are taken near the origin: far from it, the step would be rounded like the coordinates.
 std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
+  const Vec3 origin = corners[0];
+  for (Vec3& corner : corners) corner -= origin;
   std::array<Vec3, 6> gradient;
   for (int c = 0; c < 6; ++c)
     for (int axis = 0; axis < 3; ++axis) {
