@@ -32,11 +32,26 @@ Jaw jaw_of(const Scene& scene, std::size_t bone) {
   return Jaw::other;
 }
 
-/// One clinical move, read with what it needs of the head.
+/// The first of several bones whose jaw satisfies `matches`, or else the first of them.
+template <class Matches>
+std::size_t first_of(const std::vector<std::size_t>& bones, const Scene& scene, Matches matches) {
+  const auto found = std::find_if(bones.begin(), bones.end(),
+                                  [&](std::size_t bone) { return matches(jaw_of(scene, bone)); });
+  return found == bones.end() ? bones.front() : *found;
+}
+
+bool has_incisors(Jaw jaw) { return jaw == Jaw::upper || jaw == Jaw::lower; }
+
+/// One clinical move of an entry's bones, read with what it needs of the head. It turns about the
+/// pivot of the first bone that has a default, and reaches targets with the first that has
+/// incisors.
 class ClinicalMove {
  public:
-  ClinicalMove(const Value& value, const Scene& scene, std::size_t bone)
-      : map_(value), scene_(scene), bone_(bone), jaw_(jaw_of(scene, bone)) {
+  ClinicalMove(const Value& value, const Scene& scene, const std::vector<std::size_t>& bones)
+      : map_(value),
+        scene_(scene),
+        bone_(first_of(bones, scene, [](Jaw jaw) { return jaw != Jaw::other; })),
+        bone_with_teeth_(first_of(bones, scene, has_incisors)) {
     if (!scene.anatomy)
       value.refuse("needs the axes of the head; give anatomy: {{landmarks: FILE}}");
     try {
@@ -73,7 +88,7 @@ class ClinicalMove {
       const std::string name = standard_name(place->text());
       return now((name.empty() ? place->text() : name).c_str(), bone_);
     }
-    switch (jaw_) {
+    switch (jaw_of(scene_, bone_)) {
       case Jaw::upper:
         return now("upper_incisor_edge", bone_);
       case Jaw::lower:
@@ -104,27 +119,30 @@ class ClinicalMove {
 
   /// The row of the bone that carries the other jaw's teeth: a piece of a template, or the whole.
   std::size_t opposite() const {
-    const Jaw expected = jaw_ == Jaw::upper ? Jaw::lower : Jaw::upper;
+    const Jaw own = jaw_of(scene_, bone_with_teeth_);
+    const Jaw expected = own == Jaw::upper ? Jaw::lower : Jaw::upper;
     for (const Osteotomy& cut : scene_.osteotomies)
       if (jaw_of(scene_, cut.piece) == expected) return cut.piece;
     for (std::size_t b = 0; b < scene_.bones.size(); ++b)
       if (jaw_of(scene_, b) == expected) return b;
     for (std::size_t b = 0; b < scene_.bones.size(); ++b)
-      if (!cut_of(scene_, b) && b != bone_) return b;
-    return bone_;
+      if (!cut_of(scene_, b) && b != bone_with_teeth_) return b;
+    return bone_with_teeth_;
   }
 
   /// mm, the move along `direction` (a unit vector) that brings the distance of the upper incisors
   /// from the lower ones along it to `target`.
   double to_target(const char* name, const Vec3& direction, const RigidMotion& turned) const {
     const auto target = map_.find(name);
-    if (jaw_ != Jaw::upper && jaw_ != Jaw::lower)
+    const Jaw jaw = jaw_of(scene_, bone_with_teeth_);
+    if (!has_incisors(jaw))
       target->refuse(
           "needs a jaw with incisors: a piece of le_fort_1 or sagittal_split, or a bone called "
           "mandible");
-    const bool upper = jaw_ == Jaw::upper;
+    const bool upper = jaw == Jaw::upper;
     const std::size_t other = opposite();
-    const Vec3 own = turned.apply(now(upper ? "upper_incisor_edge" : "lower_incisor_edge", bone_));
+    const Vec3 own =
+        turned.apply(now(upper ? "upper_incisor_edge" : "lower_incisor_edge", bone_with_teeth_));
     const Vec3 fixed = now(upper ? "lower_incisor_edge" : "upper_incisor_edge", other);
     const double distance = (upper ? own - fixed : fixed - own).dot(direction);
     return upper ? target->number() - distance : distance - target->number();
@@ -149,15 +167,16 @@ class ClinicalMove {
 
   Map map_;
   const Scene& scene_;
-  std::size_t bone_;
-  Jaw jaw_;
+  std::size_t bone_;  // carries pivot and condyles
+  std::size_t bone_with_teeth_;
   HeadAxes axes_{};
 };
 
 }  // namespace
 
-RigidMotion read_clinical_move(const Value& value, const Scene& scene, std::size_t bone) {
-  return ClinicalMove(value, scene, bone).read();
+RigidMotion read_clinical_move(const Value& value, const Scene& scene,
+                               const std::vector<std::size_t>& bones) {
+  return ClinicalMove(value, scene, bones).read();
 }
 
 }  // namespace repose::scene

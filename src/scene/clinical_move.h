@@ -4,9 +4,11 @@
 
 namespace repose::scene {
 
-/// Reads a move in the words of surgery of the bone in row `bone`: rotations about its pivot, then
-/// a translation, in the axes of the head (head_axes). Targets of overjet and overbite are reached
-/// from where both jaws are by the moves so far.
-RigidMotion read_clinical_move(const Value& value, const Scene& scene, std::size_t bone);
+/// Reads a move in the words of surgery of the bones in rows `bones`, one at least: one rigid
+/// motion of all of them, rotations about the pivot of the first bone that has a default, then a
+/// translation, in the axes of the head (head_axes). Targets of overjet and overbite are reached
+/// from where both jaws are by the moves so far, by the first bone that has incisors.
+RigidMotion read_clinical_move(const Value& value, const Scene& scene,
+                               const std::vector<std::size_t>& bones);
 
 }  // namespace repose::scene

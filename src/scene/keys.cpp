@@ -334,7 +334,7 @@ Keys clinical_keys() {
              "lower."),
       {above + ".pivot", place, "",
        "Point of the axes of yaw, roll and pitch; by default the incisors of the jaw, or pogonion "
-       "of a chin."}};
+       "of a chin. For several bones the default is that of the first bone that has one."}};
 }
 
 Keys move_keys() {

@@ -50,14 +50,14 @@ RigidMotion read_matrix(const Value& value) {
   return located(value, [&] { return RigidMotion::from_matrix(matrix); });
 }
 
-/// Reads the forms of a move of one bone.
+/// Reads the forms of a move, of one bone or of several as one rigid body.
 class Forms {
  public:
   Forms(const std::map<std::string, Vec3>& landmarks, std::vector<std::string>& remarks)
       : landmarks_(landmarks), remarks_(remarks) {}
 
-  /// Returns the motion of an entry that follows the motion `before` of its bone; `clinical` reads
-  /// that form.
+  /// Returns the motion of an entry that follows the motion `before` of its first bone; `clinical`
+  /// reads that form.
   template <class Clinical>
   RigidMotion read_entry(const Map& entry, const RigidMotion& before, const Clinical& clinical) {
     const Value form =
@@ -174,13 +174,13 @@ void read_moves(const Value& list, const std::map<std::string, Vec3>& landmarks,
   Forms forms(landmarks, scene.remarks);
   for (const Value& item : list.items()) {
     const Map entry(item);
-    for (const auto& [name, value] : entry.at("bone").texts()) {
-      const std::size_t bone = find_bone(name, value, scene.bones);
-      RigidMotion& motion = scene.moves[bone];
-      const RigidMotion next = forms.read_entry(
-          entry, motion, [&](const Value& form) { return read_clinical_move(form, scene, bone); });
-      motion = next.after(motion);
-    }
+    std::vector<std::size_t> bones;
+    for (const auto& [name, value] : entry.at("bone").texts())
+      bones.push_back(find_bone(name, value, scene.bones));
+    const RigidMotion motion =
+        forms.read_entry(entry, scene.moves[bones.front()],
+                         [&](const Value& form) { return read_clinical_move(form, scene, bones); });
+    for (const std::size_t bone : bones) scene.moves[bone] = motion.after(scene.moves[bone]);
   }
 }
 

@@ -320,6 +320,48 @@ TEST(ClinicalMove, ReachesTargetsFromWhereTheOtherJawIs) {
   expect_near(both.moves[3].apply(lower), both.moves[2].apply(upper) + Vec3(0, 2, 2));
 }
 
+/// The motions of mandible and chin by one entry, after `before`.
+std::pair<RigidMotion, RigidMotion> moved_together(const std::string& bones,
+                                                   const std::string& form,
+                                                   const std::string& before = "") {
+  const Scene scene =
+      read(head(), chin + "moves:\n" + before + fmt::format("  - {{bone: {}, {}}}\n", bones, form));
+  return {scene.moves[1], scene.moves[2]};
+}
+
+TEST(SharedMove, IsOneRigidMotion) {
+  for (const char* form :
+       {"clinical: {roll: 4, pitch: 5}", "clinical: {open: 10, yaw: 3}",
+        "clinical: {roll: 4, pivot: menton}", "clinical: {pitch: 5, overjet: 2, overbite: 1}",
+        "rotate: {axis: [1, 0, 0], center: [0, 10, 20], angle: 8}", "translate: [0, -5, 1]"})
+    for (const char* bones : {"[mandible, chin]", "[chin, mandible]"}) {
+      const auto [jaw, piece] = moved_together(bones, form);
+      EXPECT_EQ(jaw.matrix(), piece.matrix()) << bones << form;
+      EXPECT_NE(jaw.matrix(), Mat4(Mat4::Identity())) << bones << form;
+    }
+}
+
+TEST(SharedMove, TurnsAboutThePivotOfTheFirstBoneThatHasOne) {
+  const Vec3 edge = head()["lower_incisor_edge"], pogonion = head()["pogonion_bone"];
+  const std::string roll = "clinical: {roll: 4, pitch: 5}";
+  expect_near(moved_together("[mandible, chin]", roll).second.apply(edge), edge);
+  expect_near(moved_together("[chin, mandible]", roll).first.apply(pogonion), pogonion);
+  const Scene with_skull = read(head(), "moves: [{bone: [skull, mandible], " + roll + "}]\n");
+  expect_near(with_skull.moves[0].apply(edge), edge);
+}
+
+TEST(SharedMove, FollowsEarlierMovesOfItsBonesAsOneMotion) {
+  const std::string before = "  - {bone: chin, translate: [0, -6, 0]}\n";
+  for (const char* form : {"clinical: {roll: 4}",
+                           "landmark: {from: [0, -86, -60], to: [1, -90, "
+                           "-61]}"}) {
+    const auto [jaw, piece] = moved_together("[mandible, chin]", form, before);
+    EXPECT_LT((piece.matrix() - jaw.after(RigidMotion::translation({0, -6, 0})).matrix()).norm(),
+              1e-12)
+        << form;
+  }
+}
+
 TEST(ClinicalMove, RefusesWhatHasNoMeaning) {
   const auto says = [](const std::string& more) { return refused(head(), more); };
   EXPECT_NE(says(split + "moves: [{bone: jaw, clinical: {overjet: 2, advance: 3}}]\n")
