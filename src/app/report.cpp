@@ -66,6 +66,10 @@ std::string remedy(const solve::Summary& s, bool stretched) {
            "or lower tissue.turgor: what the skin's tension presses together beneath it may have "
            "no balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
+  if (s.pierced_by_instrument.columns > 0)
+    return " The instrument is inside tissue or bone, because only points of the skin touch it: "
+           "push it less far, use a finer skin (tissue.edge), or let the skin stick to it "
+           "(skin: stick).";
   if (s.path.last.overlapped > 0)
     return " Move these bones less, or trim them: repose-collide says where they meet. The tissue "
            "there rests on one of the two alone.";
@@ -139,14 +143,22 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
   return text;
 }
 
-std::string describe_pierced(const std::vector<std::string>& bodies,
-                             const solve::PiercedColumns& pierced) {
-  if (pierced.columns == 0 || bodies.empty()) return "";  // rank 0 has their names
-  return report_row(
-      "pierced by bone",
-      "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
-      "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
-      pierced.columns, pierced.depth, bodies[pierced.body], pierced.where);
+std::string describe_pierced(const std::vector<std::string>& bodies, const solve::Summary& s) {
+  std::string text;
+  if (bodies.empty()) return text;  // rank 0 has their names
+  if (s.pierced.columns > 0)
+    text += report_row(
+        "pierced by bone",
+        "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
+        "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
+        s.pierced.columns, s.pierced.depth, bodies[s.pierced.body], s.pierced.where);
+  const solve::PiercedColumns& by = s.pierced_by_instrument;
+  if (by.columns > 0)
+    text += report_row("pierced by instrument",
+                       "{} columns, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; push it "
+                       "less far, use a finer skin (tissue.edge) or skin: stick",
+                       by.columns, by.depth, bodies[by.body], by.where);
+  return text;
 }
 
 namespace {

@@ -43,9 +43,8 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 /// anything passes.
 std::string describe_contact(const std::vector<std::string>& bodies, const solve::Summary& s);
 
-/// Columns that bone enters between their points; empty if there is none.
-std::string describe_pierced(const std::vector<std::string>& bodies,
-                             const solve::PiercedColumns& pierced);
+/// Describes columns of tissue that bones or instruments have entered; empty if there is none.
+std::string describe_pierced(const std::vector<std::string>& bodies, const solve::Summary& s);
 
 /// Describes torn springs in two rows; empty without a limit.
 std::string describe_tearing(const solve::Tearing& tearing);

@@ -338,7 +338,7 @@ base::Exit Run::solve() {
         describe_tangents(writer.point_fields()));
   if (path) print(describe_path(*path));
   print(writer.reactions() + describe_contact(job_.bodies, summary) +
-        describe_pierced(job_.bodies, summary.pierced));
+        describe_pierced(job_.bodies, summary));
   print(self_contact + report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) + given);
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;

@@ -111,6 +111,30 @@ def test_the_shipped_scene_presses_a_cheek(run, tmp_path):
     assert run("repose-check", "press.h5").returncode == 0
 
 
+def test_an_instrument_inside_the_tissue_is_no_rest_position(run, folder):
+    """A ball that comes out of the bone lifts the skin, which alone touches it, and ends inside the
+    tissue below, in whatever load steps."""
+    center, radius = np.array([43.8, -72.4, -10]), 6  # at the end of the push, mm
+    (folder / "pierce.yaml").write_text(SCENE.replace(
+        SHAPE, f"skin: slide, sphere: {{center: [28.8, -52.4, -10], radius: {radius}}}").replace(
+        "push: [-9, 12, 0]", "push: [15, -20, 0]"))
+    result = run("repose-solve", "pierce.yaml", "-verify_path", ranks=2, cwd=folder)
+    assert (result.returncode, result.stderr) == (2, ""), result
+    assert "NOT AT REST" in result.stdout and "verified" not in result.stdout
+    found = re.search(r"pierced by instrument +(\d+) columns, up to (.*?) mm deep, .* by "
+                      r"instruments\[0\] at \((.*?)\) mm; push it less far", result.stdout)
+    model, step = model_of(folder / "pierce.h5"), last(folder / "pierce.h5")
+    inside = radius - np.linalg.norm(step["point/position"] - center, axis=1) > 0.5
+    assert int(found[1]) >= len(set(model["point/column"][inside])) > 0
+    assert not inside[model["point/layer"] == 0].any()
+    place = np.array([float(x) for x in found[3].split(",")])
+    assert radius - np.linalg.norm(place - center) == pytest.approx(float(found[2]), abs=0.2)
+    assert not step["converged"] and b"pierced by an instrument" in step["reason"]
+    again = run("repose-solve", "pierce.yaml", "-restart", "pierce.h5", "-output", "again",
+                cwd=folder)
+    assert again.returncode == 2 and "pierced by instrument" in again.stdout, again
+
+
 BAD = {
     "no shape": (SHAPE + ", ", "", ["press.yaml:", "instruments[0]", "exactly one of sphere"]),
     "two shapes": (SHAPE, SHAPE + ", box: {center: [0, 0, 0], size: [1, 1, 1]}",

@@ -103,7 +103,7 @@ struct ContactSummary {
   PenetrationDepth exact;     ///< into a rigid body's own triangles, at the last step
 };
 
-/// Columns that a bone enters between their two deepest points.
+/// Columns of tissue that a body has entered since the start.
 struct PiercedColumns {
   int64_t columns = 0;
   int32_t body = -1;          ///< of the model's contact: that at the deepest place
@@ -123,8 +123,9 @@ struct Summary {
   std::optional<Gradient> gradient;          ///< where requested, of a rest position at load 1
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where requested
   std::vector<ContactSummary>
-      contacts;  ///< a row a body of the model's contact, then the sides of cuts
-  PiercedColumns pierced;
+      contacts;            ///< a row a body of the model's contact, then the sides of cuts
+  PiercedColumns pierced;  ///< by bones, between their two deepest points
+  PiercedColumns pierced_by_instrument;  ///< anywhere; with such columns it is not a rest position
 };
 
 /// Where a search begins.

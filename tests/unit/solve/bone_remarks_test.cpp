@@ -4,7 +4,7 @@
 #include "rest.h"
 #include "solid_block.h"
 
-/// Columns that bone enters between their points, and skin that presses on bone.
+/// Columns that bones and instruments enter, and skin that presses on bone.
 namespace repose {
 namespace bone_remarks_test {
 
@@ -53,6 +53,56 @@ TEST(PiercedColumns, ABoneThatCarriesNoPointMovesAlongItsWay) {
 TEST(PiercedColumns, APlateBesideTheBlockOrThereFromTheStartIsNot) {
   EXPECT_EQ(push_plate(-60, 5).columns, 0);
   EXPECT_EQ(push_plate(0, 0.5).columns, 0);
+}
+
+/// A block of 7 × 9 columns, 5 mm apart, of four layers 3 mm apart, the skin at z = 0, free but for
+/// its rim and its deepest layer. A ball is pushed to `end`, too deep to touch the skin, which
+/// alone has contact with it.
+solve::Summary push_ball(double radius, const Vec3& end, const Vec3& push) {
+  model::Model m = testing::solid_block(7, 9, 4, 0.45, 0, [&](int i, int j, int a) {
+    if (i + j + a == 0) return PointSet::held;
+    const bool free = i > 0 && i < 6 && j > 0 && j < 8 && a < 3;
+    return free ? PointSet::soft_tissue : PointSet::boundary;
+  });
+  m.points.target[0] += Vec3(0.1, 0, 0);
+  m.contact.bodies.push_back({"ball", -1, scene::Sphere{end - push, radius}, push});
+  m.contact.stiffness = 0.05;
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    if (m.points.set[i] != PointSet::soft_tissue || m.points.layer[i] != 0) continue;
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(25);
+  }
+  return testing::find_rest(m, testing::settings(1e-3)).summary;
+}
+
+TEST(PiercedByInstrument, ColumnsWithPointsInABallAreNoRestPosition) {
+  const solve::Summary summary = push_ball(8, {15, 20, -9}, {60, 0, 0});
+  EXPECT_EQ(summary.pierced_by_instrument.columns, 9);
+  EXPECT_EQ(summary.pierced_by_instrument.body, 0);
+  EXPECT_NEAR(summary.pierced_by_instrument.depth, 8, 1e-9);
+  EXPECT_LT((summary.pierced_by_instrument.where - Vec3(15, 20, -9)).norm(), 1e-9);
+  EXPECT_EQ(summary.pierced.columns, 0);
+  EXPECT_EQ(summary.path.load, 1);
+  EXPECT_FALSE(summary.path.complete());
+  EXPECT_FALSE(summary.last.converged);
+  EXPECT_EQ(summary.last.reason, "columns of tissue pierced by an instrument: 9");
+  EXPECT_EQ(summary.path.last.reason, summary.last.reason);
+}
+
+TEST(PiercedByInstrument, ABallBetweenTwoLayersIsFound) {
+  const solve::PiercedColumns pierced =
+      push_ball(0.9, {15, 20, -4.5}, {60, 0, 0}).pierced_by_instrument;
+  EXPECT_EQ(pierced.columns, 1);
+  EXPECT_NEAR(pierced.depth, 0.9, 0.01);
+}
+
+TEST(PiercedByInstrument, FixedColumnsAndThoseThatBeganInsideAreNot) {
+  EXPECT_EQ(push_ball(8, {0, 20, -9}, {60, 0, 0}).pierced_by_instrument.columns, 3);
+  const solve::Summary inside = push_ball(8, {15, 20, -9}, {0.5, 0, 0});
+  EXPECT_EQ(inside.pierced_by_instrument.columns, 0);
+  EXPECT_TRUE(inside.path.complete());
 }
 
 TEST(SkinOnBone, PointsUnderAPlateAreFound) {
