@@ -83,7 +83,7 @@ def test_a_scene_turned_and_moved_is_turned_and_moved(run, tmp_path, tissue):
     assert energy_there == pytest.approx(energy, rel=1e-9)
 
 
-CHEEK = {"center": np.array([-63.0, -98.0, -10.0]), "push": np.array([12.0, 16.0, 0.0])}
+CHEEK = {"center": np.array([-63.0, -98.0, -10.0]), "push": np.array([9.0, 12.0, 0.0])}
 
 
 def pressed_cheek(run, folder, name, turn, shift):
