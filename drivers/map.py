@@ -79,8 +79,8 @@ def packed_shape(pack, shape, coefficients):
 def packed_bones(pack, session):
     share = BONE_TRIANGLES / max(sum(len(one) for _, one in session.bones.values()), 1)
     for name, (points, triangles) in session.bones.items():
-        points, triangles, _ = coarser(points.astype(float), triangles, [],
-                                       max(int(share * len(triangles)), 200))
+        (points,), triangles, _ = coarser([points.astype(float)], triangles, [],
+                                          max(int(share * len(triangles)), 200))
         yield {"name": name, "points": pack.numbers(points), "triangles": pack.add(triangles, 32)}
 
 

@@ -9,18 +9,23 @@ import numpy as np
 FINER = 2.0  # so many times longer are edges where nothing moves
 
 
-def coarser(points, corners, attributes, most, still=None):
-    """Points, corners and attributes of the surface with at most so many triangles: vertices in one
-    cell of a grid become one. `still` marks vertices that may be in larger cells."""
+def coarser(states, corners, fields, most, still=None):
+    """States, corners and fields of the surface with at most so many triangles. `states` are places
+    [n, 3] of its vertices, initial ones first. Connected vertices in one cell of a grid become one, so
+    that the sides of a cut, which begin at one place, stay apart. `still` marks vertices that may be in
+    larger cells."""
     if len(corners) <= most:
-        return points, corners, attributes
+        return states, corners, fields
+    points, links = states[0], np.concatenate([edges(corners), joints(states)])
     low, one = points.min(0), points[corners[:, 0]] - points[corners[:, 1]]
     edge = np.linalg.norm(one, axis=1).mean()
     size = np.where(still, FINER, 1.0) if still is not None else np.ones(len(points))
     while True:
         cell = np.floor((points - low) / (edge * size)[:, None]).astype(np.int64)
         key = ((cell[:, 2] << 40) + (cell[:, 1] << 20) + cell[:, 0]) * 2 + (size > 1)
-        _, row, count = np.unique(key, return_inverse=True, return_counts=True)
+        inside = links[key[links[:, 0]] == key[links[:, 1]]]
+        _, row, count = np.unique(components(len(points), inside), return_inverse=True,
+                                  return_counts=True)
         faces = row.ravel()[corners]
         whole = (faces != np.roll(faces, 1, axis=1)).all(1)
         faces = faces[whole]
@@ -37,10 +42,35 @@ def coarser(points, corners, attributes, most, still=None):
         sums = np.stack([np.bincount(row.ravel(), flat[:, k]) for k in range(flat.shape[1])], 1)
         return (sums / count[:, None])[used].reshape(-1, *values.shape[1:])
 
-    places, faces = mean(points), faces.reshape(-1, 3)
-    turned = (normals(places, faces) * normals(points, origin)).sum(1) < 0
+    states, faces = [mean(places) for places in states], faces.reshape(-1, 3)
+    turned = (normals(states[0], faces) * normals(points, origin)).sum(1) < 0
     faces[turned] = faces[turned][:, ::-1]  # by the merging of their corners
-    return places, faces, [mean(values) for values in attributes]
+    return states, faces, [mean(values) for values in fields]
+
+
+def edges(corners):
+    """[3 T, 2], those of a triangle and its neighbor twice."""
+    return np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+
+
+def joints(states):
+    """Pairs of vertices [n, 2] that lie at one place in every state, as on a seam of a texture."""
+    _, first, place = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True,
+                                return_inverse=True)
+    pairs = np.stack([first[place.ravel()], np.arange(len(states[0]))], axis=1)
+    return pairs[pairs[:, 0] != pairs[:, 1]]
+
+
+def components(count, links):
+    """For each of so many vertices the first vertex of its connected component."""
+    root = np.arange(count)
+    while len(links):
+        root[links.max(1)] = links.min(1)
+        while (root[root] != root).any():
+            root = root[root]
+        links = root[links]
+        links = links[links[:, 0] != links[:, 1]]
+    return root
 
 
 def normals(points, corners):

@@ -94,19 +94,18 @@ def packed_skin(plans, appearance, pack):
     """The surface of the skin for the page, and its fields."""
     result = plans[0].result
     skin = appearance.skin if appearance else result.skin
-    states = [skin.after] if len(plans) == 1 else [skin.after, matched(*plans)]
+    states = [skin.before, skin.after, *([matched(*plans)] if len(plans) == 2 else [])]
     near = None if skin is result.skin else nearest(result.skin.before, skin.before)
     unsure = result.uncertainty
     fields = {"solved": skin.solved}
     if unsure is not None:
         fields["uncertainty"] = unsure if near is None else unsure[near]
-    if len(states) == 2 and near is not None:
-        states[1] = skin.before + (states[1] - result.skin.before)[near]
-    extra = appearance.arrays() if appearance else {}
-    names, arrays = [*fields, *extra], [*states, *fields.values(), *extra.values()]
-    before, corners, arrays = coarser(skin.before, skin.corners, arrays, MOST_TRIANGLES,
-                                      skin.solved == 0)
-    after, values = arrays[:len(states)], dict(zip(names, arrays[len(states):]))
+    if len(plans) == 2 and near is not None:
+        states[2] = skin.before + (states[2] - result.skin.before)[near]
+    fields |= appearance.arrays() if appearance else {}
+    (before, *after), corners, arrays = coarser(states, skin.corners, list(fields.values()),
+                                                MOST_TRIANGLES, skin.solved == 0)
+    values = dict(zip(fields, arrays))
     surface = {"name": "skin", "kind": "skin", "triangles": pack.add(corners, 32),
                "states": [pack.numbers(before), *(pack.numbers(a - before) for a in after)]}
     surface["oriented"] = is_oriented(before, corners)
@@ -114,7 +113,7 @@ def packed_skin(plans, appearance, pack):
         surface["colors"] = pack.add(np.clip(np.rint(values["colors"]), 0, 255), 8)
     if "uv" in values:
         surface |= {"uv": pack.numbers(values["uv"]), "image": appearance.image}
-    return surface, packed_fields(values, len(states), pack)
+    return surface, packed_fields(values, len(after), pack)
 
 
 def is_oriented(points, corners):
@@ -150,9 +149,8 @@ def packed_bones(plans, pack):
                          same(bone, other)), None)
             if twin is not None:
                 continue
-            after = [bone["after"]]
-            before, corners, (after,) = coarser(
-                bone["before"], bone["corners"], after,
+            (before, after), corners, _ = coarser(
+                [bone["before"], bone["after"]], bone["corners"], [],
                 max(MOST_TRIANGLES * len(bone["corners"]) // max(total, 1), 200))
             states = [pack.numbers(before)] + [None] * len(plans)
             states[number + 1] = pack.numbers(after - before)
