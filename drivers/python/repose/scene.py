@@ -5,6 +5,8 @@ import os
 import pathlib
 import re
 
+LARGEST = 1 << 20  # bytes, as of the programs
+
 
 class Scene:
     """The path of a scene file (YAML) with a plan; `with_plan` writes a copy that has one."""
@@ -15,13 +17,19 @@ class Scene:
             raise FileNotFoundError(f"{path}: there is no such scene")
 
     def _text(self):
-        return self.path.read_text(encoding="utf-8", errors="replace")
+        """The scene as text; ValueError where it cannot be YAML."""
+        if self.path.stat().st_size > LARGEST:
+            raise ValueError(f"{self.path}: too large for a scene file (1 MiB allowed); give a scene file (.yaml)")
+        content = self.path.read_bytes()
+        if re.search(rb"[\x00-\x08\x0e-\x1f\x7f]", content):
+            raise ValueError(f"{self.path}: not a text file; give a scene file (.yaml)")
+        return content.decode(errors="replace")
 
     def files(self):
         """The scene file, then the files that it names."""
         words = set(re.findall(r"[^\s:,\[\]{}\"'#]+", self._text()))
-        named = sorted(self.path.parent / word for word in words if len(word) < 256)
-        return [self.path, *(file for file in named if file.is_file())]
+        named = sorted(self.path.parent / word for word in words)
+        return [self.path, *(file for file in named if os.path.isfile(file))]
 
     def fingerprint(self, program=None):
         """A hash of the scene without its comments, of the files that it names, and of the solver."""

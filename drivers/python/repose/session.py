@@ -121,7 +121,7 @@ class Face:
 def find_program():
     """repose-live: REPOSE_LIVE, else on the PATH, else built in the project around this file."""
     if "REPOSE_LIVE" in os.environ:
-        return os.environ["REPOSE_LIVE"]
+        return absolute_program(os.environ["REPOSE_LIVE"], "set REPOSE_LIVE to repose-live")
     found = shutil.which("repose-live")
     for folder in () if found else pathlib.Path(__file__).resolve().parents:
         built = sorted(folder.glob("build*/bin/repose-live"))
@@ -129,7 +129,15 @@ def find_program():
             return str(built[0])
     if not found:
         raise FileNotFoundError("repose-live is not found: build or install Repose, or set REPOSE_LIVE")
-    return found
+    return os.path.abspath(found)
+
+
+def absolute_program(name, remedy, path=None):
+    """The absolute path of a program, as it is started in another folder; FileNotFoundError without it."""
+    found = shutil.which(name, path=path)
+    if not found:
+        raise FileNotFoundError(f"{name}: no such program; {remedy}")
+    return os.path.abspath(found)
 
 
 class Session:
@@ -145,9 +153,10 @@ class Session:
     def __init__(self, scene, ranks=1, program=None, environment=None, verify_every=0, on_verified=None,
                  niceness=0):
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
-        command = [str(program or find_program()), str(path)]
+        command = [absolute_program(str(program), "name repose-live") if program else find_program(), str(path)]
         if ranks > 1:
-            command = ["mpirun", "-n", str(ranks), *command]
+            command = [absolute_program("mpirun", "install Open MPI, or take one rank",
+                                        (environment or os.environ).get("PATH")), "-n", str(ranks), *command]
         if niceness:
             command = ["nice", "-n", str(niceness), *command]
         self._watch = SceneWatch(Scene(path)) if path.is_file() else None
