@@ -8,7 +8,6 @@ derivatives, and exactly a moment later (docs/guide/live.md).
 Starts repose-live and a server for this machine alone (127.0.0.1); its address holds a token,
 without which nothing is answered. Ends with Ctrl-C. Needs NumPy and a browser with WebGL 2."""
 
-import argparse
 import hmac
 import http.server
 import json
@@ -23,6 +22,8 @@ import webbrowser
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
+from sheet.script import Arguments, number_from, refuse, refuse_missing, run  # noqa: E402
+
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
@@ -216,7 +217,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
 def make_server(session, scene, port=0):
     """A server of the page about a session of this scene, and its address."""
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    try:
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    except OSError as reason:
+        refuse(f"-port {port}: {reason.strerror}; choose another one, or 0 for a free one")
     server.daemon_threads = True
     server.session, server.scene = session, scene.resolve()
     server.angles = ProfileAngles(server.scene, session)
@@ -225,19 +229,18 @@ def make_server(session, scene, port=0):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Plan in the browser.")
+    parser = Arguments(__doc__)
     parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
-    parser.add_argument("-ranks", type=int, default=1, help="processes of the solver")
-    parser.add_argument("-port", type=int, default=0, help="port of 127.0.0.1; default: a free one")
+    parser.add_argument("-ranks", type=number_from(1, 1024), default=1, help="processes of the solver")
+    parser.add_argument("-port", type=number_from(0, 65535), default=0, help="port of 127.0.0.1; default: a free one")
     parser.add_argument("-no_browser", action="store_true", help="only print the address")
     options = parser.parse_args()
     if not options.scene.is_file():
-        sys.exit(f"live.py: {options.scene}: no such file")
+        refuse(f"{options.scene}: no such file")
     try:
         import repose
     except ImportError as missing:
-        sys.exit(f"live.py: {missing.name} is missing: apt-get install --no-install-recommends "
-                 "python3-numpy")
+        refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with repose.Session(options.scene, options.ranks, verify_every=VERIFY_EVERY) as session:
@@ -249,11 +252,9 @@ def main():
                 server.serve_forever()
     except KeyboardInterrupt:
         print()
-    except OSError as error:
-        sys.exit(f"live.py: {error}; if the port is taken, choose another -port")
-    except repose.Refused as refusal:
-        sys.exit(f"live.py: {refusal}")
+    except (repose.Refused, ValueError) as refusal:
+        refuse(refusal)
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -11,12 +11,15 @@ Solved plans are kept in a folder beside the page; a run that was ended goes on.
 exactly, writes the result, and says how far the map is from it. Needs: apt-get install
 --no-install-recommends python3-numpy python3-scipy"""
 
-import argparse
 import html
 import json
+import math
 import pathlib
 import shlex
 import sys
+
+from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run
+from sheet.whole_file import Target
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "python"))
@@ -32,11 +35,6 @@ PAGE = """<!doctype html>
 """
 
 
-def refuse(message):
-    print(f"map.py: {message}", file=sys.stderr)
-    sys.exit(1)
-
-
 try:
     import numpy as np
     import scipy.stats  # noqa: F401  here, so that it is missed at once
@@ -46,8 +44,7 @@ try:
     from repose.samples import PlanBox, SampleStore, solve_all
     from sheet.meshes import Pack, coarser
 except ImportError as missing:
-    refuse(f"{missing.name} is missing: apt-get install --no-install-recommends python3-numpy "
-           "python3-scipy")
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy python3-scipy")
 
 
 # ----- the page
@@ -144,14 +141,12 @@ def fitted_page(scene, session, box, samples, accuracy):
 
 
 def arguments():
-    parser = argparse.ArgumentParser(prog="map.py", description=__doc__, allow_abbrev=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.error = refuse
+    parser = Arguments(__doc__)
     parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
-    parser.add_argument("-samples", type=int, help="plans to solve; default: 1 + 2 d and at least 24 or "
+    parser.add_argument("-samples", type=number_from(3, 10000), help="plans to solve; default: 1 + 2 d and at least 24 or "
                         "4 d more for d coordinates")
-    parser.add_argument("-accuracy", type=float, default=0.02, help="mm, of each (default: 0.02)")
-    parser.add_argument("-processes", type=int, default=1, help="solvers at a time (default: 1)")
+    parser.add_argument("-accuracy", type=number_from(1e-4, 1, float), default=0.02, help="mm, of each (default: 0.02)")
+    parser.add_argument("-processes", type=number_from(1, 64), default=1, help="solvers at a time (default: 1)")
     parser.add_argument("-output", type=pathlib.Path, help="page (default: SCENE_map.html) or, with "
                         "-plan, result without ending (default: SCENE_plan)")
     parser.add_argument("-cache", type=pathlib.Path, help="folder of solved plans (default: SCENE_map)")
@@ -159,15 +154,14 @@ def arguments():
     chosen = parser.parse_args()
     if not chosen.scene.is_file():
         refuse(f"{chosen.scene}: no such file")
-    for name, least, most in (("samples", 3, 10000), ("processes", 1, 64), ("accuracy", 1e-4, 1)):
-        value = getattr(chosen, name)
-        if value is not None and not least <= value <= most:
-            refuse(f"-{name} {value}: must be {least:g} … {most:g}")
     stem = chosen.scene.with_suffix("")
     chosen.cache = chosen.cache or pathlib.Path(f"{stem}_map")
-    chosen.output = chosen.output or pathlib.Path(f"{stem}_plan" if chosen.plan else f"{stem}_map.html")
-    if not chosen.output.resolve().parent.is_dir():
-        refuse(f"-output {chosen.output}: make its folder first")
+    inputs = repose.Scene(chosen.scene).files()
+    if chosen.plan:
+        chosen.output = chosen.output or pathlib.Path(f"{stem}_plan")
+        Target(f"{chosen.output}.h5", ".h5", inputs)
+    else:
+        chosen.output = Target(chosen.output or f"{stem}_map.html", (".html", ".htm"), inputs)
     return chosen
 
 
@@ -180,7 +174,7 @@ def read_plan(text):
     for motion in motions:
         numbers = list(motion.items()) if isinstance(motion, dict) else [("", None)]
         if not all(key in ("translate", "rotate") and isinstance(value, list) and len(value) == 3 and
-                   all(isinstance(x, (int, float)) for x in value) for key, value in numbers):
+                   all(isinstance(x, (int, float)) and math.isfinite(x) for x in value) for key, value in numbers):
             refuse("-plan: give {PIECE: {\"translate\": [x, y, z], \"rotate\": [x, y, z]}}, mm and degrees")
     return plan
 
@@ -224,16 +218,14 @@ def make_page(chosen, session, box, store):
     if samples is None:
         return  # another rank makes the page
     plan_map, text = fitted_page(chosen.scene, session, box, samples, chosen.accuracy)
-    part = pathlib.Path(f"{chosen.output}.part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(chosen.output)
+    chosen.output.write(text)
     print(f"{chosen.output}: {len(text) / 1e6:.2f} MB, {len(plan_map.u)} plans, "
           f"{len(plan_map.modes.shapes)} modes\n{summary(plan_map, chosen.accuracy)}")
 
 
 def main():
-    chosen = arguments()
     try:
+        chosen = arguments()
         with repose.Session(chosen.scene) as session:
             box = PlanBox([piece.name for piece in session.pieces], session.box)
             key = f"{repose.Scene(chosen.scene).fingerprint(repose.session.find_program())}_{chosen.accuracy:g}"
@@ -241,9 +233,9 @@ def main():
             (solve_plan if chosen.plan else make_page)(chosen, session, box, store)
     except KeyboardInterrupt:
         refuse("ended; the plans solved so far are kept, and the same command goes on")
-    except (repose.Refused, ValueError, OSError) as reason:
-        refuse(reason)
+    except (repose.Refused, ValueError) as reason:
+        raise Unusable(reason) from None
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

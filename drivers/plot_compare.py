@@ -7,16 +7,14 @@ Reads NAME.csv and writes NAME.png beside it.
 Needs: apt-get install --no-install-recommends python3-matplotlib
 """
 
-import os
-import sys
+from sheet.script import reading, refuse_missing, run, words
+from sheet.whole_file import Target, write_figure
 
 try:
     import matplotlib
     import numpy as np
 except ImportError as missing:
-    print(f"plot_compare.py: {missing.name} is missing: "
-          "apt-get install --no-install-recommends python3-matplotlib", file=sys.stderr)
-    sys.exit(1)
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -25,8 +23,9 @@ import matplotlib.pyplot as plt
 def read(file):
     """Lower and upper end of each bin, mm, and its share of the area; what lies beyond the ends is
     in the outermost bins."""
-    table = np.genfromtxt(file, delimiter=",", names=True)
-    return table["low_mm"], table["high_mm"], table["share_of_area"]
+    with reading(file, "a histogram of repose-compare"):
+        table = np.genfromtxt(file, delimiter=",", names=True)
+        return table["low_mm"], table["high_mm"], table["share_of_area"]
 
 
 def draw(low, high, share, target):
@@ -37,24 +36,12 @@ def draw(low, high, share, target):
     axes.axvline(0, color="0.3", lw=0.7)
     axes.set(xlabel="signed distance, mm (beyond the ends: in the outermost bars)",
              ylabel="share of the area, %", xlim=(low[0], reach))
-    figure.savefig(target + ".part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(target + ".part", target)
-    print(target)
+    write_figure(figure, target)
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        print(__doc__.strip(), file=sys.stdout if "-help" in sys.argv else sys.stderr)
-        return 0 if "-help" in sys.argv else 1
-    name = sys.argv[1].removesuffix(".csv")
-    try:
-        low, high, share = read(name + ".csv")
-    except (OSError, ValueError, IndexError) as problem:
-        print(f"plot_compare.py: {name}.csv: not a histogram of repose-compare: {problem}",
-              file=sys.stderr)
-        return 1
-    draw(low, high, share, name + ".png")
-    return 0
+    name = words(__doc__, 1, 1)[0].removesuffix(".csv")
+    draw(*read(name + ".csv"), Target(name + ".png", ".png", [name + ".csv"]))
 
 
-sys.exit(main())
+run(main)

@@ -9,18 +9,17 @@ scan_gravity), N/kg; when not given, that of /model.
 Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
 """
 
-import os
-import sys
+from sheet.script import Unusable, is_number, reading, refuse_missing, run, words
+from sheet.whole_file import Target, write_figure
 
 try:
     import h5py
     import matplotlib
     import numpy as np
+
+    from sheet.shown_skin import read_places, read_rows
 except ImportError as missing:
-    print(f"plot_equilibrium.py: {missing.name} is missing: "
-          "apt-get install --no-install-recommends python3-matplotlib python3-h5py",
-          file=sys.stderr)
-    sys.exit(1)
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib python3-h5py")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -31,8 +30,8 @@ MOST = 1500  # arrows
 
 def spring_forces(model, which):
     """The forces of the springs `which` on all points at the initial position, [N, 3] N."""
-    points = model["spring/points"][()][which]
-    position = model["point/position"][()]
+    position = read_places(model, "point/position")
+    points = read_rows(model, "spring/points", len(position))[which]
     edge = position[points[:, 1]] - position[points[:, 0]]
     length = np.linalg.norm(edge, axis=1)
     elongation = length - model["spring/rest_length"][()][which]
@@ -46,19 +45,12 @@ def spring_forces(model, which):
     return force
 
 
-def refuse(message):
-    print(f"plot_equilibrium.py: {message}", file=sys.stderr)
-    sys.exit(1)
-
-
 def initial_forces(file, gravity=None):
     """Free skin points, and the forces on them before and after the equilibrium, [K, 3] each."""
-    if not h5py.is_hdf5(file):
-        refuse(f"{file}: not there, or no result file; give NAME.h5 of repose-solve")
-    with h5py.File(file) as h5:
+    with reading(file, "a result of repose-solve"), h5py.File(file) as h5:
         model = h5["model"]
         if "spring/points" not in model:
-            refuse(f"{file}: holds no springs; give the result of a scene with tissue.springs")
+            raise Unusable(f"{file}: holds no springs; give the result of a scene with tissue.springs")
         field = np.array(gravity if gravity else model.attrs["gravity"], float)
         skin = list(model["spring_set"][()]).index(b"layer 0")
         weight = model["point/mass"][()][:, None] * field if "point/mass" in model else 0
@@ -84,27 +76,16 @@ def draw_forces(points, before, after, target):
         axes.set_title(f"{state}: {largest:.2g} N at most", fontsize=10)
         axes.set_aspect("equal")
         axes.set_axis_off()
-    save(figure, target)
-
-
-def save(figure, file):
-    """Writes a picture whole or not at all."""
-    figure.savefig(file + ".part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(file + ".part", file)
-    plt.close(figure)
-    print(file)
+    write_figure(figure, target)
 
 
 def main():
-    if len(sys.argv) not in (3, 6):
-        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
-        sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
-    try:
-        gravity = [float(g) for g in sys.argv[3:]]
-    except ValueError as problem:
-        refuse(f"GX GY GZ: {problem}")
-    draw_forces(*initial_forces(sys.argv[1], gravity), sys.argv[2])
+    file, picture, *field = words(__doc__, 2, 5)
+    if len(field) not in (0, 3) or not all(map(is_number, field)):
+        raise Unusable(f"GX GY GZ: give three numbers in place of '{' '.join(field)}'")
+    target = Target(picture, ".png", [file])
+    draw_forces(*initial_forces(file, [float(number) for number in field]), target)
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

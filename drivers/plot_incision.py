@@ -8,17 +8,18 @@ Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
 """
 
 import os
-import sys
+
+from sheet.script import Unusable, reading, refuse_missing, run, words
+from sheet.whole_file import Target, write_figure
 
 try:
     import h5py
     import matplotlib
     import numpy as np
+
+    from sheet.shown_skin import read_places, read_rows
 except ImportError as missing:
-    print(f"plot_incision.py: {missing.name} is missing: "
-          "apt-get install --no-install-recommends python3-matplotlib python3-h5py",
-          file=sys.stderr)
-    sys.exit(1)
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib python3-h5py")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -29,27 +30,22 @@ MARGIN = 8  # mm around the cut
 LIGHT = np.array([-0.4, 0.5, 0.77])  # right, up, towards the eye
 
 
-def refuse(message):
-    print(f"plot_incision.py: {message}", file=sys.stderr)
-    sys.exit(1)
-
-
 class Result:
     """The last step of a result, and which of its points are doubled."""
 
     def __init__(self, file):
         self.name = os.path.splitext(os.path.basename(file))[0]
-        with h5py.File(file) as h5:
+        with reading(file, "a result of repose-solve"), h5py.File(file) as h5:
             layer, column = (h5[f"model/point/{name}"][()] for name in ("layer", "column"))
-            self.initial = h5["model/point/position"][()]
-            self.skin = h5["model/skin/points"][()]
-            self.position = h5["step"][sorted(h5["step"])[-1]]["point/position"][()]
-        layers, columns = layer.max() + 1, column.max() + 1
-        self.twin = np.arange(columns * layers, len(layer))
-        if len(self.twin) == 0:
-            refuse(f"{file}: no point is doubled: its scene has no incision")
-        self.row = column[self.twin] * layers + layer[self.twin]
-        self.layer = layer[self.row]
+            self.initial = read_places(h5, "model/point/position", len(layer))
+            self.skin = read_rows(h5, "model/skin/points", len(layer))
+            self.position = read_places(h5["step"][sorted(h5["step"])[-1]], "point/position", len(layer))
+            layers, columns = layer.max() + 1, column.max() + 1
+            self.twin = np.arange(columns * layers, len(layer))
+            if len(self.twin) == 0:
+                raise Unusable(f"{file}: no point is doubled: its scene has no incision")
+            self.row = column[self.twin] * layers + layer[self.twin]
+            self.layer = layer[self.row]
 
     def gaps(self):
         """The largest distance between doubled points of each layer, mm."""
@@ -93,13 +89,8 @@ def draw(axes, result, middle, frame, half):
 
 
 def main():
-    if len(sys.argv) < 3:
-        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
-        sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
-    for file in sys.argv[2:]:
-        if not h5py.is_hdf5(file):
-            refuse(f"{file}: not there, or no result file; give NAME.h5 of repose-solve")
-    target, results = sys.argv[1], [Result(file) for file in sys.argv[2:]]
+    picture, *files = words(__doc__, 2)
+    target, results = Target(picture, ".png", files), [Result(file) for file in files]
     for result in results:
         gaps = ", ".join(f"{gap:.3f} mm in layer {a}" for a, gap in enumerate(result.gaps()))
         print(f"{result.name}: {gaps}")
@@ -109,10 +100,8 @@ def main():
     figure, panels = plt.subplots(1, len(results), figsize=(2.4 * len(results), 4), squeeze=False)
     for axes, result in zip(panels[0], results):
         draw(axes, result, middle, frame, half)
-    figure.savefig(target + ".part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(target + ".part", target)
-    print(target)
+    write_figure(figure, target)
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

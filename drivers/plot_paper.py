@@ -9,23 +9,22 @@ Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
 """
 
 import os
-import sys
+
+from sheet.script import reading, refuse, refuse_missing, run, words
+from sheet.whole_file import Target, write_figure
 
 try:
     import h5py
     import matplotlib
     import numpy as np
 except ImportError as missing:
-    print(f"plot_paper.py: {missing.name} is missing: "
-          "apt-get install --no-install-recommends python3-matplotlib python3-h5py",
-          file=sys.stderr)
-    sys.exit(1)
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib python3-h5py")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
 
-from plot_equilibrium import draw_forces, save
+from plot_equilibrium import draw_forces
 
 # Where the camera stands as seen from the head: +x patient left, +y posterior, +z up.
 VIEWS = {"front": (0, -1, 0), "side": (1, 0, 0)}
@@ -37,7 +36,8 @@ SOURCES = ("laws.csv", "equilibrium.csv", "opening.h5", "forward.h5", "turned.h5
 
 def columns_of(file):
     """The columns of a CSV file by their names."""
-    return np.genfromtxt(file, delimiter=",", names=True)
+    with reading(file, "a table of repose-paper"):
+        return np.genfromtxt(file, delimiter=",", names=True)
 
 
 def draw_laws(source, target):
@@ -50,7 +50,7 @@ def draw_laws(source, target):
     axes.axhline(0, color="0.8", lw=0.7, zorder=0)
     axes.axvline(0, color="0.8", lw=0.7, zorder=0)
     axes.legend(frameon=False)
-    save(figure, target)
+    write_figure(figure, target)
 
 
 def draw_equilibrium(source, target):
@@ -64,7 +64,7 @@ def draw_equilibrium(source, target):
 
 def read(file):
     """Skin triangles and bones of the last step of a result; points before and after."""
-    with h5py.File(file) as h5:
+    with reading(file, "a result of repose-paper"), h5py.File(file) as h5:
         before = h5["model/point/position"][()]
         steps = [h5["step"][name] for name in sorted(h5["step"])]
         after = steps[-1]["point/position"][()]
@@ -116,29 +116,26 @@ def draw_states(panels, target):
                 place.set_title(title, fontsize=9)
     scale = plt.cm.ScalarMappable(plt.Normalize(0, largest / 0.9), plt.cm.magma_r)
     figure.colorbar(scale, ax=axes, shrink=0.5, label="displacement, mm")
-    save(figure, target)
+    write_figure(figure, target)
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] == ["-help"] else sys.stderr)
-        sys.exit(0 if sys.argv[1:] == ["-help"] else 1)
-    path = lambda name: os.path.join(sys.argv[1], name)
+    folder = words(__doc__, 1, 1)[0]
+    path = lambda name: os.path.join(folder, name)
+    target = lambda name: Target(path(f"paper_{name}.png"), ".png", map(path, SOURCES))
     for name in SOURCES:
         if not os.path.isfile(path(name)):
-            print(f"plot_paper.py: {path(name)} is missing: give the folder that repose-paper wrote",
-                  file=sys.stderr)
-            sys.exit(1)
-    draw_laws(path("laws.csv"), path("paper_laws.png"))
-    draw_equilibrium(path("equilibrium.csv"), path("paper_equilibrium.png"))
+            refuse(f"{path(name)} is missing: give the folder that repose-paper wrote")
+    draw_laws(path("laws.csv"), target("laws"))
+    draw_equilibrium(path("equilibrium.csv"), target("equilibrium"))
     opening, forward, turned = (read(path(f"{n}.h5")) for n in ("opening", "forward", "turned"))
     draw_states([("before", opening, "before", False),
                  ("jaw opened by 8°", opening, "after", False),
-                 ("displacement", opening, "after", True)], path("paper_opening.png"))
+                 ("displacement", opening, "after", True)], target("opening"))
     draw_states([("6 mm forward", forward, "after", False),
                  ("displacement", forward, "after", True),
                  ("forward and turned by 4°", turned, "after", False),
-                 ("displacement", turned, "after", True)], path("paper_options.png"))
+                 ("displacement", turned, "after", True)], target("options"))
 
 
-main()
+run(main)

@@ -11,16 +11,15 @@ Needs: apt-get install --no-install-recommends python3-matplotlib
 """
 
 import csv
-import os
-import sys
+
+from sheet.script import Unusable, reading, refuse_missing, run, words
+from sheet.whole_file import Target, write_figure
 
 try:
     import matplotlib
     import numpy as np
 except ImportError as missing:
-    print(f"plot_tradeoff.py: {missing.name} is missing: "
-          "apt-get install --no-install-recommends python3-matplotlib", file=sys.stderr)
-    sys.exit(1)
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -41,32 +40,18 @@ NUMBERS = ("accuracy_mm", "cpu_s", "evaluations", "estimate_mm", "error_mm", "sk
            "skin_95_mm", "skin_max_mm")
 
 
-def refuse(message):
-    print(f"plot_tradeoff.py: {message}", file=sys.stderr)
-    sys.exit(1)
-
-
 def read(name):
     """The rows of NAME.csv, numbers as numbers."""
-    try:
+    with reading(name + ".csv", "a table of repose-tradeoff"):
         with open(name + ".csv", newline="") as file:
             rows = list(csv.DictReader(file))
         for row in rows:
             row.update({key: float(row[key]) for key in NUMBERS})
-    except (OSError, KeyError, ValueError) as problem:
-        refuse(f"{name}.csv: not a table of repose-tradeoff: {problem}")
     for row in rows:
         if row["study"] not in ("solver", *STUDIES):
-            refuse(f"{name}.csv: unknown study '{row['study']}'; this script draws solver, "
+            raise Unusable(f"{name}.csv: unknown study '{row['study']}'; this script draws solver, "
                    f"{', '.join(STUDIES)}")
     return rows
-
-
-def save(figure, file):
-    figure.savefig(file + ".part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(file + ".part", file)
-    plt.close(figure)
-    print(file)
 
 
 def front(rows, cost, error):
@@ -128,15 +113,17 @@ def draw_study(name, rows):
     if others:
         draw_choices(panels[0][-1], others)
     figure.tight_layout()
-    save(figure, name + ".png")
+    write_figure(figure, Target(name + ".png", ".png"))
 
 
 def draw_map(name):
     """The reference's face from the side and the front, colored by each way's error."""
-    with open(name + "_map.csv", newline="") as file:
-        titles = next(csv.reader(file))[3:]
-    values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))
-    triangles = np.genfromtxt(name + "_triangles.csv", delimiter=",", skip_header=1, dtype=int)
+    with reading(name + "_map.csv", "a map of repose-tradeoff"):
+        with open(name + "_map.csv", newline="") as file:
+            titles = next(csv.reader(file))[3:]
+        values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))
+    with reading(name + "_triangles.csv", "triangles of repose-tradeoff"):
+        triangles = np.genfromtxt(name + "_triangles.csv", delimiter=",", skip_header=1, dtype=int)
     shown = [k for k, title in enumerate(titles) if title.startswith(MAPPED)]
     if not shown:
         return
@@ -156,7 +143,7 @@ def draw_map(name):
     bar = figure.colorbar(faces, ax=panels[0], shrink=0.8)
     bar.set_label("mm from the reference", fontsize=7)
     bar.ax.tick_params(labelsize=6)
-    save(figure, name + "_map.png")
+    write_figure(figure, Target(name + "_map.png", ".png"))
 
 
 def judge_estimates(rows):
@@ -180,11 +167,8 @@ def judge_estimates(rows):
 
 
 def main():
-    if not sys.argv[1:] or sys.argv[1] == "-help":
-        print(__doc__.strip(), file=sys.stdout if sys.argv[1:] else sys.stderr)
-        sys.exit(0 if sys.argv[1:] else 1)
     every = []
-    for name in sys.argv[1:]:
+    for name in words(__doc__, 1):
         rows = read(name)
         draw_study(name, rows)
         draw_map(name)
@@ -192,4 +176,4 @@ def main():
     judge_estimates(every)
 
 
-main()
+run(main)

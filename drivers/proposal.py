@@ -9,7 +9,6 @@ its border (black), incisions and the parting of the lips (red), boxes (blue). N
 PyYAML; surfaces of a scene are files, not volumes.
 """
 
-import argparse
 import pathlib
 import subprocess
 import sys
@@ -19,7 +18,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import plan  # noqa: E402
 import render  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
-from sheet.result import Unusable  # noqa: E402
+from sheet.script import Arguments, Unusable, reading, refuse  # noqa: E402
+from sheet.script import run as run_script  # noqa: E402
+from sheet.whole_file import Target  # noqa: E402
 
 ORANGE, BLUE, GREEN, RED = (0.93, 0.53, 0.18), (0.20, 0.45, 0.80), (0.30, 0.68, 0.55), (0.80, 0.12, 0.15)
 WIDE, MARGIN, PLANE = 620, 1.1, 42  # pixels; beside the head; mm, half the side of a plane's square
@@ -33,9 +34,9 @@ def run(*command):
     try:
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     except OSError as reason:
-        render.refuse(f"{command[0]}: {reason.strerror}")
+        refuse(f"{command[0]}: {reason.strerror}; build Repose, or set REPOSE_BUILD to its build folder")
     if done.returncode:
-        render.refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
+        refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
 
 
 def parts_of(file, work):
@@ -129,7 +130,7 @@ def boxes_of(scene):
     return [box if len(box) == 6 else [*box[0], *box[1]] for box in boxes]
 
 
-def bones_drawn(scene, file, parts, marks):
+def bones_drawn(scene, parts, marks):
     """Bones, pieces before and after, planes; and before them the landmarks."""
     drawn = []
     for mesh, moved in parts:
@@ -185,21 +186,17 @@ def draw(rows, frame, legend, output):
                 scene.SetLayer(layer)
                 sheet.put(scene, i * WIDE, top + render.TITLE, WIDE, high)
                 render.look(scene, view, middle, high / scale / 2)
-    render.write_picture(sheet.pixels(), str(output))
+    render.write_picture(sheet.pixels(), output)
 
 
 def arguments():
-    parser = argparse.ArgumentParser(prog="proposal.py", description=__doc__, add_help=False,
-                                     allow_abbrev=False,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.error = render.refuse
-    parser.add_argument("-help", action="help")
+    parser = Arguments(__doc__)
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("-output", type=pathlib.Path)
     chosen = parser.parse_args()
     if not chosen.scene.is_file():
-        render.refuse(f"{chosen.scene}: no such file")
-    chosen.output = (chosen.output or chosen.scene.with_name("proposal.png")).absolute()
+        refuse(f"{chosen.scene}: no such file")
+    chosen.output = Target(chosen.output or chosen.scene.with_name("proposal.png"), ".png", [chosen.scene])
     return chosen
 
 
@@ -212,12 +209,10 @@ def main():
     file = chosen.scene
     scene = render.read_scene(file)
     if not isinstance(scene.get("skin"), str):
-        render.refuse(f"{file}: its skin is no file; make one with repose-isosurface")
-    anatomy = scene.get("anatomy") or scene
-    try:
-        marks = read_landmarks(file.parent / anatomy["landmarks"]) if "landmarks" in anatomy else {}
-    except Unusable as reason:
-        render.refuse(reason)
+        raise Unusable(f"{file}: its skin is no file; make one with repose-isosurface")
+    with reading(file, "a scene that repose-solve takes"):
+        named = (scene.get("anatomy") or scene).get("landmarks")
+        marks = read_landmarks(file.parent / named) if named else {}
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         parts = parts_of(file, work)
@@ -227,10 +222,11 @@ def main():
     skin = render.read_mesh(file.parent / scene["skin"])
     frame = np.concatenate([render.vtk_to_numpy(mesh.GetPoints().GetData())
                             for mesh in (*(mesh for mesh, _ in parts), solved)])
-    draw((lambda: bones_drawn(scene, file, parts, marks), lambda: skin_drawn(scene, skin, solved, incisions)),
-         frame, legend_of(scene, incisions), chosen.output)
+    with reading(file, "a scene that repose-solve takes"):
+        rows = (lambda: bones_drawn(scene, parts, marks), lambda: skin_drawn(scene, skin, solved, incisions))
+        draw(rows, frame, legend_of(scene, incisions), chosen.output)
     print(chosen.output)
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

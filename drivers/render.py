@@ -25,14 +25,19 @@ libgl1-mesa-dri; or, without pip, apt-get install --no-install-recommends python
 python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
 """
 
-import argparse
 import ctypes
 import ctypes.util
 import importlib.util
+import io
 import json
 import os
 import shutil
 import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from sheet.script import (Arguments, Unusable, number_from, reading, refuse,  # noqa: E402
+                          refuse_missing, run)
+from sheet.whole_file import Target  # noqa: E402
 
 if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_screen
     sys.argv[1:] = json.loads(os.environ["REPOSE_RENDER"])
@@ -49,16 +54,8 @@ SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
 FLESH, GREY, STEEL = (0.70, 0.36, 0.33), (0.72, 0.74, 0.78), (0.45, 0.55, 0.65)
 REGION = ("a8acb2", "2a9d8f")  # as given, computed
 BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
-
-
-class Arguments(argparse.ArgumentParser):
-    def error(self, message):
-        refuse(message)
-
-
-def refuse(message):
-    print(f"{os.path.basename(sys.argv[0])}: {message}", file=sys.stderr)
-    sys.exit(1)
+INSTALL = ("pip install vtk h5py, or apt-get install --no-install-recommends python3-paraview python3-h5py "
+           "xvfb xauth")
 
 
 def words(option, text, known):
@@ -70,9 +67,7 @@ def words(option, text, known):
 
 
 def arguments():
-    parser = Arguments(prog="render.py", description=__doc__, add_help=False, allow_abbrev=False,
-                       formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
+    parser = Arguments(__doc__)
     parser.add_argument("name")
     parser.add_argument("other", nargs="?")
     parser.add_argument("-output")
@@ -80,14 +75,13 @@ def arguments():
     parser.add_argument("-columns", default="before,after,movement,bones")
     parser.add_argument("-step", default="last")
     parser.add_argument("-film")
-    parser.add_argument("-frames", type=int, default=24)
+    parser.add_argument("-frames", type=number_from(2, 1000), default=24)
     parser.add_argument("-scene")
     parser.add_argument("-solved_skin", action="store_true")
     chosen = parser.parse_intermixed_args()
     chosen.names = [os.path.abspath(name.removesuffix(".h5"))
-                    for name in (chosen.name, chosen.other) if name]
+                    for name in (chosen.name, chosen.other) if name is not None]
     made = "_and_".join([chosen.names[0], *map(os.path.basename, chosen.names[1:])])
-    chosen.output = os.path.abspath(chosen.film or chosen.output or made + ".png")
     chosen.views = words("-views", chosen.views, tuple(VIEWS))
     chosen.columns = words("-columns", chosen.columns, COLUMNS)
     if chosen.scene and not os.path.isfile(chosen.scene):
@@ -97,10 +91,9 @@ def arguments():
             refuse(f"{name}.h5 is missing: NAME is the result's path")
     if chosen.film and len(chosen.names) > 1:
         refuse("-film shows one result, not two")
-    if not os.path.isdir(os.path.dirname(chosen.output)):
-        refuse(f"{chosen.output}: make its folder first")
-    if chosen.film and not (chosen.film.endswith(".gif") and 2 <= chosen.frames <= 1000):
-        refuse("-film must end in .gif, -frames be from 2 to 1000")
+    chosen.output = Target(
+        os.path.abspath(chosen.film or chosen.output or made + ".png"), ".gif" if chosen.film else ".png",
+        [*(name + ending for name in chosen.names for ending in (".h5", "_given_skin.vtp")), chosen.scene])
     return chosen
 
 
@@ -133,8 +126,7 @@ def find_screen():
     inside = "REPOSE_RENDER" in os.environ
     for program in ("xvfb-run",) if own else ("pvbatch", "xvfb-run"):
         if not shutil.which(program) or (inside and not own):
-            refuse("VTK is missing: pip install vtk h5py, or apt-get install "
-                   "--no-install-recommends python3-paraview python3-h5py xvfb xauth")
+            refuse(f"VTK is missing in {sys.executable}: {INSTALL}")
     os.environ["REPOSE_RENDER"] = json.dumps(sys.argv[1:])
     os.execvp("xvfb-run", ["xvfb-run", "-a", sys.executable if own else "pvbatch",
                            os.path.abspath(sys.argv[0])])
@@ -149,14 +141,15 @@ def load_modules():
         import vtkmodules.all as vtk
         from vtkmodules.util.numpy_support import (numpy_to_vtk, numpy_to_vtkIdTypeArray,
                                                    vtk_to_numpy)
-        sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
         from sheet import RAMP, shown_skin
     except ImportError as missing:
-        refuse(f"{missing.name} is missing: pip install vtk h5py, or apt-get install "
-               "--no-install-recommends python3-numpy python3-h5py")
+        refuse_missing(missing, INSTALL)
 
 
 # ----- what is drawn
+
+
+WHAT = "a result of repose-solve"
 
 
 class Result:
@@ -164,33 +157,35 @@ class Result:
 
     def __init__(self, file, solved_skin=False):
         file = str(file)
-        self.name = os.path.basename(file).removesuffix(".h5")
-        try:
+        self.file, self.name = file, os.path.basename(file).removesuffix(".h5")
+        with reading(file, WHAT):
             self.h5 = h5py.File(file)
-        except OSError as reason:
-            refuse(f"{file}: cannot be read: {reason}")
-        if "step" not in self.h5 or not len(self.h5["step"]) or "model/skin/points" not in self.h5:
-            refuse(f"{file}: holds no solved skin; solve it with repose-solve first")
+            if "step" not in self.h5 or not len(self.h5["step"]) or "model/skin/points" not in self.h5:
+                raise Unusable(f"{file}: holds no solved skin; solve it with repose-solve first")
+            self.take(file.removesuffix(".h5"), solved_skin)
+
+    def take(self, name, solved_skin):
         self.model = self.h5["model"]
         self.steps = [self.h5["step"][name] for name in sorted(self.h5["step"])]
         self.loads = [step.attrs["load"] for step in self.steps]
         solved, self.used = shown_skin.solved_skin(self.h5)
-        shown = solved if solved_skin else shown_skin.shown_skin(self.h5, file.removesuffix(".h5"))
+        shown = solved if solved_skin else shown_skin.shown_skin(self.h5, name)
         self.corners, self.before, self.solved = shown.corners, shown.before, shown.solved
         self.given = None if len(shown.before) == len(solved.before) else shown
         self.near = None if self.given is None else shown_skin.nearest(solved.before, shown.before)
         self.walls = self.find_walls()
         self.instruments = []
-        bones = self.model.get("bone_surfaces")
-        self.bone_corners = bones["triangles"][:] if bones else np.zeros((0, 3), int)
-        self.bones_before = bones["points"][:] if bones else np.zeros((0, 3))
+        self.bones_before, self.bone_corners = np.zeros((0, 3)), np.zeros((0, 3), int)
+        if bones := self.model.get("bone_surfaces"):
+            self.bones_before = shown_skin.read_places(bones, "points")
+            self.bone_corners = shown_skin.read_rows(bones, "triangles", len(self.bones_before))
 
     def find_walls(self):
         """Quadrilaterals at which tissue ends beside other tissue: the sides of cuts and lips. The
         rim has none beside it, and is not drawn."""
-        prisms = self.model["prism/points"][:] if "prism/points" in self.model else []
-        if not len(prisms):
+        if not len(self.model.get("prism/points", ())):
             return np.zeros((0, 4), int)
+        prisms = shown_skin.read_rows(self.model, "prism/points", len(self.model["point/position"]))
         sides = np.concatenate([prisms[:, corners] for corners in
                                 ((0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))])
         _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True,
@@ -204,7 +199,7 @@ class Result:
         return self.points(step)[self.walls.ravel()]
 
     def points(self, step):
-        return self.steps[step]["point/position"][:]
+        return shown_skin.read_places(self.steps[step], "point/position", len(self.model["point/position"]))
 
     def skin(self, step):
         """The shown skin at a step; a given one goes evenly to where it is at the last."""
@@ -218,8 +213,9 @@ class Result:
         return numbers if self.near is None else np.where(self.solved > 0, numbers[self.near], 0.0)
 
     def bones(self, step):
-        moved = self.steps[step].get("bone_surface/points")
-        return moved[:] if moved else self.bones_before
+        if "bone_surface/points" not in self.steps[step]:
+            return self.bones_before
+        return shown_skin.read_places(self.steps[step], "bone_surface/points", len(self.bones_before))
 
     def stress(self, step):
         """At each point of the skin the mean of the prisms, or the most of the springs, there."""
@@ -241,6 +237,10 @@ class Result:
 
     def state(self, step):
         """Skin, bones and the numbers of each colored column, at a step."""
+        with reading(self.file, WHAT):
+            return self.read_state(step)
+
+    def read_state(self, step):
         skin = self.skin(step)
         numbers = {"movement": np.linalg.norm(skin - self.before, axis=1), "region": self.solved}
         if "point/advance" in self.steps[step]:
@@ -308,21 +308,21 @@ def read_scene(file):
         import yaml
     except ImportError:
         refuse("scenes need PyYAML: pip install pyyaml, or apt-get install python3-yaml")
-    try:
-        with open(file, encoding="utf-8") as text:
-            return yaml.safe_load(text)
-    except (OSError, ValueError, yaml.YAMLError) as reason:
-        refuse(f"{file}: cannot be read: {' '.join(str(reason).split())}")
+    with reading(file, "a scene in YAML"), open(file, encoding="utf-8") as text:
+        try:
+            scene = yaml.safe_load(text)
+        except yaml.YAMLError as reason:
+            raise ValueError(" ".join(str(reason).split())) from None
+    if not isinstance(scene, dict):
+        raise Unusable(f"{file}: not a scene: it holds no keys such as skin, bones and tissue")
+    return scene
 
 
 def read_instruments(file):
     """[(shape, push)] of a scene, the shapes as the scene gives them: before the push."""
-    scene = read_scene(file)
-    try:
+    with reading(file, "a scene that repose-solve takes"):
         return [(shape_of(entry, os.path.dirname(os.path.abspath(file))), np.array(entry["push"]))
-                for entry in scene.get("instruments") or []]
-    except (AttributeError, KeyError, TypeError, ValueError) as reason:
-        refuse(f"{file}: not a scene that repose-solve takes: {reason}")
+                for entry in read_scene(file).get("instruments") or []]
 
 
 def shape_of(entry, folder):
@@ -603,29 +603,28 @@ def picture(drawn, views, tables, title=""):
     return sheet.pixels()
 
 
-def write_picture(pixels, output):
-    """To another name first: a picture is complete or absent."""
+def write_picture(pixels, target):
     image = vtk.vtkImageData()
     image.SetDimensions(pixels.shape[1], pixels.shape[0], 1)
     flat = np.ascontiguousarray(pixels[::-1].reshape(-1, 3))
     image.GetPointData().SetScalars(numpy_to_vtk(flat, deep=True))
     writer = vtk.vtkPNGWriter()
     writer.SetInputData(image)
-    writer.SetFileName(output + ".part")
+    writer.WriteToMemoryOn()
     writer.Write()
-    os.replace(output + ".part", output)
+    target.write(vtk_to_numpy(writer.GetResult()).tobytes())
 
 
-def write_film(frames, output):
+def write_film(frames, target):
     try:
         from PIL import Image
     except ImportError:
         refuse("-film needs Pillow: pip install pillow, or apt-get install python3-pil")
     images = [Image.fromarray(np.ascontiguousarray(frame)) for frame in frames]
     hold = [80] * (len(images) - 1) + [1500]  # ms
-    images[0].save(output + ".part", format="GIF", save_all=True, append_images=images[1:],
-                   duration=hold, loop=0)
-    os.replace(output + ".part", output)
+    film = io.BytesIO()
+    images[0].save(film, format="GIF", save_all=True, append_images=images[1:], duration=hold, loop=0)
+    target.write(film.getvalue())
 
 
 def state_of(result, chosen):
@@ -642,6 +641,8 @@ def state_of(result, chosen):
 
 def main():
     chosen = arguments()
+    find_screen()
+    load_modules()
     results = [Result(name + ".h5", chosen.solved_skin) for name in chosen.names]
     if chosen.scene:
         for result in results:
@@ -659,7 +660,4 @@ def main():
 
 
 if __name__ == "__main__":
-    arguments()
-    find_screen()
-    load_modules()
-    main()
+    run(main)

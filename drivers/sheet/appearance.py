@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from sheet.result import Unusable
+from sheet.script import Unusable, reading
 from sheet.shown_skin import Skin, nearest
 
 LARGEST_IMAGE = 2_000_000  # bytes: the page must stay below 5 MB
@@ -31,10 +31,11 @@ class Appearance:
 def read_appearance(file, skin):
     """The appearance that a mesh file gives the shown skin; None where it has none."""
     ending = pathlib.Path(file).suffix.lower()
-    if ending == ".ply":
-        points, colors = read_ply(file)
-        return None if colors is None else Appearance(skin, colors[nearest(points, skin.before)])
-    return read_obj(file, skin) if ending == ".obj" else None
+    with reading(file, "a mesh of the skin"):
+        if ending == ".ply":
+            points, colors = read_ply(file)
+            return None if colors is None else Appearance(skin, colors[nearest(points, skin.before)])
+        return read_obj(file, skin) if ending == ".obj" else None
 
 
 def read_ply(file):

@@ -1,13 +1,14 @@
 """Landmarks: read, placed on skin and bones, found by the shape of the profile, and the parts of the
 face that they bound. In mm along the axes of the head: +x patient left, +y posterior, +z up."""
 
+import csv
 import json
 import math
 import pathlib
 
 import numpy as np
 
-from sheet.result import Unusable
+from sheet.script import Unusable, is_number, reading
 
 RISE = math.radians(14)  # of nasion and upper incisors as seen from the condyles, together
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
@@ -28,20 +29,78 @@ MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper l
 
 
 def read_landmarks(file):
-    """{name: position} in LPS, of Slicer's markups or of named points."""
-    try:
-        stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as reason:
-        raise Unusable(f"{file}: not landmarks as JSON: {reason}") from None
-    found = {name: value for name, value in stored.items()
-             if isinstance(value, list) and len(value) == 3 and
-             all(isinstance(number, (int, float)) for number in value)}
-    for markup in stored.get("markups", []):
-        sign = (-1, -1, 1) if markup.get("coordinateSystem", "LPS") == "RAS" else (1, 1, 1)
-        for point in markup.get("controlPoints", []):
+    """{name: position} in LPS, as the programs read them (src/scene/landmarks.cpp): 3D Slicer's .mrk.json
+    and .fcsv, JSON {"name": [x, y, z], …}, and .csv of name, x, y, z."""
+    ending = pathlib.Path(file).suffix
+    if ending not in (".json", ".fcsv", ".csv"):
+        raise Unusable(f"{file}: the ending is none of .mrk.json, .json, .fcsv and .csv")
+    with reading(file, "landmarks"):
+        text = pathlib.Path(file).read_text(encoding="utf-8-sig")
+        found = of_json(json.loads(text)) if ending == ".json" else of_table(text, ending == ".fcsv")
+        for name, position in found.items():
+            if not np.isfinite(position).all():
+                raise ValueError(f"landmark '{name}' has a coordinate that is no finite number")
+    if not found:
+        raise Unusable(f"{file}: holds no landmark that is placed")
+    return found
+
+
+def in_lps(frame, position):
+    """A position given in a frame by its name, or by its number as old .fcsv files have it."""
+    if frame is None:
+        raise ValueError("the file does not say its coordinate system, LPS or RAS (.csv: by a line "
+                         '"# CoordinateSystem = LPS" before the points)')
+    sign = {"LPS": 1, "1": 1, "RAS": -1, "0": -1}.get(frame)
+    if sign is None:
+        raise ValueError(f"the coordinate system is '{frame}'; it must be LPS or RAS")
+    x, y, z = map(float, position)
+    return np.array([sign * x, sign * y, z])
+
+
+def of_json(stored):
+    """Landmarks of markups or, where there are none, of named points in LPS."""
+    if not isinstance(stored, dict):
+        raise TypeError("no object with markups or named points")
+    if not isinstance(stored.get("markups"), list):
+        return {name: in_lps("LPS", value) for name, value in stored.items()
+                if isinstance(value, list) and len(value) == 3}
+    found = {}
+    for markup in stored["markups"]:
+        if markup.get("coordinateUnits") not in (None, "mm", ["mm"] * 3):
+            raise ValueError("coordinateUnits must be mm")
+        for point in markup.get("controlPoints") or []:
             if point.get("positionStatus", "defined") == "defined":
-                found[point["label"]] = np.array(point["position"]) * sign
-    return {name: np.array(value, float) for name, value in found.items()}
+                name = point.get("label") or str(len(found) + 1)
+                found[name] = in_lps(markup.get("coordinateSystem"), point["position"])
+    return found
+
+
+def of_table(text, fcsv):
+    """Landmarks of the lines of a .fcsv or .csv file."""
+    found, frame, columns, titled = {}, None, (11, 1) if fcsv else None, False
+    for line in filter(None, map(str.strip, text.splitlines())):
+        if line.startswith("#"):
+            key, _, value = (word.strip() for word in line[1:].partition("="))
+            frame = value if key == "CoordinateSystem" else frame
+            if key == "columns" and fcsv:
+                names = fields(value)
+                columns = names.index("label") if "label" in names else None, names.index("x")
+            continue
+        row = fields(line)
+        if not (fcsv or found or titled or is_number(row[-1])):
+            titled = True
+            continue
+        label, first = columns or (0 if len(row) == 4 else None, len(row) - 3)
+        if not 0 <= first <= len(row) - 3 or (not fcsv and len(row) > 4):
+            raise ValueError(f"expected {'the columns of .fcsv' if fcsv else 'name, x, y, z'}, got '{line}'")
+        name = row[label] if label is not None and label < len(row) else ""
+        found[name or str(len(found) + 1)] = in_lps(frame, row[first:first + 3])
+    return found
+
+
+def fields(line):
+    """The fields of a line; a comma inside quotes does not part them."""
+    return [field.strip() for field in next(csv.reader([line], skipinitialspace=True))]
 
 
 def head_axes(landmarks):

@@ -8,7 +8,7 @@ import pathlib
 import numpy as np
 
 from sheet.landmarks import on_surface
-from sheet.result import Unusable
+from sheet.script import reading
 
 NORMS = pathlib.Path(__file__).with_name("norms.json")
 
@@ -21,15 +21,13 @@ FOLLOWS_SOURCE = "a review of 16 studies, 2016"
 
 def read_norms(file):
     """[{source, population, norms: {measure: [mean, standard deviation]}}] of a file."""
-    try:
+    with reading(file, "norms as in docs/guide/report.md"):
         stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
         for group in stored:
             for name, (mean, deviation) in group["norms"].items():
                 if not (name in MEASURES and math.isfinite(mean) and deviation > 0):
                     raise ValueError(f"{name}: not a measure, or not mean and deviation")
             group["population"], group["source"]
-    except (OSError, ValueError, TypeError, KeyError) as reason:
-        raise Unusable(f"{file}: not norms as in docs/guide/report.md: {reason}") from None
     return stored
 
 

@@ -16,7 +16,8 @@ from sheet.measures import (FOLLOWS_SOURCE, following, measured, occlusion, refe
                             shift_in_words, turns, turns_in_words)
 from sheet.profile import COLORS, cut, drawing, middle_plane, outlines
 from sheet.shown_skin import nearest
-from sheet.result import Figure, Unusable
+from sheet.result import Figure
+from sheet.script import Unusable
 from sheet.tables import folded, table, tenths
 from sheet.words import PUBLISHED, by_part, paragraphs
 

@@ -5,11 +5,8 @@ import math
 import h5py
 import numpy as np
 
-from sheet.shown_skin import Skin, nearest, opened, read_given, solved_skin
-
-
-class Unusable(Exception):
-    """Why a file cannot be shown, in one line."""
+from sheet.script import Unusable, reading
+from sheet.shown_skin import nearest, opened, read_given, read_places, read_rows, solved_skin
 
 
 class Figure(str):
@@ -30,11 +27,7 @@ class Result:
 
     def __init__(self, file):
         self.file = file
-        try:
-            stored = h5py.File(file)
-        except OSError as reason:
-            raise Unusable(f"{file}: cannot be read: {reason}") from None
-        with stored as h5:
+        with reading(file, "a result of repose-solve"), h5py.File(file) as h5:
             if "step" not in h5 or not len(h5["step"]):
                 raise Unusable(f"{file}: holds no step; solve it with repose-solve first")
             if "model/skin/points" not in h5:
@@ -45,12 +38,12 @@ class Result:
                            ("program", "command", "ranks", "libraries") if name in h5.attrs}
             self.end = self.steps[-1]
             last = h5["step"][sorted(h5["step"])[-1]]
-            self.solved, rows = solved_skin(h5)
+            self.solved, used = solved_skin(h5)
             self.given = read_given(file.removesuffix(".h5") + "_given_skin.vtp")
             self.skin = opened(self.given, self.solved) if self.given else self.solved
             self.read_tissue(h5["model"], last)
             self.read_bones(h5["model"], last)
-            self.read_uncertainty(last, rows)
+            self.read_uncertainty(last, used)
 
     def read_tissue(self, model, step):
         self.counts = {f"{kind}s": len(model[f"{kind}/points"]) for kind in ("spring", "prism")
@@ -59,7 +52,8 @@ class Result:
                         "skin triangles": len(self.solved.corners),
                         "layers": int(model["point/layer"][:].max()) + 1}
         self.volume, self.ratio = model["prism/rest_volume"][:], step["prism/volume_ratio"][:]
-        self.places = model["point/position"][:][model["prism/points"][:]].mean(1) \
+        position = model["point/position"][:]
+        self.places = position[read_rows(model, "prism/points", len(position))].mean(1) \
             if len(self.ratio) else np.zeros((0, 3))
         self.strain = {label: three_digits(step[name][:]) for label, name in (
             ("largest tension of a spring, N", "spring/tension"),
@@ -76,11 +70,12 @@ class Result:
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         self.bones, first = [], 0
-        moved = step["bone_surface/points"][:] if "bone_surface/points" in step else None
+        moved = read_places(step, "bone_surface/points") if "bone_surface/points" in step else None
         for b, name in enumerate(names):
             if str(b) not in surfaces or not len(surfaces[str(b)]["points"]):
                 continue
-            points, faces = surfaces[f"{b}/points"][:], surfaces[f"{b}/triangles"][:]
+            points = read_places(surfaces, f"{b}/points")
+            faces = read_rows(surfaces, f"{b}/triangles", len(points))
             after = points if moved is None else moved[first:first + len(points)]
             first += len(points)
             self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
@@ -95,13 +90,13 @@ class Result:
             bone["before"], bone["after"] = bone["before"] @ axes.T, bone["after"] @ axes.T
             bone["motion"] = rigid(bone["before"], bone["after"])
 
-    def read_uncertainty(self, step, rows):
+    def read_uncertainty(self, step, used):
         """mm at each vertex of the shown skin: how far the face may be from the model's exact
         answer; None where mesh and layers were not estimated."""
         error = float(self.end["displacement_error"])
         self.uncertainty = None
         if "point/discretisation_error" in step and math.isfinite(error):
-            values = error + step["point/discretisation_error"][:][rows]
+            values = error + step["point/discretisation_error"][:][used]
             near = nearest(self.solved.before, self.skin.before)
             self.uncertainty = np.where(self.skin.solved > 0, values[near], 0.0)
 
@@ -112,6 +107,3 @@ def rigid(before, after):
     u, _, v = np.linalg.svd((before - middle).T @ (after - there))
     turn = v.T @ np.diag([1, 1, np.sign(np.linalg.det(v.T @ u.T))]) @ u.T
     return turn, there - turn @ middle
-
-
-__all__ = ["Figure", "Result", "Skin", "Unusable", "rigid", "text"]

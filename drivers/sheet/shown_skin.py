@@ -7,7 +7,27 @@ import xml.etree.ElementTree
 
 import numpy as np
 
+from sheet.script import reading
+
 AROUND_CUTS = 4.0  # mm: so near to a cut the solved skin is shown, which is cut open
+
+
+def read_places(group, name, count=None):
+    """The places [n, 3] of a stored array, which must be finite, and `count` where that is given."""
+    found = group[name][:]
+    if found.ndim != 2 or found.shape[1] != 3 or count not in (None, len(found)):
+        raise ValueError(f"{name} has the shape {found.shape}")
+    if not np.isfinite(found).all():
+        raise ValueError(f"{name} holds coordinates that are no finite numbers")
+    return found
+
+
+def read_rows(group, name, count):
+    """The indices of a stored array, of rows of an array of length `count`."""
+    found = group[name][:]
+    if found.size and not 0 <= found.min() <= found.max() < count:
+        raise ValueError(f"{name} has indices from {found.min()} to {found.max()}, of {count} rows")
+    return found
 
 
 class Skin:
@@ -28,20 +48,23 @@ def read_given(file):
     file = pathlib.Path(file)
     if not file.is_file():
         return None
-    found = {item.get("Name"): np.frombuffer(
-        base64.b64decode(item.text)[8:], "<f8" if item.get("type") == "Float64" else "<i8")
-        for item in xml.etree.ElementTree.parse(file).iter("DataArray")}
-    before = found["Points"].reshape(-1, 3)
-    return Skin(before, before + found["displacement"].reshape(-1, 3),
-                found["connectivity"].reshape(-1, 3), found["solved"])
+    with reading(file, "the given skin of a result"):
+        found = {item.get("Name"): np.frombuffer(
+            base64.b64decode(item.text)[8:], "<f8" if item.get("type") == "Float64" else "<i8")
+            for item in xml.etree.ElementTree.parse(file).iter("DataArray")}
+        found |= {name: found[name].reshape(-1, 3) for name in ("Points", "displacement", "connectivity")}
+        before = read_places(found, "Points")
+        return Skin(before, before + read_places(found, "displacement", len(before)),
+                    read_rows(found, "connectivity", len(before)), found["solved"])
 
 
 def solved_skin(h5, step=None):
     """The solved skin of a result at a step (the last), and the rows of its points in the model."""
     step = step or h5["step"][sorted(h5["step"])[-1]]
-    used, corners = np.unique(h5["model/skin/points"][:], return_inverse=True)
-    before = h5["model/point/position"][:][used]
-    return Skin(before, step["point/position"][:][used], corners.reshape(-1, 3),
+    before = read_places(h5, "model/point/position")
+    after = read_places(step, "point/position", len(before))
+    used, corners = np.unique(read_rows(h5, "model/skin/points", len(before)), return_inverse=True)
+    return Skin(before[used], after[used], corners.reshape(-1, 3),
                 np.ones(len(used))), used
 
 

@@ -61,7 +61,7 @@ def main():
         render.look(scene, VIEW, middle, half)
         bar = render.color_bar(table) if table else render.renderer([])
         sheet.put(bar, i * wide, render.TITLE + high, wide, render.BAR)
-    render.write_picture(sheet.pixels(), out)
+    render.write_picture(sheet.pixels(), render.Target(out, ".png"))
 
 
 main()

@@ -124,7 +124,7 @@ def picture(file, landmarks, output):
                                     render.actors("after", state, result, {}))
             sheet.put(scene, j * WIDTH, i * WIDTH, WIDTH, WIDTH)
             render.look(scene, "profile" if view == "section" else view, middle, HALF)
-    render.write_picture(sheet.pixels(), str(output))
+    render.write_picture(sheet.pixels(), render.Target(output, ".png"))
 
 
 def main():

@@ -103,8 +103,8 @@ def test_the_plan_shown_is_solved_by_its_command(made, script):
     (["-plan", '{"jaw": {}}'], "'jaw' is no piece of the plan; its pieces are mandible"),
     (["-plan", '{"mandible": 3}'], "give {PIECE:"), (["-plan", "{"], "not JSON"),
     (["-plan", "[" * 10000], "not JSON"),
-    (["-samples", 1], "-samples 1: must be 3 … 10000"), (["-accuracy", "x"], "-accuracy"),
-    (["-output", "/nowhere/page.html"], "make its folder first")])
+    (["-samples", 1], "-samples: 1: must be from 3 to 10000"), (["-accuracy", "x"], "-accuracy"),
+    (["-output", "/nowhere/page.html"], "there is no folder /nowhere; make it first")])
 def test_refusals_are_one_line(made, script, arguments, words):
     message = script(made[0], *arguments)
     assert message.returncode == 1 and words in message.stderr, message

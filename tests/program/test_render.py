@@ -32,8 +32,8 @@ WRONG = {"no result": (["none"], "none.h5 is missing"),
          "unknown view": (["{}", "-views", "back"], "-views back: unknown, take some of front"),
          "unknown column": (["{}", "-columns", "x"], "-columns x: unknown, take some of before"),
          "no scene": (["{}", "-scene", "none.yaml"], "-scene none.yaml: no such file"),
-         "not a film": (["{}", "-film", "way.mp4"], "-film must end in .gif"),
-         "no folder": (["{}", "-output", "none/p.png"], "none/p.png: make its folder first")}
+         "not a film": (["{}", "-film", "way.mp4"], "way.mp4: cannot be written: its name does not end in .gif"),
+         "no folder": (["{}", "-output", "none/p.png"], "none; make it first")}
 
 
 @pytest.mark.parametrize("case", WRONG)

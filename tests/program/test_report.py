@@ -416,8 +416,8 @@ def test_mistakes_are_one_line(report, opened, tmp_path):
     (tmp_path / "bad.json").write_text("{")
     (tmp_path / "none.h5").write_bytes(b"")
     for arguments, part in ((["missing"], "missing.h5: no such file"),
-                            ([opened, "-landmarks", "bad.json"], "bad.json: not landmarks"),
-                            ([opened, "-output", "no/page.html"], "make its folder first"),
+                            ([opened, "-landmarks", "bad.json"], "bad.json: damaged, or not landmarks"),
+                            ([opened, "-output", "no/page.html"], "no/page.html: cannot be written: there is no folder no; make it first"),
                             ([opened, "-outptu", "x"], "-outptu"),
                             (["none.h5"], "none.h5: cannot be read")):
         result = report(*arguments)

@@ -1,5 +1,8 @@
-"""drivers/sheet, what report.py, render.py and others share: surfaces made coarser."""
+"""drivers/sheet, what report.py, render.py and others share: surfaces made coarser, landmarks, written files."""
 
+import os
+import resource
+import subprocess
 import sys
 
 import numpy as np
@@ -8,7 +11,10 @@ import pytest
 from conftest import PROJECT
 
 sys.path.insert(0, str(PROJECT / "drivers"))
+from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
+from sheet.script import Unusable  # noqa: E402
+from sheet.whole_file import Target  # noqa: E402
 
 
 def parted_sheet(n, wide):
@@ -50,3 +56,87 @@ def test_a_coarser_surface_keeps_its_cuts_open_and_welds_other_seams(wide, open_
     assert np.abs(inside[:, 1] - 20).max(initial=0) < 1, "the border is that of the seam"
     sides = (moved - coarse)[np.abs(coarse[:, 1] - 20) < 1][:, 1]
     assert sides.max() == pytest.approx(wide) and sides.min() == pytest.approx(0)
+
+
+# ----- landmarks
+
+
+MARKUP = '{{"markups": [{{"coordinateSystem": "{}", "controlPoints": [{{"label": "a b", "position": {}}}]}}]}}'
+SAME = {"lps.mrk.json": MARKUP.format("LPS", "[1, -2, 3.5]"), "ras.mrk.json": MARKUP.format("RAS", "[-1, 2, 3.5]"),
+        "named.json": '{"a b": [1, -2, 3.5], "about": "a head"}',
+        "lps.csv": "# CoordinateSystem = LPS\nname, x, y, z\n\"a b\", 1, -2, 3.5\n",
+        "ras.csv": "\ufeff# CoordinateSystem = RAS\r\na b,-1,2,3.5\r\n",
+        "ras.fcsv": "# Markups fiducial file version = 4.6\n# CoordinateSystem = 0\n"
+                    "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+                    "vtkMRMLMarkupsFiducialNode_0,-1,2,3.5,0,0,0,1,1,1,0,a b,\"of the, skin\",\n",
+        "lps.fcsv": "# CoordinateSystem = LPS\n# columns = label,x,y,z\na b,1,-2,3.5\n"}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_every_format_of_landmarks_is_read_in_lps(tmp_path, run, name):
+    (tmp_path / name).write_text(SAME[name], encoding="utf-8")
+    (position,) = read_landmarks(tmp_path / name).items()
+    assert position[0] == "a b" and position[1].tolist() == [1, -2, 3.5]
+    (tmp_path / "other.csv").write_text("# CoordinateSystem = LPS\nnone, 0, 0, 0\n")
+    mesh = PROJECT / "meshes/head_skin.ply"
+    refused = run("repose-register", mesh, mesh, "-landmarks", name, "other.csv", "-output", "o")
+    assert "common" in refused.stderr, "the programs read it, too: " + refused.stderr
+
+
+REFUSED = {"null.json": "null", "list.json": "[1, 2]", "deep.json": "[" * 100_000, "empty.json": "{}",
+           "nan.json": '{"a": [NaN, 0, 0]}', "word.json": '{"a": ["x", 0, 0]}', "none.mrk.json": '{"markups": [3]}',
+           "frame.mrk.json": MARKUP.format("IJK", "[1, 2, 3]"), "short.mrk.json": MARKUP.format("LPS", "[1, 2]"),
+           "frame.csv": "a, 1, 2, 3\n", "short.csv": "# CoordinateSystem = LPS\n1, 2\n",
+           "long.csv": "# CoordinateSystem = LPS\na, 1, 2, 3, 4\n", "empty.fcsv": "", "a.txt": "a, 1, 2, 3\n",
+           "word.csv": "# CoordinateSystem = LPS\na, 1, 2, 3\nb, 1, x, 3\n"}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_files_that_are_no_landmarks_are_refused(tmp_path, name):
+    (tmp_path / name).write_text(REFUSED[name])
+    with pytest.raises(Unusable, match=f"{name}: "):
+        read_landmarks(tmp_path / name)
+
+
+# ----- written files
+
+
+def test_a_target_is_written_whole(tmp_path):
+    file = tmp_path / "page.html"
+    for text in ("one", "two"):
+        Target(file, ".html", [tmp_path / "none.h5", None]).write(text)
+        assert file.read_text() == text
+    assert os.listdir(tmp_path) == ["page.html"]
+
+
+def test_targets_that_must_not_be_written_are_refused(tmp_path):
+    (tmp_path / "in.html").write_text("input")
+    (tmp_path / "folder.html").mkdir()
+    os.link(tmp_path / "in.html", tmp_path / "hard.html")
+    (tmp_path / "soft.html").symlink_to("in.html")
+    os.mkfifo(tmp_path / "pipe.html")
+    for name, part in (("in.html", "is an input of this run"), ("hard.html", "is an input of this run"),
+                       ("soft.html", "is an input of this run"), ("folder.html", "no regular file"),
+                       ("pipe.html", "no regular file"), ("no/page.html", "there is no folder"),
+                       ("page.h5", "does not end in .html or .htm")):
+        with pytest.raises(Unusable, match=part):
+            Target(tmp_path / name, (".html", ".htm"), [tmp_path / "in.html"])
+    assert (tmp_path / "in.html").read_text() == "input"
+
+
+FILLS = """import sys
+sys.path.insert(0, sys.argv[1])
+from sheet.script import run
+from sheet.whole_file import Target
+run(lambda: Target(sys.argv[2], "").write(b"x" * 100_000))
+"""
+
+
+@pytest.mark.parametrize("name, part", [("full.html", "File too large; free some space"),
+                                        ("x" * 253, "File name too long; choose a shorter name")])
+def test_what_cannot_be_written_leaves_the_file_as_it_was(tmp_path, name, part):
+    (tmp_path / name).write_text("old")
+    done = subprocess.run([sys.executable, "-B", "-c", FILLS, PROJECT / "drivers", name], cwd=tmp_path, text=True,
+                          capture_output=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
+    assert done.returncode == 1 and part in done.stderr and len(done.stderr.splitlines()) == 1, done
+    assert os.listdir(tmp_path) == [name] and (tmp_path / name).read_text() == "old"

@@ -16,6 +16,10 @@ import tempfile
 import xml.etree.ElementTree
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(FOLDER.parent))
+from sheet.script import Unusable as Refusal  # noqa: E402
+from sheet.whole_file import Target  # noqa: E402
+
 BONES = 4
 TISSUE = {**{preset: {"material": {"preset": preset}}
              for preset in ("face", "skin_on_fat", "incompressible")},
@@ -26,10 +30,6 @@ PATIENCE = 10  # s that a canceled solver has to end by itself
 PREVIEW = 1  # mm, the accuracy of a preview
 TEMPORARY = "repose_panel_"  # what the names of temporary folders begin with
 ITERATION = re.compile(r"load (\S+)  iteration .* evaluations  (?:(\S+) mm to go)?")
-
-
-class Refusal(Exception):
-    """What a person has to change, in one line."""
 
 
 class Canceled(Exception):
@@ -87,6 +87,16 @@ def parse(arguments):
         texts[name] = text if joined else rest.pop(0)
     return {name: value_of(known[name], text) if name in known and text is not None else text
             for name, text in texts.items()}
+
+
+def targets_of(chosen):
+    """{parameter: Target} of the files that are written and chosen."""
+    known = {name: item for name, item in parameters().items() if item.find("longflag") is not None}
+    outputs = [name for name, item in known.items() if item.findtext("channel") == "output"]
+    inputs = [chosen[name] for name, item in known.items()
+              if "fileExtensions" in item.attrib and name not in outputs]
+    return {name: Target(chosen[name], "", inputs) for name in [*outputs, "returnparameterfile"]
+            if chosen[name]}
 
 
 # ----- the scene
@@ -287,7 +297,7 @@ def data_array(name, values):
             "</DataArray>\n")
 
 
-def write_vtp(file, points, triangles, arrays):
+def vtp_text(points, triangles, arrays):
     """A surface in LPS, as the field SPACE tells Slicer, with arrays at its points."""
     import numpy as np
     ends = 3 * np.arange(1, len(triangles) + 1)
@@ -295,7 +305,7 @@ def write_vtp(file, points, triangles, arrays):
     scalars = next((name for name, values in arrays.items() if values.ndim == 1), None)
     active = f' Vectors="{vectors}"' if vectors else ""
     active += f' Scalars="{scalars}"' if scalars else ""
-    text = ('<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" '
+    return ('<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" '
             'byte_order="LittleEndian" header_type="UInt64">\n<PolyData>\n<FieldData>\n'
             + data_array("SPACE", "LPS") + "</FieldData>\n"
             f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="0" NumberOfLines="0" '
@@ -305,16 +315,12 @@ def write_vtp(file, points, triangles, arrays):
             + "</PointData>\n<Points>\n" + data_array("Points", points) + "</Points>\n<Polys>\n"
             + data_array("connectivity", triangles.ravel()) + data_array("offsets", ends)
             + "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n")
-    part = pathlib.Path(f"{file}.part")
-    part.write_text(text)
-    part.replace(file)
 
 
 def skin_to_hand_back(h5, result):
     """Points, triangles and arrays of the predicted skin: of the model that was given, displaced, where
     a remeshed part of it was solved."""
     import numpy as np
-    sys.path.insert(0, str(FOLDER.parent))
     from sheet.shown_skin import nearest, shown_skin, solved_skin
     step = h5["step"][sorted(h5["step"])[-1]]
     solved, used = solved_skin(h5)
@@ -332,7 +338,7 @@ def skin_to_hand_back(h5, result):
     return skin.after, skin.corners, arrays
 
 
-def hand_back(chosen, result, numbers):
+def hand_back(targets, result, numbers):
     """Writes the models that are requested; the numbers for the panel."""
     import h5py
     import numpy as np
@@ -342,15 +348,15 @@ def hand_back(chosen, result, numbers):
         points, triangles, arrays = skin_to_hand_back(h5, result)
         movement, ratio = arrays["displacement_magnitude"], step["prism/volume_ratio"][:]
         error, mesh_error = report["displacement_error"], report.get("discretisation_error")
-        if chosen["predictedSkin"]:
-            write_vtp(chosen["predictedSkin"], points, triangles, arrays)
+        if "predictedSkin" in targets:
+            targets["predictedSkin"].write(vtp_text(points, triangles, arrays))
         moved, first = step["bone_surface/points"][:] if "bone_surface/points" in step else None, 0
         for b, number in enumerate(numbers):
             surface = h5[f"model/bone_surface/{b}"]
             count = len(surface["points"])
-            if chosen[f"movedBone{number}"]:
+            if f"movedBone{number}" in targets:
                 where = surface["points"][:] if moved is None else moved[first:first + count]
-                write_vtp(chosen[f"movedBone{number}"], where, surface["triangles"][:], {})
+                targets[f"movedBone{number}"].write(vtp_text(where, surface["triangles"][:], {}))
             first += count
     moving = movement[movement > MOVING]
     return {"accuracyReached": float(error) if math.isfinite(error) else -1,
@@ -376,17 +382,18 @@ def verdict(status, report, accuracy, preview):
 
 
 def work(chosen, folder):
+    targets = targets_of(chosen)
     scene, numbers = write_scene(chosen, folder)
     print("<filter-start><filter-name>Repose</filter-name></filter-start>", flush=True)
     status, printed = solve(chosen, scene)
-    returned, report = hand_back(chosen, scene.with_name("result.h5"), numbers)
+    returned, report = hand_back(targets, scene.with_name("result.h5"), numbers)
     returned = {"verdict": verdict(status, report, accuracy_of(chosen), chosen["preview"]), **returned}
-    if chosen["resultFile"]:
-        shutil.copyfile(scene.with_name("result.h5"), chosen["resultFile"])
-    if chosen["returnparameterfile"]:
+    if "resultFile" in targets:
+        targets["resultFile"].write(scene.with_name("result.h5").read_bytes())
+    if "returnparameterfile" in targets:
         lines = [f"{name} = {value if isinstance(value, str) else format(value, '.6g')}\n"
                  for name, value in returned.items()]
-        pathlib.Path(chosen["returnparameterfile"]).write_text("".join(lines))
+        targets["returnparameterfile"].write("".join(lines))
     print(printed.replace(f"{folder}/", "") + returned["verdict"])
     print("<filter-progress>1</filter-progress>", flush=True)
 
@@ -442,8 +449,8 @@ def main():
             signal.signal(number, cancel)
         run()
     except ImportError as missing:  # h5py raises it for a missing numpy
-        print(f"Repose: {missing.name} is missing: apt-get install python3-numpy python3-h5py",
-              file=sys.stderr)
+        print(f"Repose: {missing.name} is missing in {sys.executable}: apt-get install python3-numpy "
+              "python3-h5py", file=sys.stderr)
         return 1
     except (Refusal, OSError) as reason:
         print(f"Repose: {reason}", file=sys.stderr)

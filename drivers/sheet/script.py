@@ -1,0 +1,96 @@
+"""What the scripts in drivers share: their arguments, refusals in one line, and how they end. Needs no
+package."""
+
+import argparse
+import contextlib
+import math
+import os
+import sys
+
+
+class Unusable(Exception):
+    """Why a script cannot go on, in one line."""
+
+
+def refuse(reason):
+    """Ends the script with status 1 and one line."""
+    line = " ".join(str(reason).splitlines())
+    print(f"{os.path.basename(sys.argv[0])}: {line}", file=sys.stderr)
+    sys.exit(1)
+
+
+def refuse_missing(module, install):
+    """Ends a script whose Python lacks a module; `install` says how to get it."""
+    refuse(f"{module.name} is missing in {sys.executable}: {install}")
+
+
+def run(main):
+    """Runs the main function of a script and ends the script: with status 1 and one line where a file or an
+    argument is unusable, with status 130 after Ctrl-C."""
+    try:
+        sys.exit(main())
+    except Unusable as reason:
+        refuse(reason)
+    except OSError as reason:
+        refuse(f"{reason.filename}: {reason.strerror}" if reason.filename else reason)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+@contextlib.contextmanager
+def reading(file, what):
+    """Makes the failures of reading a damaged or foreign file one line that names it."""
+    try:
+        yield
+    except OSError as reason:
+        raise Unusable(f"{file}: cannot be read: {reason}") from None
+    except RecursionError:
+        raise Unusable(f"{file}: nested too deeply for {what}") from None
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, SyntaxError, TypeError,
+            ValueError) as reason:
+        raise Unusable(f"{file}: damaged, or not {what}: {reason}") from None
+
+
+class Arguments(argparse.ArgumentParser):
+    """Arguments of a script. -h, -help and --help print its documentation; a wrong argument ends it with
+    status 1 and one line."""
+
+    def __init__(self, documentation):
+        super().__init__(prog=os.path.basename(sys.argv[0]), description=documentation, add_help=False,
+                         allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
+        self.add_argument("-h", "-help", "--help", action="help", help="print this text and end")
+
+    def error(self, message):
+        refuse(f"{message}; -help lists the arguments")
+
+
+def number_from(low, high, kind=int):
+    """The type of an argument that is a number from `low` to `high`."""
+    def read(text):
+        value = kind(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text}: must be from {low:g} to {high:g}")
+        return value
+
+    read.__name__ = {int: "whole number", float: "number"}[kind]
+    return read
+
+
+def words(documentation, least, most=math.inf):
+    """The arguments of a script without options, `least` to `most` of them."""
+    given = sys.argv[1:]
+    if {"-h", "-help", "--help"} & set(given):
+        print(documentation.strip())
+        sys.exit(0)
+    unknown = [word for word in given if word.startswith("-") and not is_number(word)]
+    if unknown or not least <= len(given) <= most:
+        usage = next(line.strip() for line in documentation.splitlines() if line.startswith("    drivers/"))
+        refuse(f"{unknown[0]}: unknown; usage: {usage}" if unknown else f"usage: {usage}")
+    return given
+
+
+def is_number(text):
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
