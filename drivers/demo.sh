@@ -10,6 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 case "$*" in
   "") ct= ;;
   --ct) ct=1 ;;
+  -h | -help | --help) sed -n '2,/^set /s/^# \{0,1\}//p' drivers/demo.sh && exit ;;
   *) echo "demo.sh: unknown argument: $*; it takes none, or --ct" >&2 && exit 1 ;;
 esac
 

@@ -6,6 +6,10 @@
 #
 # Needs matplotlib, h5py, PyYAML and what drivers/render.py asks for.
 set -euo pipefail
+case "${1:-}" in
+  -h | -help | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" && exit ;;
+  -*) echo "figures.sh: unknown argument: $1; -help prints the usage" >&2 && exit 1 ;;
+esac
 project="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 . "$project/drivers/setup.sh"
 mpi_environment
