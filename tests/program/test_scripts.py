@@ -1,12 +1,17 @@
-"""Messages of every script in drivers if something is missing: one line, and what to do."""
+"""Messages of every script in drivers if something is missing, wrong or damaged: one line, and what to do."""
 
 import os
 import shutil
+import signal
+import subprocess
 import sys
+import time
 
+import h5py
+import numpy as np
 import pytest
 
-from conftest import PROJECT, TIME_LIMIT, finish, programs
+from conftest import PROJECT, TIME_LIMIT, can_draw, finish, programs
 
 SCRIPTS = {path.name: path for path in sorted((PROJECT / "drivers").glob("*.py"))}
 SCRIPTS["Repose"] = PROJECT / "drivers/slicer/lib/run.py"
@@ -34,7 +39,8 @@ def script(tmp_path, environment):
         stubs.mkdir(exist_ok=True)
         (stubs / "sitecustomize.py").write_text(
             f"import sys\nsys.modules.update(dict.fromkeys({list(without)}))\n")
-        surroundings = environment | {"PYTHONPATH": str(stubs),
+        path = os.pathsep.join([str(stubs), *filter(None, [environment.get("PYTHONPATH")])])
+        surroundings = environment | {"PYTHONPATH": path,
                                       "REPOSE_LIVE": str(programs() / "repose-live")}
         surroundings |= settings or {}
         return finish([sys.executable, "-B", str(SCRIPTS[name]), *map(str, arguments)], tmp_path,
@@ -56,7 +62,7 @@ def test_a_missing_module_is_one_line_that_says_what_to_install(script, solved, 
     file = solved("paper_jaw_opening.yaml")
     arguments = [a.format(file) for a in ARGUMENTS.get(name, ["{}"])]
     result = script(name, *arguments, without=[module])
-    says(result, name, "install ")
+    says(result, name, "install ", *([] if name in ("plan.py", "paraview_repose.py") else [sys.executable]))
 
 
 @pytest.mark.parametrize("name", SCRIPTS.keys() - {"paraview_repose.py"})
@@ -70,6 +76,185 @@ def test_springs_are_named_where_a_result_has_none(script, solved):
     solid = solved("head_incision.yaml")
     says(script("plot_equilibrium.py", solid, "picture.png"), "plot_equilibrium.py",
          "tissue.springs")
+
+
+# ----- arguments
+
+OWN = sorted(SCRIPTS.keys() - {"paraview_repose.py", "plan.py", "Repose"})
+
+
+@pytest.mark.parametrize("name", [*OWN, "figures.sh", "demo.sh"])
+def test_help_is_printed_and_nothing_is_done(script, environment, tmp_path, name):
+    for word in ("-h", "-help", "--help"):
+        result = script(name, word) if name in SCRIPTS else \
+            finish([PROJECT / "drivers" / name, word], tmp_path, environment, TIME_LIMIT)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        assert len(result.stdout.splitlines()) > 4
+    assert not [path for path in tmp_path.iterdir() if path.name != "stubs"]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_wrong_arguments_are_one_line(script, name):
+    for arguments in (["-nonsense"], [], [""]):
+        if (name, arguments) != ("weights.py", []):
+            says(script(name, *arguments), name)
+
+
+@pytest.mark.parametrize("arguments, part", [
+    (["-port", "-1"], "-port: -1: must be from 0 to 65535"), (["-port", "99999"], "must be from 0 to 65535"),
+    (["-ranks", "0"], "-ranks: 0: must be from 1"), (["-ranks", "x"], "-ranks: invalid whole number value: 'x'")])
+def test_numbers_out_of_range_are_refused(script, arguments, part):
+    says(script("live.py", PROJECT / "meshes/head_live.yaml", "-no_browser", *arguments), "live.py", part)
+
+
+def test_a_solver_that_is_not_there_is_named(script):
+    says(script("live.py", PROJECT / "meshes/head_live.yaml", settings={"REPOSE_LIVE": "bin/none"}), "live.py",
+         "bin/none: no such program; set REPOSE_LIVE")
+
+
+# ----- inputs are kept
+
+
+def linked(file, name):
+    """Another name of a file."""
+    os.link(file, file.with_name(name))
+    return name
+
+
+@pytest.fixture
+def result(solved, tmp_path):
+    shutil.copy(solved("paper_jaw_opening.yaml"), tmp_path / "r.h5")
+    return tmp_path / "r.h5"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    for file in PROJECT.glob("meshes/head*"):
+        (tmp_path / file.name).symlink_to(file)
+    (tmp_path / "head_live.yaml").unlink()
+    return shutil.copy(PROJECT / "meshes/head_live.yaml", tmp_path)
+
+
+REPLACED = {"report.py": (["r", "-output"], ".html"), "render.py": (["r", "-output"], ".png"),
+            "plot_incision.py": (["{}", "r.h5"], ".png"), "plot_equilibrium.py": (["r.h5"], ".png")}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_a_script_does_not_replace_the_result_that_it_reads(script, result, name):
+    arguments, ending = REPLACED[name]
+    content = result.read_bytes()
+    for target, part in (("r.h5", "does not end in " + ending), (linked(result, "r" + ending), "is an input")):
+        words = [word.format(target) for word in arguments]
+        says(script(name, *words, *([] if "{}" in arguments else [target])), name, target, part)
+        assert result.read_bytes() == content
+
+
+@pytest.mark.parametrize("name, ending", [("map.py", ".html"), ("proposal.py", ".png")])
+def test_a_script_does_not_replace_the_scene_that_it_reads(script, scene, tmp_path, name, ending):
+    content = (tmp_path / "head_live.yaml").read_bytes()
+    for target, part in (("head_live.yaml", "does not end in " + ending),
+                         (linked(tmp_path / "head_live.yaml", "page" + ending), "is an input")):
+        says(script(name, "head_live.yaml", "-output", target), name, target, part)
+        assert (tmp_path / "head_live.yaml").read_bytes() == content
+
+
+def test_a_page_without_a_mark_is_not_filled(script, tmp_path):
+    (tmp_path / "page.md").write_text("a page\n")
+    says(script("weights.py", "-bin", programs(), "-output", "page.md"), "weights.py", "<!-- measured -->")
+    assert (tmp_path / "page.md").read_text() == "a page\n"
+
+
+# ----- damaged files
+
+
+def set_rows(h5):
+    h5["model/skin/points"][0] = [0, 1, 10_000_000]
+
+
+def set_negative_rows(h5):
+    h5["model/skin/points"][0] = [0, 1, -1]
+
+
+def set_positions(h5):
+    h5["step"][sorted(h5["step"])[-1]]["point/position"][5] = np.nan
+
+
+def remove_model(h5):
+    del h5["model/point"]
+
+
+DRAWN = {"report.py": ["r.h5"], "render.py": ["r.h5"], "plot_incision.py": ["picture.png", "r.h5"],
+         "plot_equilibrium.py": ["r.h5", "picture.png"]}
+
+
+@pytest.mark.parametrize("damage", [set_rows, set_negative_rows, set_positions, remove_model])
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_damaged_result_is_refused(script, result, name, damage):
+    if name == "render.py" and not can_draw():
+        pytest.skip("no VTK")
+    if name == "plot_equilibrium.py":  # reads springs, of the initial position
+        damage = {set_rows: lambda h5: h5["model/spring/points"].__setitem__(0, [0, 10_000_000]),
+                  set_negative_rows: lambda h5: h5["model/spring/points"].__setitem__(0, [0, -1]),
+                  set_positions: lambda h5: h5["model/point/position"].__setitem__(5, np.nan)}.get(damage, damage)
+    with h5py.File(result, "r+") as h5:
+        damage(h5)
+    says(script(name, *DRAWN[name]), name, "r.h5: damaged, or not a result")
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_truncated_or_foreign_result_is_refused(script, result, name):
+    if name == "render.py" and not can_draw():
+        pytest.skip("no VTK")
+    content = result.read_bytes()
+    result.write_bytes(content[:len(content) // 2])
+    says(script(name, *DRAWN[name]), name, "r.h5: ")
+    with h5py.File(result, "w") as h5:
+        h5["numbers"] = [1, 2]
+    says(script(name, *DRAWN[name]), name, "r.h5: ")
+
+
+@pytest.mark.parametrize("option, file, content", [
+    ("-landmarks", "null.json", b"null"), ("-landmarks", "deep.json", b"[" * 100_000),
+    ("-scene", "scene.yaml", b"skin: \xff\xfe.ply\n"), ("-norms", "deep.json", b"[" * 100_000),
+    ("-skin", "skin.ply", b"ply\nformat ascii 1.0\nelement vertex x\nend_header\n")],
+    ids=["null landmarks", "nested landmarks", "scene", "norms", "skin"])
+def test_files_beside_a_result_that_are_damaged_are_refused(script, result, option, file, content):
+    result.with_name(file).write_bytes(content)
+    says(script("report.py", "r", option, file), "report.py", f"{file}: ")
+
+
+@pytest.mark.parametrize("content", [b"", b"[" * 10_000, b"\x00\xff", b"- 3\n"],
+                         ids=["empty", "nested", "binary", "list"])
+def test_what_is_no_scene_is_refused(script, tmp_path, content):
+    (tmp_path / "scene.yaml").write_bytes(content)
+    if can_draw():
+        says(script("proposal.py", "scene.yaml"), "proposal.py", "scene.yaml: ")
+    for name in ("map.py", "live.py"):
+        says(script(name, "scene.yaml"), name, "scene.yaml")
+
+
+@pytest.mark.parametrize("name", ["map.py", "live.py"])
+def test_a_result_in_place_of_a_scene_is_refused(script, result, name):
+    says(script(name, "r.h5"), name, "r.h5: ", "give a scene file (.yaml)")
+
+
+def test_weights_end_at_the_first_refusal(script):
+    done = script("weights.py", PROJECT / "meshes/head_solid.yaml", "-bin", programs())
+    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (1, "", 1), done
+
+
+def test_an_interrupt_ends_a_script_in_silence(tmp_path):
+    slow = tmp_path / "repose-solve"
+    slow.write_text("#!/bin/sh\ntouch started\nexec sleep 60\n")
+    slow.chmod(0o755)
+    process = subprocess.Popen([sys.executable, "-B", SCRIPTS["weights.py"], "-bin", "."], cwd=tmp_path, text=True,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    for _ in range(600):
+        if (tmp_path / "started").exists():
+            break
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=60) == ("", "") and process.returncode == 130
 
 
 # ----- ParaView, played by modules of its names
