@@ -360,6 +360,15 @@ def test_what_is_wrong_is_said_in_one_line(panel, tmp_path, case):
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
+def test_the_panel_does_not_replace_a_model_that_it_reads(panel, head, tmp_path):
+    arguments = head()
+    for flag in ("--predictedSkin", "--movedBone2", "--resultFile"):
+        content = arguments[1].read_bytes()
+        result = panel(*arguments, flag, arguments[1])
+        assert result.returncode == 1 and "is an input of this run" in result.stderr, result
+        assert len(result.stderr.splitlines()) == 1 and arguments[1].read_bytes() == content
+
+
 def test_a_preview_says_that_it_is_one(panel, head, tmp_path):
     result = panel(*head(), "--preview", "--accuracy", 0.1, "--predictedSkin",
                    tmp_path / "skin.vtp", "--returnparameterfile", tmp_path / "numbers")
