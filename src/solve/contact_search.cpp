@@ -95,18 +95,14 @@ Outcome ContactSearch::with_other(Vec displacement, double accuracy, Outcome out
 }
 
 Outcome ContactSearch::run(Vec displacement, double accuracy) {
-  other_.begin(displacement);
-  Outcome outcome;
-  if (!std::exchange(predicted_, false)) outcome = descent_.finish(displacement, accuracy);
-  if (!outcome.converged) outcome = search(displacement, accuracy);
-  return with_other(displacement, accuracy, std::move(outcome));
-}
-
-/// Searches through rounded bodies. Collective.
-Outcome ContactSearch::search(Vec displacement, double accuracy) {
   constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
   constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
   Outcome outcome;
+  other_.begin(displacement);
+  if (!std::exchange(predicted_, false)) {
+    outcome = descent_.finish(displacement, accuracy);
+    if (outcome.converged) return with_other(displacement, accuracy, std::move(outcome));
+  }
   int times = 1;  // stiffness of the penalty
   descent_.stiffen(times);
   int64_t iterations = 0;
@@ -150,7 +146,7 @@ Outcome ContactSearch::search(Vec displacement, double accuracy) {
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason =
         fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());
-  return outcome;
+  return with_other(displacement, accuracy, std::move(outcome));
 }
 
 Outcome ContactSearch::run_near(Vec displacement, double accuracy) {

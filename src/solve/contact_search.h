@@ -33,7 +33,6 @@ class ContactSearch : public RestSearch {
 
  private:
   using End = ContactPrograms::End;
-  Outcome search(Vec displacement, double accuracy);
   Outcome with_other(Vec displacement, double accuracy, Outcome outcome);
   Outcome stopped(Vec displacement, Outcome outcome);
   bool release_overlapped(double accuracy);
