@@ -102,7 +102,7 @@ Parts parts_of_bone(const base::Options& options, const std::filesystem::path& i
   if (!scene::is_bone_name(piece) || piece == "rest")
     base::refuse(
         "-piece {} must be 1 to 64 printable ASCII characters without '/', and not rest, the name "
-        "of what is left",
+        "of the bone's other part",
         base::quote(piece));
   const meshtools::Osteotomy plan = plan_of(options);
   meshtools::Pieces pieces =

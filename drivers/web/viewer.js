@@ -2,7 +2,7 @@
 // report.py and other pages. Needs three.js beside it (window.THREE) and viewer.css; no network.
 //
 //   const viewer = new FaceViewer(element, axes); // throws where the browser has no WebGL 2; axes: rows left,
-//                                                 // back and up of the head, by which it is looked at; or none
+//                                                 // back and up of the head, for views; or none
 //   const skin = viewer.add({name: "skin", triangles, states: [before, after]});
 //   viewer.add({name: "mandible", kind: "bone", triangles, states: [before, after]});
 //   // further keys: colors (Uint8Array, 3 a vertex), uv (2 a vertex), oriented (triangles are

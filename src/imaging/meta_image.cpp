@@ -53,28 +53,24 @@ MetaHeader meta_header(const std::filesystem::path& file) {
   return header;
 }
 
-/// Voxels of one file: the whole volume's or a slice's.
-void check_data(const std::filesystem::path& file, const MetaHeader& header,
-                const std::string& name, int64_t bytes) {
-  const auto data = file.parent_path() / name;
-  const int64_t size = file_bytes(data);
-  if (size == 0)
-    base::refuse("{}: its voxels should be in {}, which is missing or empty; copy that file, too",
-                 file.string(), data.string());
-  const int64_t offset = std::max<int64_t>(0, header.skipped);
-  const int64_t stored = header.compressed ? unpacked_bytes(data, offset) : size - offset;
+/// Refuses a file that is too short to hold `bytes` of voxels from `offset` on.
+void check_length(const std::filesystem::path& file, const MetaHeader& header,
+                  const std::filesystem::path& data, int64_t offset, int64_t bytes) {
+  const int64_t stored =
+      header.compressed ? unpacked_bytes(data, offset) : file_bytes(data) - offset;
   if (stored < bytes)
     base::refuse("{}: truncated: {} of the {} bytes of its voxels are in {}; copy it again",
                  file.string(), stored, bytes, data.string());
 }
 
-void check_local(const std::filesystem::path& file, const MetaHeader& header, int64_t bytes) {
-  const int64_t offset = header.skipped > 0 ? header.skipped : header.bytes;
-  const int64_t stored =
-      header.compressed ? unpacked_bytes(file, offset) : file_bytes(file) - offset;
-  if (stored < bytes)
-    base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it again",
-                 file.string(), stored, bytes);
+/// Voxels of one file: the whole volume's or a slice's.
+void check_data(const std::filesystem::path& file, const MetaHeader& header,
+                const std::string& name, int64_t bytes) {
+  const auto data = file.parent_path() / name;
+  if (file_bytes(data) == 0)
+    base::refuse("{}: its voxels should be in {}, which is missing or empty; copy that file, too",
+                 file.string(), data.string());
+  check_length(file, header, data, std::max<int64_t>(0, header.skipped), bytes);
 }
 
 void check_count(const std::filesystem::path& file, int64_t named, int64_t count) {
@@ -196,7 +192,8 @@ void check_meta_voxels(const std::filesystem::path& file, const Image& header) {
   if (meta.data.empty())
     base::refuse("{}: its ElementDataFile names no file; mend the header", file.string());
   if (meta.data == "LOCAL" || meta.data == "Local" || meta.data == "local")
-    return check_local(file, meta, header.bytes);
+    return check_length(file, meta, file, meta.skipped > 0 ? meta.skipped : meta.bytes,
+                        header.bytes);
   if (meta.data.starts_with("LIST")) return check_list(file, meta, header);
   if (meta.data.find('%') != std::string::npos) return check_format(file, meta, header);
   check_data(file, meta, meta.data, header.bytes);

@@ -122,8 +122,7 @@ bool BodyContact::measure_within(double reach, double smoothed_to, size_t c, con
     distance_[c] = bound;
     return false;
   }
-  const bool smoothed =
-      multiplier_[c] != 0 || bound < std::max(0.0, smoothed_to + pairs_.offset[c]);
+  const bool smoothed = multiplier_[c] != 0 || bound < exact_from(c, smoothed_to);
   set(c, beside, smoothed ? body.distance(beside) : body.outside(beside));
   return gap_[c] <= reach;
 }
@@ -233,7 +232,7 @@ double BodyContact::measure_gap(size_t c, std::span<const Vec3> position) {
   constexpr double smoothed_to = 1;  // mm
   const RigidBody& body = bodies_[pairs_.body[c]];
   const Vec3 beside = body.beside(position[pairs_.point[c]]);
-  const double needed = std::max(0.0, smoothed_to + pairs_.offset[c]);
+  const double needed = exact_from(c, smoothed_to);
   const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
   set(c, beside, away ? body.outside(beside) : body.distance(beside));
   return gap_[c];

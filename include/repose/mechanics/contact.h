@@ -122,6 +122,10 @@ class BodyContact {
   bool face(size_t c, size_t d) const;
   std::vector<std::pair<size_t, size_t>> overlapped(double overlap) const;
   double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
+  /// mm, the distance of a point outside from which a gap above `smoothed_to` may be the exact one.
+  double exact_from(size_t c, double smoothed_to) const {
+    return std::max(0.0, smoothed_to + pairs_.offset[c]);
+  }
   bool stays_above(double gap, size_t c, const Vec3& beside);
   Pressing now(size_t c) const {
     return released(c) ? Pressing{} : press(gap_[c], multiplier_[c], stiffness_, slides(c));
