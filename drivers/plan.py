@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """From voxels to a face: plan.py VOLUME [LABELS] -operation TEXT
 
     drivers/plan.py head.mhd labels.nii.gz -operation "Le Fort I, 5 mm forward, 2 up" -output plan
@@ -22,7 +22,6 @@ pitch), along the axes of the head, whatever those of the scan (docs/guide/anato
 
 After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face."""
 
-import argparse
 import os
 import pathlib
 import re
@@ -32,14 +31,16 @@ import tempfile
 import time
 import zlib
 
-try:
-    import numpy as np
-except ImportError as missing:
-    sys.exit(f"plan.py: {missing.name} is missing: apt-get install python3-numpy")
-
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 from planning.operation import NotUnderstood, read_operations, summarize  # noqa: E402
+from sheet.script import Arguments, number_from, reading, refuse, refuse_missing  # noqa: E402
+from sheet.script import run as run_script  # noqa: E402
+
+try:
+    import numpy as np
+except ImportError as missing:
+    refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
 
 TEETH = r"(teeth|tooth|dent)"
 ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
@@ -60,15 +61,6 @@ WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "mandible.ply", "bone_1.ply",
            "face.png", "face.html")
 # Template → back and up of the head in each direction in which its piece moves towards what it is cut from.
 INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
-
-
-class Arguments(argparse.ArgumentParser):
-    def error(self, message):
-        refuse(message)
-
-
-def refuse(message):
-    sys.exit(f"plan.py: {message}")
 
 
 def program(name):
@@ -190,7 +182,8 @@ def extract_labels(labels, folder, work):
     """Writes a mesh of each bone; without names the largest label is the skull, and that before and below its
     middle the mandible."""
     if labels.name.endswith(".seg.nrrd"):
-        segmentation = Segmentation(labels)
+        with reading(labels, "a segmentation of 3D Slicer"):
+            segmentation = Segmentation(labels)
         map_file = work / "segment.nrrd"
         for role, names in segmentation.roles().items():
             print(f"{role}: {', '.join(names)}", flush=True)
@@ -277,9 +270,7 @@ def scene_text(operations, edge, bones):
 
 
 def arguments():
-    parser = Arguments(prog="plan.py", description=__doc__, add_help=False, allow_abbrev=False,
-                       formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-help", action="help")
+    parser = Arguments(__doc__)
     parser.add_argument("volumes", nargs="+", type=pathlib.Path)
     parser.add_argument("-operation", required=True)
     parser.add_argument("-output", default="plan", type=pathlib.Path)
@@ -287,7 +278,7 @@ def arguments():
     parser.add_argument("-bone", type=float, default=226)
     parser.add_argument("-apart", nargs=2, type=pathlib.Path)
     parser.add_argument("-edge", type=float, default=4)
-    parser.add_argument("-ranks", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("-ranks", type=number_from(1, 1024), default=min(2, os.cpu_count() or 1))
     parser.add_argument("-propose", action="store_true")
     return parser.parse_args()
 
@@ -343,4 +334,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import sys
+import zlib
 
 
 class Unusable(Exception):
@@ -47,7 +48,7 @@ def reading(file, what):
     except RecursionError:
         raise Unusable(f"{file}: nested too deeply for {what}") from None
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, SyntaxError, TypeError,
-            ValueError) as reason:
+            ValueError, zlib.error) as reason:
         raise Unusable(f"{file}: damaged, or not {what}: {reason}") from None
 
 
