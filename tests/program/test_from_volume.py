@@ -198,7 +198,7 @@ def test_what_cannot_be_planned_is_refused_in_one_line(tmp_path, environment, ar
     assert not (tmp_path / "plan").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"NRRD0004\n", b"NRRD0004\ntype: short\nsizes: 2 2 2\nencoding: gzip\n\nx",
+@pytest.mark.parametrize("content", [b"", b"NRRD0004\n", b"NRRD0004\ntype: short\nsizes: 2 2 2\nencoding: gzip\n\nxyz",
                                      b"NRRD0004\ntype: short\nsizes: 2 2 2\nencoding: raw\n\nx"])
 def test_a_damaged_segmentation_is_refused_in_one_line(tmp_path, environment, content):
     (tmp_path / "head.seg.nrrd").write_bytes(content)
