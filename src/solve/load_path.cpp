@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pierced_columns.h"
+
 namespace repose::solve {
 
 using base::check;
@@ -164,9 +166,9 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
                                           : search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   require_value(result_.last, result_.load);
-  refuse_overlap();
   ++result_.steps;
   objective_.positions().update(displacement);
+  refuse_end();
   on_step(result_.last, result_.load, watch.seconds());
 }
 
@@ -174,10 +176,10 @@ void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
   require_value(outcome, load);
   result_.last = outcome;
   result_.load = load;
-  refuse_overlap();
   ++result_.steps;
   check(VecCopy(trial_, displacement));
   objective_.positions().update(displacement);
+  refuse_end();
 }
 
 void LoadPath::reject_step(const Attempt& tried) {
@@ -203,7 +205,7 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   if (outcome.stopped || (outcome.converged && inverted(trial_) <= folded_before)) {
     accept(outcome, 1, displacement);
     result_.leapt = true;
-    on_step(outcome, 1, watch.seconds());
+    on_step(result_.last, 1, watch.seconds());
   } else {
     objective_.positions().set_load(before);
     objective_.positions().update(displacement);
@@ -223,12 +225,19 @@ void LoadPath::explain_failure() {
                                      result_.halvings.count(), refused_);
 }
 
-/// An end of the path where points had to be released from bodies that overlap is no rest position.
-void LoadPath::refuse_overlap() {
+/// Refuses an end of the path that is no rest position: points had to be released from bodies that
+/// overlap, or an instrument, which only points of the skin touch, is inside the tissue. At the
+/// positions' last update.
+void LoadPath::refuse_end() {
   Outcome& last = result_.last;
-  if (result_.load < 1 || !last.converged || last.overlapped == 0) return;
+  if (result_.load < 1 || !last.converged) return;
+  last.pierced = find_columns_in_instruments(objective_).columns;
+  if (last.overlapped == 0 && last.pierced == 0) return;
   last.converged = false;
-  last.reason = fmt::format("points of tissue between bodies that overlap: {}", last.overlapped);
+  last.reason =
+      last.overlapped > 0
+          ? fmt::format("points of tissue between bodies that overlap: {}", last.overlapped)
+          : fmt::format("columns of tissue pierced by an instrument: {}", last.pierced);
 }
 
 PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
@@ -307,7 +316,8 @@ void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec dis
   result_.last = search_.run(start, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   follow(start, automatic_step(), 1, [](const Outcome&, double, double) {});
-  if (result_.complete() || (result_.load == 1 && result_.last.overlapped > 0)) {
+  const bool refused = result_.last.overlapped > 0 || result_.last.pierced > 0;
+  if (result_.complete() || (result_.load == 1 && refused)) {
     check(VecCopy(start, displacement));
     result_.steps = reached.steps + 1;
     on_step(result_.last, result_.load, watch.seconds());

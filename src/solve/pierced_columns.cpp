@@ -131,6 +131,7 @@ PiercedColumns find_pierced_columns(discrete::Objective& objective) {
 PiercedColumns find_columns_in_instruments(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
   if (!part.contact) return {};
+  objective.contact().place_bodies();
   return find_columns(objective, free_columns(part), in_instruments);
 }
 

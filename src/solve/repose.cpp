@@ -298,7 +298,6 @@ class Steps {
     last.epsilon = searcher_.epsilon();
     const bool start = load == 0 && settings_.initial_equilibrium;
     const bool end = load == 1 || !outcome.converged;
-    if (end) refuse_pierced(last);
     std::optional<Stability> stability;
     if (settings_.stability && (start || end)) {
       stability = stability_of(searcher_.elastic_solver(), objective.positions(), displacement);
@@ -316,7 +315,7 @@ class Steps {
     if (outcome.other)
       rows.point_fields.push_back(
           natural_.field("other_rest_displacement", outcome.other->displacement));
-    if (settings_.derivatives.requested() && load == 1 && last.converged)
+    if (settings_.derivatives.requested() && load == 1 && outcome.converged)
       summary_.gradient = differentiate(searcher_.problem(), natural_, displacement,
                                         settings_.derivatives, rows.point_fields);
     receive_(last, rows);
@@ -326,16 +325,6 @@ class Steps {
   const std::vector<PenetrationDepth>& depths() const { return depths_; }
 
  private:
-  /// Rejects an end of the path with an instrument inside the tissue as a rest position: only
-  /// points of the skin touch instruments, so one may pass between them.
-  void refuse_pierced(model::StepNumbers& last) {
-    summary_.pierced_by_instrument = find_columns_in_instruments(searcher_.objective());
-    if (summary_.pierced_by_instrument.columns == 0 || !last.converged) return;
-    last.converged = false;
-    last.reason = fmt::format("columns of tissue pierced by an instrument: {}",
-                              summary_.pierced_by_instrument.columns);
-  }
-
   Searcher& searcher_;
   const Settings& settings_;
   const discrete::NaturalRows& natural_;
@@ -429,12 +418,9 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
       path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {
         steps.add(outcome, load, seconds, displacement);
       });
-  if (summary.path.last.converged && summary.pierced_by_instrument.columns > 0) {
-    summary.path.last.converged = false;
-    summary.path.last.reason = summary.last.reason;
-  }
   summary.contacts = contacts_of(searcher.objective());
   summary.pierced = find_pierced_columns(searcher.objective());
+  summary.pierced_by_instrument = find_columns_in_instruments(searcher.objective());
   for (size_t k = 0; k < steps.depths().size(); ++k) summary.contacts[k].exact = steps.depths()[k];
   summary.unknowns = 3 * positions.part().unknowns.total;
   summary.evaluations = searcher.evaluations();

@@ -202,7 +202,8 @@ def test_what_cannot_be_planned_is_refused_in_one_line(tmp_path, environment, ar
                                      b"NRRD0004\ntype: short\nsizes: 2 2 2\nencoding: raw\n\nx"])
 def test_a_damaged_segmentation_is_refused_in_one_line(tmp_path, environment, content):
     (tmp_path / "head.seg.nrrd").write_bytes(content)
-    result = finish([sys.executable, SCRIPT, "head.seg.nrrd", "-operation", "jaw, 5 mm forward"], tmp_path, environment, 60)
+    result = finish([sys.executable, SCRIPT, "head.seg.nrrd", "-operation", "jaw, 5 mm forward"], tmp_path,
+                    environment, 60)
     assert result.returncode == 1 and result.stderr.count("\n") == 1, result
     assert "plan.py: head.seg.nrrd: damaged, or not a segmentation of 3D Slicer" in result.stderr
 
@@ -307,7 +308,8 @@ def propose(folder, environment, *arguments):
     (folder / "build").mkdir(exist_ok=True)
     (folder / "build/bin").unlink(missing_ok=True)
     (folder / "build/bin").symlink_to(programs())
-    result = finish([sys.executable, SCRIPT, *arguments, "-propose"], folder, environment | {"REPOSE_BUILD": "build"}, 240)
+    result = finish([sys.executable, SCRIPT, *arguments, "-propose"], folder,
+                    environment | {"REPOSE_BUILD": "build"}, 240)
     assert (result.returncode, result.stderr) == (0, ""), result
     assert result.stdout.startswith("understood: "), result
     assert (folder / "plan/landmarks.svg").exists()

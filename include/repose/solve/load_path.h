@@ -101,7 +101,7 @@ class LoadPath {
   void accept(const Outcome& outcome, double load, Vec displacement);
   void reject_step(const Attempt& tried);
   bool in_vain(const Attempt& tried) const;
-  void refuse_overlap();
+  void refuse_end();
   void explain_failure();
 
   Problem& problem_;
