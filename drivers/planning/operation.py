@@ -38,10 +38,12 @@ MOVEMENT_WORDS = {
     ("impaction", 1): "up upward upwards impaction impact impacted",
     ("lower", 1): "down downward downwards lower lowers lowered lowering",
     ("left", 1): "left", ("left", -1): "right", ("yaw", 1): "yaw", ("roll", 1): "roll", ("pitch", 1): "pitch",
-    ("open", 1): "open opens opened opening", ("open", -1): "close closes closed closing"}
+    ("open", 1): "open opens opened opening", ("open", -1): "close closes closed closing",
+    ("overjet", 1): "overjet", ("overbite", 1): "overbite"}
 MOVEMENTS = {word: move for move, words in MOVEMENT_WORDS.items() for word in words.split()}
 ROTATIONS = {"yaw", "roll", "pitch", "open"}
-OPPOSITES = {"advance": "set_back", "set_back": "advance", "impaction": "lower", "lower": "impaction"}
+EXCLUSIVE = ({"advance", "set_back", "overjet"}, {"impaction", "lower", "overbite"})
+OF_TEETH = {"overjet", "overbite"}  # targets, which the incisors reach
 YAW_TO_A_SIDE = {("number", "yaw", "side"), ("yaw", "number", "side"), ("number", "side", "yaw"),
                  ("yaw", "side", "number"), ("side", "yaw", "number")}
 LONGEST = 15  # tokens between boundaries: a movement of each kind, and a side
@@ -162,11 +164,14 @@ def read_move(name, tokens):
             segments[-1].append(token)
     move = {}
     for key, value in (movement for segment in segments for movement in read_segment(segment)):
-        if other := next((known for known in (key, OPPOSITES.get(key)) if known in move), None):
+        alike = next((group for group in EXCLUSIVE if key in group), {key})
+        if other := next((known for known in move if known in alike), None):
             raise NotUnderstood(f"{name}: {describe(other, move[other])} and {describe(key, value)} exclude each "
                                 "other: remove one of them")
         if key == "open" and name not in ("sagittal split", "jaw"):
             raise NotUnderstood(f"{name}: {describe(key, value)} is a movement of the lower jaw")
+        if key in OF_TEETH and name == "genioplasty":
+            raise NotUnderstood(f"{name}: {describe(key, value)} is a target of a jaw with teeth")
         if abs(value) > LIMITS[unit_of(key)]:
             raise NotUnderstood(f"{name}: {describe(key, value)} is more than {LIMITS[unit_of(key)]} {unit_of(key)}")
         move[key] = value

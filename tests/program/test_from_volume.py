@@ -60,6 +60,9 @@ MAXILLA, SPLIT, JAW, CHIN = "Le Fort I", "sagittal split", "jaw", "genioplasty"
     # opening and closing imply the jaw
     ("open the jaw by 8 degrees", {JAW: {"open": 8}}),
     ("open bite: close by 3 degrees", {JAW: {"open": -3}}),
+    # targets of the incisors
+    ("BSSO to an overjet of 2 mm and an overbite of 1.5 mm", {SPLIT: {"overjet": 2, "overbite": 1.5}}),
+    ("Le Fort I: overjet -1 mm, 3 mm up", {MAXILLA: {"overjet": -1, "impaction": 3}}),
     # several operations
     ("Le Fort I 5 mm forward and genioplasty 4 mm forward", {MAXILLA: {"advance": 5}, CHIN: {"advance": 4}}),
     ("BSSO 6 mm back with Le Fort I 5 mm forward, yaw 2", {MAXILLA: {"advance": 5, "yaw": 2}, SPLIT: {"set_back": 6}}),
@@ -102,6 +105,9 @@ def test_a_text_is_read_as_operations(text, moves):
     ("jaw " + 999 * "5 mm up ", "too long"),
     ("Le Fort I, 5 mm forward, 5 mm back", "exclude each other"),
     ("jaw, 2 mm left, 3 mm right", "exclude each other"),
+    ("jaw, 2 mm forward, overjet 3 mm", "advance 2 mm and overjet 3 mm exclude each other"),
+    ("Le Fort I, overbite 3 mm, 2 mm down", "exclude each other"),
+    ("genioplasty, overjet 2 mm", "target of a jaw with teeth"),
     ("Le Fort I, open 3 degrees", "movement of the lower jaw"),
     ("jaw 400 mm forward", "more than 30 mm"),
     ("5 mm forward", "no operation is named"),
