@@ -136,7 +136,8 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& o
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   programs_.evaluate(displacement);
-  const std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
+  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
+  std::erase_if(sides, [&](const OtherSide& s) { return tried_.contains(s.gap.constraint); });
   size_t next = 0;
   bool changed = false;
   for (int n = 0; n < max_tried; ++n) {
@@ -145,6 +146,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& o
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
+    if (mine) tried_.insert(sides[next].gap.constraint);
     const End end = change_side(mine ? &sides[next++] : nullptr, displacement, accuracy);
     Outcome there;
     int64_t iterations = 0;
@@ -162,9 +164,10 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& o
 }
 
 void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
-  constexpr int max_passes = 3;  // after a change, points that were left before may follow
+  constexpr int max_passes = 3;  // after a change, other points may follow
   if (!presses_near_edge(displacement)) return;
   const int64_t evaluated = objective_.evaluations();
+  tried_.clear();
   consider_other(displacement, accuracy, outcome);
   for (int pass = 0; pass < max_passes; ++pass)
     if (!change_sides(displacement, accuracy, outcome)) break;

@@ -1,4 +1,6 @@
 #pragma once
+#include <set>
+
 #include "contact_descent.h"
 #include "contact_sides.h"
 
@@ -37,6 +39,7 @@ class OtherRestSearch {
   int64_t evaluations_ = 0;
   ContactPressures at_prediction_;
   base::VecHandle start_;
+  std::set<size_t> tried_;  // constraints of this rank whose other side one find() has tried
 };
 
 }  // namespace repose::solve
