@@ -98,9 +98,9 @@ def turn_head(folder, turn):
     (folder / "turned/head.mrk.json").write_text(json.dumps(text))
 
 
-@pytest.mark.parametrize("template, move", [("le_fort_1", "advance: 4, impaction: 2, yaw: 2"),
-                                            ("genioplasty", "advance: 6"),
-                                            ("sagittal_split", "set_back: 5")])
+@pytest.mark.parametrize("template, move", [
+    pytest.param("le_fort_1", "advance: 4, impaction: 2, yaw: 2", marks=pytest.mark.long),
+    ("genioplasty", "advance: 6"), ("sagittal_split", "set_back: 5")])
 @pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_plan_and_face_turn_with_the_head(run, tmp_path, head, template, move):
     """On the given mesh, which turns with the head: a remeshed skin is another one in another pose."""
@@ -179,6 +179,7 @@ def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
 
 
 @REAL
+@pytest.mark.long
 @pytest.mark.parametrize("head", ["real_head"], indirect=True)
 def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
     """It follows them farther, by as much on three ranks, and the upper lip stays."""

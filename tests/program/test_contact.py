@@ -136,6 +136,7 @@ def test_points_at_an_edge_go_to_the_side_of_less_energy_on_any_ranks(folder, en
     assert np.linalg.norm(faces[1] - faces[0], axis=1).max() < 0.01
 
 
+@pytest.mark.long
 @real_head
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
     file = solve("real_head_split")
@@ -154,6 +155,7 @@ def test_lips_part_when_the_jaw_opens(solve):
     assert down.max() > -4 and down.min() < -12, "one lip stays, the other goes"
 
 
+@pytest.mark.long
 @real_head
 def test_tissue_that_slides_takes_less_along_than_tissue_that_is_held(folder, solve):
     text = (folder / "real_head_genioplasty.yaml").read_text()

@@ -348,7 +348,8 @@ def test_voxels_of_the_shipped_head_become_a_scene(parts, written, tmp_path, env
         assert np.linalg.norm(place[name] - given[name]) < 5
 
 
-@pytest.mark.parametrize("operation", ["genioplasty, 6 mm forward", "Le Fort I, 4 mm up, 3 degrees yaw"])
+@pytest.mark.parametrize("operation", [
+    "genioplasty, 6 mm forward", pytest.param("Le Fort I, 4 mm up, 3 degrees yaw", marks=pytest.mark.long)])
 def test_a_head_that_is_turned_in_the_scan_has_the_same_plan(parts, tmp_path, environment, operation):
     turn, scenes, pieces = Rotation.from_euler("xyz", [-12, 5, -8], degrees=True).as_matrix(), [], []
     for name, axes in (("upright", np.eye(3)), ("turned", turn)):
@@ -365,7 +366,7 @@ def test_a_head_that_is_turned_in_the_scan_has_the_same_plan(parts, tmp_path, en
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
-@pytest.mark.parametrize("labels", [["labels.nii.gz"], []])
+@pytest.mark.parametrize("labels", [["labels.nii.gz"], pytest.param([], marks=pytest.mark.long)])
 def test_a_scene_is_proposed_that_can_be_solved(tmp_path, environment, labels):
     scene, dry, place = propose(tmp_path, environment, DATA / "head_hu.mhd",
                                 *(DATA / name for name in labels), "-operation",

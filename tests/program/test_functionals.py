@@ -46,6 +46,7 @@ def test_force_and_energy_meet(solved, small, scene, weight):
     assert np.linalg.norm(last(force)["point/displacement"], axis=1).max() > 0.9
 
 
+@pytest.mark.long
 def test_force_and_energy_meet_after_the_whole_move_of_the_finer_head(solved, tmp_path):
     """With weight and without volume term; the opening has many minima there, the advance one."""
     text = (PROJECT / "meshes/head_springs_advance.yaml").read_text()

@@ -71,8 +71,8 @@ def busy():
         loop.wait()
 
 
-@pytest.mark.parametrize("lines", [1, 6, *[pytest.param(lines, marks=pytest.mark.long)
-                                           for lines in (1, 1, 1, 6, 6, 6)]])
+@pytest.mark.parametrize("lines", [1, *[pytest.param(lines, marks=pytest.mark.long)
+                                        for lines in (6, 1, 1, 1, 6, 6, 6)]])
 def test_ctrl_c_at_mpirun_leaves_a_result_though_ranks_are_killed(run, environment, tmp_path, busy,
                                                                   lines):
     process = begin(tmp_path, environment, SCENE, "-output", "early", ranks=2)

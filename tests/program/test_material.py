@@ -219,7 +219,8 @@ def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
 
 
 @pytest.mark.parametrize("edge, accuracy, report, more", [
-    ("", 0.01, "MORE THAN THE 0.01 mm REQUESTED: the skin as given is the finest", False),
+    pytest.param("", 0.01, "MORE THAN THE 0.01 mm REQUESTED: the skin as given is the finest", False,
+                 marks=pytest.mark.long),
     ("", 20, "mm from the continuum at most", False),
     ("  edge: 9\n  depths: [0, 0.3, 0.6, 1]", 0.01, "the scene fixes its layers", False),
     ("  edge: 9", 1.5, "mm from the continuum at most", True)])

@@ -41,7 +41,8 @@ CASES = {
 }
 
 
-@pytest.fixture(params=CASES, scope="module")
+@pytest.fixture(params=[pytest.param(case, marks=[pytest.mark.long] if case in ("advance", "opening") else [])
+                        for case in CASES], scope="module")
 def found(request, solved, tmp_path_factory):
     """The model in numpy, and the last step of the result."""
     scene, volume, options = CASES[request.param]

@@ -111,6 +111,7 @@ def test_the_path_that_is_verified_has_a_bar(environment, tmp_path):
     assert re.search(r"\[#*\.+\] verifying the path: load \d", text)
 
 
+@pytest.mark.long
 def test_estimates_have_a_bar_with_the_time_left(environment, tmp_path):
     small_head(environment, tmp_path)
     estimated = r"\[#+\.+\] estimating sensitivities  \d+ s  about \d+ s left"

@@ -179,7 +179,7 @@ def test_same_face_with_weight_turgor_and_forces(solved, tmp_path, volume):
     assert last(solved(*options))["potential"] != 0
 
 
-@pytest.mark.parametrize("ranks", [2, 3, 5])
+@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.long), 5])
 def test_a_run_on_ranks_repeats_bit_by_bit(run, tmp_path, ranks):
     positions = set()
     for _ in range(3):

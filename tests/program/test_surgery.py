@@ -76,7 +76,7 @@ def solve(environment, folder, scene):
     return folder / "face.h5"
 
 
-@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("head", ["head", pytest.param("real_head", marks=[REAL, pytest.mark.long])])
 def test_the_chin_takes_its_tissue_along(environment, folder, head):
     face = solve(environment, folder, f"{head}_genioplasty.yaml")
     model, step = model_of(face), last(face)

@@ -31,6 +31,7 @@ def instructions(tmp_path_factory, environment):
     return count
 
 
+@pytest.mark.long
 def test_prisms_without_a_volume_term_cost_nothing(instructions):
     alone = instructions("NoPrisms")
     assert alone > 1e6
