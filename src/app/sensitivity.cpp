@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <map>
 
 #include "report.h"
 #include "repose/base/agreement.h"
 #include "repose/base/error.h"
+#include "repose/discrete/natural_rows.h"
 #include "repose/model/cut.h"
 #include "repose/model/material.h"
 #include "repose/solve/prestress.h"
@@ -19,15 +22,24 @@ namespace {
 constexpr double moves = 0.5;  // mm, of the skin that counts
 
 /// Downwards: pressures of a change towards 0.5 are not of first order.
+double lower(double poisson) { return poisson < 0.47 ? poisson - 0.05 : 0.45; }
+
 void soften(scene::Material& material) {
-  const auto lower = [](double& poisson) { poisson = poisson < 0.47 ? poisson - 0.05 : 0.45; };
-  lower(material.deep.poisson);
-  for (scene::Stratum& stratum : material.strata) lower(stratum.elasticity.poisson);
+  material.deep.poisson = lower(material.deep.poisson);
+  for (scene::Stratum& stratum : material.strata)
+    stratum.elasticity.poisson = lower(stratum.elasticity.poisson);
+}
+
+/// mm, of the skin of a material without strata; that of the preset skin_on_fat.
+constexpr double usual_skin = 1.5;
+
+double skin_thickness(const scene::Material& material) {
+  return material.strata.empty() ? usual_skin : material.strata.front().thickness;
 }
 
 void stiffen_skin(scene::Material& material) {
-  constexpr double thickness = 1.5, times = 5;  // mm, of the moduli, as in the preset skin_on_fat
-  if (material.strata.empty()) material.strata.push_back({thickness, material.deep});
+  constexpr double times = 5;  // of the moduli, as in the preset skin_on_fat
+  if (material.strata.empty()) material.strata.push_back({usual_skin, material.deep});
   material.strata.front().elasticity.young *= times;
 }
 
@@ -43,6 +55,27 @@ model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) 
     model::add_tone(model::ring_muscle(scene), built.model);
   });
   return std::move(built.model);
+}
+
+/// Returns the state `rest` of `model` on the points of `other`, which has the same columns and
+/// layers. Cuts double only soft tissue: a point that `other` alone doubles is at rest where the
+/// single one is.
+solve::RestState on_points_of(const model::Points& other, const model::Points& model,
+                              const solve::RestState& rest) {
+  using ColumnLayer = std::array<int64_t, 2>;
+  std::map<ColumnLayer, std::vector<size_t>> rows;
+  for (size_t i = 0; i < model.column.size(); ++i)
+    rows[{model.column[i], model.layer[i]}].push_back(i);
+  std::map<ColumnLayer, size_t> used;
+  solve::RestState found;
+  for (size_t i = 0; i < other.column.size(); ++i) {
+    const ColumnLayer place = {other.column[i], other.layer[i]};
+    const std::vector<size_t>& same = rows.at(place);
+    const size_t row = same[std::min(used[place]++, same.size() - 1)];
+    found.position.push_back(rest.position[row]);
+    if (!rest.pressure.empty()) found.pressure.push_back(rest.pressure[row]);
+  }
+  return found;
 }
 
 Sensitivity over_skin(const model::Model& model, const std::vector<Vec3>& position,
@@ -70,7 +103,7 @@ Sensitivity over_skin(const model::Model& model, const std::vector<Vec3>& positi
 std::vector<Variation> variations(const scene::Scene& scene) {
   constexpr double more = 1.5;
   std::vector<Variation> all;
-  const auto vary = [&](const char* name, bool applies, auto&& change) {
+  const auto vary = [&](const std::string& name, bool applies, auto&& change) {
     if (!applies) return;
     all.push_back({name, scene});
     change(all.back().scene);
@@ -79,10 +112,13 @@ std::vector<Variation> variations(const scene::Scene& scene) {
   using scene::Scene;
   vary("a free rim", scene.rim != Rim::free, [](Scene& s) { s.rim = Rim::free; });
   vary("a rim held all round", scene.rim != Rim::fixed, [](Scene& s) { s.rim = Rim::fixed; });
-  vary("a lower Poisson's ratio (0.40 for 0.45, 0.45 for 0.49)", scene.tissue.material.has_value(),
-       [](Scene& s) { soften(*s.tissue.material); });
-  vary("a skin of 1.5 mm, five times as stiff", scene.tissue.material.has_value(),
-       [](Scene& s) { stiffen_skin(*s.tissue.material); });
+  if (const std::optional<scene::Material>& material = scene.tissue.material) {
+    const double poisson = material->deep.poisson;
+    vary(fmt::format("a lower Poisson's ratio ({:.2f} for {:.2f})", lower(poisson), poisson), true,
+         [](Scene& s) { soften(*s.tissue.material); });
+    vary(fmt::format("a skin of {:g} mm, five times as stiff", skin_thickness(*material)), true,
+         [](Scene& s) { stiffen_skin(*s.tissue.material); });
+  }
   const bool moved = std::any_of(scene.moves.begin(), scene.moves.end(),
                                  [](const auto& move) { return !move.is_identity(); });
   vary("tissue.release half as large again", moved && scene.tissue.release > 0,
@@ -99,12 +135,16 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
   auto count = all.size();
   base::broadcast(comm, count);
   all.resize(count);
+  const model::Points points = discrete::gather_model(comm, job.local_model).points;
   std::vector<Sensitivity> found;
   for (const Variation& variation : all) {
     Sensitivity one;
     try {
       const model::Model other = model_of(comm, job, variation.scene);
-      one = over_skin(other, rest.position, solve::first_order_change(comm, other, weights, rest));
+      solve::RestState state;
+      base::on_root(comm, [&] { state = on_points_of(other.points, points, rest); });
+      one =
+          over_skin(other, state.position, solve::first_order_change(comm, other, weights, state));
     } catch (const base::InputError&) {
       // no tissue fits so: nothing is known of it
     }
