@@ -91,7 +91,8 @@ Sensitivity over_skin(const model::Model& model, const std::vector<Vec3>& positi
     found.where = initial;
   }
   found.known = !change.empty();
-  if (lengths.empty()) return found;
+  found.counted = !lengths.empty();
+  if (!found.counted) return found;
   std::sort(lengths.begin(), lengths.end());
   found.median = lengths[(lengths.size() - 1) / 2];
   found.percentile_95 = lengths[(lengths.size() - 1) * 95 / 100];
@@ -158,16 +159,17 @@ std::vector<Sensitivity> sensitivities(MPI_Comm comm, const Job& job,
 }
 
 std::string describe_sensitivities(const std::vector<Sensitivity>& found) {
+  const auto describe = [](const Sensitivity& s) {
+    if (!s.known) return fmt::format("{}: not known to first order", s.name);
+    if (!s.counted)
+      return fmt::format("{}: no skin counts, as none moves by {:g} mm", s.name, moves);
+    return fmt::format(
+        "{} moves half of the skin by less than {:.2g} mm, 95 % by {:.2g} mm, all by {:.2g} mm, "
+        "the most near {:.0f}",
+        s.name, s.median, s.percentile_95, s.largest, s.where);
+  };
   std::string text;
-  for (const Sensitivity& s : found) {
-    const std::string report = s.known
-                                   ? fmt::format(
-                                         "{} moves half of the skin by less than {:.2g} mm, 95 % "
-                                         "by {:.2g} mm, all by {:.2g} mm, the most near {:.0f}",
-                                         s.name, s.median, s.percentile_95, s.largest, s.where)
-                                   : fmt::format("{}: not known to first order", s.name);
-    text += report_row("sensitivity", report);
-  }
+  for (const Sensitivity& s : found) text += report_row("sensitivity", describe(s));
   return text;
 }
 

@@ -23,6 +23,7 @@ std::vector<Variation> variations(const scene::Scene& scene);
 struct Sensitivity {
   std::string name;
   bool known = false;                                 ///< the linear system was solved
+  bool counted = false;                               ///< some skin moves that far
   double median = 0, percentile_95 = 0, largest = 0;  ///< mm
   Vec3 where = Vec3::Zero();                          ///< mm, the initial place of the largest
 };

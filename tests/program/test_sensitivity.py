@@ -75,6 +75,12 @@ def test_cut_through_tissue_that_is_let_go(run, tmp_path):
     assert np.allclose(report[more], true, rtol=0.3, atol=0.02), (report[more], true)
 
 
+def test_face_that_hardly_moves_has_no_numbers(run, tmp_path):
+    text, _, _ = solve(run, tmp_path, SCENE.replace("-3", "-0.3"), "-sensitivity")
+    assert text.count("no skin counts, as none moves by 0.5 mm") == len(VARIED)
+    assert not ROW.search(text)
+
+
 def test_names_hold_the_numbers_of_the_material(run, tmp_path):
     thin = SKIN.replace("1.5", "2").replace("{skin", "{poisson: 0.3, skin")
     text, _, _ = solve(run, tmp_path, SCENE.replace("moves", thin + "moves"), "-sensitivity")
