@@ -179,14 +179,18 @@ base::Similarity bring(const base::Options& options, const surface::Surface& act
   return icp.transform.after(start);
 }
 
-/// Where both have the same triangles, each vertex stands for one place of the skin.
-void print_vertices(const surface::Surface& predicted, const surface::Surface& actual) {
+/// Prints the distances of vertices where both have the same triangles, so that each vertex stands
+/// for one place of the skin. Their sign is that of the side of ACTUAL on which PREDICTED lies.
+void print_vertices(const surface::Surface& predicted, const surface::Surface& actual,
+                    const meshtools::SignedDistance& to_actual) {
   if (predicted.triangles != actual.triangles || predicted.points.size() != actual.points.size())
     return;
   std::vector<Sample> apart;
-  for (size_t i = 0; i < actual.points.size(); ++i)
-    apart.push_back(
-        {predicted.points[i], 1, (predicted.points[i] - actual.points[i]).norm(), false});
+  for (size_t i = 0; i < actual.points.size(); ++i) {
+    const Vec3& point = predicted.points[i];
+    const double distance = (point - actual.points[i]).norm();
+    apart.push_back({point, 1, std::copysign(distance, to_actual.at(point).distance), false});
+  }
   print_row("corresponding vertices", apart);
 }
 
@@ -277,7 +281,7 @@ void run(const base::Options& options) {
   const meshtools::SignedDistance to_actual(actual);
   print_header();
   const auto samples = measure(options, predicted, to_actual, "PREDICTED to ACTUAL");
-  print_vertices(predicted, actual);
+  print_vertices(predicted, actual, to_actual);
   if (options.flag("parts"))
     print_parts(tools::comparison::FaceParts(marks, options.text("landmarks")), samples);
   if (options.has("regions")) print_regions(options.text("regions"), samples);

@@ -59,6 +59,13 @@ def test_spheres_two_millimeters_apart(run, tmp_path):
     assert "Name=\"distance\"" in (tmp_path / "compared.vtp").read_text()
 
 
+def test_corresponding_vertices_have_the_sign_of_the_surface(run, tmp_path):
+    small, large = sphere(tmp_path / "a.ply", 38), sphere(tmp_path / "b.ply", 40)
+    for predicted, actual, signed in ((small, large, -2), (large, small, 2)):
+        found = rows(run("repose-compare", predicted, actual).stdout)["corresponding vertices"]
+        assert found[1:] == pytest.approx([signed, 2, 2, 2, 2, 2], abs=1e-3)
+
+
 def test_regions_by_a_label_map(run, tmp_path):
     labels = np.zeros((40, 50, 48), "<i2")
     labels[:20], labels[20:] = 1, 2
