@@ -18,6 +18,7 @@
 #include "repose/base/program.h"
 #include "repose/meshtools/remesh.h"
 #include "repose/model/build.h"
+#include "repose/model/material.h"
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "skin.h"
@@ -77,11 +78,15 @@ class Study {
           "{}: tissue.depths, tissue.mass or a set of springs is for {} layers; -layers cannot "
           "vary them, leave it empty",
           file, scene.tissue.layers);
-    if (!scene.incisions.empty())
-      base::refuse("{}: incisions are not compared; take the key out for this study", file);
     if (scene.solve.functional == scene::Functional::force)
       base::refuse("{}: functional force is not compared; take the key out for this study", file);
     anatomy_ = model::load_anatomy(scene);
+    const auto& incisions = anatomy_.scene.incisions;  // also of lips parted by landmarks
+    if (!incisions.empty())
+      base::refuse(
+          "{}: incisions and parted lips are not compared; take the keys incisions and mouth out "
+          "for this study, and set anatomy.lips: joined where anatomy is given",
+          file);
     own_ = model::build_model(anatomy_).model;
   }
 
@@ -94,7 +99,7 @@ class Study {
 
   /// The scene's tissue, or springs that resemble its material.
   scene::Tissue tissue_of(const Variant& variant) const {
-    scene::Tissue tissue = plan_.scene.tissue;
+    scene::Tissue tissue = anatomy_.scene.tissue;
     if (tissue.material && variant.volume != scene::VolumeTerm::material) {
       tissue.isotropic = tissue.material->deep;
       tissue.material.reset();
@@ -151,6 +156,10 @@ class Study {
   void bring_into_equilibrium(model::Model& model) const {
     if (const auto reference_state = app::reference_state_of(plan_.scene))
       solve::prestress(comm, model, *reference_state);
+    base::on_root(comm, [&] {
+      const model::RingMuscle muscle = model::ring_muscle(anatomy_.scene);
+      if (muscle.tone != 0 && model::is_solid(model)) model::add_tone(muscle, model);
+    });
   }
 
   solve::Settings settings_of(const Variant& variant, double bulk_modulus) const {

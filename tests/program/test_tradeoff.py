@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
+from tissue import last, model_of
 
 SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
 FEW = ("-methods", "ntr,lmvm", "-accuracies", "1,0.01", "-load_steps", "2", "-volumes", "none",
@@ -175,3 +176,33 @@ def test_depths_for_other_layers_are_refused(run, tmp_path):
     (tmp_path / "scene.yaml").write_text(text)
     result = run("repose-tradeoff", "scene.yaml", *FEW)
     assert result.returncode == 1 and "tissue.depths" in result.stderr
+
+
+def test_models_of_other_layers_are_those_of_the_scene(run, tmp_path):
+    """What landmarks add to a scene, a vestibule and the tone of the mouth, is in all models."""
+    head = PROJECT / "meshes/head"
+    done = run("repose-landmarks", f"{head}_skin.ply", "-skull", f"{head}_skull.ply", "-mandible",
+               f"{head}_mandible.ply", "-output", "head")
+    assert done.returncode == 0, done
+    rest = []
+    for layers in (2, 3):
+        (tmp_path / f"face{layers}.yaml").write_text(
+            f"skin: {head}_skin.ply\nbones:\n  - {{name: skull, file: {head}_skull.ply}}\n"
+            f"  - {{name: mandible, file: {head}_mandible.ply}}\n"
+            f"tissue: {{layers: {layers}}}\nanatomy: {{landmarks: head.mrk.json, tone: 0.3}}\n"
+            "moves: [{bone: mandible, clinical: {set_back: 3}}]\n")
+        done = run("repose-solve", f"face{layers}.yaml", "-accuracy", 1e-4)
+        assert done.returncode == 0 and "vestibule by landmarks" in done.stdout, done
+        skin = model_of(tmp_path / f"face{layers}.h5")["point/layer"] == 0
+        rest.append(last(tmp_path / f"face{layers}.h5")["point/position"][skin])
+    done = run("repose-tradeoff", "face2.yaml", "-methods", "ntr", "-accuracies", "0.001",
+               "-load_steps", ",", "-volumes", ",", "-layers", "2,3", "-edges", ",", "-reference",
+               "1e-5", "-output", "few")
+    assert done.returncode == 0, done
+    reference = [[float(row[axis]) for axis in "xyz"]
+                 for row in rows(tmp_path / "few_map.csv")]
+    assert np.abs(reference - rest[1]).max() < 1e-3
+    found = rows(tmp_path / "few.csv")[0]
+    true = np.linalg.norm(rest[0] - rest[1], axis=1)
+    assert float(found["skin_rms_mm"]) == pytest.approx((true**2).mean()**0.5, rel=0.05)
+    assert float(found["skin_max_mm"]) == pytest.approx(true.max(), rel=0.05)
