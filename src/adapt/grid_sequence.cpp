@@ -13,6 +13,7 @@
 #include "repose/base/error.h"
 #include "repose/base/options.h"
 #include "repose/meshtools/remesh.h"
+#include "repose/model/material.h"
 #include "repose/model/motion.h"
 
 namespace repose::adapt {
@@ -73,6 +74,10 @@ class SequenceSolver {
     base::on_root(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
     if (requested_.reference_state)
       solve::prestress(comm_, built.model, *requested_.reference_state);
+    base::on_root(comm_, [&] {
+      const model::RingMuscle muscle = model::ring_muscle(anatomy_.scene);
+      if (muscle.tone != 0) model::add_tone(muscle, built.model);
+    });
     std::vector<Vec3> position;
     const solve::Settings settings = settings_for(built.model);
     const solve::Summary summary =

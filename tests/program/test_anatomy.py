@@ -263,3 +263,20 @@ def test_a_plane_through_the_palate_is_reported(run, tmp_path, head):
     assert "the mouth is open in the scan" in result.stdout
     with h5py.File(tmp_path / "face.h5") as file:
         assert len(file["model"]) > 0
+
+
+def test_coarser_models_have_the_tone_of_the_mouth(run, tmp_path):
+    head, coarse = PROJECT / "meshes/head", []
+    done = run("repose-landmarks", f"{head}_skin.ply", "-skull", f"{head}_skull.ply", "-mandible",
+               f"{head}_mandible.ply", "-output", "head")
+    assert done.returncode == 0, done
+    for tone in (0, 0.3):
+        (tmp_path / "face.yaml").write_text(
+            f"skin: {head}_skin.ply\nbones:\n  - {{name: skull, file: {head}_skull.ply}}\n"
+            f"  - {{name: mandible, file: {head}_mandible.ply}}\ntissue: {{layers: 3}}\n"
+            f"anatomy: {{landmarks: head.mrk.json, adhesion: 0, tone: {tone}}}\n"
+            "moves: [{bone: mandible, clinical: {set_back: 3}}]\n")
+        done = run("repose-solve", "face.yaml", "-discretisation")
+        assert done.returncode == 0, done
+        coarse.append(re.findall(r"coarse model +(.* of the Hessian)", done.stdout))
+    assert len(coarse[0]) > 1 and not set(coarse[0]) & set(coarse[1])  # the searches differ
