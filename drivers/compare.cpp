@@ -18,6 +18,7 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
+#include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/read.h"
@@ -69,7 +70,11 @@ std::vector<base::Option> option_table() {
        .range = length,
        .unit = "MM",
        .choices = {"auto"}},
-      {"output", OptionKind::path, "compared", "Path of the files without ending."}};
+      {.name = "output",
+       .kind = OptionKind::path,
+       .default_text = "compared",
+       .help = "Path of the files; .vtp or .csv, where it ends so, is left out.",
+       .endings = {".vtp", ".csv"}}};
 }
 
 void print_header() {
@@ -105,7 +110,7 @@ void print_painted(const std::string& file, const std::vector<Sample>& samples) 
 }
 
 void print_regions(const std::string& file, const std::vector<Sample>& samples) {
-  if (file.ends_with(".ply") || file.ends_with(".PLY")) return print_painted(file, samples);
+  if (base::lower(file).ends_with(".ply")) return print_painted(file, samples);
   const imaging::Volume labels = imaging::read_volume(file);
   const Mat3 to_index = imaging::inverse_axes(labels);
   std::map<int64_t, std::vector<Sample>> regions;
@@ -269,6 +274,7 @@ void write_results(const std::string& name, const surface::Surface& predicted,
 
 void run(const base::Options& options) {
   require_landmarks(options);
+  base::require_writable(options.text("output") + ".vtp");
   const surface::Surface predicted = surface::read_surface(options.arguments()[0]);
   surface::Surface actual = surface::read_surface(options.arguments()[1]);
   const Marks marks = marks_of(options, "landmarks"),

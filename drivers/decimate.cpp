@@ -10,6 +10,8 @@
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
+#include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
@@ -41,9 +43,10 @@ std::vector<base::Option> option_table() {
 tools::decimation::DecimateOptions requested(const base::Options& options) {
   tools::decimation::DecimateOptions requested;
   const std::filesystem::path output = options.text("output");
-  if (output.extension() != ".ply")
+  if (base::lower(output.extension().string()) != ".ply")
     base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
                  output.string());
+  base::require_writable(output);
   if (!options.has("distance") && !options.has("triangles"))
     base::refuse("neither -distance nor -triangles is given; say how far, e.g. -distance 0.5 (mm)");
   if (options.has("distance")) requested.distance = options.number("distance");

@@ -201,6 +201,7 @@ void write_apart(const imaging::Volume& volume, imaging::Extraction requested,
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
+  base::require_writable(output);
   imaging::Extraction requested = requested_of(options);
   const bool all = options.flag("labels"), apart = options.has("apart") || options.flag("jaw");
   if (int{requested.level.has_value()} + requested.otsu + requested.label.has_value() + all != 1)

@@ -29,8 +29,11 @@ std::vector<base::Option> option_table() {
           {"mandible", OptionKind::path, "", "Surface of the mandible; required."},
           {"landmarks", OptionKind::path, "",
            "Landmarks that are known (.mrk.json, .fcsv, .csv, .json): kept, and compared with."},
-          {"output", OptionKind::path, "landmarks",
-           "Path of the files; .mrk.json, where it ends so, is left out."}};
+          {.name = "output",
+           .kind = OptionKind::path,
+           .default_text = "landmarks",
+           .help = "Path of the files; .mrk.json, where it ends so, is left out.",
+           .endings = {".mrk.json"}}};
 }
 
 /// Landmarks without which a scene gets neither the parting of the lips nor a vestibule nor a
@@ -58,6 +61,17 @@ void require_sides(const scene::Landmarks& given, const anatomy::HeadFrame& fram
       base::refuse("{}: {} lies {:.0f} mm to the patient's right of {}: they are exchanged", file,
                    left, -apart, right);
   }
+}
+
+/// Names the standard landmark that a name without one may misspell, or nothing.
+std::string remark_on_name(const std::string& name) {
+  constexpr std::size_t misspelled = 2;  // letters
+  std::vector<std::string> known;
+  for (const scene::LandmarkName& landmark : scene::landmark_names())
+    known.push_back(landmark.name);
+  const std::string nearest = base::nearest(name, known);
+  if (base::edit_distance(name, nearest) > misspelled) return "";
+  return fmt::format(", under no standard name; did you mean {}?", nearest);
 }
 
 void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal& alone,
@@ -89,8 +103,8 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
   }
   for (const auto& [name, at] : given)
     if (scene::standard_name(name).empty())
-      std::printf("%-24s %10.2f %10.2f %10.2f   given\n", base::quote(name).c_str(), at.x(), at.y(),
-                  at.z());
+      std::printf("%-24s %10.2f %10.2f %10.2f   given%s\n", base::quote(name).c_str(), at.x(),
+                  at.y(), at.z(), remark_on_name(name).c_str());
   if (count > 0)
     std::printf(
         "%d given landmarks: proposed at a distance of %.2f mm in the mean, %.2f mm at most\n",
@@ -98,9 +112,8 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
 }
 
 base::Exit run(const base::Options& options) {
-  std::string name = options.text("output");
-  const std::string ending = ".mrk.json";
-  if (name.ends_with(ending)) name.resize(name.size() - ending.size());
+  const std::string name = options.text("output");
+  base::require_writable(name + ".mrk.json");
   const surface::Surface skull = read(options, "skull"), mandible = read(options, "mandible"),
                          skin = surface::read_surface(options.arguments()[0]);
   scene::Landmarks given;
@@ -115,7 +128,7 @@ base::Exit run(const base::Options& options) {
       given.empty() ? alone : anatomy::propose_landmarks(skin, skull, mandible, given);
   print_landmarks(proposal, alone, given);
   for (const std::string& remark : proposal.remarks) std::printf("remark: %s\n", remark.c_str());
-  base::write_whole_file(name + ending, scene::markups_text(proposal.found));
+  base::write_whole_file(name + ".mrk.json", scene::markups_text(proposal.found));
   base::write_whole_file(name + ".svg", anatomy::draw_landmarks(skin, skull, mandible, proposal));
   std::printf("wrote %s.mrk.json and %s.svg: check the picture before you use them\n", name.c_str(),
               name.c_str());

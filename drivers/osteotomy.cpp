@@ -11,6 +11,8 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/text.h"
+#include "repose/base/whole_file.h"
 #include "repose/meshtools/osteotomy.h"
 #include "repose/model/build.h"
 #include "repose/scene/bone_name.h"
@@ -47,8 +49,12 @@ std::vector<base::Option> option_table() {
           {"moved", OptionKind::flag, "",
            "Also writes each bone of a scene that moves where its moves take it, to "
            "NAME_PIECE_moved.ply; the scene may have no osteotomies."},
-          {"output", OptionKind::path, "",
-           "Path of the files without _PIECE.ply; default: the input's name here."}};
+          {.name = "output",
+           .kind = OptionKind::path,
+           .default_text = "",
+           .help = "Path of the files without _PIECE.ply; .ply, where it ends so, is left out.",
+           .default_note = "the input's name, here",
+           .endings = {".ply"}}};
 }
 
 Vec3 vector(const base::Options& options, const char* name) {
@@ -127,7 +133,9 @@ void write_moved(const std::string& file, surface::Surface surface,
 
 void cut(const base::Options& options) {
   const std::filesystem::path input = options.arguments()[0];
-  const bool is_scene = input.extension() == ".yaml" || input.extension() == ".yml";
+  if (options.has("output")) base::require_writable(options.text("output") + ".ply");
+  const std::string ending = base::lower(input.extension().string());
+  const bool is_scene = ending == ".yaml" || ending == ".yml";
   const Parts parts = is_scene ? parts_of_scene(options, input) : parts_of_bone(options, input);
   const std::string name = options.has("output") ? options.text("output") : input.stem().string();
   for (const std::string& remark : parts.remarks) std::printf("  %s\n", remark.c_str());

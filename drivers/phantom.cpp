@@ -10,6 +10,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/whole_file.h"
 #include "repose/tools/phantom/phantom.h"
 
 namespace {
@@ -31,13 +32,18 @@ std::vector<base::Option> option_table() {
            .unit = "mm",
            .choices = {"auto"}},
           {"springs", OptionKind::flag, "", "Scenes of springs, as the paper's, not of a solid."},
-          {"output", OptionKind::path, "head", "Path of the files without ending."}};
+          {.name = "output",
+           .kind = OptionKind::path,
+           .default_text = "head",
+           .help = "Path of the files; .yaml or .ply, where it ends so, is left out.",
+           .endings = {".yaml", ".ply"}}};
 }
 
 void write_head(const base::Options& options) {
   tools::phantom::PhantomOptions requested;
   requested.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") requested.bone_edge = options.number("bone_edge");
+  base::require_writable(options.text("output") + ".yaml");
   std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)\n",
               options.text("output").c_str());
   std::fflush(stdout);

@@ -11,6 +11,7 @@
 
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
+#include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
 #include "repose/scene/transform_file.h"
 #include "repose/surface/read.h"
@@ -45,7 +46,11 @@ std::vector<base::Option> option_table() {
        .default_text = "100",
        .help = "Most steps of ICP.",
        .range = {1, 100000}},
-      {"output", OptionKind::path, "registered", "Path of the files without ending."}};
+      {.name = "output",
+       .kind = OptionKind::path,
+       .default_text = "registered",
+       .help = "Path of the files; .ply or .tfm, where it ends so, is left out.",
+       .endings = {".ply", ".tfm"}}};
 }
 
 struct Pairs {
@@ -153,6 +158,7 @@ base::Exit refine(const base::Options& options, const surface::Surface& moving,
 
 base::Exit run(const base::Options& options) {
   const auto& files = options.arguments();
+  base::require_writable(options.text("output") + ".tfm");
   const Pairs pairs = read_pairs(options);
   const surface::Surface moving = surface::read_surface(files[0]);
   const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));

@@ -33,7 +33,12 @@ const MPI_Comm comm = MPI_COMM_WORLD;
 
 std::vector<base::Option> option_table() {
   return {
-      {"output", OptionKind::path, "", "Path of the tables without ending (SCENE_tradeoff)."},
+      {.name = "output",
+       .kind = OptionKind::path,
+       .default_text = "",
+       .help = "Path of the tables; .csv, where it ends so, is left out.",
+       .default_note = "SCENE_tradeoff",
+       .endings = {".csv"}},
       {"methods", OptionKind::text, "ntr,nls,lmvm,cg", "TAO's methods, the usual one first."},
       {"accuracies", OptionKind::text, "1,0.3,0.1,0.03,0.01,0.001", "mm."},
       {"load_steps", OptionKind::text, "1,2,4,8,16", "Numbers of equal steps; a comma for none."},
@@ -127,6 +132,7 @@ base::Exit run(const base::Options& options) {
   base::collective_try(comm, [&] { plan.scene = scene::read_scene(input); });
   const std::string name =
       options.has("output") ? options.text("output") : input.stem().string() + "_tradeoff";
+  base::on_root(comm, [&] { base::require_writable(name + ".csv"); });
   const auto tell = [](const std::string& line, size_t number, size_t runs) {
     const std::string counter = fmt::format("{:>3} of {}", number, runs);
     if (base::rank(comm) == 0)

@@ -125,6 +125,11 @@ std::string help_line(const Option& option) {
                      notes.empty() ? "" : fmt::format(" [{}]", notes));
 }
 
+/// Returns whether PETSc takes each value of the option, not the last alone.
+bool is_cumulative(const std::string& name) {
+  return name.starts_with("options_file") || name.starts_with("prefix_");
+}
+
 /// Returns whether PETSc reads the option only in PetscFinalize.
 bool is_read_at_finalize(const std::string& name) {
   return name == "options_left" || name == "options_view" || name == "objects_dump" ||
@@ -220,25 +225,50 @@ int Options::sort_option(int position, const std::vector<std::string>& tokens) {
     return next;
   }
   if (!help && !begins_as_petsc(name)) {
-    unknown_.push_back(name);
+    remarks_.unknown.push_back(name);
     return is_value(tokens, next) ? next + 1 : next;
   }
+  const bool takes_value = is_value(tokens, next) && !is_argument_behind(name, tokens[next]);
+  if (!is_cumulative(name))
+    if (const auto before = last_petsc_values(name))
+      note_repeated(name, *before,
+                    takes_value ? std::vector{tokens[next]} : std::vector<std::string>{});
   petsc_tokens_.push_back("-" + name);
-  if (!is_value(tokens, next) || is_argument_behind(name, tokens[next])) return next;
-  if (!help || tokens[next] == "intro") petsc_tokens_.push_back(tokens[next]);
-  return next + 1;
+  if (takes_value && (!help || tokens[next] == "intro")) petsc_tokens_.push_back(tokens[next]);
+  return takes_value ? next + 1 : next;
+}
+
+/// The values that an option of PETSc has so far, if it is given.
+std::optional<std::vector<std::string>> Options::last_petsc_values(const std::string& name) const {
+  const auto last = std::find(petsc_tokens_.rbegin(), petsc_tokens_.rend(), "-" + name);
+  if (last == petsc_tokens_.rend()) return {};
+  const auto position = static_cast<int>(petsc_tokens_.rend() - last);  // behind the name
+  if (!is_value(petsc_tokens_, position)) return std::vector<std::string>{};
+  return std::vector{petsc_tokens_[position]};
+}
+
+void Options::note_repeated(const std::string& name, const std::vector<std::string>& before,
+                            const std::vector<std::string>& values) {
+  if (before == values) return;
+  const auto typed = [](const std::vector<std::string>& words) {
+    return words.empty() ? "no value" : quote(fmt::format("{}", fmt::join(words, " ")));
+  };
+  remarks_.repeated.push_back(
+      fmt::format("option -{} is given several times: {} is used, not {}; give it once", name,
+                  typed(values), typed(before)));
 }
 
 int Options::take_values(const Option& option, int position,
                          const std::vector<std::string>& tokens) {
-  std::vector<std::string>& values = given_[option.name];
-  values.clear();
+  std::vector<std::string> values;
   const auto more = [&] { return is_value(tokens, position); };
-  if (option.kind == OptionKind::flag) {
+  if (option.kind == OptionKind::flag)
     values.push_back(more() && parse_flag(tokens[position]) ? tokens[position++] : "true");
-    return position;
-  }
-  for (int i = 0; i < option.values && more(); ++i) values.push_back(tokens[position++]);
+  else
+    for (int i = 0; i < option.values && more(); ++i) values.push_back(tokens[position++]);
+  if (const auto before = given_.find(option.name); before != given_.end())
+    note_repeated(option.name, before->second, values);
+  given_[option.name] = std::move(values);
   return position;
 }
 
@@ -258,9 +288,15 @@ std::string Options::help() const {
 
 void Options::check() {
   read_database();
-  if (!unknown_.empty()) refuse_unknown(unknown_.front());
+  if (!remarks_.unknown.empty()) refuse_unknown(remarks_.unknown.front());
   for (const auto& [name, values] : given_) check_values(row(name), values);
   check_arguments();
+  leave_out_endings();
+}
+
+void Options::leave_out_endings() {
+  for (auto& [name, values] : given_)
+    for (std::string& value : values) value = without_ending(value, row(name).endings);
 }
 
 void Options::read_database() {
@@ -285,7 +321,7 @@ void Options::read_database() {
   }
   for (const std::string& name : left_in_database())
     if (!begins_as_petsc(name) && name != "help" && !is_in_environment(name))
-      unknown_.push_back(name);
+      remarks_.unknown.push_back(name);
 }
 
 void Options::refuse_unknown(const std::string& name) const {

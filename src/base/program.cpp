@@ -44,6 +44,8 @@ int internal_error(const std::exception& error) {
 int guarded(Options& options, const std::function<Exit()>& work) {
   try {
     options.check();
+    for (const std::string& line : options.repeated())
+      print(stderr, fmt::format("warning: {}", line));
     const Exit status = work();
     for (const std::string& name : options.unused())
       print(stderr, fmt::format("warning: option {} was not used", name));

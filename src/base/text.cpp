@@ -64,6 +64,13 @@ std::string lower(std::string_view text) {
   return lowered;
 }
 
+std::string without_ending(std::string_view name, const std::vector<std::string>& endings) {
+  for (const std::string& ending : endings)
+    if (lower(name).ends_with(ending))
+      return std::string(name.substr(0, name.size() - ending.size()));
+  return std::string(name);
+}
+
 std::string_view next_line(std::string_view text, size_t& position) {
   const size_t begin = position;
   const size_t end = std::min(text.find_first_of("\r\n", begin), text.size());

@@ -77,6 +77,15 @@ def test_known_landmarks_are_kept(run, tmp_path):
     assert float(mean) < 3 and float(most) < 6
 
 
+def test_a_misspelled_name_is_named(run, tmp_path):
+    (tmp_path / "given.csv").write_text("# CoordinateSystem = LPS\npogonion_bonne, 0, -90, -60\nwart, 0, -91, -60\n")
+    result = run("repose-landmarks", *SURFACES, "-landmarks", "given.csv")
+    assert result.returncode == 0
+    rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("'")}
+    assert rows["'pogonion_bonne'"].endswith("given, under no standard name; did you mean pogonion_bone?")
+    assert rows["'wart'"].endswith("given")
+
+
 def test_no_given_landmark_is_replaced_or_lost(run, tmp_path):
     assert run("repose-landmarks", *SURFACES, "-output", "proposed").returncode == 0
     given = {name: [x + 2, y + 1, z - 1] for name, (x, y, z) in points(tmp_path / "proposed.mrk.json").items()}

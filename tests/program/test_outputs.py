@@ -54,6 +54,34 @@ def test_an_input_is_not_replaced(run, inputs, program, arguments, file):
     assert all(path.read_bytes() == content for path, content in inputs.items())
 
 
+@pytest.mark.parametrize("program, arguments, name, files", [
+    ("repose-solve", ["scene.yaml"], "r.h5", {"r.h5", "r_skin.xdmf"}),
+    ("repose-osteotomy", ["skull.ply", "-point", "0", "0", "0", "-normal", "0", "0", "1"], "r.PLY",
+     {"r_piece.ply", "r_rest.ply"}),
+    ("repose-compare", ["skin.ply", "skin.ply"], "r.csv", {"r.vtp", "r.csv"}),
+    ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json"], "r.tfm",
+     {"r.tfm", "r.ply"}),
+    ("repose-landmarks", HEAD, "r.mrk.json", {"r.mrk.json"}),
+    ("repose-phantom", ["-skin_vertices", "477"], "r.yaml", {"r_skin.ply"})])
+def test_the_ending_of_a_result_is_not_doubled(run, inputs, tmp_path, program, arguments, name, files):
+    assert run(program, *arguments, "-output", name).returncode == 0
+    made = {file.name for file in tmp_path.iterdir() if file.name.lower().startswith("r")}
+    assert files <= made and not any(file.lower().startswith(f"{name.lower()}.") or
+                                     file.lower().startswith(f"{name.lower()}_") for file in made), made
+
+
+@pytest.mark.parametrize("program, arguments", [
+    ("repose-compare", ["skin.ply", "skin.ply"]), ("repose-decimate", ["skin.ply", "-triangles", "1000"]),
+    ("repose-isosurface", ["none.mhd", "-otsu"]), ("repose-landmarks", HEAD), ("repose-phantom", ["-skin_vertices", "477"]),
+    ("repose-osteotomy", ["skull.ply", "-point", "0", "0", "0", "-normal", "0", "0", "1"]),
+    ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json"]),
+    ("repose-scan", ["none.ply"]), ("repose-tradeoff", ["scene.yaml"])])
+def test_a_missing_folder_is_refused_before_the_work(run, inputs, program, arguments):
+    result = run(program, *arguments, "-output", "none/r.ply")
+    assert (result.returncode, result.stdout) == (1, "") and result.stderr.count("\n") == 1, result
+    assert "cannot be written: there is no folder none; make it or choose another -output" in result.stderr
+
+
 @pytest.mark.parametrize("name", ["folder/", ".", "a\tb"])
 def test_names_that_are_none_are_refused(run, inputs, tmp_path, name):
     result = run("repose-solve", "scene.yaml", "-output", name)

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -30,9 +31,10 @@ struct Option {
   /// choice: the words allowed; number, integer: words that may stand in place of the number.
   std::vector<std::string> choices{};
   std::map<std::string, std::string>
-      removed{};               ///< words of earlier versions: what to give instead
-  int values = 1;              ///< how many values follow the name
-  std::string default_note{};  ///< for the help, what holds without a default_text
+      removed{};                       ///< words of earlier versions: what to give instead
+  int values = 1;                      ///< how many values follow the name
+  std::string default_note{};          ///< for the help, what holds without a default_text
+  std::vector<std::string> endings{};  ///< path: each is left out where the value ends with it
 };
 
 /// Command-line options, checked against one table; the program's own are read from the command
@@ -40,7 +42,7 @@ struct Option {
 /// program makes them and calls run_program (program.h), which starts PETSc, answers -help and
 /// calls check(): every error comes when ranks can agree who prints it. As in PETSc a token is a
 /// name if a letter follows its dash (or two); "-300" and "-.5" are values. The last of several
-/// wins. Nothing here is collective; every rank sees the same command line.
+/// wins, with a warning. Nothing here is collective; every rank sees the same command line.
 class Options {
  public:
   /// Sorts the command line into the program's own options, PETSc's and arguments. Never throws.
@@ -68,6 +70,10 @@ class Options {
   /// functions below.
   void check();
 
+  /// One line for each option that the command line gives several times with different values, of
+  /// which the last is used.
+  const std::vector<std::string>& repeated() const { return remarks_.repeated; }
+
   /// One value per Argument, in order.
   const std::vector<std::string>& arguments() const { return positional_; }
   /// The person gave it, on the command line or in PETSc's database.
@@ -91,7 +97,11 @@ class Options {
   const Option& row(std::string_view name) const;
   int sort_option(int position, const std::vector<std::string>& tokens);
   int take_values(const Option& option, int position, const std::vector<std::string>& tokens);
+  std::optional<std::vector<std::string>> last_petsc_values(const std::string& name) const;
+  void note_repeated(const std::string& name, const std::vector<std::string>& before,
+                     const std::vector<std::string>& values);
   void read_database();
+  void leave_out_endings();
   void check_values(const Option& option, const std::vector<std::string>& values) const;
   void check_arguments() const;
   [[noreturn]] void refuse_unknown(const std::string& name) const;
@@ -100,7 +110,10 @@ class Options {
   std::vector<Argument> arguments_;
   std::vector<Option> table_;
   std::map<std::string, std::vector<std::string>, std::less<>> given_;
-  std::vector<std::string> positional_, unknown_, petsc_tokens_;
+  std::vector<std::string> positional_, petsc_tokens_;
+  struct {
+    std::vector<std::string> unknown, repeated;
+  } remarks_;
   mutable std::vector<char*> petsc_pointers_;
   bool help_requested_ = false, version_requested_ = false;
 };

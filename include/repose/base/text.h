@@ -24,6 +24,9 @@ std::string quote(std::string_view text);
 /// ASCII letters in lower case, whatever the locale.
 std::string lower(std::string_view text);
 
+/// `name` without the first of the endings that it ends with, in upper or lower case.
+std::string without_ending(std::string_view name, const std::vector<std::string>& endings);
+
 /// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
 std::string_view next_line(std::string_view text, size_t& position);
 

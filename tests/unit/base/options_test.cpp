@@ -33,7 +33,11 @@ std::vector<Option> table() {
            .default_text = "energy",
            .help = "What is minimized.",
            .choices = {"energy", "force"}},
-          {"output", OptionKind::path, "", "Where to write."},
+          {.name = "output",
+           .kind = OptionKind::path,
+           .default_text = "",
+           .help = "Where to write.",
+           .endings = {".h5"}},
           {.name = "landmarks",
            .kind = OptionKind::path,
            .default_text = "",
@@ -108,6 +112,34 @@ TEST(Options, LastOneWinsAndTwoDashesDo) {
   Line line({"-accuracy", "1", "head.yaml", "--accuracy", "-.5", "-accuracy", "2"});
   line->check();
   EXPECT_EQ(line->number("accuracy"), 2);
+}
+
+TEST(Options, NamesBothValuesOfAnOptionGivenTwice) {
+  const Line line({"head.yaml", "-accuracy", "1", "-accuracy", "2", "-dry_run", "-dry_run", "false",
+                   "-tao_type", "lmvm", "-tao_type", "ntr", "-landmarks", "a", "b", "-landmarks",
+                   "a", "c"});
+  EXPECT_EQ(
+      line.options->repeated(),
+      (std::vector<std::string>{
+          "option -accuracy is given several times: '2' is used, not '1'; give it once",
+          "option -dry_run is given several times: 'false' is used, not 'true'; give it once",
+          "option -tao_type is given several times: 'ntr' is used, not 'lmvm'; give it once",
+          "option -landmarks is given several times: 'a c' is used, not 'a b'; give it once"}));
+  const Line same({"head.yaml", "-accuracy", "1", "-accuracy", "1", "-dry_run", "-dry_run",
+                   "-options_file", "a", "-options_file", "b"});
+  EXPECT_TRUE(same.options->repeated().empty());
+}
+
+TEST(Options, LeavesOutTheEndingsOfAPath) {
+  const auto output = [](const char* typed) {
+    Line line({"head.yaml", "-output", typed});
+    line->check();
+    return line->text("output");
+  };
+  EXPECT_EQ(output("out/r.h5"), "out/r");
+  EXPECT_EQ(output("r.H5"), "r");
+  EXPECT_EQ(output("r.h5.h5"), "r.h5");
+  EXPECT_EQ(output("r.v2"), "r.v2");
 }
 
 TEST(Options, PassesPetscsOwnOn) {
