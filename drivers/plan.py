@@ -181,7 +181,7 @@ def begin_run(folder, operations, inputs):
 def extract_labels(labels, folder, work):
     """Writes a mesh of each bone; without names the largest label is the skull, and that before and below its
     middle the mandible."""
-    if labels.name.endswith(".seg.nrrd"):
+    if labels.name.lower().endswith(".seg.nrrd"):
         with reading(labels, "a segmentation of 3D Slicer"):
             segmentation = Segmentation(labels)
         map_file = work / "segment.nrrd"
@@ -274,10 +274,10 @@ def arguments():
     parser.add_argument("volumes", nargs="+", type=pathlib.Path)
     parser.add_argument("-operation", required=True)
     parser.add_argument("-output", default="plan", type=pathlib.Path)
-    parser.add_argument("-level", type=float, default=-300)
-    parser.add_argument("-bone", type=float, default=226)
+    parser.add_argument("-level", type=number_from(-32768, 65535, float), default=-300)
+    parser.add_argument("-bone", type=number_from(-32768, 65535, float), default=226)
     parser.add_argument("-apart", nargs=2, type=pathlib.Path)
-    parser.add_argument("-edge", type=float, default=4)
+    parser.add_argument("-edge", type=number_from(1, 20, float), default=4)
     parser.add_argument("-ranks", type=number_from(1, 1024), default=min(2, os.cpu_count() or 1))
     parser.add_argument("-propose", action="store_true")
     return parser.parse_args()
@@ -297,11 +297,11 @@ def main():
     for file in options.volumes:
         if not file.exists():
             refuse(f"{file}: no such file or folder")
-    alone = len(options.volumes) == 1 and not volume.name.endswith(".seg.nrrd")
+    alone = len(options.volumes) == 1 and not volume.name.lower().endswith(".seg.nrrd")
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)
     begin_run(folder, operations, [*options.volumes, *(options.apart or [])])
-    segmented = volume.name.endswith(".seg.nrrd")
+    segmented = volume.name.lower().endswith(".seg.nrrd")
     if alone:
         extract_bones(volume, options, folder)
     else:

@@ -22,7 +22,10 @@ def refuse(reason):
 
 def refuse_missing(module, install):
     """Ends a script whose Python lacks a module; `install` says how to get it."""
-    refuse(f"{module.name} is missing in {sys.executable}: {install}")
+    usual = "/usr/bin/python3"
+    of_another = os.path.exists(usual) and not os.path.samefile(sys.executable, usual)
+    run_usual = f"; packages of apt are of {usual}: {usual} {sys.argv[0]} …" if of_another else ""
+    refuse(f"{module.name} is missing in {sys.executable}: {install}{run_usual}")
 
 
 def run(main):
@@ -52,6 +55,19 @@ def reading(file, what):
         raise Unusable(f"{file}: damaged, or not {what}: {reason}") from None
 
 
+class _Store(argparse.Action):
+    """Stores the value of an argument; of an option that is given several times the last one, with a warning
+    where they differ."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        before = getattr(self, "before", values)
+        if option_string and before != values:
+            print(f"{parser.prog}: warning: option {option_string} is given several times: {values} is used, not "
+                  f"{before}; give it once", file=sys.stderr)
+        self.before = values
+        setattr(namespace, self.dest, values)
+
+
 class Arguments(argparse.ArgumentParser):
     """Arguments of a script. -h, -help and --help print its documentation; a wrong argument ends it with
     status 1 and one line."""
@@ -59,6 +75,8 @@ class Arguments(argparse.ArgumentParser):
     def __init__(self, documentation):
         super().__init__(prog=os.path.basename(sys.argv[0]), description=documentation, add_help=False,
                          allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
+        for name in (None, "store"):
+            self.register("action", name, _Store)
         self.add_argument("-h", "-help", "--help", action="help", help="print this text and end")
 
     def error(self, message):

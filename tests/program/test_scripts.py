@@ -65,6 +65,16 @@ def test_a_missing_module_is_one_line_that_says_what_to_install(script, solved, 
     says(result, name, "install ", *([] if name in ("plan.py", "paraview_repose.py") else [sys.executable]))
 
 
+@pytest.mark.skipif(not os.path.exists("/usr/bin/python3"), reason="no Python of the system")
+def test_a_python_that_apt_does_not_serve_is_told_of_the_one_that_it_does(script, solved, tmp_path):
+    python = tmp_path / "python3"
+    shutil.copy(sys.executable, python)
+    names = "import sys; sys.path.insert(0, sys.argv[1]); sys.argv[0] = 'report.py'; from sheet.script import *; "
+    result = finish([python, "-c", f"{names} refuse_missing(ImportError(name='numpy'), 'apt-get install')",
+                     PROJECT / "drivers"], tmp_path, os.environ, TIME_LIMIT)
+    says(result, "report.py", f"numpy is missing in {python}: apt-get install; ", "/usr/bin/python3 report.py")
+
+
 @pytest.mark.parametrize("name", SCRIPTS.keys() - {"paraview_repose.py"})
 def test_a_missing_file_is_one_line(script, name):
     arguments = [a.format("none.h5") for a in ARGUMENTS.get(name, ["none.h5"])]
@@ -105,6 +115,24 @@ def test_wrong_arguments_are_one_line(script, name):
     (["-ranks", "0"], "-ranks: 0: must be from 1"), (["-ranks", "x"], "-ranks: invalid whole number value: 'x'")])
 def test_numbers_out_of_range_are_refused(script, arguments, part):
     says(script("live.py", PROJECT / "meshes/head_live.yaml", "-no_browser", *arguments), "live.py", part)
+
+
+@pytest.mark.parametrize("option, value, limits", [
+    ("-level", "nan", "from -32768 to 65535"), ("-bone", "inf", "from -32768 to 65535"), ("-edge", "-4", "from 1 to 20"),
+    ("-edge", "nan", "from 1 to 20")])
+def test_numbers_out_of_range_are_refused_before_a_folder_is_made(script, tmp_path, option, value, limits):
+    volume = tmp_path / "head.mhd"
+    volume.touch()
+    result = script("plan.py", volume, "-operation", "jaw, 5 mm forward", option, value)
+    says(result, "plan.py", f"argument {option}: {value}: must be {limits}")
+    assert not (tmp_path / "plan").exists()
+
+
+def test_an_option_given_twice_is_named_with_both_values(script, solved, tmp_path):
+    result = script("report.py", solved("paper_jaw_opening.yaml"), "-output", "a.html", "-output", "b.html")
+    assert result.returncode == 0 and (tmp_path / "b.html").exists() and not (tmp_path / "a.html").exists()
+    assert result.stderr == ("report.py: warning: option -output is given several times: b.html is used, not a.html; "
+                             "give it once\n")
 
 
 def test_a_solver_that_is_not_there_is_named(script):
