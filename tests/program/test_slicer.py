@@ -334,6 +334,12 @@ def test_a_missed_accuracy_is_handed_over_and_says_so(panel, head, tmp_path):
     assert len(read_vtp(tmp_path / "skin.vtp")["Points"]) == 477
 
 
+def test_help_lists_every_flag(panel):
+    result = panel("--help")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert {"--skin", "--bone1", "--accuracy", "--predictedSkin"} <= set(result.stdout.split())
+
+
 WRONG = {"no skin": ([], "no skin is chosen"),
          "unknown flag": (["--sknn", "x"], "--sknn: unknown"),
          "no value": (["--skin"], "--skin: a value is missing"),

@@ -46,6 +46,13 @@ def parameters():
             if item.find("name") is not None}
 
 
+def help_text():
+    """The flags of Repose.xml, with what each means."""
+    lines = [f"--{name:<20} {' '.join((item.findtext('description') or '').split())}"
+             for name, item in parameters().items() if item.find("longflag") is not None]
+    return "Repose [--FLAG VALUE …]\nWhat the panel Repose of 3D Slicer does.\n\n" + "\n".join(lines)
+
+
 def value_of(item, text):
     """A parameter's text as what its tag says."""
     name, kind = item.findtext("name"), item.tag
@@ -78,7 +85,7 @@ def parse(arguments):
         flag, joined, text = rest.pop(0).partition("=")
         name = flag.removeprefix("--")
         if not flag.startswith("--") or name not in [*texts, "processinformationaddress"]:
-            raise Refusal(f"{flag}: unknown; the flags are those of Repose.xml")
+            raise Refusal(f"{flag}: unknown; --help lists the flags")
         if name in known and known[name].tag == "boolean":
             texts[name] = "true"
             continue
@@ -443,6 +450,9 @@ def run():
 def main():
     if "--xml" in sys.argv[1:]:
         sys.stdout.write((FOLDER / "Repose.xml").read_text(encoding="utf-8"))
+        return 0
+    if {"-h", "-help", "--help"} & set(sys.argv[1:]):
+        print(help_text())
         return 0
     try:
         for number in SIGNALS:
