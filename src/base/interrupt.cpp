@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <csignal>
 #include <cstring>
 #include <thread>
@@ -28,9 +30,11 @@ void send(int pipe, char word) {
   }
 }
 
-extern "C" void remember(int) {
+extern "C" void remember(int signal) {
   const int reason = errno;
   received = 1;
+  for (size_t k = 0; k < signals.size(); ++k)
+    if (signals[k] == signal) sigaction(signal, &before[k], nullptr);
   if (wake >= 0) send(wake, signaled);
   errno = reason;
 }
@@ -84,14 +88,49 @@ Interrupt::Interrupt(MPI_Comm comm, double limit, bool heeds_signals)
   if (!signals_) return;
   struct sigaction action = {};
   action.sa_handler = remember;
-  action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
-  for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &action, &before[k]);
+  action.sa_flags = SA_RESTART;
+  for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], nullptr, &before[k]);
+  for (const int signal : signals) sigaction(signal, &action, nullptr);
 }
 
 Interrupt::~Interrupt() {
   listener_.reset();
   if (!signals_) return;
   for (size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &before[k], nullptr);
+}
+
+namespace {
+
+constexpr std::array<int, 4> ending_signals = {SIGHUP, SIGINT, SIGTERM, SIGUSR1};
+std::array<struct sigaction, ending_signals.size()> usual_actions;
+std::array<char, PATH_MAX> file_to_remove{};  // empty: none
+
+extern "C" void remove_and_end(int signal) {
+  unlink(file_to_remove.data());
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);  // delivered when this function returns
+}
+
+}  // namespace
+
+RemovalOnSignal::RemovalOnSignal(const std::filesystem::path& file) {
+  const std::string path = std::filesystem::absolute(file).string();
+  if (file_to_remove[0] != '\0' || path.size() >= file_to_remove.size()) return;
+  installed_ = true;
+  std::copy_n(path.c_str(), path.size() + 1, file_to_remove.begin());
+  struct sigaction action = {};
+  action.sa_handler = remove_and_end;
+  for (size_t k = 0; k < ending_signals.size(); ++k) {
+    sigaction(ending_signals[k], nullptr, &usual_actions[k]);
+    if (usual_actions[k].sa_handler != SIG_IGN) sigaction(ending_signals[k], &action, nullptr);
+  }
+}
+
+RemovalOnSignal::~RemovalOnSignal() {
+  if (!installed_) return;
+  for (size_t k = 0; k < ending_signals.size(); ++k)
+    sigaction(ending_signals[k], &usual_actions[k], nullptr);
+  file_to_remove[0] = '\0';
 }
 
 bool Interrupt::requested() {

@@ -1,7 +1,5 @@
 #include "mpi_environment.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -28,13 +26,6 @@ bool is_on_one_machine(const Environment& environment) {
   return all && local && std::string_view(all) == local;
 }
 
-/// A folder of this process, where programs started at the same time would share one and remove it
-/// from one another.
-std::string session_folder(const Environment& environment) {
-  const char* temporary = environment("TMPDIR");
-  return std::string(temporary ? temporary : "/tmp") + "/repose-" + std::to_string(getpid());
-}
-
 /// Linux' seccomp mode 2.
 bool system_calls_are_filtered() {
   std::ifstream status("/proc/self/status");
@@ -54,7 +45,8 @@ std::vector<std::pair<std::string, std::string>> mpi_variables(const Environment
   };
   if (std::none_of(launchers.begin(), launchers.end(), environment)) {
     add("OMPI_MCA_ess_singleton_isolated", "1");
-    add("OMPI_MCA_orte_top_session_dir", session_folder(environment));
+    add("OMPI_MCA_orte_create_session_dirs", "0");
+    add("OMPI_MCA_sharedfp", "individual");  // the others make files of their own
     add("OMPI_MCA_pml", "ob1");
     add("OMPI_MCA_btl", "self");
     add("HWLOC_COMPONENTS", "-gl,-opencl");

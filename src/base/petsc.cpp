@@ -1,10 +1,12 @@
 #include "repose/base/petsc.h"
 
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 
 #include "mpi_environment.h"
+#include "repose/base/options.h"
 
 namespace repose::base {
 
@@ -35,7 +37,12 @@ void check(PetscErrorCode code) {
 }
 
 void check_options(PetscErrorCode code) {
-  if (code != 0) refuse("PETSc does not take an option's value: {}", text_of(code));
+  if (code == 0) return;
+  const std::string text = text_of(code);
+  for (const auto& [name, value] : petsc_options())
+    if (!value.empty() && text.find(" " + value + " ") != std::string::npos)
+      refuse("-{} {}: PETSc does not take this value: {}", name, value, text);
+  refuse("PETSc does not take an option's value: {}", text);
 }
 
 Session::Session(int argc, char** argv, const char* help) {
@@ -43,6 +50,10 @@ Session::Session(int argc, char** argv, const char* help) {
   // With more, models are shared out over ranks in another way in every run (Scotch 7).
   setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
   ignore_broken_pipes();
+  // PETSc takes these for faults, of which it prints a page.
+  constexpr std::array kept{SIGTERM, SIGHUP};
+  std::array<struct sigaction, kept.size()> actions{};
+  for (size_t k = 0; k < kept.size(); ++k) sigaction(kept[k], nullptr, &actions[k]);
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
   if (const PetscErrorCode code = PetscInitialize(&argc, &argv, nullptr, help))
     refuse("PETSc does not start with its options (command line, -options_file, PETSC_OPTIONS): {}",
@@ -51,9 +62,7 @@ Session::Session(int argc, char** argv, const char* help) {
   PetscBool asked = PETSC_FALSE;
   check(PetscOptionsHasName(nullptr, nullptr, "-options_left", &asked));
   if (!asked) check(PetscOptionsSetValue(nullptr, "-options_left", "no"));
-  // PETSc takes these for faults, of which it prints a page.
-  std::signal(SIGTERM, SIG_DFL);
-  std::signal(SIGHUP, SIG_DFL);
+  for (size_t k = 0; k < kept.size(); ++k) sigaction(kept[k], &actions[k], nullptr);
 }
 
 Session::~Session() {

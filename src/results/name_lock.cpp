@@ -85,11 +85,13 @@ NameLock::NameLock(const std::filesystem::path& name)
   base::require_writable(name.string() + ".h5");
   while (!acquire()) {
   }
+  on_signal_.emplace(file_);
   write_holder(descriptor_);
   remove_leftovers();
 }
 
 NameLock::~NameLock() {
+  on_signal_.reset();
   std::error_code ignored;
   std::filesystem::remove(file_, ignored);
   close(descriptor_);

@@ -61,6 +61,35 @@ def test_a_signal_ends_the_run_and_keeps_its_state(run, environment, tmp_path, c
     assert not list(tmp_path.glob("*.part"))
 
 
+def building(folder, environment, **settings):
+    """Starts a solve and waits until it has begun to build its model."""
+    process = subprocess.Popen([programs() / "repose-solve", SCENE, "-output", "early"], cwd=folder, env=environment,
+                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **settings)
+    lock = folder / "early.lock"
+    while not (lock.exists() and lock.stat().st_size):
+        assert process.poll() is None, process.stderr.read()
+    return process
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_before_the_search_leaves_no_file(environment, tmp_path, sent):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    process = building(tmp_path, {**environment, "TMPDIR": str(temporary)})
+    process.send_signal(sent)
+    process.communicate(timeout=60)
+    assert process.returncode == -sent
+    assert list(tmp_path.rglob("*")) == [temporary]
+
+
+def test_a_run_that_ignores_hang_ups_goes_on(environment, tmp_path):
+    """nohup makes a run ignore them."""
+    process = building(tmp_path, environment, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    process.send_signal(signal.SIGHUP)
+    process.communicate(timeout=60)
+    assert process.returncode == 0 and (tmp_path / "early.h5").exists()
+
+
 @pytest.fixture
 def busy():
     """Two processes that take what they get of the processors."""

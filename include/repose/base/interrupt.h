@@ -2,6 +2,7 @@
 #include <mpi.h>
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 
@@ -9,7 +10,7 @@ namespace repose::base {
 
 /// A person's wish that a run, all its searches, should end and keep what it has: SIGINT, SIGTERM
 /// or SIGUSR1 to any rank (mpirun and batch systems pass the last one on to all), or a time limit.
-/// A second SIGINT or SIGTERM ends the program as usual.
+/// The second signal of a sort does what it did before.
 class Interrupt {
  public:
   /// `limit` in s of wall-clock time from now; without `signals` the limit alone counts.
@@ -33,6 +34,19 @@ class Interrupt {
   Clock::time_point begin_ = Clock::now();
   bool requested_ = false;
   std::unique_ptr<Listener> listener_;
+};
+
+/// While it lives, a signal that ends the process (SIGHUP, SIGINT, SIGTERM, SIGUSR1) first removes
+/// a file. Signals that the process ignores stay ignored. Of several that live at a time only the
+/// first does this.
+class RemovalOnSignal {
+ public:
+  explicit RemovalOnSignal(const std::filesystem::path& file);
+  ~RemovalOnSignal();  ///< signals do again what they did before
+  RemovalOnSignal(RemovalOnSignal&&) = delete;
+
+ private:
+  bool installed_ = false;
 };
 
 }  // namespace repose::base

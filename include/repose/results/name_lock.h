@@ -1,6 +1,9 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "repose/base/interrupt.h"
 
 namespace repose::results {
 
@@ -18,7 +21,7 @@ class NameLock {
   /// `name` is a path without ending. InputError at once where another run holds it, naming that
   /// run, and where the folder is missing or not writable.
   explicit NameLock(const std::filesystem::path& name);
-  ~NameLock();  ///< removes NAME.lock
+  ~NameLock();  ///< removes NAME.lock, as does a signal that ends the process
   NameLock(NameLock&&) = delete;
 
  private:
@@ -27,6 +30,7 @@ class NameLock {
 
   std::filesystem::path name_, file_;
   int descriptor_ = -1;
+  std::optional<base::RemovalOnSignal> on_signal_;
 };
 
 }  // namespace repose::results

@@ -1,7 +1,6 @@
 #include "base/mpi_environment.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -29,11 +28,11 @@ TEST(MpiEnvironment, AProgramAloneNeedsNeitherDaemonNorNetwork) {
   EXPECT_EQ(set.at("OMPI_MCA_btl"), "self");
 }
 
-TEST(MpiEnvironment, ProgramsStartedAtTheSameTimeShareNoFolder) {
-  const std::string own = "/repose-" + std::to_string(getpid());
-  EXPECT_TRUE(variables({}).at("OMPI_MCA_orte_top_session_dir").ends_with(own));
-  EXPECT_EQ(variables({{"TMPDIR", "/scratch"}}).at("OMPI_MCA_orte_top_session_dir"),
-            "/scratch" + own);
+TEST(MpiEnvironment, AProgramAloneMakesNoFolder) {
+  EXPECT_EQ(variables({}).at("OMPI_MCA_orte_create_session_dirs"), "0");
+  EXPECT_EQ(variables({}).at("OMPI_MCA_sharedfp"), "individual");
+  EXPECT_FALSE(
+      variables({{"OMPI_COMM_WORLD_SIZE", "2"}}).contains("OMPI_MCA_orte_create_session_dirs"));
 }
 
 TEST(MpiEnvironment, RanksOnOneMachineNeedNoNetwork) {

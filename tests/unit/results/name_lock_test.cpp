@@ -1,5 +1,7 @@
 #include "repose/results/name_lock.h"
 
+#include <csignal>
+#include <cstdlib>
 #include <fstream>
 
 #include "files.h"
@@ -21,6 +23,45 @@ TEST(NameLock, IsOneRunsAtATime) {
   }
   EXPECT_EQ(folder.content(), "");
   EXPECT_EQ(refusal([&] { NameLock(folder.path("a")); }), "accepted");
+}
+
+// In a process of its own, which the signal ends.
+TEST(NameLockDeathTest, ASignalThatEndsTheProcessRemovesTheFile) {
+  const Folder folder;
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1}) {
+    const auto begin_and_end = [&] {
+      std::signal(signal, SIG_DFL);
+      const NameLock lock(folder.path("a"));
+      std::raise(signal);
+    };
+    EXPECT_EXIT(begin_and_end(), ::testing::KilledBySignal(signal), "");
+    EXPECT_EQ(folder.content(), "") << signal;
+  }
+}
+
+TEST(NameLockDeathTest, ASecondSignalDuringASearchRemovesTheFile) {
+  const Folder folder;
+  const auto begin_and_end = [&] {
+    std::signal(SIGTERM, SIG_DFL);
+    const NameLock lock(folder.path("a"));
+    base::Interrupt interrupt(MPI_COMM_SELF, 1e9, true);
+    std::raise(SIGTERM);
+    if (!interrupt.requested()) std::_Exit(1);
+    std::raise(SIGTERM);
+  };
+  EXPECT_EXIT(begin_and_end(), ::testing::KilledBySignal(SIGTERM), "");
+  EXPECT_EQ(folder.content(), "");
+}
+
+TEST(NameLockDeathTest, AnIgnoredSignalStaysIgnored) {
+  const Folder folder;
+  const auto go_on = [&] {
+    std::signal(SIGHUP, SIG_IGN);
+    const NameLock lock(folder.path("a"));
+    std::raise(SIGHUP);
+    std::_Exit(folder.content() == "a.lock" ? 0 : 1);
+  };
+  EXPECT_EXIT(go_on(), ::testing::ExitedWithCode(0), "");
 }
 
 TEST(NameLock, WhatAKilledRunLeftGoesAndNothingElse) {
