@@ -37,6 +37,25 @@ void require_supported(const std::string& name, const std::string& value) {
   }
 }
 
+/// Returns whether a word is what PETSc reads as no number at all.
+bool is_nan(const std::string& value) {
+  const std::string word = lower(value);
+  return word == "nan" || word == "+nan" || word == "-nan";
+}
+
+void require_number(const std::string& name, const std::string& value) {
+  for (const SupportedNumbers& numbers : supported_numbers()) {
+    const auto is_named = [&](const std::string& option) { return matches(option, lower(name)); };
+    if (std::none_of(numbers.options.begin(), numbers.options.end(), is_named)) continue;
+    const auto number = base::parse_number(value);
+    const bool whole = !numbers.whole || base::parse_integer(value);
+    if (number && whole && numbers.range.contains(*number)) return;
+    base::refuse("-{} {}: must be {}", name, value.empty() ? "(no value)" : value,
+                 base::expected_number(numbers.whole, "", numbers.range, {}));
+  }
+  if (is_nan(value)) base::refuse("-{} {}: must be a number", name, value);
+}
+
 }  // namespace
 
 const std::vector<SupportedTypes>& supported_types() {
@@ -64,6 +83,29 @@ void require_supported_types() {
   for (const auto& [name, value] : base::petsc_options()) require_supported(name, value);
 }
 
+const std::vector<SupportedNumbers>& supported_numbers() {
+  using base::Range;
+  static const std::vector<SupportedNumbers> table{
+      {{"tao_gatol", "tao_grtol", "tao_gttol", "tao_catol", "tao_crtol", "tao_steptol"},
+       Range::at_least(0)},
+      {{"tao_max_it", "tao_max_funcs"}, Range::at_least(-1), true},
+      {{"tao_ls_ftol", "tao_ls_gtol", "tao_ls_rtol", "tao_ls_stepmin"}, Range::at_least(0)},
+      {{"tao_ls_stepmax"}, Range::above(0)},
+      {{"tao_ls_max_funcs"}, Range::at_least(1), true},
+      {{"ksp_rtol", "tao_*_ksp_rtol"}, Range::between(0, 1)},
+      {{"ksp_atol", "tao_*_ksp_atol"}, Range::at_least(0)},
+      {{"ksp_divtol", "tao_*_ksp_divtol"}, Range::above(0)},
+      {{"ksp_max_it", "tao_*_ksp_max_it"}, Range::at_least(1), true},
+      {{"pc_renewal_price"}, Range::at_least(-1)},
+      {{"eps_tol"}, {.min = 0, .max = 1, .min_excluded = true}},
+      {{"eps_max_it", "eps_nev"}, Range::at_least(1), true}};
+  return table;
+}
+
+void require_supported_numbers() {
+  for (const auto& [name, value] : base::petsc_options()) require_number(name, value);
+}
+
 std::string describe_supported_types() {
   std::string text = "| option | values | chooses |\n|---|---|---|\n";
   for (const SupportedTypes& types : supported_types()) {
@@ -72,6 +114,14 @@ std::string describe_supported_types() {
       values += fmt::format("{}`{}`", values.empty() ? "" : ", ", value);
     text += fmt::format("| `-{}` | {} | {} |\n", types.option, values, types.use);
   }
+  return text;
+}
+
+std::string describe_supported_numbers() {
+  std::string text = "| options | value |\n|---|---|\n";
+  for (const SupportedNumbers& numbers : supported_numbers())
+    text += fmt::format("| `-{}` | {} |\n", fmt::join(numbers.options, "`, `-"),
+                        base::expected_number(numbers.whole, "", numbers.range, {}));
   return text;
 }
 

@@ -112,6 +112,7 @@ struct TaoSearch::Callbacks {
 TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver)
     : function_(function), solver_(solver), gradient_(function.positions().make_vector()) {
   require_supported_types();
+  require_supported_numbers();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
   check(TaoSetObjective(tao_, Callbacks::value, this));

@@ -228,7 +228,7 @@ CASES = {
     "PETSc's option of unknown choice": (
         lambda i: i.option("-tao_type", "fast"), ["-tao_type fast", "must be one of"]),
     "PETSc's option not a number": (
-        lambda i: i.option("-tao_max_it", "many"), ["option", "many"]),
+        lambda i: i.option("-tao_max_it", "many"), ["-tao_max_it many", "must be a whole number"]),
     "initial Hessian of unknown name": (
         lambda i: i.option("-tao_type", "lmvm", "-tao_lmvm_initial", "stif"), ["stif", "stiffness"]),
     "force with a penalty": (

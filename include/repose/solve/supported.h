@@ -2,7 +2,10 @@
 #include <string>
 #include <vector>
 
-/// The types of PETSc's objects that work with the program's functions and matrices.
+#include "repose/base/text.h"
+
+/// The types of PETSc's objects that work with the program's functions and matrices, and the
+/// numbers that they take.
 namespace repose::solve {
 
 /// Allowed values of a PETSc option that chooses a type.
@@ -18,7 +21,21 @@ const std::vector<SupportedTypes>& supported_types();
 /// (InputError). Others crash, stop with an error or return a wrong answer. Not collective.
 void require_supported_types();
 
-/// The table in Markdown, as docs/guide/solver.md has it.
+/// Allowed values of a PETSc option that is a number.
+struct SupportedNumbers {
+  std::vector<std::string> options;  ///< without their dash; a * stands for the name of a method
+  base::Range range;
+  bool whole = false;
+};
+
+const std::vector<SupportedNumbers>& supported_numbers();
+
+/// Refuses, with the allowed range, a number in PETSc's options that is not in the table, and nan
+/// for any option (InputError): PETSc takes these without a word. Not collective.
+void require_supported_numbers();
+
+/// The tables in Markdown, as docs/guide/solver.md has them.
 std::string describe_supported_types();
+std::string describe_supported_numbers();
 
 }  // namespace repose::solve

@@ -84,12 +84,44 @@ TEST(SupportedTypes, OtherPrefixesAreLeftAlone) {
   EXPECT_NO_THROW(require_supported_types());
 }
 
+/// The message of a refusal, or "accepted".
+std::string refusal_of(const char* option, const std::string& value) {
+  const base::ScopedOption chosen(option, value);
+  try {
+    require_supported_numbers();
+  } catch (const base::InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(SupportedNumbers, ValuesOutOfRangeAreRefusedWithTheRange) {
+  for (const char* value : {"nan", "inf", "-1", "1e-2mm", "0,01", "1e400", "many"})
+    EXPECT_EQ(refusal_of("-tao_gatol", value),
+              fmt::format("-tao_gatol {}: must be a number, ≥ 0", value));
+  EXPECT_EQ(refusal_of("-tao_gatol", ""), "-tao_gatol (no value): must be a number, ≥ 0");
+  EXPECT_EQ(refusal_of("-tao_ntr_ksp_rtol", "1.5"),
+            "-tao_ntr_ksp_rtol 1.5: must be a number, 0 … 1");
+  EXPECT_EQ(refusal_of("-tao_max_it", "2.5"), "-tao_max_it 2.5: must be a whole number, ≥ -1");
+  for (const char* value : {"0", "1e-3", ".5"})
+    EXPECT_EQ(refusal_of("-tao_gatol", value), "accepted");
+  EXPECT_EQ(refusal_of("-tao_max_it", "20"), "accepted");
+}
+
+TEST(SupportedNumbers, NoOptionTakesNan) {
+  EXPECT_EQ(refusal_of("-pc_sor_omega", "NaN"), "-pc_sor_omega NaN: must be a number");
+  EXPECT_EQ(refusal_of("-pc_sor_omega", "1.5"), "accepted");
+}
+
 TEST(SupportedTypes, DocumentationHoldsTheTable) {
   std::ifstream page(REPOSE_MESHES "/../docs/guide/solver.md");
   const std::string text{std::istreambuf_iterator<char>(page), {}};
   EXPECT_NE(text.find(describe_supported_types()), std::string::npos)
       << "replace the table in docs/guide/solver.md by\n"
       << describe_supported_types();
+  EXPECT_NE(text.find(describe_supported_numbers()), std::string::npos)
+      << "replace the table in docs/guide/solver.md by\n"
+      << describe_supported_numbers();
 }
 
 }  // namespace supported_test
