@@ -228,6 +228,7 @@ int64_t PlanSession::points() const { return state_->part().total_points; }
 PlanSession::Answer PlanSession::solve(const Request& request) {
   State& s = *state_;
   s.require_inside(request.plan);
+  auto before = s.last;
   Answer answer;
   solve::Start start;
   if (request.base) {
@@ -250,6 +251,8 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
     answer.field.push_back(field);
     answer.field.back().values = base::gather(s.comm, field.values);
   }
+  if (answer.summary.path.last.stopped)
+    s.last = std::move(before);  // an abandoned plan is no answer
   return answer;
 }
 

@@ -107,7 +107,7 @@ void read_points(const json& value, Request& request) {
 
 void read_output(const json& value, Request& request) {
   if (!value.is_string()) refuse_value("output", "the path of the result without ending", value);
-  request.output = value.get<std::string>();
+  request.output = base::without_ending(value.get<std::string>(), {".h5"});
   base::require_name(request.output);
 }
 

@@ -1,6 +1,7 @@
 #include "requests.h"
 
 #include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -37,7 +38,8 @@ void broadcast_asleep(MPI_Comm comm, std::string& text) {
 
 }  // namespace
 
-Requests::Requests(MPI_Comm comm, int input) : comm_(comm), input_(input) {
+Requests::Requests(MPI_Comm comm, int input, int output)
+    : comm_(comm), input_(input), output_(output) {
   if (base::rank(comm) > 0) return;
   if (pipe(stop_) != 0) throw base::InternalError("no pipe can be made");
   reader_ = std::thread([this] { read(); });
@@ -99,11 +101,20 @@ std::optional<std::string> Requests::next() {
   return text.substr(1);
 }
 
+/// On rank 0, with the lock. A peer that has closed its socket looks like one that sends no more
+/// but still reads, until bytes are sent: a blank, which JSON allows before an object.
+bool Requests::is_output_closed() {
+  if (ended_ && input_ == output_ && !std::exchange(probed_, true))
+    if (::send(output_, " ", 1, MSG_NOSIGNAL | MSG_DONTWAIT) < 0) return true;
+  pollfd watched{output_, 0, 0};
+  return poll(&watched, 1, 0) > 0 && (watched.revents & (POLLERR | POLLHUP)) != 0;
+}
+
 bool Requests::superseded(const std::function<bool(const std::string&)>& overtakes) {
   bool superseded = false;
   if (base::rank(comm_) == 0) {
     const std::lock_guard lock(mutex_);
-    superseded = std::ranges::any_of(lines_, overtakes);
+    superseded = std::ranges::any_of(lines_, overtakes) || is_output_closed();
   }
   base::broadcast(comm_, superseded);
   return superseded;

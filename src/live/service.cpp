@@ -43,7 +43,7 @@ class Service {
   /// Answers until the input ends, the output is closed, or a request says quit; returns whether
   /// one did. Collective.
   bool run(int input, int output) {
-    Requests requests(comm_, input);
+    Requests requests(comm_, input, output);
     requests_ = &requests;
     output_ = output;
     bool quits = false;

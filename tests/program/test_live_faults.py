@@ -258,6 +258,30 @@ def test_a_client_that_vanishes_leaves_the_solver_to_others(listening):
     third.close()
 
 
+def test_the_search_of_a_client_that_vanishes_ends(listening, tmp_path):
+    port, token = listening
+    gone, stream = greeted(port, token)
+    gone.sendall(json.dumps({"do": "solve", "plan": PLAN, "accuracy": 1e-6, "base": "rest"}).encode() + b"\n")
+    stream.close()
+    gone.close()
+    after, stream = greeted(port, token)
+    after_it = {"do": "write", "output": str(tmp_path / "face")}
+    assert "there is no solved plan to write" in ask(after, stream, after_it).get("error", ""), "its search was finished"
+    stream.close()
+    after.close()
+
+
+def test_a_client_that_sends_no_more_gets_its_answer(listening):
+    port, token = listening
+    client, stream = greeted(port, token)
+    client.sendall(json.dumps({"do": "solve", "plan": PLAN, "base": "rest", "id": 7}).encode() + b"\n")
+    client.shutdown(socket.SHUT_WR)
+    head = json.loads(stream.readline())
+    assert head["ok"] and head["converged"] and head["id"] == 7
+    stream.close()
+    client.close()
+
+
 def damaged(random_numbers):
     """A request, damaged at random."""
     line = bytearray(json.dumps(random_numbers.choice([
