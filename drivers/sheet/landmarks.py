@@ -31,7 +31,7 @@ MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper l
 def read_landmarks(file):
     """{name: position} in LPS, as the programs read them (src/scene/landmarks.cpp): 3D Slicer's .mrk.json
     and .fcsv, JSON {"name": [x, y, z], …}, and .csv of name, x, y, z."""
-    ending = pathlib.Path(file).suffix
+    ending = pathlib.Path(file).suffix.lower()
     if ending not in (".json", ".fcsv", ".csv"):
         raise Unusable(f"{file}: the ending is none of .mrk.json, .json, .fcsv and .csv")
     with reading(file, "landmarks"):
@@ -92,7 +92,7 @@ def of_table(text, fcsv):
             continue
         label, first = columns or (0 if len(row) == 4 else None, len(row) - 3)
         if not 0 <= first <= len(row) - 3 or (not fcsv and len(row) > 4):
-            raise ValueError(f"expected {'the columns of .fcsv' if fcsv else 'name, x, y, z'}, got '{line}'")
+            raise ValueError(f"expected {'the columns of .fcsv' if fcsv else 'name, x, y, z, separated by commas'}, got '{line}'")
         name = row[label] if label is not None and label < len(row) else ""
         found[name or str(len(found) + 1)] = in_lps(frame, row[first:first + 3])
     return found

@@ -205,7 +205,8 @@ class Table {
     }
     if (columns.first < 0 || columns.first + 3 > size || (!fcsv_ && size > 4))
       base::refuse("{}: expected {}, got {} field(s)", place,
-                   fcsv_ ? "the columns of a .fcsv file" : "name, x, y, z", size);
+                   fcsv_ ? "the columns of a .fcsv file" : "name, x, y, z, separated by commas",
+                   size);
     if (!frame_)
       base::refuse(
           "{}: the file does not say its coordinate system; put a line \"# CoordinateSystem = "
@@ -232,7 +233,7 @@ std::vector<Landmark> read_landmarks(const std::filesystem::path& file) {
   const std::string name = file.string();
   const std::string text = base::read_text_input(
       file, {16, "a file of landmarks", "give landmarks as .mrk.json, .fcsv or .csv"});
-  const std::string ending = file.extension().string();
+  const std::string ending = base::lower(file.extension().string());
   std::vector<Landmark> found;
   if (ending == ".json")
     found = read_markups(name, text);

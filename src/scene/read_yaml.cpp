@@ -58,6 +58,19 @@ int second_document(const std::string& text) {
   return documents.lines.size() < 2 ? 0 : documents.lines[1];
 }
 
+/// Names the first line that a tab indents, of which YAML's own message says nothing.
+std::string remark_on_tabs(std::string_view text) {
+  int number = 0;
+  for (size_t position = 0; position < text.size();) {
+    const std::string_view line = base::next_line(text, position);
+    ++number;
+    const size_t indentation = std::min(line.find_first_not_of(" \t"), line.size());
+    if (line.substr(0, indentation).find('\t') != line.npos)
+      return fmt::format("; line {} is indented by a tab, use blanks", number);
+  }
+  return "";
+}
+
 }  // namespace
 
 YAML::Node read_yaml(const std::filesystem::path& file) {
@@ -73,8 +86,8 @@ YAML::Node read_yaml(const std::filesystem::path& file) {
     return document;
   } catch (const YAML::Exception& error) {
     std::string reason = base::quote(error.msg);
-    base::refuse("{}:{}:{}: not valid YAML: {}", file.string(), error.mark.line + 1,
-                 error.mark.column + 1, reason.substr(1, reason.size() - 2));
+    base::refuse("{}:{}:{}: not valid YAML: {}{}", file.string(), error.mark.line + 1,
+                 error.mark.column + 1, reason.substr(1, reason.size() - 2), remark_on_tabs(text));
   }
 }
 

@@ -245,6 +245,11 @@ std::string key_elsewhere(const std::string& name) {
 }  // namespace
 
 void Map::refuse_unknown(const Value::Entry& entry) const {
+  if (base::parse_number(entry.name))
+    itself_.refuse_at(entry.mark,
+                      fmt::format("has the number {} in place of a key; decimals follow "
+                                  "a point, not a comma",
+                                  base::quote(entry.name)));
   std::vector<std::string> siblings;
   for (const Key* key : keys_below(itself_.path_)) siblings.push_back(last_word(key->path));
   const std::string sibling = base::nearest(entry.name, siblings);

@@ -62,7 +62,8 @@ def test_a_coarser_surface_keeps_its_cuts_open_and_welds_other_seams(wide, open_
 
 
 MARKUP = '{{"markups": [{{"coordinateSystem": "{}", "controlPoints": [{{"label": "a b", "position": {}}}]}}]}}'
-SAME = {"lps.mrk.json": MARKUP.format("LPS", "[1, -2, 3.5]"), "ras.mrk.json": MARKUP.format("RAS", "[-1, 2, 3.5]"),
+SAME = {"lps.mrk.json": MARKUP.format("LPS", "[1, -2, 3.5]"),
+        "UPPER.MRK.JSON": MARKUP.format("LPS", "[1, -2, 3.5]"), "ras.mrk.json": MARKUP.format("RAS", "[-1, 2, 3.5]"),
         "named.json": '{"a b": [1, -2, 3.5], "about": "a head"}',
         "lps.csv": "# CoordinateSystem = LPS\nname, x, y, z\n\"a b\", 1, -2, 3.5\n",
         "ras.csv": "\ufeff# CoordinateSystem = RAS\r\na b,-1,2,3.5\r\n",

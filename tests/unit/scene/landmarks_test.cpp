@@ -52,6 +52,11 @@ TEST(Landmarks, OurOwnJsonIsLpsAndMayHoldMore) {
               {1.5, -2, 30});
 }
 
+TEST(Landmarks, EndingsMayBeInUpperCase) {
+  expect_chin(read("A.MRK.JSON", markups(R"("coordinateSystem": "LPS",)", point)), {1.5, -2, 30});
+  expect_chin(read("A.CSV", "# CoordinateSystem = LPS\nchin, 1.5, -2, 30\n"), {1.5, -2, 30});
+}
+
 TEST(Landmarks, ColumnsOfFcsvMayStandElsewhere) {
   expect_chin(read("a.fcsv",
                    "# CoordinateSystem = LPS\n# columns = label,id,x,y,z\n"
