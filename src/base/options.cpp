@@ -130,6 +130,21 @@ bool is_cumulative(const std::string& name) {
   return name.starts_with("options_file") || name.starts_with("prefix_");
 }
 
+/// Puts files of options before other options: PETSc takes them in their order, and what the
+/// command line gives beats a file. Behind a prefix (-prefix_push) all stay where they are.
+std::vector<std::string> files_first(const std::vector<std::string>& tokens) {
+  if (std::ranges::find(tokens, "-prefix_push") != tokens.end()) return tokens;
+  std::vector<std::string> files{tokens.front()}, others;
+  bool of_file = false;
+  for (size_t i = 1; i < tokens.size(); ++i) {
+    if (const std::string name = name_of(tokens[i]); !name.empty())
+      of_file = name.starts_with("options_file");
+    (of_file ? files : others).push_back(tokens[i]);
+  }
+  files.insert(files.end(), others.begin(), others.end());
+  return files;
+}
+
 /// Returns whether PETSc reads the option only in PetscFinalize.
 bool is_read_at_finalize(const std::string& name) {
   return name == "options_left" || name == "options_view" || name == "objects_dump" ||
@@ -204,6 +219,7 @@ Options::Options(int argc, char* const* argv, std::string description,
     else
       i = sort_option(i, tokens);
   }
+  petsc_tokens_ = files_first(petsc_tokens_);
   for (std::string& token : petsc_tokens_) petsc_pointers_.push_back(token.data());
   petsc_pointers_.push_back(nullptr);
 }

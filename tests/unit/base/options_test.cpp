@@ -153,6 +153,21 @@ TEST(Options, PassesPetscsOwnOn) {
   EXPECT_EQ(line->petsc_argv()[line->petsc_argc()], nullptr);
 }
 
+TEST(Options, PassesFilesOfOptionsBeforeWhatTheCommandLineGives) {
+  const auto passed = [](const std::vector<std::string>& typed) {
+    Line line(typed);
+    return std::vector<std::string>(line->petsc_argv() + 1,
+                                    line->petsc_argv() + line->petsc_argc());
+  };
+  EXPECT_EQ(passed({"head.yaml", "-tao_type", "ntr", "-options_file", "a", "-log_view",
+                    "-options_file", "b"}),
+            (std::vector<std::string>{"-options_file", "a", "-options_file", "b", "-tao_type",
+                                      "ntr", "-log_view"}));
+  const std::vector<std::string> prefixed{"-prefix_push",  "tao_", "-type",      "ntr",
+                                          "-options_file", "a",    "-prefix_pop"};
+  EXPECT_EQ(passed(prefixed), prefixed);
+}
+
 TEST(Options, PathBehindAViewerOptionIsAnArgument) {
   Line path({"-log_view", "head.yaml"});
   path->check();
