@@ -163,8 +163,8 @@ TEST(Options, PassesFilesOfOptionsBeforeWhatTheCommandLineGives) {
                     "-options_file", "b"}),
             (std::vector<std::string>{"-options_file", "a", "-options_file", "b", "-tao_type",
                                       "ntr", "-log_view"}));
-  const std::vector<std::string> prefixed{"-prefix_push",  "tao_", "-type",      "ntr",
-                                          "-options_file", "a",    "-prefix_pop"};
+  const std::vector<std::string> prefixed{"-prefix_push",  "mg_", "-ksp_type",  "cg",
+                                          "-options_file", "a",   "-prefix_pop"};
   EXPECT_EQ(passed(prefixed), prefixed);
 }
 
