@@ -52,6 +52,7 @@ def arguments():
                  chosen.skin, chosen.norms):
         if file and not os.path.isfile(file):
             refuse(f"{file}: no such file")
+    chosen.colors = chosen.skin
     if chosen.scene:
         chosen.landmarks = chosen.landmarks or of_scene(chosen.scene, "landmarks")
         skin = of_scene(chosen.scene, "skin")
@@ -70,6 +71,9 @@ def main():
     axes, frame = landmarks.head_axes(marks)
     results = [Result(f"{name}.h5") for name in chosen.names]
     appearance = read_appearance(chosen.skin, results[0].skin) if chosen.skin else None
+    if chosen.colors and not appearance:
+        refuse(f"{chosen.colors}: has neither colors nor a texture that can be shown; give a .ply with colors, or "
+               "an .obj with colors or with a .png or .jpg beside it that its .mtl names, or leave -skin out")
     for result in results:
         result.turn(axes)
     if appearance and appearance.skin is not results[0].skin:

@@ -110,6 +110,8 @@ def head_axes(landmarks):
         "condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"))
     if right is None or left is None:
         return np.eye(3), "the scan: no landmarks of the condyles are given"
+    if not np.linalg.norm((left - right)[[0, 2]]) > 0:
+        return np.eye(3), "the scan: the condyles are not beside each other"
     across = (left - right) / np.linalg.norm(left - right)
     back = np.array([0, 1, 0]) - across[1] * across
     axes = np.stack([across, back / np.linalg.norm(back), np.cross(across, back / np.linalg.norm(back))])

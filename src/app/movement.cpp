@@ -15,6 +15,7 @@ namespace {
 
 constexpr double worth_saying = 0.3;  // mm, of a component beside the largest one
 constexpr double unmoved = 0.1;       // mm
+constexpr double still = 1e-3;        // mm
 constexpr double same_place = 25;     // mm
 constexpr double beside_stomion = 8;  // mm
 constexpr double closed = 0.1;        // mm
@@ -95,7 +96,8 @@ std::string describe_movement(const std::vector<model::FacePlace>& places, const
   for (size_t i = 1; i < moved.size(); ++i)
     if (moved_by(i).squaredNorm() > moved_by(farthest).squaredNorm()) farthest = i;
   const double largest = moved.empty() ? 0 : moved_by(farthest).norm();
-  if (largest < unmoved) return "The face does not move.";
+  if (largest < still) return "The face does not move.";
+  if (largest < unmoved) return fmt::format("The face moves {:.2g} mm at most.", largest);
   std::string text;
   std::vector<Vec3> movement;
   const surface::TriangleTree tree(initial);

@@ -12,6 +12,7 @@
 #include "repose/discrete/natural_rows.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/result_file.h"
+#include "repose/scene/landmark_names.h"
 
 namespace repose::app {
 
@@ -214,7 +215,7 @@ bool PlanSession::has_cuts() const { return !state_->job.cuts.empty(); }
 
 Mat3 PlanSession::axes() const {
   const auto& anatomy = state_->job.anatomy;
-  return anatomy && anatomy->scene.anatomy ? anatomy->scene.anatomy->axes : Mat3::Identity();
+  return scene::head_axes(anatomy ? anatomy->scene.landmarks : scene::Landmarks());
 }
 
 std::vector<Vec3> PlanSession::initial() const {

@@ -178,7 +178,7 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
     const solve::PenetrationDepth& depth = s.contacts[k].exact;
     if (depth.points == 0) continue;
     text += report_row("exact penetration",
-                       "{} points are deeper than {:g} mm inside {}, {:.2g} mm at most at "
+                       "{} points are deeper than {:g} mm inside {}, {:.3g} mm at most at "
                        "{:.1f} mm; {}",
                        depth.points, solve::PenetrationDepth::reported, bodies[k], depth.deepest,
                        depth.where, advice);
@@ -262,9 +262,12 @@ std::string describe_path(const PathCheck& c) {
   return row(
       fmt::format("THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about {:.1f} "
                   "mm; its objective is {:.6g}, that of the result {:.6g}: look there before you "
-                  "trust it; springs buckle where they are pressed together (raise the volume "
-                  "stiffness, or make the tissue a solid)",
-                  repetition, apart, c.place, c.again.last.objective, c.objective));
+                  "trust it; {}",
+                  repetition, apart, c.place, c.again.last.objective, c.objective,
+                  c.springs ? "springs buckle where they are pressed together (raise the volume "
+                              "stiffness, or make the tissue a solid)"
+                            : "tissue folds or catches on an edge of bone there (a finer mesh, or "
+                              "a smaller move, may decide)"));
 }
 
 std::string describe_stages(const base::Stages& stages) {

@@ -52,6 +52,7 @@ std::string describe_tearing(const solve::Tearing& tearing);
 /// Comparison of the rest position with that of twice the load steps.
 struct PathCheck {
   int64_t steps = 0;          ///< of the first run; 0: nothing moves
+  bool springs = false;       ///< of the tissue, not a solid
   double allowed = 0;         ///< mm, that two searches for one rest position may differ by
   double objective = 0;       ///< of the first run
   solve::Summary again;       ///< the second run

@@ -28,6 +28,7 @@
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/results/run_files.h"
+#include "repose/scene/landmark_names.h"
 #include "repose/scene/landmarks.h"
 #include "repose/solve/supported.h"
 #include "repose/surface/write.h"
@@ -299,9 +300,8 @@ std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>
   std::vector<model::FacePlace> places;
   if (job_.anatomy) places = model::face_places(*job_.anatomy);
   const surface::Surface& before = skin.initial();
-  const scene::AnatomyPlan* head =
-      job_.anatomy && job_.anatomy->scene.anatomy ? &*job_.anatomy->scene.anatomy : nullptr;
-  const Mat3 axes = head ? head->axes : Mat3(Mat3::Identity());
+  const Mat3 axes =
+      scene::head_axes(job_.anatomy ? job_.anatomy->scene.landmarks : scene::Landmarks());
   std::string text = describe_movement(places, axes, before, now) + " ";
   if (job_.anatomy)
     text += describe_lips(job_.anatomy->scene.landmarks, axes.row(2), before.points, now);

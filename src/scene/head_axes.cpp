@@ -17,6 +17,7 @@ Vec3 require_landmark(const Landmarks& landmarks, const std::string& name,
 }
 
 Mat3 head_axes(const Landmarks& landmarks) {
+  constexpr double upright = 0.5;  // condyles at one place or one behind the other have no axes
   constexpr double rise = 14 * std::numbers::pi / 180;  // of both directions together
   const Vec3 *right = find(landmarks, "condyle_right_center"),
              *left = find(landmarks, "condyle_left_center"),
@@ -27,6 +28,7 @@ Mat3 head_axes(const Landmarks& landmarks) {
   axes.row(0) = (*left - *right).normalized();
   axes.row(1) = (Vec3::UnitY() - axes(0, 1) * axes.row(0).transpose()).normalized();
   axes.row(2) = axes.row(0).cross(axes.row(1));
+  if (!(axes.determinant() > upright)) return Mat3::Identity();
   if (!nasion || !edge) return axes;
   const auto angle = [&](const Vec3& at) {
     const Vec3 way = axes * (at - (*right + *left) / 2);

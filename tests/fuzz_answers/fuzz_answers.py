@@ -28,7 +28,7 @@ from scenes import Writer, plan
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 ACCURACY = 1e-4  # mm, asked of the program
 CLOSE = 3e-4  # mm, a rest position is the same
-TIME_LIMIT = 200  # s, of a search
+TIME_LIMIT = 400  # s, of a search
 PATIENCE = 500 * float(os.environ.get("REPOSE_PATIENCE", 1))  # s, of a run
 ENOUGH = 0.8  # of scenes must come to rest or leave no room: others are refused or not converged
 

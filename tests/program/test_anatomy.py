@@ -98,6 +98,19 @@ def turn_head(folder, turn):
     (folder / "turned/head.mrk.json").write_text(json.dumps(text))
 
 
+@pytest.mark.parametrize("right, left, words", [
+    ((-40, -30, 0), (40, 30, 0), r"forward.*to the right|to the right.*forward"),
+    ((-50, 0, 0), (50, 0, 0), "forward"), ((0, 50, 0), (0, -50, 0), "forward")])
+def test_the_answer_is_along_the_head_without_anatomy(run, tmp_path, right, left, words):
+    """Of landmarks that are given for moves, too; condyles one behind the other give no axes."""
+    scene = (MESHES / "paper_jaw_advance.yaml").read_text().replace(": paper_", f": {MESHES}/paper_")
+    (tmp_path / "marks.json").write_text(json.dumps({"condyle_right_center": right, "condyle_left_center": left}))
+    (tmp_path / "scene.yaml").write_text(scene + "landmarks: marks.json\n")
+    answer, = re.findall(r"^(?:Chin|Largest).*", run("repose-solve", "scene.yaml").stdout, re.M)
+    chin = answer.split(";")[0]
+    assert re.search(words, chin) and ("right" in words or "right" not in chin), answer
+
+
 @pytest.mark.parametrize("template, move", [
     pytest.param("le_fort_1", "advance: 4, impaction: 2, yaw: 2", marks=pytest.mark.long),
     ("genioplasty", "advance: 6"), ("sagittal_split", "set_back: 5")])

@@ -492,6 +492,17 @@ def test_colors_and_photographs_of_a_skin_are_kept(report, opened, tmp_path):
     assert np.abs(after - last(opened)["point/position"][rows]).max() < 0.02
 
 
+@pytest.mark.parametrize("name, text", [
+    ("plain.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                  "end_header\n0 0 0\n"),
+    ("damaged.ply", "ply\nformat ascii 1.0\n"), ("plain.obj", "v 0 0 0\n"), ("plain.stl", "solid\nendsolid\n")])
+def test_a_skin_without_colors_is_refused(report, opened, tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    refused = report(opened, "-skin", name)
+    assert refused.returncode == 1 and len(refused.stderr.splitlines()) == 1
+    assert f"{name}: has neither colors nor a texture" in refused.stderr
+
+
 def test_norms_of_ones_own(report, opened, tmp_path):
     norms = [{"source": "of ours 2020", "population": "12 adults", "norms": {"facial convexity": [9, 2]}}]
     (tmp_path / "norms.json").write_text(json.dumps(norms))

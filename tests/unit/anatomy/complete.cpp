@@ -8,9 +8,9 @@
 
 #include "../../folder.h"
 #include "repose/anatomy/propose.h"
+#include "repose/scene/landmark_names.h"
 #include "repose/surface/read.h"
 #include "repose/surface/triangle_tree.h"
-#include "scene/head_axes.h"
 
 namespace repose::anatomy {
 namespace {

@@ -50,5 +50,15 @@ TEST(Movement, OfAPlaceIsLinearBetweenVertices) {
   EXPECT_TRUE(text.starts_with("Chin 3.0 mm forward; largest movement 6.0 mm")) << text;
 }
 
+/// A movement that is less than the sentence's last digit is stated as such.
+TEST(Movement, OfLessThanATenthOfAMillimeterIsStated) {
+  const surface::Surface triangle{"", {{0, 0, 0}, {4, 0, 0}, {0, 0, 4}}, {{0, 1, 2}}};
+  const auto moved_by = [&](double mm) {
+    return describe_movement({}, Mat3::Identity(), triangle, {{0, 0, 0}, {4, -mm, 0}, {0, 0, 4}});
+  };
+  EXPECT_EQ(moved_by(0), "The face does not move.");
+  EXPECT_EQ(moved_by(0.05), "The face moves 0.05 mm at most.");
+}
+
 }  // namespace
 }  // namespace repose::app
