@@ -297,6 +297,8 @@ def main():
     for file in options.volumes:
         if not file.exists():
             refuse(f"{file}: no such file or folder")
+    if folder.exists() and not folder.is_dir():
+        refuse(f"-output {folder}: is a file, not a folder; choose another name")
     alone = len(options.volumes) == 1 and not volume.name.lower().endswith(".seg.nrrd")
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)

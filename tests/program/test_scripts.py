@@ -128,6 +128,13 @@ def test_numbers_out_of_range_are_refused_before_a_folder_is_made(script, tmp_pa
     assert not (tmp_path / "plan").exists()
 
 
+def test_a_file_in_place_of_the_folder_of_a_plan_is_refused(script, tmp_path):
+    for name in ("head.mhd", "plan"):
+        (tmp_path / name).touch()
+    says(script("plan.py", "head.mhd", "-operation", "jaw, 5 mm forward"), "plan.py",
+         "-output plan: is a file, not a folder; choose another name")
+
+
 def test_an_option_given_twice_is_named_with_both_values(script, solved, tmp_path):
     result = script("report.py", solved("paper_jaw_opening.yaml"), "-output", "a.html", "-output", "b.html")
     assert result.returncode == 0 and (tmp_path / "b.html").exists() and not (tmp_path / "a.html").exists()
