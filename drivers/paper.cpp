@@ -104,7 +104,10 @@ base::Exit run(const base::Options& options) {
                                    .seconds = options.number("seconds")}};
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) base::refuse("{}: {}", folder.string(), error.message());
+  if (error)
+    base::refuse("{}: cannot be made: {}; choose another -output", folder.string(),
+                 error.message());
+  base::require_writable(folder / "paper.md");
   const paper::Findings findings = paper::measure(plan, [](const std::string& line) {
     std::printf("  %s\n", line.c_str());
     std::fflush(stdout);

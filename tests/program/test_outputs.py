@@ -82,6 +82,12 @@ def test_a_missing_folder_is_refused_before_the_work(run, inputs, program, argum
     assert "cannot be written: there is no folder none; make it or choose another -output" in result.stderr
 
 
+def test_a_file_in_place_of_the_folder_of_a_page_is_refused(run, inputs):
+    result = run("repose-paper", "-output", "skin.ply", "-meshes", MESHES)
+    assert (result.returncode, result.stdout) == (1, ""), result
+    assert "skin.ply: cannot be made: " in result.stderr and "; choose another -output" in result.stderr
+
+
 @pytest.mark.parametrize("name", ["folder/", ".", "a\tb"])
 def test_names_that_are_none_are_refused(run, inputs, tmp_path, name):
     result = run("repose-solve", "scene.yaml", "-output", name)
