@@ -156,10 +156,7 @@ class Study {
   void bring_into_equilibrium(model::Model& model) const {
     if (const auto reference_state = app::reference_state_of(plan_.scene))
       solve::prestress(comm, model, *reference_state);
-    base::on_root(comm, [&] {
-      const model::RingMuscle muscle = model::ring_muscle(anatomy_.scene);
-      if (muscle.tone != 0 && model::is_solid(model)) model::add_tone(muscle, model);
-    });
+    base::on_root(comm, [&] { model::add_tone(anatomy_.scene, model); });
   }
 
   solve::Settings settings_of(const Variant& variant, double bulk_modulus) const {

@@ -74,10 +74,7 @@ class SequenceSolver {
     base::on_root(comm_, [&] { built = coarse_model(anatomy_, fine_, resolution); });
     if (requested_.reference_state)
       solve::prestress(comm_, built.model, *requested_.reference_state);
-    base::on_root(comm_, [&] {
-      const model::RingMuscle muscle = model::ring_muscle(anatomy_.scene);
-      if (muscle.tone != 0) model::add_tone(muscle, built.model);
-    });
+    base::on_root(comm_, [&] { model::add_tone(anatomy_.scene, built.model); });
     std::vector<Vec3> position;
     const solve::Settings settings = settings_for(built.model);
     const solve::Summary summary =

@@ -52,7 +52,7 @@ model::Model model_of(MPI_Comm comm, const Job& job, const scene::Scene& scene) 
   if (job.reference_state) solve::prestress(comm, built.model, *job.reference_state);
   base::on_root(comm, [&] {
     model::make_cuts(built.cuts, false, built.model);
-    model::add_tone(model::ring_muscle(scene), built.model);
+    model::add_tone(scene, built.model);
   });
   return std::move(built.model);
 }

@@ -79,7 +79,9 @@ RingMuscle ring_muscle(const scene::Scene& scene) {
       axes.row(2).dot(*bottom), axes};
 }
 
-void add_tone(const RingMuscle& muscle, Model& model) {
+void add_tone(const scene::Scene& scene, Model& model) {
+  const RingMuscle muscle = ring_muscle(scene);
+  if (muscle.tone == 0 || !is_solid(model)) return;
   const size_t points = model.points.position.size();
   add_tone(muscle, base::all_rows(points), static_cast<int64_t>(points), model);
 }

@@ -86,11 +86,12 @@ RingMuscle ring_muscle(const scene::Scene& scene);
 
 /// Gives the ring muscle its tone, balanced as the tissue is: adds ½ ∫ τ |F f − f|² dV, τ = σ (1 −
 /// ρ²), to the edges and, what is linear in the displacements, to the external forces of soft
-/// tissue. Serial.
-void add_tone(const RingMuscle& muscle, Model& model);
-/// Does so for a part of a model, whose points have the given rows [points] in the whole, so that
-/// sums are taken in the same order; forces on its first `owned` points alone.
+/// tissue, of a part of a model. Its points have the given rows [points] in the whole, so that sums
+/// are taken in the same order; forces on its first `owned` points alone.
 void add_tone(const RingMuscle& muscle, const std::vector<int64_t>& row, int64_t owned,
               Model& model);
+/// Does so for the ring muscle of a scene and a whole model, which may be of springs, without tone.
+/// Serial.
+void add_tone(const scene::Scene& scene, Model& model);
 
 }  // namespace repose::model

@@ -46,6 +46,11 @@ double energy(const Model& m, const std::vector<Vec3>& x) {
   return sum;
 }
 
+void add_tone_to(Model& model) {
+  const size_t points = model.points.position.size();
+  add_tone(muscle_of(0.004), base::all_rows(points), static_cast<int64_t>(points), model);
+}
+
 /// Energy of a deformation gradient over that of none.
 double energy_of(const Model& model, const Mat3& F) {
   std::vector<Vec3> x = model.points.position;
@@ -65,7 +70,7 @@ double volume_of(const std::array<Vec3, 6>& corners) { return prism_volume(corne
 TEST(RingMuscle, HasTheEnergyOfItsStretch) {
   const Vec3 middle = Vec3(1.0, 0.8, 0.5);
   Model model = prisms_at({moved(-middle)});
-  add_tone(muscle_of(0.004), model);
+  add_tone_to(model);
   const std::array<Vec3, 6> corners = corners_of(model, 0);
   const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
   const Vec3 f = (Vec3::UnitX() - normal.x() * normal).normalized();
@@ -80,7 +85,7 @@ TEST(RingMuscle, HasTheEnergyOfItsStretch) {
 
 TEST(RingMuscle, IsBalancedAsItIsRecorded) {
   Model model = prisms_at({moved({0, 0, 3}), moved({-20, 0, -9}), moved({26, 0, 1})});
-  add_tone(muscle_of(0.004), model);
+  add_tone_to(model);
   std::vector<Vec3> force = model.points.external_force;
   double largest = 0;
   for (const Vec3& f : force) largest = std::max(largest, f.norm());
@@ -104,7 +109,7 @@ TEST(RingMuscle, RunsRoundTheMouth) {
     std::array<Vec3, 6> corners = front;
     for (Vec3& corner : corners) corner += by;
     Model model = prisms_at({corners});
-    add_tone(muscle_of(0.004), model);
+    add_tone_to(model);
     return model;
   };
   const Model middle = at({0, 0, 4}), low = at({0, 0, -5}), beyond = at({31, 0, 0});
@@ -128,7 +133,7 @@ TEST(RingMuscle, PartsOfAModelGetTheSameBits) {
   std::swap(part.prisms.points[0], part.prisms.points[3]);
   std::vector<int64_t> row(model.points.position.size());
   for (size_t i = 0; i < row.size(); ++i) row[i] = static_cast<int64_t>(i) + 7;
-  add_tone(muscle_of(0.004), model);
+  add_tone_to(model);
   add_tone(muscle_of(0.004), row, 3, part);
   EXPECT_EQ(part.edges.weight, model.edges.weight);
   for (size_t i = 0; i < row.size(); ++i)
@@ -139,7 +144,7 @@ TEST(RingMuscle, PartsOfAModelGetTheSameBits) {
 TEST(RingMuscle, HeldPointsGetNoForce) {
   Model model = prisms_at({wedge});
   model.points.set[4] = PointSet::bone;
-  add_tone(muscle_of(0.004), model);
+  add_tone_to(model);
   EXPECT_EQ(model.points.external_force[4], Vec3(Vec3::Zero()));
   EXPECT_NE(model.points.external_force[5], Vec3(Vec3::Zero()));
 }
