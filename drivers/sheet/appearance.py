@@ -7,13 +7,11 @@ import re
 
 import numpy as np
 
+from sheet.ply import Header
 from sheet.script import Unusable, reading
 from sheet.shown_skin import Skin, nearest
 
 LARGEST_IMAGE = 2_000_000  # bytes: the page must stay below 5 MB
-TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-         "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-         "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 
 
 class Appearance:
@@ -40,27 +38,20 @@ def read_appearance(file, skin):
 
 def read_ply(file):
     """Points and colors of the vertices, None where it has no colors."""
-    head, _, body = pathlib.Path(file).read_bytes().partition(b"end_header\n")
-    lines = head.decode("ascii", "replace").replace("\r", "").splitlines()
-    at = [i for i, line in enumerate(lines) if line.startswith("element")]
-    if not at or not lines[at[0]].startswith("element vertex"):
-        return None, None
-    count = int(lines[at[0]].split()[2])
-    columns = [line.split()[1:] for line in lines[at[0] + 1:(at + [len(lines)])[1]]
-               if line.startswith("property")]
-    names = [column[-1] for column in columns]
+    header = Header(pathlib.Path(file).read_bytes())
+    names = [column[-1] for column in header.columns]
     if not {"red", "green", "blue"} <= set(names):
         return None, None
-    if "format ascii 1.0" in lines:
-        rows = np.array([line.split() for line in body.split(b"\n", count)[:count]], float)
+    if header.is_text:
+        rows = np.array([row[:len(names)] for row in header.rows()[0]], float)
         vertices = {name: rows[:, k] for k, name in enumerate(names)}
     else:
-        order = "<" if "format binary_little_endian 1.0" in lines else ">"
-        vertices = np.frombuffer(body, np.dtype([(name, order + TYPES[kind])
-                                                 for kind, name in columns]), count)
+        vertices = np.frombuffer(header.body, header.layout(), header.count)
     points, colors = (np.stack([vertices[name] for name in three], 1).astype(float)
                       for three in (("x", "y", "z"), ("red", "green", "blue")))
-    whole = any(kind.startswith(("u", "i")) for kind, name in columns if name == "red")
+    if not np.isfinite([points, colors]).all():
+        raise ValueError("a vertex or color is not a finite number")
+    whole = any(kind.startswith(("u", "i")) for kind, name in header.columns if name == "red")
     return points, colors if whole else 255 * colors
 
 

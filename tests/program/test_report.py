@@ -495,7 +495,7 @@ def test_colors_and_photographs_of_a_skin_are_kept(report, opened, tmp_path):
 @pytest.mark.parametrize("name, text", [
     ("plain.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
                   "end_header\n0 0 0\n"),
-    ("damaged.ply", "ply\nformat ascii 1.0\n"), ("plain.obj", "v 0 0 0\n"), ("plain.stl", "solid\nendsolid\n")])
+    ("plain.obj", "v 0 0 0\n"), ("plain.stl", "solid\nendsolid\n")])
 def test_a_skin_without_colors_is_refused(report, opened, tmp_path, name, text):
     (tmp_path / name).write_text(text)
     refused = report(opened, "-skin", name)

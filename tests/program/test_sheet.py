@@ -2,6 +2,7 @@
 
 import os
 import resource
+import struct
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ import pytest
 from conftest import PROJECT
 
 sys.path.insert(0, str(PROJECT / "drivers"))
+from sheet.appearance import read_appearance, read_ply  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.script import Unusable  # noqa: E402
@@ -97,6 +99,34 @@ def test_files_that_are_no_landmarks_are_refused(tmp_path, name):
     (tmp_path / name).write_text(REFUSED[name])
     with pytest.raises(Unusable, match=f"{name}: "):
         read_landmarks(tmp_path / name)
+
+
+# ----- colors of a skin
+
+
+COLORED = ("ply\nformat {} 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+           "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["Unix", "Windows"])
+@pytest.mark.parametrize("layout", ["ascii", "binary_little_endian"])
+def test_colors_are_read_whatever_the_line_ends(tmp_path, layout, end):
+    head = COLORED.format(layout).replace("\n", end).encode()
+    body = f"1 2 3 4 5 6{end}-1 -2 -3 7 8 9{end}".encode() if layout == "ascii" else b"".join(
+        struct.pack("<3f3B", *row) for row in ((1, 2, 3, 4, 5, 6), (-1, -2, -3, 7, 8, 9)))
+    (tmp_path / "skin.ply").write_bytes(head + body)
+    points, colors = read_ply(tmp_path / "skin.ply")
+    assert points.tolist() == [[1, 2, 3], [-1, -2, -3]] and colors.tolist() == [[4, 5, 6], [7, 8, 9]]
+
+
+@pytest.mark.parametrize("body, part", [
+    ("1 2 3 4 5 6\n", "vertex 2 of 2 is missing or incomplete"),
+    ("1 2 3 4 5 6\n1 2 3 4 5\n", "vertex 2 of 2 is missing or incomplete"),
+    ("1 2 3 4 5 6\n1 2 nan 4 5 6\n", "not a finite number"), ("1 2 3 4 5 6\n1 2 x 4 5 6\n", "x")])
+def test_damaged_colors_are_refused(tmp_path, body, part):
+    (tmp_path / "skin.ply").write_text(COLORED.format("ascii") + body)
+    with pytest.raises(Unusable, match=f"skin.ply: damaged, or not a mesh of the skin: .*{part}"):
+        read_appearance(tmp_path / "skin.ply", None)
 
 
 # ----- written files

@@ -309,6 +309,30 @@ def test_models_and_curves_in_ras_give_the_same_face(panel, head, tmp_path, bina
     assert len(lps["Points"]) > len(triangles_of(MESHES / "paper_skin.ply")[0])
 
 
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["Unix", "Windows"])
+@pytest.mark.parametrize("name", ["face.ply", "FACE.PLY"])
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_model_in_ras_is_turned_whatever_its_line_ends(program, tmp_path, binary, name, end):
+    points, triangles = np.array([[1, 2, 3], [4, -5, 6], [7, 8, -9.5]]), np.array([[0, 1, 2]])
+    file = slicer_ply(tmp_path / name, points, triangles, "RAS", binary)
+    head, mark, body = file.read_bytes().partition(b"end_header\n")
+    file.write_bytes((head + mark).replace(b"\n", end) + (body if binary else body.replace(b"\n", end)))
+    (tmp_path / "scene").mkdir()
+    turned = tmp_path / "scene" / program["link"](file, tmp_path / "scene", "skin")
+    content = turned.read_bytes().replace(b"\r\n", b"\n")
+    assert b"SPACE=LPS" in content and b"SPACE=RAS" not in content
+    turned.write_bytes(content)
+    for one, other in zip(triangles_of(turned), (points, triangles)):
+        assert np.array_equal(one, other)
+
+
+def test_a_damaged_model_in_ras_is_refused(program, tmp_path):
+    file = slicer_ply(tmp_path / "face.ply", np.zeros((3, 3)), np.array([[0, 1, 2]]), "RAS", True)
+    file.write_bytes(file.read_bytes()[:-35])
+    with pytest.raises(program["Refusal"], match="face.ply: damaged, or not a PLY file"):
+        program["link"](file, tmp_path, "skin")
+
+
 def test_the_lips_are_the_scenes_mouth_and_a_cut_is_an_incision(panel, head, tmp_path):
     """The solver names what it refuses: so much of a scene that the panel writes is seen."""
     short = slicer_curve(tmp_path / "short.mrk.json", [[47.0, -80.0, 8.0]], "LPS")

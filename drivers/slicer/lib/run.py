@@ -17,7 +17,8 @@ import xml.etree.ElementTree
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(FOLDER.parent))
-from sheet.script import Unusable as Refusal  # noqa: E402
+from sheet.ply import Header  # noqa: E402
+from sheet.script import Unusable as Refusal, reading  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 
 BONES = 4
@@ -116,7 +117,7 @@ def link(source, folder, name):
         raise Refusal(f"{source}: no such file")
     ending = ".mrk.json" if source.name.endswith(".mrk.json") else source.suffix
     target = folder / (name + ending)
-    if ending == ".ply" and (turned := in_lps(source.read_bytes(), source)):
+    if ending.lower() == ".ply" and (turned := in_lps(source.read_bytes(), source)):
         target.write_bytes(turned)
     else:
         target.symlink_to(source.resolve())
@@ -126,30 +127,21 @@ def link(source, folder, name):
 def in_lps(data, name):
     """A PLY file whose header says SPACE=RAS, as Slicer writes it, in LPS; nothing for others."""
     import numpy as np
-    types = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-             "float": "f4", "double": "f8"}
-    head, _, body = data.partition(b"end_header\n")
-    lines = head.decode("ascii", "replace").replace("\r", "").splitlines()
-    if not any("SPACE=RAS" in line for line in lines if line.startswith("comment")):
-        return None
-    elements = [i for i, line in enumerate(lines) if line.startswith("element")]
-    if not elements or not lines[elements[0]].startswith("element vertex"):
-        raise Refusal(f"{name}: in RAS, and its vertices do not come first; save it as LPS")
-    count = int(lines[elements[0]].split()[2])
-    columns = [line.split()[1:] for line in lines[elements[0] + 1:elements[1]]
-               if line.startswith("property")]
-    if "format ascii 1.0" in lines:
-        rows = body.split(b"\n", count)
-        flipped = [b" ".join(negated(row.split(), columns)) for row in rows[:count]]
-        body = b"\n".join(flipped + rows[count:])
-    else:
-        order = "<" if "format binary_little_endian 1.0" in lines else ">"
-        layout = np.dtype([(axis, order + types[kind]) for kind, axis in columns])
-        vertices = np.frombuffer(body, layout, count).copy()
-        for axis in "xy":
-            vertices[axis] *= -1
-        body = vertices.tobytes() + body[vertices.nbytes:]
-    return head.replace(b"SPACE=RAS", b"SPACE=LPS") + b"end_header\n" + body
+    with reading(name, "a PLY file"):
+        header = Header(data)
+        if not any("SPACE=RAS" in line for line in header.lines if line.startswith("comment")):
+            return None
+        if not header.columns:
+            raise Refusal(f"{name}: in RAS, and its vertices do not come first; save it as LPS")
+        if header.is_text:
+            rows, rest = header.rows()
+            body = b"\n".join([b" ".join(negated(row, header.columns)) for row in rows] + rest)
+        else:
+            vertices = np.frombuffer(header.body, header.layout(), header.count).copy()
+            for axis in "xy":
+                vertices[axis] *= -1
+            body = vertices.tobytes() + header.body[vertices.nbytes:]
+    return header.bytes.replace(b"SPACE=RAS", b"SPACE=LPS") + body
 
 
 def negated(words, columns):
