@@ -1,5 +1,6 @@
 """Files that a script writes: complete or absent, and never one that it reads."""
 
+import contextlib
 import errno
 import io
 import os
@@ -31,29 +32,37 @@ class Target:
             raise Unusable(f"{self.file}: cannot be written: there is no folder {folder}; make it first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise Unusable(f"{self.file}: cannot be written: folder {folder} is read-only; choose another one")
-        if not os.path.exists(self.file):
-            return
-        if not os.path.isfile(self.file):
+        if os.path.exists(self.file) and not os.path.isfile(self.file):
             raise Unusable(f"{self.file}: cannot be written: it is no regular file; choose another name")
-        if any(os.path.exists(file) and os.path.samefile(file, self.file) for file in self.inputs):
+        if any(os.path.exists(file) and os.path.samefile(file, self.file) for file in self.inputs
+               if os.path.exists(self.file)):
             raise Unusable(f"{self.file}: is an input of this run and would be replaced; choose another name")
+        with self.part() as part:  # names and folders that the system refuses
+            os.remove(part)
 
-    def write(self, data):
-        """Writes bytes or text to another name, and renames that."""
-        self.check()
-        part, began = f"{self.file}.part", False
+    @contextlib.contextmanager
+    def part(self):
+        """The name of a new file beside the target, to be renamed or removed; it is removed after a failure."""
+        part, began = f"{self.file}.{os.getpid()}.part", False
         try:
-            with open(part, "wb") as out:
+            with open(part, "wb"):
                 began = True
-                out.write(data.encode() if isinstance(data, str) else data)
-            os.replace(part, self.file)
+            yield part
         except BaseException as reason:
-            if began:
+            if began and os.path.exists(part):
                 os.remove(part)
             if not isinstance(reason, OSError):
                 raise
             remedy = REMEDIES.get(reason.errno, "choose another name or folder")
             raise Unusable(f"{self.file}: cannot be written: {reason.strerror}; {remedy}") from None
+
+    def write(self, data):
+        """Writes bytes or text to another name, and renames that."""
+        self.check()
+        with self.part() as part:
+            with open(part, "wb") as out:
+                out.write(data.encode() if isinstance(data, str) else data)
+            os.replace(part, self.file)
 
 
 def write_figure(figure, target):

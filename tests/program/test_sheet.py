@@ -140,6 +140,12 @@ def test_a_target_is_written_whole(tmp_path):
     assert os.listdir(tmp_path) == ["page.html"]
 
 
+def test_a_name_that_the_system_refuses_is_refused_before_the_work(tmp_path):
+    with pytest.raises(Unusable, match="File name too long; choose a shorter name"):
+        Target(tmp_path / ("x" * 253), "")
+    assert os.listdir(tmp_path) == []
+
+
 def test_targets_that_must_not_be_written_are_refused(tmp_path):
     (tmp_path / "in.html").write_text("input")
     (tmp_path / "folder.html").mkdir()
