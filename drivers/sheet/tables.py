@@ -10,6 +10,7 @@ import pathlib
 import numpy as np
 
 from sheet.result import Figure
+from sheet.words import to_html
 
 
 def shown(value):
@@ -74,7 +75,7 @@ def accuracy(result):
     steady = "" if lowest is None else "<p>" + (
         "Stable" if lowest > 0 else "NOT STABLE: it may buckle") + \
         f": smallest eigenvalue {lowest:.3g} N/mm.</p>"
-    return f"<p>What mesh and layers leave out: {left}.</p>{steady}" + table(
+    return f"<p>What mesh and layers leave out: {to_html(left)}.</p>{steady}" + table(
         ("load", "converged", "to the rest position, mm", "iterations", "evaluations", "s", ""),
         rows)
 

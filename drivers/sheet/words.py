@@ -2,6 +2,7 @@
 
 import html
 import math
+import re
 
 import numpy as np
 
@@ -108,9 +109,14 @@ def trust(result):
             "not a medical device.")
 
 
+def to_html(text):
+    """The text as HTML, in which no line ends within a command."""
+    return re.sub(r"repose-\w+ -\w+", r"<code>\g<0></code>", html.escape(text))
+
+
 def paragraphs(result, known, parts, guessed, trusted=True):
     """The verdict with its cautions; `trusted`: with what every sheet says once."""
-    message = "".join(f'<p class="warning">{html.escape(line)}</p>'
+    message = "".join(f'<p class="warning">{to_html(line)}</p>'
                    for line in cautions(result, known, parts, guessed))
-    rest = html.escape(trust(result)) if trusted else ""
+    rest = to_html(trust(result)) if trusted else ""
     return f'<p class="verdict"><b>{html.escape(verdict(result))}</b> {rest}</p>{message}'

@@ -17,6 +17,7 @@ from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.script import Unusable  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
+from sheet.words import to_html  # noqa: E402
 
 
 def parted_sheet(n, wide):
@@ -127,6 +128,12 @@ def test_damaged_colors_are_refused(tmp_path, body, part):
     (tmp_path / "skin.ply").write_text(COLORED.format("ascii") + body)
     with pytest.raises(Unusable, match=f"skin.ply: damaged, or not a mesh of the skin: .*{part}"):
         read_appearance(tmp_path / "skin.ply", None)
+
+
+def test_no_line_ends_within_a_command():
+    assert to_html("A < B (repose-solve -discretisation does).") == (
+        "A &lt; B (<code>repose-solve -discretisation</code> does).")
+    assert "code{white-space:nowrap}" in (PROJECT / "drivers/web/sheet.css").read_text()
 
 
 # ----- written files
