@@ -63,7 +63,7 @@ def files(*suffixes):
     """The project's text files with one of the suffixes, build folders left out."""
     for path in sorted(PROJECT.rglob("*")):
         name = path.relative_to(PROJECT)
-        skip = any(part == ".git" or part.startswith("build") for part in name.parts[:-1])
+        skip = any(part in (".git", ".pytest_cache") or part.startswith("build") for part in name.parts[:-1])
         if path.is_file() and path.suffix in suffixes and not skip:
             yield name.as_posix(), path.read_text(encoding="utf-8")
 
