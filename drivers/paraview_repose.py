@@ -15,7 +15,19 @@ browser is the one with load steps.
 import ctypes
 import ctypes.util
 import os
+import shlex
 import sys
+
+IS_SCRIPT = bool(sys.argv) and os.path.basename(sys.argv[0]) == "paraview_repose.py"
+if IS_SCRIPT:
+    sys.path.insert(0, os.path.dirname(os.path.abspath(sys.argv[0])))
+    from sheet.script import Unusable, refuse, run, words
+    from sheet.whole_file import Target
+else:  # a macro, which ParaView copies to a folder of its own and whose exit would end ParaView
+
+    def refuse(reason):
+        raise RuntimeError(f"paraview_repose.py: {reason}")
+
 
 try:
     from paraview.simple import (AddCameraLink, AssignViewToLayout, ColorBy,
@@ -24,28 +36,32 @@ try:
                                  RenderAllViews, SaveScreenshot, SaveState, SetActiveView, Show,
                                  Slice, Text, Threshold, WarpByVector, XDMFReader, XMLPolyDataReader)
 except ImportError as missing:
-    raise SystemExit(f"paraview_repose.py: {missing.name} is missing: run pvpython of ParaView; "
-                     "apt-get install --no-install-recommends python3-paraview xvfb xauth") from None
+    refuse(f"{missing.name} is missing: run pvpython of ParaView; "
+           "apt-get install --no-install-recommends python3-paraview xvfb xauth")
 
 BLUE, RED, INK = (0.12, 0.44, 0.71), (0.75, 0.22, 0.17), (0.15, 0.15, 0.15)
 SKIN, IVORY = (0.87, 0.68, 0.58), (0.96, 0.92, 0.8)
 # As in drivers/sheet/__init__.py, which a macro cannot import.
 RAMP = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")
 FRONT_RIGHT, PROFILE = (-0.65, -0.75, 0.1), (-1, 0, 0)  # looking to the right
+PICTURES, STATE = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"), ".pvsm"
 PARTS = ("_skin.xdmf", "_given_skin.vtp", "_bones.xdmf", "_tissue.xdmf", "_springs.xdmf", ".h5", ".vtkhdf")
 
 
-def result_name():
-    """The result that is named or, in ParaView's window, the one that is selected."""
-    if len(sys.argv) > 1:
-        return os.path.abspath(sys.argv[1].removesuffix(".h5"))
+def selected_result():
+    """The result that is selected in ParaView's window."""
     source = GetActiveSource()
     files = getattr(source, "FileNames", None) or getattr(source, "FileName", None) or ""
     file = files if isinstance(files, str) else files[0]
     for part in PARTS:
         if file.endswith(part):
             return file.removesuffix(part)
-    raise SystemExit("paraview_repose.py: select a result's NAME_skin.xdmf or NAME.h5 first")
+    refuse("select a result's NAME_skin.xdmf or NAME.h5 first")
+
+
+def require_result(name):
+    if not os.path.isfile(name + "_skin.xdmf"):
+        refuse(f"{name}_skin.xdmf is missing: NAME is the result's path")
 
 
 def require_display():
@@ -54,8 +70,7 @@ def require_display():
     needs_display = hasattr(vtkRenderingOpenGL2, "vtkXOpenGLRenderWindow") and \
         GetParaViewVersion() < 6
     if needs_display and not has_display():
-        raise SystemExit("paraview_repose.py: no display: xvfb-run -a pvpython "
-                         f"{' '.join(sys.argv)}")
+        refuse(f"no display: xvfb-run -a pvpython {shlex.join(sys.argv)}")
 
 
 def has_display():
@@ -169,12 +184,8 @@ def profile(source, name, made, color):
     shown(line, made, color).LineWidth = 4
 
 
-def main():
-    name = result_name()
-    if len(sys.argv) > 1:
-        require_display()
-    if not os.path.isfile(name + "_skin.xdmf"):
-        raise SystemExit(f"paraview_repose.py: {name}_skin.xdmf is missing: NAME is the result's path")
+def show(name):
+    """Shows a result in three views; their layout."""
     solved = "computed skin" if os.path.isfile(name + "_given_skin.vtp") else "skin"
     skin = XDMFReader(registrationName=solved, FileNames=[name + "_skin.xdmf"])
     scene = GetAnimationScene()
@@ -203,12 +214,43 @@ def main():
     AddCameraLink(left, middle, "before and after")
     SetActiveView(middle)
     RenderAllViews()
-    for file in sys.argv[2:]:
-        if file.endswith(".pvsm"):
-            SaveState(file)
+    return layout
+
+
+def save(layout, target):
+    """Writes a picture of the views, or ParaView's state."""
+    root, ending = os.path.splitext(str(target))
+    part = f"{root}.{os.getpid()}.part{ending}"
+    try:
+        if ending.lower() == STATE:
+            SaveState(part)
         else:
             layout.SetSize(1500, 600)
-            SaveScreenshot(file, layout, ImageResolution=[3000, 1200])
+            SaveScreenshot(part, layout, ImageResolution=[3000, 1200])
+        if not os.path.isfile(part) or not os.path.getsize(part):
+            raise Unusable(f"{target}: cannot be written by ParaView; free some space or choose another name")
+        target.check()
+        os.replace(part, str(target))
+    finally:
+        if os.path.exists(part):
+            os.remove(part)
 
 
-main()
+def main():
+    """Shows the result that is named, and writes the files that are named behind it."""
+    result, *files = words(__doc__, 1, 3)
+    name = os.path.abspath(result.removesuffix(".h5"))
+    targets = [Target(file, (*PICTURES, STATE), [name + part for part in PARTS]) for file in files]
+    require_result(name)
+    require_display()
+    layout = show(name)
+    for target in targets:
+        save(layout, target)
+
+
+if IS_SCRIPT:
+    run(main)
+else:
+    selected = selected_result()
+    require_result(selected)
+    show(selected)

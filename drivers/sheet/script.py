@@ -103,7 +103,8 @@ def words(documentation, least, most=math.inf):
         sys.exit(0)
     unknown = [word for word in given if word.startswith("-") and not is_number(word)]
     if unknown or not least <= len(given) <= most:
-        usage = next(line.strip() for line in documentation.splitlines() if line.startswith("    drivers/"))
+        usage = next(line.strip() for line in documentation.splitlines()
+                     if line.startswith(("    drivers/", "    pvpython ")))
         refuse(f"{unknown[0]}: unknown; usage: {usage}" if unknown else f"usage: {usage}")
     return given
 

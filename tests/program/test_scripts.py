@@ -300,22 +300,33 @@ from unittest.mock import MagicMock
 simple = sys.modules[__name__] = MagicMock(GetParaViewVersion=lambda: {version})
 for source in (simple.XDMFReader, simple.WarpByVector):
     source.return_value.GetDataInformation.return_value.GetBounds.return_value = (0, 1) * 3
+def write(file, *_, **__):
+    with open(file, "w") as out:
+        out.write({content!r})
+simple.SaveScreenshot = simple.SaveState = write
+simple.GetActiveSource.return_value.FileNames = {selected}
 """
 
 
 @pytest.fixture
-def paraview(script, solved, tmp_path):
-    """paraview(version, windows, DISPLAY) → what the script does under such a ParaView."""
+def paraview(script, solved, tmp_path, environment):
+    """paraview(version, windows, DISPLAY, arguments, content=…, selected=…, macro=…) → what the script, or a
+    copy of it elsewhere as a macro, does under a ParaView that writes this content and where this is selected."""
 
-    def run(version, windows, display):
+    def run(version, windows, display, arguments=("look.png",), content="drawn", selected=(), macro=False):
         stubs = tmp_path / "stubs"
-        for module, text in (("paraview/simple", SIMPLE.format(version=version)),
+        for module, text in (("paraview/simple", SIMPLE.format(version=version, content=content, selected=selected)),
                              ("vtkmodules/vtkRenderingOpenGL2", f"{windows} = None\n")):
             (stubs / module).parent.mkdir(parents=True, exist_ok=True)
             (stubs / (module.split("/", maxsplit=1)[0] + "/__init__.py")).write_text("")
             (stubs / f"{module}.py").write_text(text)
+        if macro:
+            shutil.copy(SCRIPTS["paraview_repose.py"], tmp_path / "macro.py")
+            return finish([sys.executable, "-B", tmp_path / "macro.py"], tmp_path,
+                          environment | {"PYTHONPATH": str(stubs)}, TIME_LIMIT)
         name = solved("paper_jaw_opening.yaml").with_suffix("")
-        return script("paraview_repose.py", name, "look.png", settings={"DISPLAY": display})
+        return script("paraview_repose.py", *(name if word == "NAME" else word for word in ("NAME", *arguments)),
+                      settings={"DISPLAY": display})
 
     return run
 
@@ -331,6 +342,40 @@ def test_paraview_without_a_display_is_told_of_xvfb(paraview, display):
 def test_a_paraview_that_needs_no_display_draws(paraview, version, windows):
     result = paraview(version, windows, "")
     assert (result.returncode, result.stderr) == (0, ""), result
+
+
+DRAWS = (6.0, "vtkEGLRenderWindow", "")
+
+
+def test_paraview_writes_a_picture_and_a_state_as_a_whole(paraview, tmp_path):
+    result = paraview(*DRAWS, ["look.png", "state.pvsm"])
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["look.png", "state.pvsm", "stubs"]
+
+
+@pytest.mark.parametrize("arguments, part", [
+    (["-nonsense"], "-nonsense: unknown; usage: pvpython drivers/paraview_repose.py NAME"),
+    (["a.png", "b.pvsm", "c.png"], "usage: pvpython"), (["no/look.png"], "there is no folder no; make it first"),
+    (["look.gif"], "does not end in .png"), (["look.h5"], "does not end in .png")])
+def test_wrong_arguments_of_paraview_are_one_line(paraview, tmp_path, arguments, part):
+    says(paraview(*DRAWS, arguments), "paraview_repose.py", part)
+    assert [path.name for path in tmp_path.iterdir()] == ["stubs"]
+
+
+def test_what_paraview_cannot_write_is_one_line(paraview, tmp_path):
+    (tmp_path / "look.png").write_text("old")
+    says(paraview(*DRAWS, content=""), "paraview_repose.py", "look.png: cannot be written by ParaView")
+    assert (tmp_path / "look.png").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["look.png", "stubs"]
+
+
+def test_a_macro_shows_what_is_selected_and_never_ends_paraview(paraview, solved):
+    skin = str(solved("paper_jaw_opening.yaml").with_suffix("")) + "_skin.xdmf"
+    shown = paraview(*DRAWS, selected=[skin], macro=True)
+    assert (shown.returncode, shown.stderr) == (0, ""), shown
+    for selected in ([], ["other.vtk"], ["none_skin.xdmf"]):
+        refused = paraview(*DRAWS, selected=selected, macro=True)
+        assert refused.stderr.splitlines()[-1].startswith("RuntimeError: paraview_repose.py: "), refused
 
 
 def test_real_paraview_without_a_display(solved, tmp_path, environment):
