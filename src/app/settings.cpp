@@ -25,8 +25,7 @@ solve::Settings spring_settings(const scene::Solve& requested) {
   solve::Settings settings;
   settings.functional = requested.functional;
   const bool force = requested.functional == scene::Functional::force;
-  const VolumeTerm volume =
-      requested.volume.value_or(force ? VolumeTerm::none : VolumeTerm::penalty);
+  const VolumeTerm volume = volume_of(requested);
   if (force && volume != VolumeTerm::none && volume != VolumeTerm::paper)
     base::refuse(
         "functional force takes volume none or paper, not {}: a penalty belongs to the energy; "

@@ -181,22 +181,31 @@ void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job
   refuse_unless(!s.tangents.pieces.empty(), "no bone moves, and the scene has no plan.pieces");
 }
 
-/// Refuses options of the volume of springs, which a solid would ignore.
-void refuse_for_solid(const base::Options& options) {
-  for (const char* name : {"bulk_modulus", "lambda"})
-    if (options.has(name))
+/// Refuses options of a volume term of springs that the tissue does not have: they would be
+/// ignored.
+void require_volume_term(const base::Options& options, bool solid, model::VolumeTerm volume) {
+  using model::VolumeTerm;
+  for (const auto& [name, term] :
+       {std::pair("bulk_modulus", VolumeTerm::penalty), std::pair("lambda", VolumeTerm::paper)}) {
+    if (!options.has(name)) continue;
+    if (solid)
       base::refuse(
           "-{} is of springs, and the tissue is a solid, which keeps its volume by "
           "tissue.material.poisson; leave the option out",
           name);
+    if (volume != term)
+      base::refuse(
+          "-{} is of volume form {}, and the form is {}; give -volume {}, or leave -{} out", name,
+          word(term), word(volume), word(term), name);
+  }
 }
 
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
   scene::Solve requested = job.requested;
-  if (job.local_model.part.solid) refuse_for_solid(options);
   override_by(options, requested);
   Strategy s;
   s.settings = settings_of(requested, job.local_model.part.solid);
+  require_volume_term(options, job.local_model.part.solid, s.settings.weights.volume);
   s.settings.stability = options.flag("stability");
   s.settings.finds_other_rest = !options.flag("skip_other_rest");
   s.settings.monitor = options.flag("monitor_mm");

@@ -268,12 +268,18 @@ Plan read_plan(const Value& value, const Scene& scene) {
   return plan;
 }
 
-/// Keys of the volume of springs, which a solid would ignore.
-void refuse_for_solid(const std::optional<Value>& value) {
-  if (value)
+/// Refuses a key of a volume term of springs that the tissue does not have: it would be ignored.
+void require_volume_term(const std::optional<Value>& value, VolumeTerm term, const Solve& solve,
+                         bool solid) {
+  if (!value) return;
+  if (solid)
     value->refuse(
         "is of tissue.springs, and the tissue is a solid, which keeps its volume by "
         "tissue.material.poisson; remove it");
+  if (volume_of(solve) != term)
+    value->refuse(
+        "is of volume form {}, and the form is {}; give solve.volume.form: {}, or remove it",
+        word(term), word(volume_of(solve)), word(term));
 }
 
 Solve read_solve(const Value& value, bool solid) {
@@ -286,10 +292,10 @@ Solve read_solve(const Value& value, bool solid) {
     set(solve.bulk_modulus, term, "bulk_modulus", &Value::number);
     set(solve.poisson, term, "poisson", &Value::number);
     for (const char* key : {"bulk_modulus", "poisson"})
-      if (solid) refuse_for_solid(term.find(key));
+      require_volume_term(term.find(key), VolumeTerm::penalty, solve, solid);
   }
   set(solve.lambda, map, "lambda", &Value::number);
-  if (solid) refuse_for_solid(map.find("lambda"));
+  require_volume_term(map.find("lambda"), VolumeTerm::paper, solve, solid);
   set(solve.accuracy, map, "accuracy", &Value::number);
   if (const auto steps = map.find("load_steps"))
     solve.load_steps = steps->is_word("auto") ? 0 : steps->integer();

@@ -188,6 +188,12 @@ CASES = {
         lambda i: i.option("-bulk_modulus", "1000"), ["-bulk_modulus is of springs", "solid"]),
     "weight of springs' volume for a solid": (
         lambda i: i.option("-lambda", "0.3"), ["-lambda is of springs", "solid"]),
+    "weight of the paper's volume for a penalty": (
+        lambda i: [str(PROJECT / "meshes/paper_jaw_advance.yaml"), "-lambda", "0.3"],
+        ["-lambda is of volume form paper, and the form is penalty", "-volume paper"]),
+    "bulk modulus without a penalty": (
+        lambda i: [str(PROJECT / "meshes/paper_jaw_advance.yaml"), "-volume", "none", "-bulk_modulus", "1"],
+        ["-bulk_modulus is of volume form penalty, and the form is none", "-volume penalty"]),
     "force functional of a solid": (
         lambda i: i.scene("  accuracy: 0.1", "  functional: force"), ["scene.yaml", "force"]),
     "law that is not modeled": (

@@ -261,6 +261,12 @@ struct Solve {
   int load_steps = 0;     ///< 0: automatic
 };
 
+/// The volume term of springs: that of `solve`, or that of its functional.
+inline VolumeTerm volume_of(const Solve& solve) {
+  const bool force = solve.functional == Functional::force;
+  return solve.volume.value_or(force ? VolumeTerm::none : VolumeTerm::penalty);
+}
+
 /// The motions that a plan may give to pieces of bone (scene/placement.h).
 struct Plan {
   std::vector<std::size_t> pieces;      ///< rows of Scene::bones, ascending

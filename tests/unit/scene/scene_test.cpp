@@ -131,7 +131,7 @@ forces:
   - {at: [1, 2, 3], radius: 5, force: [0, 0, -2]}
 solve:
   functional: force
-  volume: {form: paper, bulk_modulus: 0.1}
+  volume: {form: paper}
   lambda: 1
   accuracy: 1e-3
   load_steps: 8
@@ -202,7 +202,6 @@ TEST(Scene, FullRest) {
   EXPECT_EQ(scene.forces[0].force, Vec3(0, 0, -2));
   EXPECT_EQ(scene.solve.functional, Functional::force);
   EXPECT_EQ(scene.solve.volume, VolumeTerm::paper);
-  EXPECT_EQ(scene.solve.bulk_modulus, 0.1);
   EXPECT_EQ(scene.solve.lambda, 1);
   EXPECT_EQ(scene.solve.accuracy, 1e-3);
   EXPECT_EQ(scene.solve.load_steps, 8);
@@ -447,6 +446,29 @@ TEST(SceneRefuses, NumbersOutOfRangeOrNone) {
       {"forces: [{at: [0, 0, 0], radius: 0, force: [0, 0, 1]}]\n",
        "6:34: forces[0].radius must be a number of mm, > 0"},
   });
+}
+
+/// Every key of a volume term is read where the term is the scene's, and refused where it is not.
+TEST(Scene, ReadsTheKeysOfItsVolumeTermOnly) {
+  const auto with = [](const std::string& keys) {
+    return "skin: face.ply\nbones: []\ntissue: {layers: 2, springs: {default: {stiffness: 1}}}\n"
+           "solve: {" +
+           keys + "}\n";
+  };
+  EXPECT_EQ(read(with("volume: {bulk_modulus: 0.1}")).solve.bulk_modulus, 0.1);
+  EXPECT_EQ(read(with("volume: {form: penalty, poisson: 0.4}")).solve.poisson, 0.4);
+  EXPECT_EQ(read(with("lambda: 0.3, volume: {form: paper}")).solve.lambda, 0.3);
+  for (const auto& [keys, expected] : std::vector<std::pair<std::string, std::string>>{
+           {"lambda: 0.3",
+            "4:17: solve.lambda is of volume form paper, and the form is penalty; give "
+            "solve.volume.form: paper, or remove it"},
+           {"lambda: 0.3, volume: {form: none}", "and the form is none"},
+           {"lambda: 0.3, functional: force", "and the form is none"},
+           {"volume: {form: paper, bulk_modulus: 0.1}",
+            "solve.volume.bulk_modulus is of volume form penalty, and the form is paper"},
+           {"volume: {form: none, poisson: 0.4}", "solve.volume.poisson is of volume form penalty"},
+           {"functional: force, volume: {poisson: 0.4}", "and the form is none"}})
+    EXPECT_NE(refused(with(keys)).find(expected), std::string::npos) << refused(with(keys));
 }
 
 TEST(SceneRefuses, Words) {
