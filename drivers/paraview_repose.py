@@ -21,7 +21,7 @@ import sys
 IS_SCRIPT = bool(sys.argv) and os.path.basename(sys.argv[0]) == "paraview_repose.py"
 if IS_SCRIPT:
     sys.path.insert(0, os.path.dirname(os.path.abspath(sys.argv[0])))
-    from sheet.script import Unusable, refuse, run, words
+    from sheet.script import Unusable, refuse, result_name, run, words
     from sheet.whole_file import Target
 else:  # a macro, which ParaView copies to a folder of its own and whose exit would end ParaView
 
@@ -239,7 +239,7 @@ def save(layout, target):
 def main():
     """Shows the result that is named, and writes the files that are named behind it."""
     result, *files = words(__doc__, 1, 3)
-    name = os.path.abspath(result.removesuffix(".h5"))
+    name = os.path.abspath(result_name(result))
     targets = [Target(file, (*PICTURES, STATE), [name + part for part in PARTS]) for file in files]
     require_result(name)
     require_display()

@@ -36,7 +36,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from sheet.script import (Arguments, Unusable, number_from, reading, refuse,  # noqa: E402
-                          refuse_missing, run)
+                          refuse_missing, result_name, run)
 from sheet.whole_file import Target  # noqa: E402
 
 if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_screen
@@ -79,16 +79,13 @@ def arguments():
     parser.add_argument("-scene")
     parser.add_argument("-solved_skin", action="store_true")
     chosen = parser.parse_intermixed_args()
-    chosen.names = [os.path.abspath(name.removesuffix(".h5"))
+    chosen.names = [os.path.abspath(result_name(name))
                     for name in (chosen.name, chosen.other) if name is not None]
     made = "_and_".join([chosen.names[0], *map(os.path.basename, chosen.names[1:])])
     chosen.views = words("-views", chosen.views, tuple(VIEWS))
     chosen.columns = words("-columns", chosen.columns, COLUMNS)
     if chosen.scene and not os.path.isfile(chosen.scene):
         refuse(f"-scene {chosen.scene}: no such file")
-    for name in chosen.names:
-        if not os.path.isfile(name + ".h5"):
-            refuse(f"{name}.h5 is missing: NAME is the result's path")
     if chosen.film and len(chosen.names) > 1:
         refuse("-film shows one result, not two")
     chosen.output = Target(
@@ -308,7 +305,7 @@ def read_scene(file):
         import yaml
     except ImportError:
         refuse("scenes need PyYAML: pip install pyyaml, or apt-get install python3-yaml")
-    with reading(file, "a scene in YAML"), open(file, encoding="utf-8") as text:
+    with reading(file, "a scene in YAML"), open(file, encoding="utf-8-sig") as text:
         try:
             scene = yaml.safe_load(text)
         except yaml.YAMLError as reason:

@@ -17,7 +17,7 @@ import os
 import pathlib
 import re
 
-from sheet.script import Arguments, reading, refuse, refuse_missing, run
+from sheet.script import Arguments, reading, refuse, refuse_missing, result_name, run
 from sheet.whole_file import Target
 
 try:
@@ -31,7 +31,7 @@ except ImportError as missing:
 def of_scene(scene, key):
     """The file that a line `key: file` of a scene names, or the same key of its anatomy; or nothing."""
     with reading(scene, "a scene (text in UTF-8)"):
-        text = pathlib.Path(scene).read_text(encoding="utf-8")
+        text = pathlib.Path(scene).read_text(encoding="utf-8-sig")
     file = r"\s*['\"]?([^'\"\n#{},]+)"
     found = (re.search(rf"^{key}:{file}", text, re.M)
              or re.search(rf"^anatomy:(?:.*\n[ \t]+)*?.*?\b{key}:{file}", text, re.M))
@@ -46,10 +46,8 @@ def arguments():
         parser.add_argument(option)
     parser.add_argument("-norms", default=str(measures.NORMS))
     chosen = parser.parse_intermixed_args()
-    chosen.names = [name.removesuffix(".h5") for name in (chosen.name, chosen.other)
-                    if name is not None]
-    for file in (*(f"{name}.h5" for name in chosen.names), chosen.scene, chosen.landmarks,
-                 chosen.skin, chosen.norms):
+    chosen.names = [result_name(name) for name in (chosen.name, chosen.other) if name is not None]
+    for file in (chosen.scene, chosen.landmarks, chosen.skin, chosen.norms):
         if file and not os.path.isfile(file):
             refuse(f"{file}: no such file")
     chosen.colors = chosen.skin

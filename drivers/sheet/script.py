@@ -95,6 +95,16 @@ def number_from(low, high, kind=int):
     return read
 
 
+def result_name(text):
+    """The path of a result without its ending, which may be left out. Refuses one that is not there."""
+    name = text[:-len(".h5")] if text.lower().endswith(".h5") else text
+    if not os.path.isfile(f"{name}.h5"):
+        scene = text.lower().endswith((".yaml", ".yml"))
+        refuse(f"{text}: is a scene; solve it, and give its result, NAME.h5" if scene else
+               f"{name}.h5: no such file; give what repose-solve writes, NAME or NAME.h5")
+    return name
+
+
 def words(documentation, least, most=math.inf):
     """The arguments of a script without options, `least` to `most` of them."""
     given = sys.argv[1:]

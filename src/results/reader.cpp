@@ -25,7 +25,11 @@ bool link_resolves(hid_t file, const std::string& path) {
 
 base::Hdf5File open_result(const std::filesystem::path& file) {
   std::error_code error;
-  if (!std::filesystem::exists(file, error)) base::refuse("{}: no such file", file.string());
+  const std::string result = file.string() + ".h5";
+  if (!std::filesystem::exists(file, error))
+    base::refuse(
+        "{}: no such file; give {}", file.string(),
+        std::filesystem::exists(result, error) ? result : "what repose-solve writes, NAME.h5");
   if (std::filesystem::is_directory(file, error))
     base::refuse("{}: is a folder, expected an HDF5 file", file.string());
   try {

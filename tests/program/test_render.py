@@ -28,7 +28,7 @@ def needs_vtk():
         pytest.skip("no VTK from 9.4 on (pip install vtk), nor an older one with xvfb-run")
 
 
-WRONG = {"no result": (["none"], "none.h5 is missing"),
+WRONG = {"no result": (["none"], "none.h5: no such file"),
          "unknown view": (["{}", "-views", "back"], "-views back: unknown, take some of front"),
          "unknown column": (["{}", "-columns", "x"], "-columns x: unknown, take some of before"),
          "no scene": (["{}", "-scene", "none.yaml"], "-scene none.yaml: no such file"),

@@ -415,7 +415,10 @@ def test_a_bad_end_is_warned_of(report, run, tmp_path):
 def test_mistakes_are_one_line(report, opened, tmp_path):
     (tmp_path / "bad.json").write_text("{")
     (tmp_path / "none.h5").write_bytes(b"")
-    for arguments, part in ((["missing"], "missing.h5: no such file"),
+    (tmp_path / "head.yaml").write_text("skin: face.ply\n")
+    for arguments, part in ((["missing"], "missing.h5: no such file; give what repose-solve writes"),
+                            (["missing.H5"], "missing.h5: no such file; give what repose-solve writes"),
+                            (["head.yaml"], "head.yaml: is a scene; solve it, and give its result"),
                             ([opened, "-landmarks", "bad.json"], "bad.json: damaged, or not landmarks"),
                             ([opened, "-output", "no/page.html"], "no/page.html: cannot be written: there is no folder no; make it first"),
                             ([opened, "-outptu", "x"], "-outptu"),
@@ -477,6 +480,10 @@ def test_colors_and_photographs_of_a_skin_are_kept(report, opened, tmp_path):
     page_of(report, tmp_path, opened, "-skin", tmp_path / "face.ply")
     view = View(tmp_path / "page.html")
     assert np.array_equal(view.array(view.told["surfaces"][0]["colors"]), colors)
+    (tmp_path / "scene.yaml").write_text("skin: face.ply\r\n", encoding="utf-8-sig", newline="")
+    page_of(report, tmp_path, opened, "-scene", tmp_path / "scene.yaml")
+    view = View(tmp_path / "page.html")
+    assert np.array_equal(view.array(view.told["surfaces"][0]["colors"]), colors), "as Windows saves it"
     (tmp_path / "photo.png").write_bytes(b"\x89PNG a photograph")
     (tmp_path / "face.mtl").write_text("newmtl face\nmap_Kd photo.png\n")
     (tmp_path / "face.obj").write_text("mtllib face.mtl\n" + "".join(

@@ -518,7 +518,10 @@ TEST(BadFile, IsRefusedWithItsName) {
   const auto refused = [&](const char* name) {
     return refusal([&] { read_model(folder.path(name)); });
   };
-  EXPECT_NE(refused("none.h5").find("none.h5: no such file"), std::string::npos);
+  EXPECT_NE(refused("none.h5").find("none.h5: no such file; give what repose-solve writes"),
+            std::string::npos);
+  EXPECT_NE(refused("text").find("text: no such file; give " + folder.path("text.h5").string()),
+            std::string::npos);
   EXPECT_NE(refused("").find("is a folder"), std::string::npos);
   EXPECT_NE(refused("text.h5").find("text.h5: is not an HDF5 file"), std::string::npos);
   EXPECT_NE(refused("empty.h5").find("empty.h5: is not an HDF5 file"), std::string::npos);
