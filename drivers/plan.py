@@ -25,6 +25,7 @@ After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -72,7 +73,7 @@ def program(name):
 
 def run(*command):
     """Runs one step, shows what it prints, and ends where it writes nothing. Returns its status."""
-    print("$", " ".join(map(str, command)), flush=True)
+    print("$", shlex.join(map(str, command)), flush=True)
     status = subprocess.run([str(word) for word in command]).returncode
     if status not in (0, 2):
         refuse(f"{pathlib.Path(str(command[0])).name} ended with status {status}")
@@ -95,7 +96,7 @@ class Segmentation:
 
     def __init__(self, file):
         self.file = file
-        begin, _, data = file.read_bytes().partition(b"\n\n")
+        begin, data = re.split(rb"\n\r?\n", file.read_bytes(), maxsplit=1)
         self.header = begin.decode(errors="replace").replace("\r", "")
         fields = dict(re.findall(r"^([a-z ]+): *(.*?) *$", self.header, re.M))
         keys = dict(re.findall(r"^(Segment\d+_\w+):=(.*?)\s*$", self.header, re.M))

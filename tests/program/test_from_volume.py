@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import subprocess
 import sys
 
 import meshio
@@ -164,10 +165,19 @@ def test_a_chin_is_cut_from_the_jaw_and_moves_with_it():
     assert "bone: mandible, piece: chin" in whole and "bone: [mandible, chin], clinical: {advance: 2}" in whole
 
 
-def test_segments_of_slicer_are_known_by_their_names(tmp_path):
+def test_a_printed_command_can_be_given_to_a_shell(tmp_path, capfd):
+    plan.run(sys.executable, "-c", "import sys; print(sys.argv[1:])", tmp_path / "Plan für ä")
+    first, printed = capfd.readouterr().out.splitlines()
+    assert subprocess.check_output(["sh", "-c", first.removeprefix("$ ")], text=True).strip() == printed
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["Unix", "Windows"])
+def test_segments_of_slicer_are_known_by_their_names(tmp_path, end):
     names = ["Mandible", "Lower teeth", "Soft tissue (skin)", "Upper skull", "Upper teeth", "Spine", "Table"]
     labels = np.arange(8, dtype="u1").reshape(2, 2, 2)
     file = volumes.write_segmentation(tmp_path / "head.seg.nrrd", labels, names, (0, 0, 0), 1.0)
+    head, blank, data = file.read_bytes().partition(b"\n\n")
+    file.write_bytes((head + blank).replace(b"\n", end) + data)
     segmentation = plan.Segmentation(file)
     assert segmentation.roles() == {
         "skin": names[:6], "mandible": names[:2], "skull": ["Upper skull", "Upper teeth"]}
