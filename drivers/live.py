@@ -55,7 +55,7 @@ def packed(head, arrays):
 def scene_with_moves(path, moves):
     """The text of the scene with these moves (piece, 4×4 matrix) in place of its own."""
     kept, inside = [], False
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in path.read_text(encoding="utf-8-sig").splitlines():
         if re.match(r"[^\s#]", line):
             inside = line.startswith("moves:")
         if not inside:
@@ -89,7 +89,7 @@ class ProfileAngles:
 
     def given(self, scene):
         from sheet import landmarks
-        named = re.search(r"\blandmarks:\s*['\"]?([^'\"\n#{},]+)", scene.read_text(encoding="utf-8"))
+        named = re.search(r"\blandmarks:\s*['\"]?([^'\"\n#{},]+)", scene.read_text(encoding="utf-8-sig"))
         try:
             read = landmarks.read_landmarks(scene.parent / named[1].strip()) if named else {}
         except landmarks.Unusable:

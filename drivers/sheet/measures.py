@@ -22,7 +22,7 @@ FOLLOWS_SOURCE = "a review of 16 studies, 2016"
 def read_norms(file):
     """[{source, population, norms: {measure: [mean, standard deviation]}}] of a file."""
     with reading(file, "norms as in docs/guide/report.md"):
-        stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
+        stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8-sig"))
         for group in stored:
             for name, (mean, deviation) in group["norms"].items():
                 if not (name in MEASURES and math.isfinite(mean) and deviation > 0):

@@ -91,7 +91,7 @@ def provenance(result, scene):
             *((name, str(count)) for name, count in result.counts.items())]
     page = table(("", ""), rows)
     if scene:
-        written = pathlib.Path(scene).read_text(encoding="utf-8")
+        written = pathlib.Path(scene).read_text(encoding="utf-8-sig")
         page += f"<h3>{html.escape(os.path.basename(scene))}</h3><pre>{html.escape(written)}</pre>"
     return page
 

@@ -63,7 +63,11 @@ std::string read_text_input(const std::filesystem::path& file, const TextLimits&
   std::ifstream stream(file, std::ios::binary);
   if (!stream) refuse("{}: cannot be read; check its permissions", name);
   record_input(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    refuse("{}: is text in UTF-16; save it as UTF-8", name);
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  return text;
 }
 
 void require_name(const std::string& name) {

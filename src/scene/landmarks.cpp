@@ -165,7 +165,6 @@ class Table {
     std::string line;
     for (size_t number = 1; std::getline(stream, line); ++number) {
       const std::string place = fmt::format("{}:{}", file_, number);
-      if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
       line = trimmed(line);
       if (line.empty()) continue;
       if (line[0] == '#')

@@ -1,5 +1,6 @@
 """drivers/sheet, what report.py, render.py and others share: surfaces made coarser, landmarks, written files."""
 
+import json
 import os
 import resource
 import struct
@@ -11,9 +12,13 @@ import pytest
 
 from conftest import PROJECT
 
-sys.path.insert(0, str(PROJECT / "drivers"))
+sys.path[:0] = [str(PROJECT / "drivers"), str(PROJECT / "drivers/python")]
+import live  # noqa: E402
+from repose.scene import Scene  # noqa: E402
+from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
+from sheet.measures import read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.script import Unusable  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -100,6 +105,35 @@ def test_files_that_are_no_landmarks_are_refused(tmp_path, name):
     (tmp_path / name).write_text(REFUSED[name])
     with pytest.raises(Unusable, match=f"{name}: "):
         read_landmarks(tmp_path / name)
+
+
+# ----- text as Windows saves it
+
+
+MARKED = "\ufeff# a plan\r\nskin: face.ply\r\n"
+
+
+def test_a_scene_that_is_written_again_begins_without_a_byte_order_mark(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(MARKED, encoding="utf-8", newline="")
+    Scene(scene).with_plan(["chin"], tmp_path / "planned.yaml")
+    for text in ((tmp_path / "planned.yaml").read_text(encoding="utf-8"), live.scene_with_moves(scene, {}),
+                 tables.provenance(Nothing(tmp_path), scene)):
+        assert "skin: face.ply" in text and "\ufeff" not in text
+
+
+class Nothing:
+    """A result of which a page states where it is from."""
+
+    def __init__(self, folder):
+        self.file, self.origin, self.counts = folder / "scene.yaml", {}, {}
+        self.end = {"functional": "", "volume": "", "bulk_modulus": 1.0, "lambda": 1.0}
+
+
+def test_norms_with_a_byte_order_mark_are_read(tmp_path):
+    group = {"source": "ours", "population": "12", "norms": {"facial convexity": [9, 2]}}
+    (tmp_path / "norms.json").write_text(json.dumps([group]), encoding="utf-8-sig")
+    assert read_norms(tmp_path / "norms.json") == [group]
 
 
 # ----- colors of a skin

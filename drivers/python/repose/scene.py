@@ -48,7 +48,7 @@ class Scene:
         path = pathlib.Path(path).resolve()
         if path.parent != self.path.parent:
             raise ValueError(f"{path}: must lie in {self.path.parent}")
-        text = self.path.read_text(encoding="utf-8")
+        text = self.path.read_text(encoding="utf-8-sig")
         if any(line.startswith("plan:") for line in text.splitlines()):
             raise ValueError(f"{self.path}: the scene has a plan already")
         numbers = [", ".join(f"{value:g}" for value in box) for box in (translate, rotate)]

@@ -29,6 +29,19 @@ TEST(WholeFile, WritesAgainWhatItHasWritten) {
   EXPECT_EQ(test::refusal([&] { write_whole_file(folder.path("b"), "second"); }), "accepted");
 }
 
+TEST(WholeFile, ReadsTextAsWindowsSavesIt) {
+  const test::Folder folder;
+  const auto read = [&](const std::string& content) {
+    return read_text_input(folder.write("a.txt", content), {1, "a list", "give a list"});
+  };
+  EXPECT_EQ(read("\xEF\xBB\xBFskin: a\r\n"), "skin: a\r\n");
+  for (const char* mark : {"\xFF\xFE", "\xFE\xFF"})
+    EXPECT_NE(test::refusal([&] {
+                read(mark + std::string("s\0", 2));
+              }).find("a.txt: is text in UTF-16; save it as UTF-8"),
+              std::string::npos);
+}
+
 TEST(WholeFile, ANameHasALastPartAndNoControlCharacters) {
   for (const char* name : {"", "/", "folder/", ".", "..", "folder/..", "a\nb", "\x7f"})
     EXPECT_NE(test::refusal([&] { require_name(name); }), "accepted") << name;

@@ -36,7 +36,7 @@ TEST(TransformFile, MovesTheBoneByTheInverse) {
 
 // A 90° turn about z through the center (10, 0, 0): row-major, y = A (x − c) + t + c.
 TEST(TransformFile, AffineWithCenter) {
-  const RigidMotion motion = read(head +
+  const RigidMotion motion = read("\xEF\xBB\xBF" + head +
                                   "Transform: AffineTransform_double_3_3\r\n"
                                   "Parameters: 0 -1 0 1 0 0 0 0 1 0 0 5\r\n"
                                   "FixedParameters: 10 0 0\r\n");
