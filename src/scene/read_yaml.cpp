@@ -1,8 +1,9 @@
 #include "read_yaml.h"
 
 #include <yaml-cpp/eventhandler.h>
-#include <algorithm>
 
+#include <algorithm>
+#include <cctype>
 #include <sstream>
 #include <string>
 
@@ -58,15 +59,41 @@ int second_document(const std::string& text) {
   return documents.lines.size() < 2 ? 0 : documents.lines[1];
 }
 
-/// Names the first line that a tab indents, of which YAML's own message says nothing.
-std::string remark_on_tabs(std::string_view text) {
+std::string_view without_indentation(std::string_view line) {
+  return line.substr(std::min(line.find_first_not_of(" \t"), line.size()));
+}
+
+bool is_indented_by_tab(std::string_view line) {
+  return line.substr(0, line.size() - without_indentation(line).size()).find('\t') != line.npos;
+}
+
+/// `layers:4`, which YAML takes for a text.
+bool lacks_blank_after_colon(std::string_view line) {
+  line = without_indentation(line);
+  if (line.starts_with("- ")) line = without_indentation(line.substr(2));
+  const auto is_of_key = [](unsigned char c) { return std::isalpha(c) != 0 || c == '_'; };
+  const auto key = static_cast<size_t>(std::ranges::find_if_not(line, is_of_key) - line.begin());
+  return key > 0 && key + 1 < line.size() && line[key] == ':' && line[key + 1] > ' ';
+}
+
+/// `"C:\Users"`, where \U begins a code.
+bool escapes_in_quotes(std::string_view line) {
+  const size_t quote = line.find('"');
+  return quote != line.npos && line.find('\\', quote) != line.npos;
+}
+
+/// Names the first line with a common mistake of which YAML's own message says nothing.
+std::string remark_on(std::string_view text) {
   int number = 0;
   for (size_t position = 0; position < text.size();) {
     const std::string_view line = base::next_line(text, position);
     ++number;
-    const size_t indentation = std::min(line.find_first_not_of(" \t"), line.size());
-    if (line.substr(0, indentation).find('\t') != line.npos)
+    if (is_indented_by_tab(line))
       return fmt::format("; line {} is indented by a tab, use blanks", number);
+    if (lacks_blank_after_colon(line))
+      return fmt::format("; line {} lacks a blank after the colon", number);
+    if (escapes_in_quotes(line))
+      return fmt::format("; line {} has a \\ in quotes, write / between folders", number);
   }
   return "";
 }
@@ -87,7 +114,7 @@ YAML::Node read_yaml(const std::filesystem::path& file) {
   } catch (const YAML::Exception& error) {
     std::string reason = base::quote(error.msg);
     base::refuse("{}:{}:{}: not valid YAML: {}{}", file.string(), error.mark.line + 1,
-                 error.mark.column + 1, reason.substr(1, reason.size() - 2), remark_on_tabs(text));
+                 error.mark.column + 1, reason.substr(1, reason.size() - 2), remark_on(text));
   }
 }
 

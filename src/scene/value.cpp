@@ -1,6 +1,7 @@
 #include "value.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <tuple>
 
@@ -15,6 +16,26 @@ constexpr double largest_component = 1e7;
 
 std::string joined(const std::string& above, const std::string& name) {
   return above.empty() ? name : fmt::format("{}.{}", above, name);
+}
+
+bool differ_in_case_only(const std::string& one, const std::string& other) {
+  return std::ranges::equal(one, other, [](unsigned char a, unsigned char b) {
+    return std::tolower(a) == std::tolower(b);
+  });
+}
+
+/// Why a path that leads to no file may do so: folders as Windows writes them, or a name in other
+/// case; else empty.
+std::string remark_on_path(const std::filesystem::path& path) {
+  if (path.string().find('\\') != std::string::npos) return "; write / between folders, not \\";
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(path.parent_path(), error), end;
+       !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (differ_in_case_only(name, path.filename().string()))
+      return fmt::format("; its folder holds {}", base::quote(name));
+  }
+  return "";
 }
 
 }  // namespace
@@ -124,7 +145,8 @@ std::filesystem::path Value::file() const {
   if (std::filesystem::is_directory(path, error))
     refuse("names the folder {}; a file is needed", quote());
   if (!std::filesystem::is_regular_file(path, error))
-    refuse("names {}, which is no file (paths are relative to the scene's folder)", quote());
+    refuse("names {}, which is no file (paths are relative to the scene's folder){}", quote(),
+           remark_on_path(path));
   return path;
 }
 
@@ -132,8 +154,8 @@ std::filesystem::path Value::file_or_folder() const {
   auto path = absolute_path();
   std::error_code error;
   if (!std::filesystem::exists(path, error))
-    refuse("names {}, which is no file or folder (paths are relative to the scene's folder)",
-           quote());
+    refuse("names {}, which is no file or folder (paths are relative to the scene's folder){}",
+           quote(), remark_on_path(path));
   return path;
 }
 
