@@ -116,6 +116,32 @@ def test_refusals_name_the_place_and_the_session_goes_on(session):
     assert session.solve(B).converged
 
 
+def test_a_request_that_is_no_line_of_json_is_refused(session):
+    """None of them waits for an answer without end."""
+    for value, words in ((float("nan"), "finite numbers only"), (float("inf"), "finite numbers only")):
+        with pytest.raises(repose.Refused, match=words):
+            session.solve({"mandible": {"translate": [0, value, 0]}})
+    with pytest.raises(repose.Refused, match="a line of at most 1048576 bytes"):
+        session.solve(A, gradient_of={row: [0.125, -1, 0] for row in range(30_000)})
+    with pytest.raises(repose.Refused, match="nests at most 8 arrays and objects"):
+        session.change(material=[[[[[[[[[1]]]]]]]]])
+    assert session.solve(A).converged
+
+
+def test_a_session_has_a_whole_number_of_ranks():
+    for ranks in (0, -1, "two", 1.5):
+        with pytest.raises(ValueError, match="ranks must be a whole number from 1, not "):
+            repose.Session(SCENE, ranks=ranks)
+
+
+def test_derivatives_refuse_what_the_plan_does_not_have(session):
+    tangent = session.solve(A, tangents=True).tangent
+    with pytest.raises(ValueError, match="'jaw' is no piece of the plan; its pieces are chin, mandible, maxilla"):
+        tangent.displacement({"jaw": {"translate": [0, 1, 0]}})
+    with pytest.raises(ValueError, match="'chin': turn: a motion has translate and rotate"):
+        tangent.displacement({"chin": {"turn": [0, 1, 0]}})
+
+
 def test_a_change_of_material_or_border_is_the_scene_with_these_values(session, environment, tmp_path):
     before = session.solve(A)
     text = SCENE.read_text().replace("material: {preset: face}", "material: {preset: face, young: 0.03}")

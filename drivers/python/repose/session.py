@@ -40,8 +40,12 @@ class Tangent:
 
     def displacement(self, change):
         """First-order displacement of the skin by a change of the plan (as a plan)."""
-        total = 0
+        pieces, total = sorted({piece for piece, _ in self.columns}), 0
         for piece, motion in change.items():
+            if piece not in pieces:
+                raise ValueError(f"{piece!r} is no piece of the plan; its pieces are {', '.join(pieces)}")
+            if unknown := motion.keys() - {"translate", "rotate"}:
+                raise ValueError(f"{piece!r}: {', '.join(sorted(unknown))}: a motion has translate and rotate")
             values = np.concatenate([motion.get("translate", (0, 0, 0)),
                                      motion.get("rotate", (0, 0, 0))])
             for name, value in zip(COMPONENTS, values):
@@ -152,6 +156,8 @@ class Session:
 
     def __init__(self, scene, ranks=1, program=None, environment=None, verify_every=0, on_verified=None,
                  niceness=0):
+        if not isinstance(ranks, int) or ranks < 1:
+            raise ValueError(f"ranks must be a whole number from 1, not {ranks!r}")
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
         command = [absolute_program(str(program), "name repose-live") if program else find_program(), str(path)]
         if ranks > 1:
@@ -329,7 +335,9 @@ class Session:
                 kind = np.dtype("<" + one["type"])
                 size = int(np.prod(one["shape"])) * kind.itemsize
                 arrays[one["name"]] = np.frombuffer(stream.read(size), kind).reshape(one["shape"])
-            self._give(head["id"], head, arrays)
+            # Without a number it refuses a line that was not understood: nobody may wait for its answer.
+            for number in list(self._waiting) if head["id"] is None else [head["id"]]:
+                self._give(number, head, arrays)
         for number in list(self._waiting):
             self._give(number, None, {})
 
@@ -345,9 +353,13 @@ class Session:
         with self._writing:
             self._last += 1
             number = self._last
+            try:
+                line = json.dumps({"id": number, **request}, allow_nan=False)
+            except ValueError as reason:
+                raise Refused(f"the request is no JSON, which has finite numbers only: {reason}") from None
             self._waiting[number] = waiting
             try:
-                self._process.stdin.write(json.dumps({"id": number, **request}).encode() + b"\n")
+                self._process.stdin.write(line.encode() + b"\n")
                 self._process.stdin.flush()
             except (OSError, ValueError):
                 self._waiting.pop(number, None)
