@@ -14,6 +14,7 @@ exactly, writes the result, and says how far the map is from it. Needs: apt-get 
 import html
 import json
 import math
+import os
 import pathlib
 import shlex
 import sys
@@ -140,6 +141,15 @@ def fitted_page(scene, session, box, samples, accuracy):
 # ----- the program
 
 
+def require_folder(cache):
+    """Refuses a folder of solved plans that cannot be made or written."""
+    there = next(place for place in (cache, *cache.absolute().parents) if place.exists())
+    if not there.is_dir():
+        refuse(f"-cache {cache}: {there} is no folder; choose another one")
+    if not os.access(there, os.W_OK | os.X_OK):
+        refuse(f"-cache {cache}: folder {there} is read-only; choose another one")
+
+
 def arguments():
     parser = Arguments(__doc__)
     parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
@@ -156,9 +166,10 @@ def arguments():
         refuse(f"{chosen.scene}: no such file")
     stem = chosen.scene.with_suffix("")
     chosen.cache = chosen.cache or pathlib.Path(f"{stem}_map")
+    require_folder(chosen.cache)
     inputs = repose.Scene(chosen.scene).files()
     if chosen.plan:
-        chosen.output = chosen.output or pathlib.Path(f"{stem}_plan")
+        chosen.output = str(chosen.output or f"{stem}_plan").removesuffix(".h5")
         Target(f"{chosen.output}.h5", ".h5", inputs)
     else:
         chosen.output = Target(chosen.output or f"{stem}_map.html", (".html", ".htm"), inputs)

@@ -85,13 +85,17 @@ class Arguments(argparse.ArgumentParser):
 
 def number_from(low, high, kind=int):
     """The type of an argument that is a number from `low` to `high`."""
+    name = {int: "whole number", float: "number"}[kind]
+
     def read(text):
-        value = kind(text)
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
         if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text}: must be from {low:g} to {high:g}")
+            raise argparse.ArgumentTypeError(f"{text}: must be a {name} from {low:g} to {high:g}")
         return value
 
-    read.__name__ = {int: "whole number", float: "number"}[kind]
     return read
 
 

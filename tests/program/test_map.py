@@ -90,12 +90,12 @@ def test_ranks_of_mpirun_share_the_plans(script, tmp_path):
 def test_the_plan_shown_is_solved_by_its_command(made, script):
     scene, _ = made
     solved = script(scene, "-accuracy", 0.05, "-samples", SAMPLES, "-plan", '{"mandible": {"translate": '
-                    '[0, -2, 0], "rotate": [1, 0, 0]}}', "-output", scene.with_name("plan"))
+                    '[0, -2, 0], "rotate": [1, 0, 0]}}', "-output", scene.with_name("plan.h5"))
     assert solved.returncode == 0, solved
     off = re.search(r"off by ([\d.]+) mm on 95 %.*at most by ([\d.]+) mm; its bound holds on (\d+) %",
                     solved.stdout)
     assert float(off[1]) < 0.1 and int(off[3]) > 80, solved.stdout
-    assert scene.with_name("plan.h5").is_file()
+    assert scene.with_name("plan.h5").is_file() and f"{scene.with_name('plan.h5')}: within" in solved.stdout
 
 
 @pytest.mark.parametrize("arguments, words", [
@@ -103,7 +103,10 @@ def test_the_plan_shown_is_solved_by_its_command(made, script):
     (["-plan", '{"jaw": {}}'], "'jaw' is no piece of the plan; its pieces are mandible"),
     (["-plan", '{"mandible": 3}'], "give {PIECE:"), (["-plan", "{"], "not JSON"),
     (["-plan", "[" * 10000], "not JSON"),
-    (["-samples", 1], "-samples: 1: must be from 3 to 10000"), (["-accuracy", "x"], "-accuracy"),
+    (["-samples", 1], "-samples: 1: must be a whole number from 3 to 10000"),
+    (["-accuracy", "0,01"], "-accuracy: 0,01: must be a number from 0.0001 to 1"),
+    (["-cache", __file__], f"-cache {__file__}: {__file__} is no folder; choose another one"),
+    (["-cache", f"{__file__}/deep/er"], f"{__file__} is no folder; choose another one"),
     (["-output", "/nowhere/page.html"], "there is no folder /nowhere; make it first")])
 def test_refusals_are_one_line(made, script, arguments, words):
     message = script(made[0], *arguments)

@@ -111,20 +111,21 @@ def test_wrong_arguments_are_one_line(script, name):
 
 
 @pytest.mark.parametrize("arguments, part", [
-    (["-port", "-1"], "-port: -1: must be from 0 to 65535"), (["-port", "99999"], "must be from 0 to 65535"),
-    (["-ranks", "0"], "-ranks: 0: must be from 1"), (["-ranks", "x"], "-ranks: invalid whole number value: 'x'")])
+    (["-port", "-1"], "-port: -1: must be a whole number from 0 to 65535"),
+    (["-port", "99999"], "must be a whole number from 0 to 65535"), (["-ranks", "0"], "-ranks: 0: must be a whole number from 1"),
+    (["-ranks", "x"], "-ranks: x: must be a whole number from 1"), (["-ranks", "1.5"], "-ranks: 1.5: must be a whole number from 1")])
 def test_numbers_out_of_range_are_refused(script, arguments, part):
     says(script("live.py", PROJECT / "meshes/head_live.yaml", "-no_browser", *arguments), "live.py", part)
 
 
 @pytest.mark.parametrize("option, value, limits", [
     ("-level", "nan", "from -32768 to 65535"), ("-bone", "inf", "from -32768 to 65535"), ("-edge", "-4", "from 1 to 20"),
-    ("-edge", "nan", "from 1 to 20")])
+    ("-edge", "nan", "from 1 to 20"), ("-edge", "4,5", "from 1 to 20"), ("-level", "4 mm", "from -32768 to 65535")])
 def test_numbers_out_of_range_are_refused_before_a_folder_is_made(script, tmp_path, option, value, limits):
     volume = tmp_path / "head.mhd"
     volume.touch()
     result = script("plan.py", volume, "-operation", "jaw, 5 mm forward", option, value)
-    says(result, "plan.py", f"argument {option}: {value}: must be {limits}")
+    says(result, "plan.py", f"argument {option}: {value}: must be a number {limits}")
     assert not (tmp_path / "plan").exists()
 
 
