@@ -28,6 +28,8 @@ void soften(scene::Material& material) {
   material.deep.poisson = lower(material.deep.poisson);
   for (scene::Stratum& stratum : material.strata)
     stratum.elasticity.poisson = lower(stratum.elasticity.poisson);
+  for (scene::MaterialRegion& region : material.regions)
+    region.elasticity.poisson = lower(region.elasticity.poisson);
 }
 
 /// mm, of the skin of a material without strata; that of the preset skin_on_fat.
