@@ -19,18 +19,20 @@ std::string ending(bool settled, bool stopped, const std::string& unsettled) {
   return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");
 }
 
-/// Why a way that came to its end was hard, and what to change.
-std::string describe_halvings(const solve::Halvings& h) {
+/// Why many load steps of a run that came to its end were halved, and what to change.
+std::string describe_halvings(const solve::Halvings& h, bool springs) {
   constexpr int64_t usual = 4;
   if (h.count() <= usual) return "";
-  return report_row(
-      "remark",
+  const char* reason =
       h.folded >= h.failed + h.off_prediction
           ? "a hard way: tissue folds on it; move the bones less or release more tissue "
-            "(tissue.release); springs: raise the volume stiffness, or make the tissue a solid"
+            "(tissue.release)"
           : "a hard way: tissue buckles on it, or has several rest positions, and -verify_path "
-            "says whether they matter; move the bones less; springs: raise the volume stiffness, "
-            "or make the tissue a solid");
+            "says whether they matter; move the bones less";
+  return report_row("remark", "{}{}", reason,
+                    springs ? "; raise the volume stiffness of the springs, or make the tissue a "
+                              "solid"
+                            : "");
 }
 
 std::string halved(const solve::Halvings& h) {
@@ -39,13 +41,14 @@ std::string halved(const solve::Halvings& h) {
                      h.count(), h.folded, h.off_prediction, h.failed);
 }
 
-std::string work_rows(const solve::Summary& s) {
+std::string work_rows(const solve::Summary& s, bool springs) {
   const std::string other =
       s.evaluations_for_other > 0
           ? fmt::format("; {} of value to find another rest position", s.evaluations_for_other)
           : "";
   return report_row("load steps", "{} ({})", s.path.steps, halved(s.path.halvings)) +
-         describe_halvings(s.path.halvings) + report_row("iterations", "{}", s.path.iterations) +
+         describe_halvings(s.path.halvings, springs) +
+         report_row("iterations", "{}", s.path.iterations) +
          report_row("evaluations", "{} of value and gradient, {} of the Hessian{}", s.evaluations,
                     s.assemblies, other);
 }
@@ -327,7 +330,7 @@ std::string describe_run(const solve::Summary& s, const solve::Settings& setting
                      s.last.inverted_prisms ? ": TISSUE IS FOLDED" : "");
   text += report_row("volume error", "{:.3g} at most", s.last.volume_error_max);
   text += report_row("unknowns", "{} on {} rank{}", s.unknowns, ranks, ranks == 1 ? "" : "s");
-  text += work_rows(s);
+  text += work_rows(s, settings.weights.volume != model::VolumeTerm::material);
   return text + describe_stages(stages);
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "app/report.h"
+#include "repose/mechanics/loops.h"
 
 namespace repose::app {
 namespace failure_test {
@@ -16,6 +17,34 @@ TEST(Failure, NamesAdhesionWhereLoadStepsFailedWithIt) {
   summary.path.halvings.failed = 2;
   EXPECT_TRUE(names(true));
   EXPECT_FALSE(names(false));
+}
+
+/// Advice about springs is given to springs only: in the remark on a hard path, and where the rest
+/// position depends on it.
+TEST(Advice, IsOfTheTissueOfTheScene) {
+  const auto names_springs = [](const std::string& text) {
+    EXPECT_NE(text.find("move"), std::string::npos) << text;
+    return text.find("springs") != std::string::npos;
+  };
+  solve::Summary hard;
+  hard.path.halvings.failed = 9;
+  solve::Settings springs, solid;
+  solid.weights = mechanics::solid_weights;
+  const base::Stages none(MPI_COMM_SELF);
+  EXPECT_TRUE(names_springs(describe_run(hard, springs, 1, none)));
+  EXPECT_FALSE(names_springs(describe_run(hard, solid, 1, none)));
+  hard.path.halvings.folded = 99;
+  EXPECT_TRUE(names_springs(describe_run(hard, springs, 1, none)));
+  EXPECT_FALSE(names_springs(describe_run(hard, solid, 1, none)));
+
+  PathCheck check;
+  check.steps = 2;
+  check.again.path.load = 1;
+  check.again.path.last.converged = true;
+  check.largest = 3;
+  EXPECT_FALSE(names_springs(describe_path(check)));
+  check.springs = true;
+  EXPECT_NE(describe_path(check).find("springs buckle"), std::string::npos);
 }
 
 }  // namespace failure_test
