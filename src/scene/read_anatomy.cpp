@@ -5,6 +5,7 @@
 #include <array>
 
 #include "head_axes.h"
+#include "repose/base/text.h"
 #include "repose/scene/landmarks.h"
 
 namespace repose::scene {
@@ -49,6 +50,19 @@ void check_sides(const Value& file, const Landmarks& landmarks) {
   }
 }
 
+/// Refuses a misspelled landmark, which would pass for a point of the user's own and be ignored.
+void check_names(const Value& file, const Landmarks& landmarks) {
+  constexpr size_t misspelled = 2, shortest = 8;  // letters
+  for (const auto& [name, place] : landmarks) {
+    if (!standard_name(name).empty()) continue;
+    for (const LandmarkName& standard : landmark_names())
+      if (standard.name.size() >= shortest && !find(landmarks, standard.name.c_str()) &&
+          base::edit_distance(name, standard.name) <= misspelled)
+        file.refuse("has {}, which is no landmark's name, and lacks {}; rename it",
+                    base::quote(name), standard.name);
+  }
+}
+
 /// Refuses condyles that are as far apart as those of no head in mm.
 void check_unit(const Value& file, const Landmarks& landmarks) {
   constexpr double low = 60, high = 160;  // mm
@@ -80,6 +94,7 @@ AnatomyPlan read_anatomy(const Value& value) {
   AnatomyPlan plan;
   plan.file = file.file();
   plan.landmarks = with_standard_names(landmarks_by_name(plan.file), plan.file.string());
+  check_names(file, plan.landmarks);
   check_front(file, plan.landmarks);
   check_sides(file, plan.landmarks);
   check_unit(file, plan.landmarks);

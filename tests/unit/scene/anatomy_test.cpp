@@ -85,6 +85,15 @@ TEST(Anatomy, RefusesLandmarksOfNoHead) {
   Landmarks lone = head();
   lone.erase("condyle_left_center");
   has(refused(lone), "has condyle_right_center without condyle_left_center");
+  Landmarks misspelled = head();
+  misspelled["lower_lpi"] = misspelled["lower_lip"];
+  EXPECT_EQ(refused(misspelled), "accepted") << "a point of the user's own beside the landmark";
+  misspelled.erase("lower_lip");
+  has(refused(misspelled),
+      "has 'lower_lpi', which is no landmark's name, and lacks lower_lip; rename it");
+  misspelled.erase("lower_lpi");
+  misspelled["left side"] = {0, 0, 0};
+  EXPECT_EQ(refused(misspelled), "accepted");
   Landmarks in_cm = head();
   for (auto& [name, place] : in_cm) place /= 10;
   has(refused(in_cm, le_fort), "landmarks must be in mm; multiply them by 10 if they are in cm");
