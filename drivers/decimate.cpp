@@ -46,7 +46,7 @@ tools::decimation::DecimateOptions requested(const base::Options& options) {
   if (base::lower(output.extension().string()) != ".ply")
     base::refuse("-output {}: the result is written as PLY; give a name that ends in .ply",
                  output.string());
-  base::require_writable(output);
+  base::reserve_output(output);
   if (!options.has("distance") && !options.has("triangles"))
     base::refuse("neither -distance nor -triangles is given; say how far, e.g. -distance 0.5 (mm)");
   if (options.has("distance")) requested.distance = options.number("distance");

@@ -113,7 +113,7 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
 
 base::Exit run(const base::Options& options) {
   const std::string name = options.text("output");
-  base::require_writable(name + ".mrk.json");
+  base::reserve_output(name + ".mrk.json");
   const surface::Surface skull = read(options, "skull"), mandible = read(options, "mandible"),
                          skin = surface::read_surface(options.arguments()[0]);
   scene::Landmarks given;

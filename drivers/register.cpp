@@ -158,7 +158,7 @@ base::Exit refine(const base::Options& options, const surface::Surface& moving,
 
 base::Exit run(const base::Options& options) {
   const auto& files = options.arguments();
-  base::require_writable(options.text("output") + ".tfm");
+  for (const char* ending : {".ply", ".tfm"}) base::reserve_output(options.text("output") + ending);
   const Pairs pairs = read_pairs(options);
   const surface::Surface moving = surface::read_surface(files[0]);
   const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));

@@ -86,7 +86,7 @@ void print_mesh(const std::string& file, const tools::range_scan::ScanMesh& mesh
 void run(const base::Options& options) {
   const std::string output = options.text("output");
   surface::check_surface_ending(output);
-  base::require_writable(output);
+  base::reserve_output(output);
   const tools::range_scan::RangeGrid grid =
       tools::range_scan::read_range_grid(options.arguments()[0]);
   const auto filled =

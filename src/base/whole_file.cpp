@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <mutex>
 #include <set>
 
@@ -22,6 +23,7 @@ namespace {
 struct Files {
   std::mutex mutex;
   std::set<std::filesystem::path> read, written;
+  std::map<std::filesystem::path, std::filesystem::path> reserved;  ///< to the names given
 };
 
 Files& files() {
@@ -35,11 +37,14 @@ std::filesystem::path real_path(const std::filesystem::path& file) {
   return error ? file : path;
 }
 
+[[noreturn]] void refuse_input(const std::filesystem::path& file) {
+  refuse("{}: is an input of this run and would be replaced; choose another -output",
+         file.string());
+}
+
 void require_no_input(const std::filesystem::path& file) {
   const std::lock_guard lock(files().mutex);
-  if (files().read.contains(real_path(file)))
-    refuse("{}: is an input of this run and would be replaced; choose another -output",
-           file.string());
+  if (files().read.contains(real_path(file))) refuse_input(file);
 }
 
 }  // namespace
@@ -47,7 +52,10 @@ void require_no_input(const std::filesystem::path& file) {
 void record_input(const std::filesystem::path& file) {
   std::filesystem::path path = real_path(file);
   const std::lock_guard lock(files().mutex);
-  if (!files().written.contains(path)) files().read.insert(std::move(path));
+  if (files().written.contains(path)) return;
+  if (const auto output = files().reserved.find(path); output != files().reserved.end())
+    refuse_input(output->second);
+  files().read.insert(std::move(path));
 }
 
 std::string read_text_input(const std::filesystem::path& file, const TextLimits& limits) {
@@ -76,6 +84,12 @@ void require_name(const std::string& name) {
   if (last.empty() || last == "." || last == ".." || std::ranges::any_of(name, is_control))
     refuse("-output {}: is no name of files; give a path without ending such as plans/first",
            quote(name));
+}
+
+void reserve_output(const std::filesystem::path& file) {
+  require_writable(file);
+  const std::lock_guard lock(files().mutex);
+  files().reserved.emplace(real_path(file), file);
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& file) {

@@ -24,6 +24,10 @@ void require_writable(const std::filesystem::path& file);
 /// or one that ends as a folder's.
 void require_name(const std::string& name);
 
+/// Refuses what require_writable does, and from now on reading this file: an input that would be
+/// replaced is named before the work. Not collective.
+void reserve_output(const std::filesystem::path& file);
+
 /// Records a file as an input of this process: begin_part and require_writable refuse it from now
 /// on. Files that the process itself has begun to write are no inputs. Every reader calls this. Not
 /// collective.

@@ -22,6 +22,20 @@ TEST(WholeFile, DoesNotReplaceAnInput) {
   EXPECT_EQ(folder.content(), "a link");
 }
 
+TEST(WholeFile, AReservedOutputIsNoInput) {
+  const test::Folder folder;
+  folder.write("c", "input");
+  std::filesystem::create_symlink("c", folder.path("link"));
+  reserve_output(folder.path("c"));
+  for (const char* name : {"c", "link"})
+    EXPECT_NE(test::refusal([&] {
+                record_input(folder.path(name));
+              }).find("is an input of this run and would be replaced"),
+              std::string::npos);
+  write_whole_file(folder.path("c"), "output");
+  EXPECT_EQ(test::refusal([&] { record_input(folder.path("c")); }), "accepted") << "its own";
+}
+
 TEST(WholeFile, WritesAgainWhatItHasWritten) {
   const test::Folder folder;
   write_whole_file(folder.path("b"), "first");
