@@ -93,6 +93,7 @@ TEST(Anatomy, RefusesLandmarksOfNoHead) {
       "has 'lower_lpi', which is no landmark's name, and lacks lower_lip; rename it");
   misspelled.erase("lower_lpi");
   misspelled["left side"] = {0, 0, 0};
+  misspelled["porion_left"] = {50, -10, 5};  // of the Frankfort plane, beside a missing gonion_left
   EXPECT_EQ(refused(misspelled), "accepted");
   Landmarks in_cm = head();
   for (auto& [name, place] : in_cm) place /= 10;
