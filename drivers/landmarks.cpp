@@ -63,17 +63,6 @@ void require_sides(const scene::Landmarks& given, const anatomy::HeadFrame& fram
   }
 }
 
-/// Names the standard landmark that a name without one may misspell, or nothing.
-std::string remark_on_name(const std::string& name) {
-  constexpr std::size_t misspelled = 2;  // letters
-  std::vector<std::string> known;
-  for (const scene::LandmarkName& landmark : scene::landmark_names())
-    known.push_back(landmark.name);
-  const std::string nearest = base::nearest(name, known);
-  if (base::edit_distance(name, nearest) > misspelled) return "";
-  return fmt::format(", under no standard name; did you mean {}?", nearest);
-}
-
 void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal& alone,
                      const scene::Landmarks& given) {
   std::printf("%-24s %10s %10s %10s   %s\n", "landmark, mm", "x", "y", "z", "");
@@ -102,9 +91,12 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
                 note.c_str());
   }
   for (const auto& [name, at] : given)
-    if (scene::standard_name(name).empty())
-      std::printf("%-24s %10.2f %10.2f %10.2f   given%s\n", base::quote(name).c_str(), at.x(),
-                  at.y(), at.z(), remark_on_name(name).c_str());
+    if (scene::standard_name(name).empty()) {
+      const std::string meant = scene::misspelled_name(name, given);
+      std::printf("%-24s %10.2f %10.2f %10.2f   given%s%s%s\n", base::quote(name).c_str(), at.x(),
+                  at.y(), at.z(), meant.empty() ? "" : ", under no standard name; did you mean ",
+                  meant.c_str(), meant.empty() ? "" : "?");
+    }
   if (count > 0)
     std::printf(
         "%d given landmarks: proposed at a distance of %.2f mm in the mean, %.2f mm at most\n",

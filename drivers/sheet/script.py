@@ -20,8 +20,18 @@ def refuse(reason):
     sys.exit(1)
 
 
+HELP = {"-h", "-help", "--help"}
+
+
+def print_help(documentation):
+    print(documentation.strip())
+    sys.exit(0)
+
+
 def refuse_missing(module, install):
-    """Ends a script whose Python lacks a module; `install` says how to get it."""
+    """Ends a script whose Python lacks a module; `install` says how to get it. Help needs no module."""
+    if HELP & set(sys.argv[1:]):
+        print_help(sys.modules["__main__"].__doc__)
     usual = "/usr/bin/python3"
     of_another = os.path.exists(usual) and not os.path.samefile(sys.executable, usual)
     run_usual = f"; packages of apt are of {usual}: {usual} {sys.argv[0]} …" if of_another else ""
@@ -112,9 +122,8 @@ def result_name(text):
 def words(documentation, least, most=math.inf):
     """The arguments of a script without options, `least` to `most` of them."""
     given = sys.argv[1:]
-    if {"-h", "-help", "--help"} & set(given):
-        print(documentation.strip())
-        sys.exit(0)
+    if HELP & set(given):
+        print_help(documentation)
     unknown = [word for word in given if word.startswith("-") and not is_number(word)]
     if unknown or not least <= len(given) <= most:
         usage = next(line.strip() for line in documentation.splitlines()

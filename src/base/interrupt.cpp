@@ -122,7 +122,9 @@ RemovalOnSignal::RemovalOnSignal(const std::filesystem::path& file) {
   action.sa_handler = remove_and_end;
   for (size_t k = 0; k < ending_signals.size(); ++k) {
     sigaction(ending_signals[k], nullptr, &usual_actions[k]);
-    if (usual_actions[k].sa_handler != SIG_IGN) sigaction(ending_signals[k], &action, nullptr);
+    // An ignored signal ends nothing, nor does one that a library takes: UCX, which Open MPI 5
+    // needs, takes SIGHUP before main().
+    if (usual_actions[k].sa_handler == SIG_DFL) sigaction(ending_signals[k], &action, nullptr);
   }
 }
 

@@ -74,6 +74,17 @@ std::string standard_name(const std::string& spelling) {
   return "";
 }
 
+std::string misspelled_name(const std::string& name, const Landmarks& landmarks) {
+  constexpr size_t misspelled = 2, shortest = 8;  // letters
+  if (!standard_name(name).empty()) return "";
+  for (const LandmarkName& standard : landmark_names())
+    if (standard.name.size() >= shortest && name.starts_with(standard.name[0]) &&
+        !find(landmarks, standard.name.c_str()) &&
+        base::edit_distance(name, standard.name) <= misspelled)
+      return standard.name;
+  return "";
+}
+
 const Vec3* find(const Landmarks& landmarks, const char* name) {
   const auto found = landmarks.find(name);
   return found == landmarks.end() ? nullptr : &found->second;

@@ -51,18 +51,11 @@ void check_sides(const Value& file, const Landmarks& landmarks) {
 }
 
 /// Refuses a misspelled landmark, which would pass for a point of the user's own and be ignored.
-/// A name with another first letter is not misspelled (porion_left is not gonion_left).
 void check_names(const Value& file, const Landmarks& landmarks) {
-  constexpr size_t misspelled = 2, shortest = 8;  // letters
-  for (const auto& [name, place] : landmarks) {
-    if (!standard_name(name).empty()) continue;
-    for (const LandmarkName& standard : landmark_names())
-      if (standard.name.size() >= shortest && name.starts_with(standard.name[0]) &&
-          !find(landmarks, standard.name.c_str()) &&
-          base::edit_distance(name, standard.name) <= misspelled)
-        file.refuse("has {}, which is no landmark's name, and lacks {}; rename it",
-                    base::quote(name), standard.name);
-  }
+  for (const auto& [name, place] : landmarks)
+    if (const std::string meant = misspelled_name(name, landmarks); !meant.empty())
+      file.refuse("has {}, which is no landmark's name, and lacks {}; rename it", base::quote(name),
+                  meant);
 }
 
 /// Refuses condyles that are as far apart as those of no head in mm.

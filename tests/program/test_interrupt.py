@@ -73,13 +73,16 @@ def building(folder, environment, **settings):
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_before_the_search_leaves_no_file(environment, tmp_path, sent):
+    """But for the folder of its own that Open MPI 5 makes in any case. With that, UCX takes SIGHUP."""
+    if sent == signal.SIGHUP and "libucs" in subprocess.check_output(["ldd", programs() / "repose-solve"], text=True):
+        pytest.skip("UCX takes the signal, which ends no program then")
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     process = building(tmp_path, {**environment, "TMPDIR": str(temporary)})
     process.send_signal(sent)
     process.communicate(timeout=60)
     assert process.returncode == -sent
-    assert list(tmp_path.rglob("*")) == [temporary]
+    assert [path for path in tmp_path.rglob("*") if "/ompi." not in str(path)] == [temporary]
 
 
 def test_a_run_that_ignores_hang_ups_goes_on(environment, tmp_path):

@@ -49,6 +49,12 @@ def script(tmp_path, environment):
     return run
 
 
+def require_matplotlib(name):
+    """Skips a test of a script that draws where Matplotlib is missing."""
+    if "import matplotlib" in SCRIPTS[name].read_text():
+        pytest.importorskip("matplotlib")
+
+
 def says(result, name, *parts):
     assert result.returncode == 1, result
     assert len(result.stderr.splitlines()) == 1, result.stderr
@@ -96,7 +102,7 @@ OWN = sorted(SCRIPTS.keys() - {"paraview_repose.py", "plan.py", "Repose"})
 @pytest.mark.parametrize("name", [*OWN, "figures.sh", "demo.sh"])
 def test_help_is_printed_and_nothing_is_done(script, environment, tmp_path, name):
     for word in ("-h", "-help", "--help"):
-        result = script(name, word) if name in SCRIPTS else \
+        result = script(name, word, without=MODULES) if name in SCRIPTS else \
             finish([PROJECT / "drivers" / name, word], tmp_path, environment, TIME_LIMIT)
         assert (result.returncode, result.stderr) == (0, ""), result
         assert len(result.stdout.splitlines()) > 4
@@ -177,6 +183,7 @@ REPLACED = {"report.py": (["r", "-output"], ".html"), "render.py": (["r", "-outp
 
 @pytest.mark.parametrize("name", REPLACED)
 def test_a_script_does_not_replace_the_result_that_it_reads(script, result, name):
+    require_matplotlib(name)
     arguments, ending = REPLACED[name]
     content = result.read_bytes()
     for target, part in (("r.h5", "does not end in " + ending), (linked(result, "r" + ending), "is an input")):
@@ -226,6 +233,7 @@ DRAWN = {"report.py": ["r.h5"], "render.py": ["r.h5"], "plot_incision.py": ["pic
 @pytest.mark.parametrize("damage", [set_rows, set_negative_rows, set_positions, remove_model])
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_damaged_result_is_refused(script, result, name, damage):
+    require_matplotlib(name)
     if name == "render.py" and not can_draw():
         pytest.skip("no VTK")
     if name == "plot_equilibrium.py":  # reads springs, of the initial position
@@ -239,6 +247,7 @@ def test_a_damaged_result_is_refused(script, result, name, damage):
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_truncated_or_foreign_result_is_refused(script, result, name):
+    require_matplotlib(name)
     if name == "render.py" and not can_draw():
         pytest.skip("no VTK")
     content = result.read_bytes()

@@ -27,6 +27,10 @@ const std::vector<LandmarkName>& landmark_names();
 /// stands for none. Upper and lower case, blanks, hyphens and underscores are alike.
 std::string standard_name(const std::string& spelling);
 
+/// The standard name, missing among `landmarks`, that a name without one may misspell; else empty.
+/// A name with another first letter is a point of the user's own (porion_left is not gonion_left).
+std::string misspelled_name(const std::string& name, const Landmarks& landmarks);
+
 /// Landmarks under their standard names; those without one keep theirs. InputError naming `file`
 /// where two spellings of one landmark have different positions.
 Landmarks with_standard_names(const Landmarks& landmarks, const std::string& file);
