@@ -93,9 +93,10 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
   for (const auto& [name, at] : given)
     if (scene::standard_name(name).empty()) {
       const std::string meant = scene::misspelled_name(name, given);
-      std::printf("%-24s %10.2f %10.2f %10.2f   given%s%s%s\n", base::quote(name).c_str(), at.x(),
-                  at.y(), at.z(), meant.empty() ? "" : ", under no standard name; did you mean ",
-                  meant.c_str(), meant.empty() ? "" : "?");
+      std::printf("%-24s %10.2f %10.2f %10.2f   given", base::quote(name).c_str(), at.x(), at.y(),
+                  at.z());
+      if (!meant.empty()) std::printf(", under no standard name; did you mean %s?", meant.c_str());
+      std::printf("\n");
     }
   if (count > 0)
     std::printf(

@@ -32,10 +32,10 @@ class Target:
             raise Unusable(f"{self.file}: cannot be written: there is no folder {folder}; make it first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise Unusable(f"{self.file}: cannot be written: folder {folder} is read-only; choose another one")
-        if os.path.exists(self.file) and not os.path.isfile(self.file):
+        there = os.path.exists(self.file)
+        if there and not os.path.isfile(self.file):
             raise Unusable(f"{self.file}: cannot be written: it is no regular file; choose another name")
-        if any(os.path.exists(file) and os.path.samefile(file, self.file) for file in self.inputs
-               if os.path.exists(self.file)):
+        if there and any(os.path.exists(file) and os.path.samefile(file, self.file) for file in self.inputs):
             raise Unusable(f"{self.file}: is an input of this run and would be replaced; choose another name")
         with self.part() as part:  # names and folders that the system refuses
             os.remove(part)

@@ -1,7 +1,6 @@
 #include "value.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <tuple>
 
@@ -18,12 +17,6 @@ std::string joined(const std::string& above, const std::string& name) {
   return above.empty() ? name : fmt::format("{}.{}", above, name);
 }
 
-bool differ_in_case_only(const std::string& one, const std::string& other) {
-  return std::ranges::equal(one, other, [](unsigned char a, unsigned char b) {
-    return std::tolower(a) == std::tolower(b);
-  });
-}
-
 /// Why a path that leads to no file may do so: folders as Windows writes them, or a name in other
 /// case; else empty.
 std::string remark_on_path(const std::filesystem::path& path) {
@@ -32,7 +25,7 @@ std::string remark_on_path(const std::filesystem::path& path) {
   for (std::filesystem::directory_iterator entry(path.parent_path(), error), end;
        !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (differ_in_case_only(name, path.filename().string()))
+    if (base::lower(name) == base::lower(path.filename().string()))
       return fmt::format("; its folder holds {}", base::quote(name));
   }
   return "";

@@ -129,15 +129,16 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
 }
 
 /// Lets points that press near an edge of a body go round it, one at a time, where that ends at
-/// less energy. The position that is left is the outcome's other one. Returns whether there was
-/// one. Collective.
-bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& outcome) {
+/// less energy, but for the constraints of this rank that were `tried`, to which it adds. The
+/// position that is left is the outcome's other one. Returns whether there was one. Collective.
+bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<size_t>& tried,
+                                   Outcome& outcome) {
   constexpr int max_tried = 8;
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   programs_.evaluate(displacement);
   std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
-  std::erase_if(sides, [&](const OtherSide& s) { return tried_.contains(s.gap.constraint); });
+  std::erase_if(sides, [&](const OtherSide& s) { return tried.contains(s.gap.constraint); });
   size_t next = 0;
   bool changed = false;
   for (int n = 0; n < max_tried; ++n) {
@@ -146,7 +147,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, Outcome& o
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
-    if (mine) tried_.insert(sides[next].gap.constraint);
+    if (mine) tried.insert(sides[next].gap.constraint);
     const End end = change_side(mine ? &sides[next++] : nullptr, displacement, accuracy);
     Outcome there;
     int64_t iterations = 0;
@@ -167,10 +168,10 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   constexpr int max_passes = 3;  // after a change, other points may follow
   if (!presses_near_edge(displacement)) return;
   const int64_t evaluated = objective_.evaluations();
-  tried_.clear();
+  std::set<size_t> tried;
   consider_other(displacement, accuracy, outcome);
   for (int pass = 0; pass < max_passes; ++pass)
-    if (!change_sides(displacement, accuracy, outcome)) break;
+    if (!change_sides(displacement, accuracy, tried, outcome)) break;
   programs_.evaluate(displacement);
   evaluations_ += objective_.evaluations() - evaluated;
 }

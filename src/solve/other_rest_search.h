@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <set>
 
 #include "contact_descent.h"
@@ -26,7 +27,7 @@ class OtherRestSearch {
   bool presses_near_edge(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
-  bool change_sides(Vec displacement, double accuracy, Outcome& outcome);
+  bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
   std::vector<Vec3> displacements(Vec state);
@@ -39,7 +40,6 @@ class OtherRestSearch {
   int64_t evaluations_ = 0;
   ContactPressures at_prediction_;
   base::VecHandle start_;
-  std::set<size_t> tried_;  // constraints of this rank whose other side one find() has tried
 };
 
 }  // namespace repose::solve

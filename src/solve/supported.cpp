@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 
 #include "repose/base/error.h"
 #include "repose/base/options.h"
@@ -11,13 +10,6 @@
 namespace repose::solve {
 
 namespace {
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));  // as PETSc compares names
-  });
-  return text;
-}
 
 bool matches(const std::string& pattern, const std::string& name) {
   const std::size_t star = pattern.find('*');
@@ -29,7 +21,7 @@ bool matches(const std::string& pattern, const std::string& name) {
 
 void require_supported(const std::string& name, const std::string& value) {
   for (const SupportedTypes& types : supported_types()) {
-    if (!matches(types.option, lower(name))) continue;
+    if (!matches(types.option, base::lower(name))) continue;
     if (types.values.empty()) base::refuse("-{} {}: {}", name, value, types.use);
     if (std::find(types.values.begin(), types.values.end(), value) != types.values.end()) return;
     base::refuse("-{} {}: must be one of {} ({})", name, value.empty() ? "(no value)" : value,
@@ -39,13 +31,15 @@ void require_supported(const std::string& name, const std::string& value) {
 
 /// Returns whether a word is what PETSc reads as no number at all.
 bool is_nan(const std::string& value) {
-  const std::string word = lower(value);
+  const std::string word = base::lower(value);
   return word == "nan" || word == "+nan" || word == "-nan";
 }
 
 void require_number(const std::string& name, const std::string& value) {
   for (const SupportedNumbers& numbers : supported_numbers()) {
-    const auto is_named = [&](const std::string& option) { return matches(option, lower(name)); };
+    const auto is_named = [&](const std::string& option) {
+      return matches(option, base::lower(name));
+    };
     if (std::none_of(numbers.options.begin(), numbers.options.end(), is_named)) continue;
     const auto number = base::parse_number(value);
     const bool whole = !numbers.whole || base::parse_integer(value);

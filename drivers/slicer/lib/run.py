@@ -18,7 +18,7 @@ import xml.etree.ElementTree
 FOLDER = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(FOLDER.parent))
 from sheet.ply import Header  # noqa: E402
-from sheet.script import Unusable as Refusal, reading  # noqa: E402
+from sheet.script import HELP, Unusable as Refusal, reading  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 
 BONES = 4
@@ -443,7 +443,7 @@ def main():
     if "--xml" in sys.argv[1:]:
         sys.stdout.write((FOLDER / "Repose.xml").read_text(encoding="utf-8"))
         return 0
-    if {"-h", "-help", "--help"} & set(sys.argv[1:]):
+    if HELP & set(sys.argv[1:]):
         print(help_text())
         return 0
     try:
