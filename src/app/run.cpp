@@ -168,6 +168,11 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file) {
   kept_ = strategy_.tears ? 0 : from.kept;
   bool done = false, folded = false;
   base::on_root(comm, [&] {
+    if (!from.differing.empty())
+      print(describe_warnings({fmt::format(
+          "{} is of another model or plan: its {} differs; the search begins at its state, and may "
+          "find another rest position than without -restart",
+          file.string(), from.differing)}));
     if (!from.end || !is_done(*from.end)) return;
     done = true;
     folded = from.end->inverted_prisms > 0 && !folds_allowed_;

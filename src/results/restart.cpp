@@ -53,18 +53,30 @@ void refuse_another_model(const std::filesystem::path& file, const model::Model&
   if (stored.prisms.points.size() != model.prisms.points.size()) refuse("prisms");
 }
 
-/// The numbers of arrays, one list an array.
+/// The numbers of arrays, one list an array, with its name in /model of the file.
 class Numbers {
  public:
   template <class Row>
-  void operator()(const char*, const std::vector<Row>& rows) {
+  void operator()(const char* array, const std::vector<Row>& rows) {
+    names_.push_back(group_ + array);
     lists_.emplace_back();
     for (const Row& row : rows) add(row);
   }
-  /// Equal but for rounding: an initial equilibrium is found by the ranks that there are.
-  bool agree_with(const Numbers& other) const {
-    return std::equal(lists_.begin(), lists_.end(), other.lists_.begin(), other.lists_.end(),
-                      are_close);
+  /// Adds the arrays of a group of the file.
+  template <class Arrays>
+  void add_group(const std::string& name, const Arrays& arrays) {
+    group_ = name + "/";
+    model::for_each_array(arrays, *this);
+    group_.clear();
+  }
+  /// Returns the first array that differs by more than rounding, with which an initial equilibrium
+  /// depends on the ranks; empty where there is none.
+  std::string first_difference(const Numbers& other) const {
+    const size_t shared = std::min(names_.size(), other.names_.size());
+    for (size_t k = 0; k < shared; ++k)
+      if (names_[k] != other.names_[k] || !are_close(lists_[k], other.lists_[k])) return names_[k];
+    if (names_.size() == other.names_.size()) return {};
+    return names_.size() > shared ? names_[shared] : other.names_[shared];
   }
 
  private:
@@ -82,32 +94,34 @@ class Numbers {
     return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                       [&](double a, double b) { return std::abs(a - b) <= rounding * largest; });
   }
+  std::string group_;
+  std::vector<std::string> names_;
   std::vector<std::vector<double>> lists_;
 };
 
 void add_contact(const model::Contact& contact, Numbers& numbers) {
-  model::for_each_array(contact.pairs, numbers);
+  numbers.add_group("contact", contact.pairs);
   numbers("contact", std::vector{contact.stiffness, contact.spacing});
   for (const model::Body& body : contact.bodies) {
-    numbers("push", std::vector{body.push});
-    numbers("shape", shape_row(body));
+    numbers("body_push", std::vector{body.push});
+    numbers("body_shape", shape_row(body));
     const auto* mesh = std::get_if<surface::Surface>(&body.shape);
-    if (body.bone < 0 && mesh) numbers("mesh", mesh->points);
+    if (body.bone < 0 && mesh) numbers("body mesh", mesh->points);
   }
 }
 
 Numbers numbers_of(const model::Model& m) {
   Numbers numbers;
   numbers("gravity", std::vector{m.gravity});
-  model::for_each_array(m.points, numbers);
-  model::for_each_array(m.prisms, numbers);
-  model::for_each_array(m.edges, numbers);
+  numbers.add_group("point", m.points);
+  numbers.add_group("prism", m.prisms);
+  numbers.add_group("edge", m.edges);
   numbers("bone_transform", m.bone_transform);
   if (!m.contact.empty()) add_contact(m.contact, numbers);
-  model::for_each_array(m.springs, numbers);
+  numbers.add_group("spring", m.springs);
   for (const model::TermElements& elements : m.elements) {
-    numbers("points", elements.points);
-    numbers("numbers", elements.numbers);
+    numbers((elements.term + "/points").c_str(), elements.points);
+    numbers((elements.term + "/numbers").c_str(), elements.numbers);
   }
   return numbers;
 }
@@ -123,7 +137,8 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
     Found found = find_step(file, model);
     restart.guess = found.guess;
     restart.load = found.guess ? 0 : found.step.numbers.load;
-    const bool same = !is_checkpoint(file) && numbers_of(stored).agree_with(numbers_of(model));
+    restart.differing = numbers_of(stored).first_difference(numbers_of(model));
+    const bool same = !is_checkpoint(file) && restart.differing.empty();
     if (same) restart.kept = found.row;
     const bool last = found.row + 1 == step_count(file);
     if (same && last && restart.load == 1) restart.end = found.step.numbers;

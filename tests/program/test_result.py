@@ -1,5 +1,6 @@
 """Which files a run of repose-solve writes, what is in them, and how a run is taken up again."""
 
+import re
 import shutil
 import xml.etree.ElementTree
 import signal
@@ -153,7 +154,16 @@ def test_a_restart_with_other_settings_searches(run, face, tmp_path):
     (tmp_path / "other.yaml").write_text(text.replace("poisson: 0.4967", "poisson: 0.49"))
     result = run("repose-solve", "other.yaml", "-accuracy", ACCURACY, "-restart", face)
     assert result.returncode == 0 and "nothing is left to do" not in result.stdout
+    assert "another model or plan" not in result.stdout
     assert apart(last(tmp_path / "other.h5"), last(face)) > 2 * ACCURACY
+
+
+def test_a_restart_from_another_plan_warns(run, face, tmp_path):
+    text = SCENE.read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")
+    (tmp_path / "other.yaml").write_text(re.sub(r"translate: .*?]", "translate: [0, -5, 0]", text))
+    result = run("repose-solve", "other.yaml", "-restart", face)
+    assert result.returncode == 0
+    assert re.search("warning .* is of another model or plan: its point/target differs", result.stdout), result
 
 
 def test_restart_from_another_model_is_refused(run, face, tmp_path):

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "repose/model/model.h"
@@ -16,6 +17,8 @@ struct Restart {
   std::vector<Vec3> position;  ///< [this rank's slab of N] mm
   bool guess = false;          ///< the position is one of a search at load 1 that was not done
   int64_t kept = 0;  ///< steps of the file before this one, where its model is the same throughout
+  /// On rank 0: the first array of the file's model that differs from the input's; empty: none.
+  std::string differing;
   std::optional<model::StepNumbers> end;  ///< on rank 0: of the last step, if it is a rest position
                                           ///< at load 1 of a result of that same model
 };

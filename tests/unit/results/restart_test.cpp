@@ -75,6 +75,7 @@ Restart restart_of_result(const Folder& folder, const std::vector<double>& loads
 TEST(Restart, KnowsAFinishedResult) {
   const Folder folder;
   const Restart restart = restart_of_result(folder, {0, 0.5, 1}, small_model());
+  EXPECT_EQ(restart.differing, "");
   ASSERT_TRUE(restart.end);
   EXPECT_EQ(restart.end->load, 1);
   EXPECT_EQ(restart.kept, 2);
@@ -89,17 +90,18 @@ TEST(Restart, KeepsTheStepsBefore) {
 }
 
 TEST(Restart, OfAModelThatDiffersKeepsNothing) {
-  const std::vector<std::function<void(model::Model&)>> changes = {
-      [](model::Model& m) { m.points.target.back().z() += 1e-3; },
-      [](model::Model& m) { m.springs.stiffness[0] *= 1.01; },
-      [](model::Model& m) { m.prisms.rest_volume[0] *= 1.01; },
-      [](model::Model& m) { m.gravity.z() = 0; },
-      [](model::Model& m) { m.bone_transform[1](2, 3) += 1; }};
-  for (const auto& change : changes) {
+  const std::vector<std::pair<std::string, std::function<void(model::Model&)>>> changes = {
+      {"point/target", [](model::Model& m) { m.points.target.back().z() += 1e-3; }},
+      {"spring/stiffness", [](model::Model& m) { m.springs.stiffness[0] *= 1.01; }},
+      {"prism/rest_volume", [](model::Model& m) { m.prisms.rest_volume[0] *= 1.01; }},
+      {"gravity", [](model::Model& m) { m.gravity.z() = 0; }},
+      {"bone_transform", [](model::Model& m) { m.bone_transform[1](2, 3) += 1; }}};
+  for (const auto& [array, change] : changes) {
     const Folder folder;
     model::Model m = small_model();
     change(m);
     const Restart restart = restart_of_result(folder, {0, 1}, m);
+    EXPECT_EQ(restart.differing, array);
     EXPECT_FALSE(restart.end);
     EXPECT_EQ(restart.kept, 0);
     EXPECT_EQ(restart.load, 1);
