@@ -154,6 +154,11 @@ HeadFrame HeadFrame::upright(const Vec3& low, const Vec3& high) const {
   return turned;
 }
 
+Vec3 fit_midsagittal_normal(const surface::Surface& bones) {
+  const Vec3 normal = fit_plane(bones).normal;
+  return normal.x() < 0 ? Vec3(-normal) : normal;
+}
+
 HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& mandible) {
   constexpr double rise = 22 * std::numbers::pi / 180;  // of the way from symphysis to rami
   const Plane plane = fit_plane(skull);

@@ -146,10 +146,12 @@ std::vector<Vec3> mirrored(const FrontMap& skin, const std::vector<Vec3>& crease
   };
   std::vector<Vec3> points;
   const int side = end.x() < 0 ? -1 : 1;
+  double last = end.y();
   for (double x = std::abs(end.x()) + skin.spacing(); x <= half; x += skin.spacing()) {
     const double z = end.z() + height(-side * x) - height(-end.x());
     const auto depth = skin.depth(side * x, z);
-    if (!depth) break;
+    if (!depth || *depth > last + behind) break;
+    last = *depth;
     points.emplace_back(side * x, *depth, z);
   }
   return points;

@@ -6,6 +6,7 @@
 
 #include "front_map.h"
 #include "repose/anatomy/propose.h"
+#include "repose/scene/landmark_names.h"
 
 namespace repose::anatomy {
 
@@ -55,6 +56,9 @@ class Search {
   Proposal proposal() const {
     Proposal result{frame_, given_, missing_, remarks_};
     for (const auto& [name, place] : found_) result.found[name] = frame_.to_scan(place);
+    for (const scene::LandmarkName& landmark : scene::landmark_names())
+      if (!result.found.contains(landmark.name))
+        result.missing.try_emplace(landmark.name, "landmarks that it follows were not found");
     return result;
   }
 

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "repose/surface/edges.h"
+#include "scan_end.h"
 #include "search.h"
 
 namespace repose::anatomy {
@@ -12,6 +14,7 @@ constexpr double condyle_depth = 9;   // mm below its top
 constexpr double condyle_reach = 12;  // mm before and behind its top
 constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
 constexpr double dentate = 34;        // mm, height of a symphysis with teeth at least
+constexpr double uneven = 0.8;        // of the rami's lengths, that a head may have
 
 /// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell from the
 /// height of `start` to `to_z`, within the incisors' width and `reach` of the depth of `start`.
@@ -33,15 +36,19 @@ std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint
   return edge;
 }
 
-void search_symphysis(const FrontMap& map, Search& search) {
+void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
+  constexpr double cut = 3;  // mm
   const auto profile = map.profile(map.low_z(), map.high_z(), midline);
-  if (profile.empty()) {
+  const auto lacks = [&](const char* why) {
     for (const char* name : {"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"})
-      search.lack(name, "MANDIBLE has no bone at the midline");
-    return;
-  }
+      search.lack(name, why);
+  };
+  if (profile.empty()) return lacks("MANDIBLE has no bone at the midline");
   const double low = profile.front().y(), front = foremost_of(profile)->x();
-  search.put("menton_bone", Vec3(0, profile.front().x(), low));
+  const Vec3 lowest(0, profile.front().x(), low);
+  if (end.within(search.frame().to_scan(lowest), cut))
+    return lacks("MANDIBLE is cut off flat at the chin, where the scan ends");
+  search.put("menton_bone", lowest);
   const auto menton = *search.find("menton_bone");
   if (const auto edge = tooth_edge(map, 1, {front + 6, menton.z() + 5}, map.high_z(), 12))
     search.put("lower_incisor_edge", *edge);
@@ -63,7 +70,38 @@ void search_symphysis(const FrontMap& map, Search& search) {
              "no bone between pogonion and the lower incisors");
 }
 
-void search_condyle(const std::vector<Vec3>& points, int side, Search& search) {
+/// The mandible in the head frame.
+struct Mandible {
+  std::vector<Vec3> points;
+  std::vector<char> at_rim;  // [points]
+  ScanEnd end;
+};
+
+Mandible mandible_in(const HeadFrame& frame, const surface::Surface& surface) {
+  Mandible mandible{{}, {}, ScanEnd(surface)};
+  std::vector<char> used(surface.points.size());
+  for (const Triangle& triangle : surface.triangles)
+    for (const int64_t corner : triangle) used[corner] = 1;
+  const auto border = surface::border_vertices(surface::EdgeTable(surface.triangles), used.size());
+  for (size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    mandible.points.push_back(frame.to_frame(surface.points[i]));
+    mandible.at_rim.push_back(border[i]);
+  }
+  return mandible;
+}
+
+/// Returns whether the mandible ends at a condyle's top because its scan did.
+bool is_cut_off(const Mandible& mandible, const Vec3& top, const HeadFrame& frame) {
+  constexpr double beside = 3;  // mm
+  if (mandible.end.within(frame.to_scan(top), condyle_reach)) return true;
+  for (size_t i = 0; i < mandible.points.size(); ++i)
+    if (mandible.at_rim[i] && (mandible.points[i] - top).norm() <= beside) return true;
+  return false;
+}
+
+void search_condyle(const Mandible& mandible, int side, Search& search) {
+  const std::vector<Vec3>& points = mandible.points;
   const std::string name = side > 0 ? "left" : "right";
   double front = INFINITY, back = -INFINITY;
   for (const Vec3& p : points) {
@@ -82,6 +120,11 @@ void search_condyle(const std::vector<Vec3>& points, int side, Search& search) {
   if (!top || !angle)
     return search.lack(fmt::format("condyle_{}_center", name),
                        fmt::format("MANDIBLE has no {} ramus", name));
+  search.put(fmt::format("gonion_{}", name), *angle);
+  if (is_cut_off(mandible, *top, search.frame()))
+    return search.lack(
+        fmt::format("condyle_{}_center", name),
+        fmt::format("MANDIBLE is cut off at its {} condyle, where the scan ends", name));
   Vec3 low = *top, high = *top;
   for (const Vec3& p : points)
     if (aside(p) && p.z() >= top->z() - condyle_depth &&
@@ -90,7 +133,24 @@ void search_condyle(const std::vector<Vec3>& points, int side, Search& search) {
       high = high.cwiseMax(p);
     }
   search.put(fmt::format("condyle_{}_center", name), (low + high) / 2);
-  search.put(fmt::format("gonion_{}", name), *angle);
+}
+
+/// Remarks on a ramus that is far shorter than the other one: its condyle may be missing.
+void remark_uneven(Search& search) {
+  std::array<double, 2> length{};
+  for (const int side : {0, 1}) {
+    const std::string name = side == 0 ? "right" : "left";
+    const auto condyle = search.find(fmt::format("condyle_{}_center", name)),
+               gonion = search.find(fmt::format("gonion_{}", name));
+    if (!condyle || !gonion) return;
+    length[side] = (*condyle - *gonion).norm();
+  }
+  const int shorter = length[1] < length[0] ? 1 : 0;
+  if (length[shorter] < uneven * length[1 - shorter])
+    search.remark(fmt::format(
+        "the {} ramus is {:.0f} mm long, the other {:.0f} mm: check whether its condyle is in "
+        "MANDIBLE; the axes of the head follow the condyles",
+        shorter == 1 ? "left" : "right", length[shorter], length[1 - shorter]));
 }
 
 /// The height of the nasal floor: the median over columns beside the septum of where the nasal
@@ -181,10 +241,10 @@ void search_upper_jaw(const FrontMap& map, Search& search) {
 }  // namespace
 
 void search_bones(const surface::Surface& skull, const surface::Surface& mandible, Search& search) {
-  search_symphysis(FrontMap(mandible, search.frame()), search);
-  std::vector<Vec3> points;
-  for (const Vec3& p : mandible.points) points.push_back(search.frame().to_frame(p));
-  for (const int side : {-1, 1}) search_condyle(points, side, search);
+  const Mandible in_frame = mandible_in(search.frame(), mandible);
+  search_symphysis(FrontMap(mandible, search.frame()), in_frame.end, search);
+  for (const int side : {-1, 1}) search_condyle(in_frame, side, search);
+  remark_uneven(search);
   search_upper_jaw(FrontMap(skull, search.frame()), search);
 }
 

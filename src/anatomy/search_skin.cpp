@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "lip_crease.h"
+#include "scan_end.h"
 #include "search.h"
 
 namespace repose::anatomy {
@@ -69,7 +70,16 @@ double search_mouth(const FrontMap& skin, Search& search) {
   return crease.gap / 2;
 }
 
-void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
+/// Takes a point of the skin's profile, unless the scan ended there.
+void put_inside(const std::string& name, const std::optional<ProfilePoint>& point,
+                const ScanEnd& end, const std::string& otherwise, Search& search) {
+  constexpr double cut = 2;  // mm
+  if (point && end.within(search.frame().to_scan(Vec3(0, point->x(), point->y())), cut))
+    return search.lack(name, "SKIN is cut off flat there, where the scan ends");
+  search.put(name, point, otherwise);
+}
+
+void search_nose_tip(const std::vector<ProfilePoint>& profile, const ScanEnd& end, Search& search) {
   const auto nasion = search.find("nasion_bone"), spine = search.find("nasal_spine");
   if (!spine) {
     for (const char* name : {"pronasale", "subnasale", "nasion_soft"})
@@ -77,10 +87,13 @@ void search_nose_tip(const std::vector<ProfilePoint>& profile, Search& search) {
     return;
   }
   const double top = nasion ? nasion->z() : spine->z() + 45;
-  search.put("pronasale", foremost_of(between(profile, spine->z() - 10, top)), "SKIN has no nose");
+  put_inside("pronasale", foremost_of(between(profile, spine->z() - 10, top)), end,
+             "SKIN has no nose", search);
   const auto tip = search.profile_point("pronasale");
   const auto brow = foremost_of(between(profile, top + 8, top + 30));
-  if (!tip || !brow) return search.lack("nasion_soft", "SKIN ends below the glabella");
+  if (!tip || !brow)
+    return search.lack("nasion_soft",
+                       tip ? "SKIN ends below the glabella" : "the tip of the nose was not found");
   search.put("nasion_soft",
              farthest_from_chord(between(profile, top - 12, top + 12), *tip, *brow, -1),
              "SKIN ends below the glabella");
@@ -122,7 +135,7 @@ void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& s
 }
 
 void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::Surface& skin,
-                      Search& search) {
+                      const ScanEnd& end, Search& search) {
   constexpr double around = 3, above = 9;  // mm
   const auto menton = search.find("menton_bone"), chin = search.find("pogonion_bone");
   if (!menton || !chin) {
@@ -130,8 +143,8 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
       search.lack(name, "the chin of MANDIBLE was not found");
     return;
   }
-  search.put("pogonion_soft", chin_of(profile, chin->z() - above, chin->z() + above),
-             "SKIN has no chin");
+  put_inside("pogonion_soft", chin_of(profile, chin->z() - above, chin->z() + above), end,
+             "SKIN has no chin", search);
   std::optional<Vec3> below;
   for (const Vec3& point : skin.points) {
     const Vec3 p = search.frame().to_frame(point);
@@ -150,8 +163,9 @@ void search_skin(const surface::Surface& skin, Search& search) {
   const FrontMap map(skin, search.frame());
   const auto profile = map.profile(map.low_z(), map.high_z(), skin_midline);
   const double half_gap = search_mouth(map, search);
-  search_nose_tip(profile, search);
-  search_soft_chin(profile, skin, search);
+  const ScanEnd end(skin);
+  search_nose_tip(profile, end, search);
+  search_soft_chin(profile, skin, end, search);
   search_lips(profile, half_gap, search);
 }
 

@@ -26,7 +26,7 @@ ROOMS = {
     "live": {"base", "scene", "surface", "model", "solve", "adapt", "app"},
     "app": {"base", "scene", "surface", "model", "mechanics", "discrete", "linear", "solve",
             "results", "adapt"},
-    "tools/bone_separation": {"base", "imaging"},
+    "tools/bone_separation": {"base", "imaging", "anatomy"},
     "tools/check": {"base", "model", "mechanics", "results"},
     "tools/comparison": {"base", "surface", "imaging", "meshtools"},
     "tools/decimation": {"base", "surface"},

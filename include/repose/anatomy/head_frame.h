@@ -17,9 +17,12 @@ struct HeadFrame {
   HeadFrame upright(const Vec3& low, const Vec3& high) const;
 };
 
+/// Returns the unit normal, with x ≥ 0, of the plane in which the mirror image of bones lies
+/// nearest to them, by robust distances, to which points without a partner hardly add.
+Vec3 fit_midsagittal_normal(const surface::Surface& bones);
+
 /// Fits the frame of a head by its bones alone, however it lies in the scan. The midsagittal plane
-/// is that in which the skull's mirror image lies nearest to it, by robust distances, to which
-/// points without a partner hardly add (docs/guide/landmarks.md). In it the way from the mandible's
+/// is that of the skull (docs/guide/landmarks.md). In it the way from the mandible's
 /// symphysis to its rami leads back and rises by 22°, and the skull lies above. A mirrored head is
 /// taken for a turned one. Throws InputError where the mandible does not cross the plane.
 HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& mandible);

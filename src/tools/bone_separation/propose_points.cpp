@@ -1,5 +1,6 @@
 #include "repose/tools/bone_separation/propose_points.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -7,7 +8,9 @@
 #include <map>
 #include <set>
 
+#include "repose/anatomy/head_frame.h"
 #include "repose/base/error.h"
+#include "repose/imaging/isosurface.h"
 #include "repose/imaging/volume_filter.h"
 
 namespace repose::tools::bone_separation {
@@ -25,9 +28,14 @@ constexpr double chin_size = 10;        // half of it
 constexpr double joint_width = 25;      // from the middle, at least
 constexpr double joint_way = 97;        // mm from the chin, at least; angles of jaws lie nearer
 constexpr double alike = 0.9;           // of the ways on both sides
+constexpr double usual_rise = 0.65;     // radians, of the way from the chin to a condyle
+constexpr double most_pitch = 0.07;     // radians
 constexpr double closed_volume = 1000;  // mm³, of a skull at the middle, behind the teeth
 constexpr double coarser = 2;           // voxels that noise or metal is averaged over
-constexpr double head_extent[] = {5, 2000};        // of a volume with a head; beyond, not in mm
+constexpr double head_extent[] = {80, 2000};       // of a volume with a head; beyond, not in mm
+constexpr double symmetric = 3;                    // voxels by which the midsagittal plane is found
+constexpr double tilt[] = {0.996, 0.7};            // cosines between its normal and x: 5°, 45°
+constexpr double cut_area = 30;                    // mm², of a jaw in the volume's border
 constexpr double level_step = 40, max_steps = 40;  // HU
 constexpr double spacing[] = {25, 10};             // of points in skull and jaw
 constexpr double apart = 14;                       // skull's points from the jaw
@@ -41,10 +49,28 @@ Cell cell_of(const Vec3& point, double size) {
   return cell;
 }
 
-/// Bone of a head: where its chin and teeth are, and what hangs together at higher levels.
+/// The rotation that takes the normal of the head's midsagittal plane to x, so that a head which is
+/// rolled or yawed in the scan is found as one that is not.
+Mat3 level_sides(const Volume& volume, double level) {
+  const Volume rough = imaging::coarsen(volume, symmetric);
+  if (imaging::value_range(rough)[1] < level) return Mat3::Identity();
+  const Vec3 normal = anatomy::fit_midsagittal_normal(imaging::isosurface(rough, level));
+  if (normal.x() > tilt[0] || normal.x() < tilt[1]) return Mat3::Identity();
+  return Eigen::Quaterniond::FromTwoVectors(normal, Vec3::UnitX()).toRotationMatrix();
+}
+
+/// Faces of voxels in the border of a volume.
+struct Cut {
+  double area = 0;             // mm²
+  Vec3 moment = Vec3::Zero();  // area times place in the scan
+};
+
+/// Bone of a head: where its chin and teeth are, and what hangs together at higher levels. Places
+/// are leveled.
 class Head {
  public:
-  Head(const Volume& volume, double level) : volume_(volume), level_(level) {
+  Head(const Volume& volume, double level, const Mat3& leveling)
+      : volume_(volume), level_(level), leveling_(leveling) {
     find_bone();
     if (bone_.empty())
       base::refuse("{}: no part of {:g} cm³ has values of {:g} or more; choose the level of bone",
@@ -62,25 +88,44 @@ class Head {
     return {};
   }
 
-  /// Returns the largest distance of a part from the chin on each side, mm; 0 for a part that is
-  /// closed at the back, which is no jaw.
-  std::array<double, 2> rami(const std::vector<int64_t>& part) const {
-    std::array<double, 2> reach{};
+  /// Returns the longest way of a part from the chin on each side, mm; 0 for a part that is closed
+  /// at the back, which is no jaw.
+  std::array<Vec3, 2> rami(const std::vector<int64_t>& part) const {
+    std::array<Vec3, 2> longest = {Vec3::Zero(), Vec3::Zero()};
     double behind = 0;
     for (const int64_t voxel : part) {
       const Vec3 way = center(voxel) - chin_;
-      double& side = reach[way.x() > 0];
-      if (std::abs(way.x()) > joint_width && way.z() > 0) side = std::max(side, way.norm());
+      Vec3& side = longest[way.x() > 0];
+      if (std::abs(way.x()) > joint_width && way.z() > 0 && way.norm() > side.norm()) side = way;
       if (std::abs(way.x()) < profile_width && way.y() > slab_depth) behind += voxel_volume();
     }
-    return behind < closed_volume ? reach : std::array<double, 2>{};
+    if (behind >= closed_volume) longest.fill(Vec3::Zero());
+    return longest;
   }
 
-  /// One voxel inside bone in each cell of a grid, of those in `voxels`.
+  /// Returns what of the jaw and of the chin's lowest bone lies in the border of the volume.
+  Cut cut_of(const std::vector<int64_t>& jaw) const {
+    Cut cut;
+    const auto add = [&](int64_t voxel) {
+      const double area = area_in_border(voxel);
+      cut.area += area;
+      cut.moment += area * volume_.center(voxel);
+    };
+    for (const int64_t voxel : jaw) add(voxel);
+    if (cut.area > 0) return cut;
+    for (const int64_t voxel : bone_) {
+      const Vec3 way = center(voxel) - chin_;
+      if (std::abs(way.x()) < profile_width && std::abs(way.z()) <= 2 && way.y() < chin_depth)
+        add(voxel);
+    }
+    return cut;
+  }
+
+  /// One voxel inside bone in each cell of a grid, of those in `voxels`, as it lies in the scan.
   std::vector<Vec3> thinned(const std::vector<int64_t>& voxels, double size) const {
     std::map<Cell, Vec3> points;
     for (const int64_t voxel : voxels)
-      if (is_inside(voxel)) points.try_emplace(cell_of(center(voxel), size), center(voxel));
+      if (is_inside(voxel)) points.try_emplace(cell_of(center(voxel), size), volume_.center(voxel));
     std::vector<Vec3> result;
     for (const auto& [cell, point] : points) result.push_back(point);
     return result;
@@ -105,7 +150,17 @@ class Head {
   }
 
  private:
-  Vec3 center(int64_t voxel) const { return volume_.center(voxel); }
+  Vec3 center(int64_t voxel) const { return leveling_ * volume_.center(voxel); }
+
+  /// mm², of the faces of a voxel in the border of the volume.
+  double area_in_border(int64_t voxel) const {
+    const auto at = volume_.index_of(voxel);
+    double area = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      if (at[axis] == 0 || at[axis] + 1 == volume_.size[axis])
+        area += voxel_volume() / volume_.spacing(axis);
+    return area;
+  }
 
   double above_teeth(const Vec3& at) const {
     return at.z() - teeth_[0] - teeth_[1] * (at.y() - front_);
@@ -239,6 +294,7 @@ class Head {
 
   const Volume& volume_;
   double level_;
+  Mat3 leveling_;
   std::vector<int64_t> bone_;
   double middle_ = 0, front_ = 0;  // mm: x, y at the teeth
   Vec3 chin_ = Vec3::Zero();
@@ -248,16 +304,40 @@ class Head {
 struct Proposal {
   std::array<std::vector<Vec3>, 2> points;  // in skull and jaw
   double least = 0, most = 0;               // mm, of the ways from the chin on both sides
+  double rise = 0;                          // of the longer way, radians
+  Cut cut;
 };
 
-Proposal propose(const Volume& volume, double level) {
-  Head head(volume, level);
+Proposal propose(const Volume& volume, double level, const Mat3& leveling) {
+  Head head(volume, level, leveling);
   const std::vector<int64_t> jaw = head.part_jaw();
   if (jaw.empty()) return {};
   const auto [right, left] = head.rami(jaw);
+  const Vec3& longer = right.norm() > left.norm() ? right : left;
   return {{head.thinned(head.skull(jaw), spacing[0]), head.thinned(jaw, spacing[1])},
-          std::min(right, left),
-          std::max(right, left)};
+          std::min(right.norm(), left.norm()),
+          longer.norm(),
+          std::atan2(longer.z(), longer.y()),
+          head.cut_of(jaw)};
+}
+
+bool is_doubtful(const Proposal& found) {
+  return found.least < joint_way || found.least < alike * found.most;
+}
+
+/// Refuses a jaw that was not found, or that the volume does not hold as a whole.
+void require_jaw(const Proposal& found, const std::string& volume) {
+  if (found.cut.area >= cut_area)
+    base::refuse(
+        "{}: the volume ends inside the jaw, at {:.0f} ({:.0f} mm² of bone); give a CT that holds "
+        "the jaw from the chin to its condyles, or points in skull and jaw (-apart)",
+        volume, Vec3(found.cut.moment / found.cut.area), found.cut.area);
+  if (found.least < joint_way)
+    base::refuse(
+        "{}: the jaw was not found, because it is part of the skull at every level, lacks its "
+        "condyles or is turned: the head must look along −y, its top along z (LPS); give points in "
+        "skull and jaw (-apart), or mend the volume's direction",
+        volume);
 }
 
 /// Refuses a volume whose sides are all too short, or all too long, for a head in mm.
@@ -276,17 +356,18 @@ void require_millimeters(const Volume& volume) {
 
 std::array<std::vector<Vec3>, 2> propose_points(const Volume& volume, double level) {
   require_millimeters(volume);
-  Proposal found = propose(volume, level);
-  if (found.least < joint_way || found.least < alike * found.most) {
-    Proposal smoother = propose(coarsen(volume, coarser), level);
-    if (smoother.least > found.least) found = std::move(smoother);
+  Mat3 leveling = level_sides(volume, level);
+  Proposal found = propose(volume, level, leveling);
+  const auto take_better = [&](const Volume& from) {
+    Proposal other = propose(from, level, leveling);
+    if (other.least > found.least) found = std::move(other);
+  };
+  if (found.least > 0 && is_doubtful(found) && std::abs(found.rise - usual_rise) > most_pitch) {
+    leveling = Eigen::AngleAxisd(usual_rise - found.rise, Vec3::UnitX()) * leveling;
+    take_better(volume);
   }
-  if (found.least < joint_way)
-    base::refuse(
-        "{}: the jaw was not found, because it is part of the skull at every level, lacks its "
-        "condyles or is turned: the head must look along −y, its top along z (LPS); give points in "
-        "skull and jaw (-apart), or mend the volume's direction",
-        volume.name);
+  if (is_doubtful(found)) take_better(coarsen(volume, coarser));
+  require_jaw(found, volume.name);
   return std::move(found.points);
 }
 

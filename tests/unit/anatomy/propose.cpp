@@ -8,6 +8,7 @@
 
 #include "../../folder.h"
 #include "repose/anatomy/picture.h"
+#include "repose/scene/landmark_names.h"
 #include "repose/scene/landmarks.h"
 #include "repose/surface/read.h"
 
@@ -128,6 +129,60 @@ TEST(ProposeLandmarks, RefusesExchangedBonesAndPartsOfSeveralHeads) {
   far = head;
   for (Vec3& p : far.mandible.points) p.x() += 80;
   EXPECT_NE(refusal([&] { propose(far); }).find("midsagittal plane"), std::string::npos);
+}
+
+/// A surface cut off flat at a limit of a coordinate (sign 1: above it, −1: below).
+surface::Surface cut_off(surface::Surface part, int axis, double limit, int sign) {
+  for (Vec3& p : part.points)
+    p[axis] = sign > 0 ? std::min(p[axis], limit) : std::max(p[axis], limit);
+  return part;
+}
+
+TEST(ProposeLandmarks, LieNotWhereTheScanEnds) {
+  const Landmarks whole = propose(shipped()).found;
+  const auto lacks = [&](const Head& head, const std::string& name, const std::string& why) {
+    const auto missing = propose(head).missing;
+    return missing.contains(name) && missing.at(name).find(why) != std::string::npos;
+  };
+  Head head = shipped();
+  head.mandible = cut_off(head.mandible, 2, whole.at("condyle_left_center").z() - 8, 1);
+  for (const char* name : {"condyle_left_center", "condyle_right_center"})
+    EXPECT_TRUE(lacks(head, name, "is cut off")) << name;
+  head.mandible = cut_off(shipped().mandible, 2, whole.at("menton_bone").z() + 8, -1);
+  EXPECT_TRUE(lacks(head, "pogonion_bone", "is cut off"));
+  EXPECT_EQ(propose(head).found.size() + propose(head).missing.size(),
+            scene::landmark_names().size());
+  head = shipped();
+  head.skin = cut_off(head.skin, 1, whole.at("pronasale").y() + 8, -1);
+  EXPECT_TRUE(lacks(head, "pronasale", "is cut off"));
+  head = shipped();
+  std::erase_if(head.mandible.triangles, [&](const Triangle& triangle) {
+    return head.mandible.points[triangle[0]].z() > whole.at("condyle_left_center").z() - 8;
+  });
+  EXPECT_TRUE(lacks(head, "condyle_left_center", "is cut off"));
+}
+
+TEST(ProposeLandmarks, RemarksOnARamusThatIsFarShorter) {
+  Head head = shipped();
+  const double limit = propose(head).found.at("condyle_left_center").z() - 20;
+  for (Vec3& p : head.mandible.points)
+    if (p.x() > 0 && p.z() > limit) p.z() = limit + 0.1 * (p.z() - limit);
+  const auto remarks = propose(head).remarks;
+  EXPECT_TRUE(std::ranges::any_of(remarks, [](const std::string& line) {
+    return line.find("the left ramus is") != std::string::npos;
+  }));
+}
+
+TEST(ProposeLandmarks, CornersOfTheMouthAreInFrontWhereSkinIsMissing) {
+  Head head = shipped();
+  const Vec3 stomion = propose(head).found.at("stomion");
+  std::erase_if(head.skin.triangles, [&](const Triangle& triangle) {
+    return head.skin.points[triangle[0]].x() < stomion.x() - 7 &&
+           head.skin.points[triangle[0]].y() < stomion.y() + 60;
+  });
+  const Landmarks found = propose(head).found;
+  ASSERT_TRUE(found.contains("mouth_right"));
+  EXPECT_LT(found.at("mouth_right").y(), stomion.y() + 30);
 }
 
 TEST(ProposeLandmarks, RemarksOnTrianglesThatPointInwards) {
