@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -72,12 +73,75 @@ DicomElement next_element(std::ifstream& in, bool implicit) {
   return element;
 }
 
-int64_t stored_bytes(const std::filesystem::path& file, ImageFormat format) {
-  if (format == ImageFormat::nrrd) return -1;
-  if (format == ImageFormat::dicom) return is_packed_dicom(file) ? -1 : file_bytes(file);
+/// The header of a NIfTI file, in either order of bytes.
+class NiftiHeader {
+ public:
+  /// Nothing where the file is no NIfTI of version 1.
+  static std::optional<NiftiHeader> of(const std::filesystem::path& file) {
+    NiftiHeader header;
+    gzFile in = gzopen(file.c_str(), "rb");  // reads what is not packed as well
+    const int read = in ? gzread(in, header.bytes_.data(), nifti_header) : 0;
+    if (in) gzclose(in);
+    // The library tells the order of bytes by the number of dimensions, 1 to 7.
+    const auto few = [&](size_t low, size_t high) {
+      return header.bytes_[high] == 0 && header.bytes_[low] >= 1 && header.bytes_[low] <= 7;
+    };
+    header.little_ = few(40, 41);
+    if (read != nifti_header || !(header.little_ || few(41, 40))) return std::nullopt;
+    return header;
+  }
+
+  bool has_rows() const { return bytes_[254] != 0 || bytes_[255] != 0; }  ///< of its orientation
+  float number(size_t at) const { return std::bit_cast<float>(bits<uint32_t>(at)); }
+  /// Bytes of a voxel in the file, which its library may rescale to wider numbers.
+  int64_t voxel_bytes() const {
+    switch (bits<uint16_t>(70)) {  // the type of its numbers
+      case 4:
+      case 512:
+        return 2;
+      case 8:
+      case 16:
+      case 768:
+        return 4;
+      case 64:
+      case 1024:
+      case 1280:
+        return 8;
+      default:
+        return 1;  // at least
+    }
+  }
+  /// Where voxels begin: behind the header and its extensions.
+  int64_t offset() const {
+    return std::max(nifti_header, static_cast<int64_t>(std::max(0.0f, number(108))));
+  }
+
+ private:
+  template <class Bits>
+  Bits bits(size_t at) const {
+    Bits value = 0;
+    for (size_t b = 0; b < sizeof(Bits); ++b)
+      value = static_cast<Bits>(value << 8 | bytes_[at + (little_ ? sizeof(Bits) - 1 - b : b)]);
+    return value;
+  }
+
+  std::array<unsigned char, nifti_header> bytes_{};
+  bool little_ = false;
+};
+
+/// Bytes of a file's voxels: those there are, and those of its header; −1: unknown.
+std::array<int64_t, 2> stored_bytes(const std::filesystem::path& file, ImageFormat format,
+                                    const Image& header) {
+  if (format == ImageFormat::nrrd) return {-1, -1};
+  if (format == ImageFormat::dicom)
+    return {is_packed_dicom(file) ? -1 : file_bytes(file), header.bytes};
+  const auto nifti = NiftiHeader::of(file);
   const bool packed = base::lower(file.extension().string()) == ".gz";
   const int64_t all = packed ? unpacked_bytes(file, 0) : file_bytes(file);
-  return all - nifti_header;
+  if (!nifti) return {all - nifti_header, header.bytes};
+  int64_t bytes = header.numbers * nifti->voxel_bytes();
+  for (const int64_t voxels : header.size) bytes *= voxels;
+  return {std::max<int64_t>(0, all - nifti->offset()), bytes};
 }
 
 }  // namespace
@@ -117,9 +181,8 @@ int64_t file_bytes(const std::filesystem::path& file) {
 
 void check_stored_bytes(const std::filesystem::path& file, ImageFormat format,
                         const Image& header) {
-  const int64_t bytes = header.bytes;
   if (format == ImageFormat::meta) return check_meta_voxels(file, header);
-  const int64_t stored = stored_bytes(file, format);
+  const auto [stored, bytes] = stored_bytes(file, format, header);
   if (stored >= 0 && stored < bytes)
     base::refuse("{}: truncated: {} of the {} bytes of its voxels are there; copy it again",
                  file.string(), stored, bytes);
@@ -155,33 +218,36 @@ void check_dicom_lengths(const std::filesystem::path& file) {
 }
 
 void check_nifti_header(const std::filesystem::path& file) {
-  std::array<unsigned char, nifti_header> header{};
-  gzFile in = gzopen(file.c_str(), "rb");  // reads what is not packed as well
-  const int read = in ? gzread(in, header.data(), nifti_header) : 0;
-  if (in) gzclose(in);
-  // The library tells the order of bytes by the number of dimensions, 1 to 7.
-  const auto few = [&](size_t low, size_t high) {
-    return header[high] == 0 && header[low] >= 1 && header[low] <= 7;
-  };
-  const bool little = few(40, 41);
-  if (read != nifti_header || !(little || few(41, 40))) return;
-  const auto number = [&](size_t at) {
-    uint32_t bits = 0;
-    for (size_t b = 0; b < 4; ++b) bits = bits << 8 | header[at + (little ? 3 - b : b)];
-    return std::bit_cast<float>(bits);
-  };
+  const auto header = NiftiHeader::of(file);
+  if (!header) return;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const float spacing = number(80 + 4 * axis);
+    const float spacing = header->number(80 + 4 * axis);
     if (spacing == 0 || !std::isfinite(spacing))
       base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
                    file.string(), "ijk"[axis], spacing);
   }
-  const bool has_rows = header[254] != 0 || header[255] != 0;
-  for (size_t entry = 0; has_rows && entry < 12; ++entry)
-    if (const float mm = number(280 + 4 * entry); !(std::abs(mm) <= farthest))
+  for (size_t entry = 0; header->has_rows() && entry < 12; ++entry)
+    if (const float mm = header->number(280 + 4 * entry); !(std::abs(mm) <= farthest))
       base::refuse(
           "{}: srow_{}[{}] of its orientation is {:g}, expected at most {:g} mm; mend the header",
           file.string(), "xyz"[entry / 4], entry % 4, mm, farthest);
+}
+
+void check_nrrd_space(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string line;
+  if (!std::getline(in, line) || !line.starts_with("NRRD")) return;
+  while (std::getline(in, line) && !line.empty() && line != "\r") {
+    const std::string text = base::lower(line);
+    if (!text.starts_with("space:")) continue;
+    const size_t from = text.find_first_not_of(" \t", 6);
+    const std::string space = from == std::string::npos ? "" : text.substr(from);
+    if (space.starts_with("las") || space.starts_with("left-anterior-superior"))
+      base::refuse(
+          "{}: its space is left-anterior-superior, which its library turns by half a turn; export "
+          "it in left-posterior-superior or right-anterior-superior",
+          file.string());
+  }
 }
 
 }  // namespace repose::imaging

@@ -28,4 +28,8 @@ void check_dicom_lengths(const std::filesystem::path& file);
 /// for ever. A file that is no NIfTI passes.
 void check_nifti_header(const std::filesystem::path& file);
 
+/// Throws InputError for a NRRD file in the space left-anterior-superior, of which ITK 5 changes
+/// the sign of x in place of that of y.
+void check_nrrd_space(const std::filesystem::path& file);
+
 }  // namespace repose::imaging

@@ -40,6 +40,7 @@ Volume read_file(const std::filesystem::path& file) {
   const ImageFormat format = format_of(file);
   const std::string name = file.string();
   if (format == ImageFormat::nifti) check_nifti_header(file);
+  if (format == ImageFormat::nrrd) check_nrrd_space(file);
   if (format == ImageFormat::meta) check_meta_header(file);
   const Image image = read_header(file, format);
   check_header(image, name);

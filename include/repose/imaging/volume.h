@@ -52,7 +52,7 @@ struct Volume {
 Mat3 inverse_axes(const Volume& volume);
 
 /// Reads a folder of DICOM slices, NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr) or MetaImage (.mha,
-/// .mhd). Positions come in LPS: NIfTI, which is RAS, and NRRD of another space are converted;
+/// .mhd). Positions come in LPS: NIfTI, which is RAS, and NRRD in RAS are converted;
 /// DICOM's rescale slope is applied; oblique axes and tilted gantries are kept as they are. Numbers
 /// that are not finite become the least finite one, with a remark. Throws InputError, one line
 /// naming the file, for what is missing, truncated, not three-dimensional, colored or without

@@ -116,6 +116,45 @@ TEST(VolumeRead, RefusesAMetaImageOfANegativeSize) {
             std::string::npos);
 }
 
+TEST(VolumeRead, RescalesANiftiFile) {
+  const test::Folder folder;
+  const std::string plain = fuzz::niftis()[1];
+  std::string scaled = plain;
+  scaled.replace(112, 8, surface::bytes_of(2.0f) + surface::bytes_of(-1024.0f));
+  const Volume before = read_volume(folder.write("a.nii", plain)),
+               volume = read_volume(folder.write("b.nii", scaled));
+  for (size_t v = 0; v < volume.values.size(); ++v)
+    EXPECT_EQ(volume.values[v], 2 * before.values[v] - 1024);
+}
+
+TEST(VolumeRead, CountsTheVoxelsOfANiftiFileBehindItsExtensions) {
+  const test::Folder folder;
+  std::string extended = fuzz::niftis()[1];
+  extended.replace(108, 4, surface::bytes_of(352.0f + 16));
+  extended[348] = 1;
+  extended.insert(352, surface::bytes_of(int32_t{16}) + std::string(12, '\0'));
+  EXPECT_FALSE(read_volume(folder.write("a.nii", extended)).values.empty());
+  extended.pop_back();
+  EXPECT_NE(test::refusal([&] { read_volume(folder.write("a.nii", extended)); }).find("truncated"),
+            std::string::npos);
+}
+
+TEST(VolumeRead, RefusesANrrdFileWhoseSpaceItsLibraryTurns) {
+  const test::Folder folder;
+  const auto nrrd = [&](const std::string& space) {
+    return folder.write("a.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nspace: " + space +
+                                      "\nsizes: 2 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+                                      "encoding: raw\nspace origin: (5,30,40)\n\n" +
+                                      std::string(8, '\7'));
+  };
+  EXPECT_EQ(read_volume(nrrd("LPS")).origin, Vec3(5, 30, 40));
+  EXPECT_EQ(read_volume(nrrd("right-anterior-superior")).origin, Vec3(-5, -30, 40));
+  for (const char* space : {"LAS", "left-anterior-superior"})
+    EXPECT_NE(test::refusal([&] { read_volume(nrrd(space)); }).find("left-anterior-superior"),
+              std::string::npos)
+        << space;
+}
+
 TEST(VolumeRead, RefusesANiftiFileWhoseOrientationIsHugeOrNotFinite) {
   const test::Folder folder;
   const std::string sound = fuzz::niftis()[1];
