@@ -41,33 +41,57 @@ Vec3 placed(const Mat4& pose, const Vec3& point) {
   return pose.topLeftCorner<3, 3>() * point + pose.topRightCorner<3, 1>();
 }
 
+struct Deepest {
+  double depth = 0;  // mm
+  Vec3 at = Vec3::Zero();
+};
+
 /// A bone with what questions about it need.
 struct Mover {
   const surface::Surface& surface;
   const scene::RigidMotion& motion;
   surface::CollisionTree tree;
-  std::unique_ptr<surface::DistanceTree> inside;  // made when needed
+  std::unique_ptr<surface::DistanceTree> inside;  // made when needed, with the box
+  Eigen::AlignedBox3d box;
 
-  /// Depth of the deepest of `points`, placed by `pose`, inside this bone.
-  double depth_of(const std::vector<Vec3>& points, const Mat4& pose) {
-    if (!inside) inside = std::make_unique<surface::DistanceTree>(surface);
-    const Eigen::AlignedBox3d box = surface::bounding_box(surface.points);
-    double depth = 0;
+  bool contains(const Vec3& point) {
+    if (!inside) {
+      inside = std::make_unique<surface::DistanceTree>(surface);
+      box = surface::bounding_box(surface.points);
+    }
+    return box.contains(point) && inside->contains(point);
+  }
+
+  /// The deepest of `points`, placed by `pose`, inside this bone; in its frame.
+  Deepest deepest_of(const std::vector<Vec3>& points, const Mat4& pose) {
+    Deepest deepest;
     for (const Vec3& point : points) {
       const Vec3 p = placed(pose, point);
-      if (box.contains(p) && inside->contains(p))
-        depth = std::max(depth, inside->nearest(p).distance);
+      if (!contains(p)) continue;
+      const double depth = inside->nearest(p).distance;
+      if (depth > deepest.depth) deepest = {depth, p};
     }
-    return depth;
+    return deepest;
+  }
+
+  /// [triangles of another bone] 1 where one lies in this bone from the start.
+  std::vector<char> holds(const surface::CollisionTree& other) {
+    std::vector<char> held(other.triangles());
+    for (int64_t t = 0; t < static_cast<int64_t>(held.size()); ++t)
+      held[t] = contains(other.corners(t)[0]);
+    return held;
   }
 };
 
-/// mm, by which two bones lie inside one another at a load; negative where they do not touch.
-double overlap(Mover& a, Mover& b, double load) {
+/// Where two bones lie deepest inside one another at a load; negative where they do not touch.
+Deepest overlap(Mover& a, Mover& b, double load) {
   const Mat4 pose = relative(a.motion, b.motion, load);
-  if (!surface::touch(a.tree, b.tree, pose)) return -1;
-  return std::max(a.depth_of(b.surface.points, pose),
-                  b.depth_of(a.surface.points, relative(b.motion, a.motion, load)));
+  if (!surface::touch(a.tree, b.tree, pose)) return {.depth = -1};
+  Deepest in_a = a.deepest_of(b.surface.points, pose),
+          in_b = b.deepest_of(a.surface.points, relative(b.motion, a.motion, load));
+  in_a.at = a.motion.apply(in_a.at, load);
+  in_b.at = b.motion.apply(in_b.at, load);
+  return in_a.depth > in_b.depth ? in_a : in_b;
 }
 
 /// Length (mm) that triangles which touch from the start shall have at most: small, but not so that
@@ -86,12 +110,37 @@ std::pair<surface::CollisionTree, surface::CollisionTree> finer(const Mover& a, 
   return {one(a, b), one(b, a)};
 }
 
+/// Finds the load from which bones that overlap from the start lie deeper in one another by `more`
+/// mm, for their triangles there are ignored.
+void find_press(Mover& a, Mover& b, double more, BonePair& pair) {
+  constexpr int steps = 16;
+  constexpr double close = 1e-3;  // of the load
+  const double allowed = std::max(overlap(a, b, 0).depth, 0.0) + more;
+  double low = 0, high = 0;
+  for (int step = 1; step <= steps; ++step, low = high) {
+    high = static_cast<double>(step) / steps;
+    if (overlap(a, b, high).depth > allowed) break;
+  }
+  if (low == 1 || low >= pair.load) return;
+  while (high - low > close) {
+    const double middle = (low + high) / 2;
+    (overlap(a, b, middle).depth > allowed ? high : low) = middle;
+  }
+  if (low >= pair.load) return;
+  pair.load = low;
+  pair.at = overlap(a, b, high).at;
+}
+
 void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pair) {
   const double touching = requested.clearance + 2 * requested.tolerance;
   std::optional<std::pair<surface::CollisionTree, surface::CollisionTree>> fine;
-  if (pair.gap <= touching) fine.emplace(finer(a, b, touching));
+  std::array<std::vector<char>, 2> inside;
+  if (pair.gap <= touching) {
+    fine.emplace(finer(a, b, touching));
+    inside = {b.holds(fine->first), a.holds(fine->second)};
+  }
   surface::Encounter encounter(fine ? fine->first : a.tree, fine ? fine->second : b.tree,
-                               twist_of(a.motion), twist_of(b.motion), touching);
+                               twist_of(a.motion), twist_of(b.motion), touching, inside);
   pair.ignored = encounter.ignored_triangles();
   constexpr double caution = 1 - 1e-9;  // of a step: twists are rounded
   for (double load = 0; load <= 1;) {
@@ -103,8 +152,10 @@ void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pai
     }
     load += caution * next.load;
   }
+  const auto held = [](const std::vector<char>& of) { return std::ranges::count(of, 1) > 0; };
+  if (held(inside[0]) || held(inside[1])) find_press(a, b, touching, pair);
   if (!pair.contact()) return;
-  pair.depth = std::max(overlap(a, b, 1), 0.0);
+  pair.depth = std::max(overlap(a, b, 1).depth, 0.0);
   const Mat4 end = relative(a.motion, b.motion, 1);
   pair.crossings = static_cast<int64_t>(
       surface::pairs_within(a.tree, b.tree, end, surface::contact_margin).size());
@@ -114,7 +165,7 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves) {
   std::vector<Mover> movers;
   for (size_t k = 0; k < bones.size(); ++k)
-    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr});
+    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr, {}});
   return movers;
 }
 
@@ -130,7 +181,7 @@ void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Sc
   for (size_t i = 0; i < bones.size(); ++i)
     for (size_t j = i + 1; j < bones.size(); ++j) {
       if (move_alike(scene.moves[i], scene.moves[j])) continue;
-      if (const double depth = overlap(movers[i], movers[j], 1); depth > worth_saying)
+      if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > worth_saying)
         remarks.push_back(
             fmt::format("bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide "
                         "reports where they "
@@ -152,7 +203,7 @@ void report_initial_overlaps(const std::vector<surface::Surface>& bones, const s
   std::vector<Mover> movers = movers_of(bones, scene.moves);
   for (size_t i = 0; i < bones.size(); ++i)
     for (size_t j = i + 1; j < bones.size(); ++j)
-      if (const double depth = overlap(movers[i], movers[j], 0); depth > worth_saying)
+      if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > worth_saying)
         warnings.push_back(fmt::format(
             "bones '{}' and '{}' lie {:.1f} mm inside one another before they move: check that "
             "both come from one scan and in one frame, or separate their segmentations",
@@ -185,17 +236,18 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
         fmt::format("bones '{}' and '{}', {} at the start: ", scene.bones[pair.a].name,
                     scene.bones[pair.b].name, start);
     if (!pair.contact())
-      line += requested.clearance > 0 ? fmt::format("stay {} mm apart", requested.clearance)
+      line += requested.clearance > 0 ? fmt::format("stay {:g} mm apart", requested.clearance)
                                       : std::string("do not come to touch");
     else
-      line += fmt::format("come within {} mm at load {:.4f}, at {:.1f}",
+      line += fmt::format("come within {:g} mm at load {:.4f}, at {:.1f}",
                           requested.clearance + requested.tolerance, pair.load, pair.at);
     if (pair.crossings > 0)
       line += fmt::format("; at the end {} pairs of triangles cross, {:.2f} mm deep",
                           pair.crossings, pair.depth);
     if (pair.ignored > 0)
-      line += fmt::format("; {} triangles that touch from the start (within {} mm) are not counted",
-                          pair.ignored, requested.clearance + 2 * requested.tolerance);
+      line += fmt::format(
+          "; {} triangles that touch or overlap from the start (within {:g} mm) are not counted",
+          pair.ignored, requested.clearance + 2 * requested.tolerance);
     lines.push_back(line);
   }
   return lines;

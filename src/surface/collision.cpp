@@ -219,12 +219,14 @@ void Encounter::summarize(Side& side) {
 }
 
 Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist& twist_a,
-                     const Twist& twist_b, double touching)
+                     const Twist& twist_b, double touching,
+                     const std::array<std::vector<char>, 2>& inside)
     : a_(make_side(a, twist_a)), b_(make_side(b, twist_b)) {
-  for (const auto& [s, t] : pairs_within(a, b, Mat4::Identity(), touching)) {
-    ignored_ += !a_.ignored[s] + !b_.ignored[t];
+  if (!inside[0].empty()) a_.ignored = inside[0];
+  if (!inside[1].empty()) b_.ignored = inside[1];
+  for (const auto& [s, t] : pairs_within(a, b, Mat4::Identity(), touching))
     a_.ignored[s] = b_.ignored[t] = 1;
-  }
+  ignored_ = std::ranges::count(a_.ignored, 1) + std::ranges::count(b_.ignored, 1);
   summarize(a_);
   summarize(b_);
 }

@@ -75,10 +75,12 @@ Surface refine_near(const Surface& surface, const CollisionTree& own, const Coll
 class Encounter {
  public:
   /// Both at their initial positions, moving by constant twists in one frame (screw motions). Pairs
-  /// of triangles that both lie within `touching` mm of the other surface there are ignored from
-  /// then on: teeth that bite, the faces of a fresh cut. So those should be small (refine_near).
+  /// of triangles that both lie within `touching` mm of the other surface there, or `inside` the
+  /// other body ([2][triangles], may be empty), are ignored from then on: teeth that bite, the
+  /// faces of a fresh cut. So those should be small (refine_near).
   Encounter(const CollisionTree& a, const CollisionTree& b, const Twist& twist_a,
-            const Twist& twist_b, double touching);
+            const Twist& twist_b, double touching,
+            const std::array<std::vector<char>, 2>& inside = {});
 
   int64_t ignored_triangles() const { return ignored_; }  ///< of both surfaces
 

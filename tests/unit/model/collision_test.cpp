@@ -94,6 +94,18 @@ TEST(Collisions, a_fresh_cut_may_part_and_slide_but_not_press) {
   EXPECT_GT(pressed.pairs[0].ignored, 0);
 }
 
+TEST(Collisions, bones_that_overlap_may_part_but_not_press) {
+  for (const double overlap : {0.15, 2.0}) {
+    const std::vector<surface::Surface> bones = {box("upper", {0, 0, 30 - overlap}, {50, 50, 30}),
+                                                 box("lower", {5, 5, 0}, {40, 40, 30})};
+    const auto safe = [&](const Vec3& translation) {
+      return follow_moves(bones, {{}, RigidMotion::translation(translation)}, {}).safe_load;
+    };
+    EXPECT_EQ(safe({0, 0, -10}), 1) << "apart";
+    EXPECT_NEAR(safe({0, 0, 4}), 0.1 / 4, 0.003) << "deeper by 0.1 mm";
+  }
+}
+
 TEST(Collisions, clamp_shortens_all_moves_alike) {
   scene::Scene scene =
       scene_of(jaws, {RigidMotion::translation({4, 0, 0}), RigidMotion::translation({0, 0, 20})});
