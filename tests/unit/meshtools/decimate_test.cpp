@@ -166,6 +166,19 @@ TEST(Decimate, a_target_count_is_met_and_its_distance_measured) {
 }
 
 // A count costs about the distance that, requested, leads to that count.
+TEST(Decimate, distances_are_measured_alike_whatever_the_bound) {
+  const Surface ball = bumpy_ball(40, 2, 1);
+  for (const double distance : {10.0, 1000.0}) {
+    const Decimated result =
+        decimate(ball, {.distance = distance, .triangles = 600}, [](int64_t) {});
+    const double there = sampled_distance(result.surface, ball, 20),
+                 back = sampled_distance(ball, result.surface, 20);
+    EXPECT_GE(result.to_input.lower, there - 0.05) << distance;
+    EXPECT_LE(result.to_input.upper, there + 0.1) << distance;
+    EXPECT_LE(result.from_input.upper, back + 0.1) << distance;
+  }
+}
+
 TEST(Decimate, a_count_costs_no_more_than_it_must) {
   const Surface input = bumpy_ball(26, 4, 2);
   const auto count = static_cast<int64_t>(decimated(input, 1.0).surface.triangles.size());
