@@ -217,9 +217,13 @@ def compare_searches(chosen, folder):
                f"{last(file)['penetration_exact']:.2f} | – |")
         barrier = run([chosen.bin / "benchmark_barrier", "scene.yaml", "-result", file], file.parent,
                       ends=None)
-        row = re.search(r"\| barrier \| (\d+) \| (\d+) \| \d+ \| \d+ \| \S+ \((\S+)\) \| (\S+) \| (\S+)",
+        row = re.search(r"\| barrier \| (\d+) \| (\d+) \| \d+ \| \d+ \| \S+ \((\S+)\) \| (\S+) \| (\S+) \| (.*) \|",
                         barrier.text)
-        yield (f"| {case} | barrier | " + " | ".join(row.groups() if row else ["failed"] * 5) + " |")
+        cells = list(row.groups()) if row else ["–"] * 5 + ["failed"]
+        ended = cells.pop()
+        if ended.startswith("failed"):
+            cells[3:] = [ended.partition(",")[0], "–"]
+        yield f"| {case} | barrier | " + " | ".join(cells) + " |"
 
 
 def draw(faces, chosen):
