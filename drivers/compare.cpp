@@ -153,21 +153,27 @@ surface::Surface above(const surface::Surface& whole, double height) {
 using Marks = std::map<std::string, Vec3>;
 
 /// Fits the landmarks of ACTUAL to those of PREDICTED; empty where fewer than three agree.
-base::Similarity by_landmarks(const Marks& predicted, const Marks& actual) {
+base::Similarity by_landmarks(const surface::Surface& actual, const surface::Surface& predicted,
+                              const Marks& marks, const Marks& actual_marks) {
+  std::vector<std::string> names;
   std::vector<Vec3> moving, fixed;
-  for (const auto& [name, position] : actual)
-    if (const auto found = predicted.find(name); found != predicted.end()) {
+  for (const auto& [name, position] : actual_marks)
+    if (const auto found = marks.find(name); found != marks.end()) {
+      names.push_back(name);
       moving.push_back(position);
       fixed.push_back(found->second);
     }
   if (moving.size() < 3) return {};
+  const std::string remark =
+      tools::registration::remark_on_distance(names, moving, actual, fixed, predicted, 1);
+  if (!remark.empty()) std::printf("note: %s\n", remark.c_str());
   return tools::registration::fit_landmarks(moving, fixed, false).transform;
 }
 
 base::Similarity bring(const base::Options& options, const surface::Surface& actual,
                        const surface::Surface& predicted, const Marks& marks,
                        const Marks& actual_marks) {
-  const base::Similarity start = by_landmarks(marks, actual_marks);
+  const base::Similarity start = by_landmarks(actual, predicted, marks, actual_marks);
   surface::Surface moving = surface::weld_and_orient(tools::registration::moved(actual, start));
   surface::Surface fixed = surface::weld_and_orient(predicted);
   if (options.text("register") == "upper") {

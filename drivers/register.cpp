@@ -161,14 +161,18 @@ base::Exit run(const base::Options& options) {
   for (const char* ending : {".ply", ".tfm"}) base::reserve_output(options.text("output") + ending);
   const Pairs pairs = read_pairs(options);
   const surface::Surface moving = surface::read_surface(files[0]);
-  const surface::Surface fixed = surface::weld_and_orient(surface::read_surface(files[1]));
+  const surface::Surface fixed = surface::read_surface(files[1]);
   const tools::registration::LandmarkFit fit =
       tools::registration::fit_landmarks(pairs.moving, pairs.fixed, options.flag("similarity"));
   print(fit, pairs);
+  const std::string remark = tools::registration::remark_on_distance(
+      pairs.names, pairs.moving, moving, pairs.fixed, fixed, fit.transform.scale);
+  if (!remark.empty()) std::printf("  note: %s\n", remark.c_str());
   tools::registration::Similarity transform = fit.transform;
   base::Exit exit = base::Exit::done;
   if (options.flag("icp"))
-    exit = refine(options, surface::weld_and_orient(moving), fixed, transform);
+    exit = refine(options, surface::weld_and_orient(moving), surface::weld_and_orient(fixed),
+                  transform);
   const std::string name = options.text("output");
   surface::write_ply(name + ".ply", tools::registration::moved(moving, transform));
   scene::write_transform(name + ".tfm", transform.matrix());

@@ -181,6 +181,14 @@ def test_the_scorecard_finds_the_chin(run, follow_up):
     assert full_rows(run(*card, "all").stdout)["chin"][7] < 3
 
 
+def test_landmarks_off_their_mesh_get_a_note(run, follow_up):
+    marks = follow_up.with_suffix(".csv")
+    card = ["repose-compare", SKIN, follow_up, "-landmarks", MARKS, "-actual_landmarks", marks, "-register", "all"]
+    assert "note" not in run(*card).stdout
+    marks.write_text(marks.read_text().replace("LPS", "RAS"))
+    assert re.search(r"^note: landmark \w+ lies [\d.]+ mm from \S*scan.ply", run(*card).stdout, re.M)
+
+
 def test_beyond_the_rim_is_left_out(run, tmp_path):
     corners = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], float)
     flat = meshio.Mesh(corners, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])

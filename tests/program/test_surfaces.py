@@ -107,6 +107,35 @@ def test_a_bad_landmark_is_named_and_icp_mends_the_rest(run, pair):
     assert np.abs(found.points - pair.fixed.points).max() < 0.01
 
 
+OFF = {
+    "RAS numbers in a file that states LPS": lambda p: {"moving": p.back(p.landmarks) * [-1, -1, 1]},
+    "landmarks of both in cm": lambda p: {"moving": p.back(p.landmarks) / 10, "fixed": p.landmarks / 10},
+}
+
+
+@pytest.mark.parametrize("case", OFF)
+def test_landmarks_off_their_mesh_get_a_note(run, pair, case):
+    assert "note: landmark" not in run(*REGISTER).stdout
+    for name, points in OFF[case](pair).items():
+        (pair.folder / f"{name}.mrk.json").write_text(markups(points))
+    result = run(*REGISTER)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert len(re.findall(r"note: landmark \w+ lies [\d.]+ mm from moving.ply", result.stdout)) == 1, result
+
+
+def in_meters(pair):
+    pair.write("moving.ply", pair.back(pair.fixed.points) / 1000)
+    (pair.folder / "moving.mrk.json").write_text(markups(pair.back(pair.landmarks) / 1000))
+
+
+def test_a_scan_in_meters_needs_a_scale(run, pair):
+    in_meters(pair)
+    result = run(*REGISTER, "-similarity", "-output", "found")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert figure(result.stdout, "scale") == pytest.approx(1000) and "note" not in result.stdout
+    assert np.abs(meshio.read(pair.folder / "found.ply").points - pair.fixed.points).max() < 0.01
+
+
 def fins(folder):
     points = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, -50, 0], [0, 0, 50]], float)
     faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], np.int32)
@@ -139,6 +168,7 @@ CASES = {
         lambda p: spoil(p, p.landmarks[:2]), REGISTER, ["2 landmark", "three"]),
     "landmarks on a line": (
         lambda p: spoil(p, np.outer(range(5), [1, 2, 3])), REGISTER, ["on a line", "beside"]),
+    "scan in meters": (in_meters, [*REGISTER, "-icp"], ["1000 times", "0.2 to 5", "mm", "-similarity"]),
     "frame not said": (
         no_frame, REGISTER, ["fixed.mrk.json:1:", "coordinateSystem", "LPS", "RAS"]),
     "no name in common": (

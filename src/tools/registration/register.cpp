@@ -7,6 +7,7 @@
 
 #include "repose/base/error.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::tools::registration {
 using namespace surface;
@@ -109,6 +110,30 @@ void check_breadth(const std::vector<Vec3>& points, const char* which) {
         which, found, min_breadth);
 }
 
+/// Refuses sets whose median ratio of distances between two landmarks is that of other units.
+void check_sizes(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed) {
+  std::vector<double> ratios;
+  for (size_t i = 0; i < moving.size(); ++i)
+    for (size_t k = 0; k < i; ++k)
+      if (moving[i] != moving[k])
+        ratios.push_back((fixed[i] - fixed[k]).norm() / (moving[i] - moving[k]).norm());
+  const double ratio = base::median(std::move(ratios));
+  if (ratio >= 1 / max_size_ratio && ratio <= max_size_ratio) return;
+  base::refuse(
+      "the fixed landmarks lie {:.4g} times as far apart as the moving ones, expected {:g} to {:g} "
+      "times: one of the two sets is not in mm; scale it and its mesh to mm (repose-register "
+      "-similarity fits the scale)",
+      ratio, 1 / max_size_ratio, max_size_ratio);
+}
+
+std::vector<double> distances(const std::vector<Vec3>& points, const Surface& surface,
+                              double scale) {
+  const TriangleTree tree(surface);
+  std::vector<double> result;
+  for (const Vec3& point : points) result.push_back(scale * std::sqrt(tree.nearest(point).squared));
+  return result;
+}
+
 }  // namespace
 
 LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
@@ -119,6 +144,7 @@ LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec
                  n);
   check_breadth(moving, "moving");
   check_breadth(fixed, "fixed");
+  if (!with_scale) check_sizes(moving, fixed);
   Fitter fitter(moving, fixed, with_scale);
   LandmarkFit result;
   result.can_be_checked = n >= 4;
@@ -143,6 +169,26 @@ LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec
                                                      : NAN);
   }
   return result;
+}
+
+std::string remark_on_distance(const std::vector<std::string>& names,
+                               const std::vector<Vec3>& on_moving, const Surface& moving,
+                               const std::vector<Vec3>& on_fixed, const Surface& fixed,
+                               double scale) {
+  constexpr double limit = 15;  // mm
+  const std::vector<double> from_moving = distances(on_moving, moving, scale),
+                            from_fixed = distances(on_fixed, fixed, 1);
+  size_t worst = 0;
+  const auto difference = [&](size_t i) { return std::abs(from_moving[i] - from_fixed[i]); };
+  for (size_t i = 1; i < names.size(); ++i)
+    if (difference(i) > difference(worst)) worst = i;
+  if (difference(worst) <= limit && base::median(from_moving) <= limit &&
+      base::median(from_fixed) <= limit)
+    return "";
+  return fmt::format(
+      "landmark {} lies {:.4g} mm from {} and {:.4g} mm from {}: landmarks seem to be of another "
+      "scan, frame (RAS or LPS) or unit than their mesh; give those of the mesh, in mm",
+      names[worst], from_moving[worst], moving.name, from_fixed[worst], fixed.name);
 }
 
 Surface moved(const Surface& surface, const Similarity& transform) {

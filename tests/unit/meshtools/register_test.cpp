@@ -144,6 +144,25 @@ TEST(Register, too_few_or_collinear_landmarks_are_refused) {
   EXPECT_EQ(refusal([&] { fit_landmarks(bent, bent, false); }), "");
 }
 
+TEST(Register, landmarks_in_another_unit_are_refused_but_by_a_fit_of_the_scale) {
+  Random random(7);
+  const auto fixed = cloud(random, 6);
+  for (const double factor : {0.001, 0.1, 1 / 25.4, 10.0, 1000.0}) {
+    const auto moving = mapped({factor, Mat3::Identity(), Vec3::Zero()}, fixed);
+    const std::string message = refusal([&] { fit_landmarks(moving, fixed, false); });
+    EXPECT_NE(message.find("not in mm"), std::string::npos) << factor;
+    EXPECT_NEAR(fit_landmarks(moving, fixed, true).transform.scale * factor, 1, 1e-9);
+  }
+  auto strayed = fixed;
+  strayed[2] += Vec3(5000, 0, 0);
+  for (const double factor : {0.5, 2.0})
+    EXPECT_EQ(
+        refusal([&] {
+          fit_landmarks(mapped({factor, Mat3::Identity(), Vec3::Zero()}, strayed), fixed, false);
+        }),
+        "");
+}
+
 /// A waved sheet of n × n squares of 4 mm that has no symmetry.
 Surface sheet(int n) {
   Surface s = patch(n);
@@ -152,6 +171,27 @@ Surface sheet(int n) {
     p.z() = 9 * std::sin(0.13 * p.x()) + 6 * std::cos(0.17 * p.y() + 0.02 * p.x());
   }
   return s;
+}
+
+TEST(Register, landmarks_off_their_mesh_get_a_remark) {
+  const Surface mesh = sheet(40);
+  const std::vector<std::string> names = {"a", "b", "c", "d"};
+  const auto& p = mesh.points;
+  const std::vector<Vec3> on = {p[20], p[700], p[1000], p[1500]};
+  const auto remark = [&](const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
+                          double scale = 1) {
+    return remark_on_distance(names, moving, mesh, fixed, mesh, scale);
+  };
+  auto deep = on, off = on, far = on;
+  deep[1].z() -= 40;  // a landmark of bone
+  off[2].z() += 30;
+  for (Vec3& point : far) point.z() += 100;
+  EXPECT_EQ(remark(on, on), "");
+  EXPECT_EQ(remark(deep, deep), "");
+  EXPECT_NE(remark(off, on).find("landmark c lies 2"), std::string::npos) << remark(off, on);
+  EXPECT_EQ(remark(off, on, 0.1), "");
+  EXPECT_NE(remark(on, far).find("landmark"), std::string::npos);
+  EXPECT_NE(remark(far, far), "");
 }
 
 TEST(Register, icp_finds_the_place_of_a_part) {

@@ -16,6 +16,10 @@ using base::Similarity;
 /// Least breadth of landmarks (base::breadth); below it, the turn about their line is noise.
 constexpr double min_breadth = 0.01;
 
+/// Largest ratio of distances between landmarks of one mesh to those of the other, either way, that
+/// a rigid fit takes; below that of cm to mm, and above that of any two heads.
+constexpr double max_size_ratio = 5;
+
 struct LandmarkFit {
   Similarity transform;           ///< from the landmarks that were not left out
   std::vector<double> residual;   ///< of each landmark, left out or not, mm
@@ -32,9 +36,18 @@ struct LandmarkFit {
 /// worst, where its error is too large for the scatter of the others, at a level of 0.1 % over all
 /// landmarks (an F test on the prediction variance of the rigid fit, to first order). At most a
 /// third of them is left out, and at least four remain, but of four one may go. Three cannot be
-/// checked. Throws InputError for fewer than three, or a set on a line (min_breadth).
+/// checked. Throws InputError for fewer than three, or a set on a line (min_breadth), and without a
+/// scale for sets of different size (max_size_ratio), of which one is in another unit.
 LandmarkFit fit_landmarks(const std::vector<Vec3>& moving, const std::vector<Vec3>& fixed,
                           bool with_scale);
+
+/// One-line remark where a landmark lies more than 15 mm farther from its mesh than its partner
+/// from the other, or half of the landmarks of a mesh lie more than 15 mm from it; else empty. All
+/// lengths of the moving mesh are times `scale`.
+std::string remark_on_distance(const std::vector<std::string>& names,
+                               const std::vector<Vec3>& on_moving, const Surface& moving,
+                               const std::vector<Vec3>& on_fixed, const Surface& fixed,
+                               double scale);
 
 struct IcpOptions {
   double trim = 0.8;  ///< share of the pairs, the nearest, that counts, (0, 1]
