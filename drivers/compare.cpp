@@ -21,6 +21,7 @@
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
+#include "repose/surface/defects.h"
 #include "repose/surface/read.h"
 #include "repose/surface/write.h"
 #include "repose/tools/comparison/compare.h"
@@ -278,11 +279,21 @@ void write_results(const std::string& name, const surface::Surface& predicted,
               name.c_str());
 }
 
+/// Reads a surface; the triangles of one that is closed and faces inward are turned, with a note.
+surface::Surface read_facing_outward(const std::string& file) {
+  surface::Surface surface = surface::read_surface(file);
+  const surface::Defects defects = surface::inspect(surface, false);
+  if (defects.border_edges > 0 || defects.misoriented_edges > 0 || defects.outward) return surface;
+  for (Triangle& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
+  std::printf("note: triangles of %s point inward; they are turned\n", file.c_str());
+  return surface;
+}
+
 void run(const base::Options& options) {
   require_landmarks(options);
   base::require_writable(options.text("output") + ".vtp");
-  const surface::Surface predicted = surface::read_surface(options.arguments()[0]);
-  surface::Surface actual = surface::read_surface(options.arguments()[1]);
+  const surface::Surface predicted = read_facing_outward(options.arguments()[0]);
+  surface::Surface actual = read_facing_outward(options.arguments()[1]);
   const Marks marks = marks_of(options, "landmarks"),
               actual_marks = marks_of(options, "actual_landmarks");
   base::Similarity brought;

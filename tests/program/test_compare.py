@@ -59,6 +59,15 @@ def test_spheres_two_millimeters_apart(run, tmp_path):
     assert "Name=\"distance\"" in (tmp_path / "compared.vtp").read_text()
 
 
+def test_a_closed_surface_that_points_inward_is_turned(run, tmp_path):
+    mesh = meshio.read(sphere(tmp_path / "b.ply", 32))
+    meshio.Mesh(mesh.points, [("triangle", mesh.cells_dict["triangle"][:, ::-1])]).write(tmp_path / "inward.ply")
+    result = run("repose-compare", sphere(tmp_path / "a.ply", 30), "inward.ply")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert rows(result.stdout)["PREDICTED to ACTUAL"][1] == pytest.approx(-2, abs=0.06)
+    assert "note: triangles of inward.ply point inward" in result.stdout
+
+
 def test_corresponding_vertices_have_the_sign_of_the_surface(run, tmp_path):
     small, large = sphere(tmp_path / "a.ply", 38), sphere(tmp_path / "b.ply", 40)
     for predicted, actual, signed in ((small, large, -2), (large, small, 2)):
