@@ -113,7 +113,8 @@ class NiftiHeader {
   }
   /// Where voxels begin: behind the header and its extensions.
   int64_t offset() const {
-    return std::max(nifti_header, static_cast<int64_t>(std::max(0.0f, number(108))));
+    const float stated = std::min(std::max(0.0f, number(108)), 1e9f);
+    return std::max(nifti_header, static_cast<int64_t>(stated));
   }
 
  private:
