@@ -169,7 +169,7 @@ class Result:
         shown = solved if solved_skin else shown_skin.shown_skin(self.h5, name)
         self.corners, self.before, self.solved = shown.corners, shown.before, shown.solved
         self.given = None if len(shown.before) == len(solved.before) else shown
-        self.near = None if self.given is None else shown_skin.nearest(solved.before, shown.before)
+        self.near = None if self.given is None else shown_skin.matching_rows(solved, shown)
         self.walls = self.find_walls()
         self.instruments = []
         self.bones_before, self.bone_corners = np.zeros((0, 3)), np.zeros((0, 3), int)
@@ -552,11 +552,7 @@ def panels(results, states, columns):
 def difference(results, states):
     """How far the faces of two results are from each other, mm, at the vertices of the second."""
     first, second = (state["skin"] - result.before for result, state in zip(results, states))
-    near = shown_skin.nearest(results[0].before, results[1].before)
-    off = np.linalg.norm(results[0].before[near] - results[1].before, axis=1)
-    if np.median(off) > 5:
-        refuse(f"{results[1].name}.h5: not the skin of {results[0].name}.h5; two plans of one patient "
-               "can be compared")
+    near = shown_skin.rows_of_patient(*results, [result.file for result in results])
     return np.linalg.norm(second - first[near], axis=1)
 
 

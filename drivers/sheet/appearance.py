@@ -9,7 +9,7 @@ import numpy as np
 
 from sheet.ply import Header
 from sheet.script import Unusable, reading
-from sheet.shown_skin import Skin, nearest
+from sheet.shown_skin import Skin, matching_rows, nearest
 
 LARGEST_IMAGE = 2_000_000  # bytes: the page must stay below 5 MB
 
@@ -103,7 +103,7 @@ def textured(points, uv, faces, image, skin):
     flat = np.where(flat < 0, flat + [len(points), len(uv)], flat - 1)
     pairs, corners = np.unique(flat, axis=0, return_inverse=True)
     before = np.array([point[:3] for point in points])[pairs[:, 0]]
-    near = nearest(skin.before, before)
-    after = before + (skin.after - skin.before)[near]
-    shown = Skin(before, after, corners.reshape(-1, 3), skin.solved[near])
+    shown = Skin(before, before, corners.reshape(-1, 3), np.zeros(len(before)))
+    near = matching_rows(skin, shown)
+    shown = Skin(before, before + (skin.after - skin.before)[near], shown.corners, skin.solved[near])
     return Appearance(shown, uv=np.array(uv)[pairs[:, 1]], image=image)

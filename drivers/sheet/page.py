@@ -15,9 +15,8 @@ from sheet.meshes import Pack, coarser
 from sheet.measures import (FOLLOWS_SOURCE, following, measured, occlusion, reference,
                             shift_in_words, turns, turns_in_words)
 from sheet.profile import COLORS, cut, drawing, middle_plane, outlines
-from sheet.shown_skin import nearest
+from sheet.shown_skin import matching_rows, rows_of_patient
 from sheet.result import Figure
-from sheet.script import Unusable
 from sheet.tables import folded, table, tenths
 from sheet.words import PUBLISHED, by_part, paragraphs
 
@@ -82,12 +81,7 @@ class Plan:
 def matched(first, second):
     """After the second plan, the vertices of the first one's skin."""
     one, other = first.result.skin, second.result.skin
-    if one.before.shape == other.before.shape and np.allclose(one.before, other.before, atol=1e-6):
-        return other.after
-    near = nearest(other.before, one.before)
-    if np.median(np.linalg.norm(other.before[near] - one.before, axis=1)) > 5:
-        raise Unusable(f"{second.result.file}: not the skin of {first.result.file}; two plans of one "
-                       "patient can be compared")
+    near = rows_of_patient(other, one, [plan.result.file for plan in (first, second)])
     return one.before + (other.after - other.before)[near]
 
 
@@ -96,7 +90,7 @@ def packed_skin(plans, appearance, pack):
     result = plans[0].result
     skin = appearance.skin if appearance else result.skin
     states = [skin.before, skin.after, *([matched(*plans)] if len(plans) == 2 else [])]
-    near = None if skin is result.skin else nearest(result.skin.before, skin.before)
+    near = None if skin is result.skin else matching_rows(result.skin, skin)
     unsure = result.uncertainty
     fields = {"solved": skin.solved}
     if unsure is not None:

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 
 from sheet.script import Unusable, reading
-from sheet.shown_skin import nearest, opened, read_given, read_places, read_rows, solved_skin
+from sheet.shown_skin import matching_rows, opened, read_given, read_places, read_rows, solved_skin
 
 
 class Figure(str):
@@ -97,7 +97,7 @@ class Result:
         self.uncertainty = None
         if "point/discretisation_error" in step and math.isfinite(error):
             values = error + step["point/discretisation_error"][:][used]
-            near = nearest(self.solved.before, self.skin.before)
+            near = matching_rows(self.solved, self.skin)
             self.uncertainty = np.where(self.skin.solved > 0, values[near], 0.0)
 
 

@@ -7,9 +7,11 @@ import xml.etree.ElementTree
 
 import numpy as np
 
-from sheet.script import reading
+from sheet.meshes import edges
+from sheet.script import Unusable, reading
 
 AROUND_CUTS = 4.0  # mm: so near to a cut the solved skin is shown, which is cut open
+SMOOTHINGS = 8     # as many neighbors from a side of a cut, whose border may be jagged
 
 
 def read_places(group, name, count=None):
@@ -98,12 +100,11 @@ def opened(given, solved):
     kept = ~near(given.before, spaced, AROUND_CUTS)[given.corners].any(1)
     edge = np.linalg.norm(np.ptp(solved.before[solved.corners], axis=1), axis=1).mean()
     patch = near(solved.before, spaced, AROUND_CUTS + edge)[solved.corners].any(1)
-    faces = solved.corners[patch]
-    rows, faces = np.unique(faces, return_inverse=True)
-    return Skin(np.concatenate([given.before, solved.before[rows]]),
-                np.concatenate([given.after, solved.after[rows]]),
-                np.concatenate([given.corners[kept], faces.reshape(-1, 3) + len(given.before)]),
-                np.concatenate([given.solved, np.ones(len(rows))]))
+    used, corners = np.unique(np.concatenate([given.corners[kept], solved.corners[patch] + len(given.before)]),
+                              return_inverse=True)
+    before, after, computed = (np.concatenate(both)[used] for both in (
+        (given.before, solved.before), (given.after, solved.after), (given.solved, solved.solved)))
+    return Skin(before, after, corners.reshape(-1, 3), computed)
 
 
 def denser(places):
@@ -130,3 +131,39 @@ def nearest(points, places):
         apart = squares - 2 * places[first:first + size] @ points.T
         found[first:first + size] = apart.argmin(1)
     return found
+
+
+def smoothed(skin):
+    """Places of the vertices, smoothed along the triangles: away from a cut or lip, to the own side of it."""
+    ends = np.concatenate([edges(skin.corners), edges(skin.corners)[:, ::-1]]).T
+    links, places = 1 + np.bincount(ends[0], minlength=len(skin.before)), skin.before
+    for _ in range(SMOOTHINGS):
+        around = [np.bincount(ends[0], column[ends[1]], len(places)) for column in places.T]
+        places = (places + np.transpose(around)) / links[:, None]
+    return places
+
+
+def matching_rows(skin, other):
+    """For each vertex of another skin of the same face the row of this one: its own row where both are one
+    mesh, else the nearest. Of several vertices at one place, as along cuts and parted lips, it is the one on the
+    same side."""
+    if skin.before.shape == other.before.shape and np.array_equal(skin.corners, other.corners) and \
+            np.allclose(skin.before, other.before, rtol=0, atol=1e-6):
+        return np.arange(len(skin.before))
+    used = np.unique(skin.corners)
+    _, place, count = np.unique(skin.before[used].round(4), axis=0, return_inverse=True,  # 0.1 µm
+                                return_counts=True)
+    place, found = place.ravel(), nearest(skin.before[used], other.before)
+    sides, other_sides = smoothed(skin)[used], smoothed(other)
+    for shared in np.unique(place[found[count[place[found]] > 1]]):
+        twins, rows = np.flatnonzero(place == shared), np.flatnonzero(place[found] == shared)
+        found[rows] = twins[nearest(sides[twins], other_sides[rows])]
+    return used[found]
+
+
+def rows_of_patient(skin, other, files):
+    """Rows as of `matching_rows`; refuses skins of two patients, by the files of both plans."""
+    rows = matching_rows(skin, other)
+    if np.median(np.linalg.norm(skin.before[rows] - other.before, axis=1)) > 5:
+        raise Unusable(f"{files[1]}: not the skin of {files[0]}; two plans of one patient can be compared")
+    return rows

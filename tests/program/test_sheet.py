@@ -21,6 +21,7 @@ from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.measures import read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.script import Unusable  # noqa: E402
+from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 from sheet.words import to_html  # noqa: E402
 
@@ -64,6 +65,30 @@ def test_a_coarser_surface_keeps_its_cuts_open_and_welds_other_seams(wide, open_
     assert np.abs(inside[:, 1] - 20).max(initial=0) < 1, "the border is that of the seam"
     sides = (moved - coarse)[np.abs(coarse[:, 1] - 20) < 1][:, 1]
     assert sides.max() == pytest.approx(wide) and sides.min() == pytest.approx(0)
+
+
+def parted_skin(n, jagged=0.0):
+    """A parted sheet of 40 × 40 mm, whose far half moves by 4 mm."""
+    (before, after), corners = parted_sheet(n, 4.0)
+    places = before * 40 / (n - 1)
+    places[:, 1] += jagged * np.sin(40 * places[:, 0])
+    return Skin(places, places + after - before, corners, np.ones(len(places)))
+
+
+@pytest.mark.parametrize("n", [41, 31, 21])
+def test_a_skin_is_compared_with_the_same_side_of_a_cut(n):
+    one, other = parted_skin(41), parted_skin(n, jagged=0.3)
+    off = other.movement - one.movement[matching_rows(one, other)]
+    inside = np.abs(other.before[:, :2] - 20).max(1) < 15
+    assert np.abs(off[inside]).max() < 1e-9
+
+
+def test_equal_skins_are_compared_row_by_row():
+    one, other = parted_skin(21), parted_skin(21)
+    assert (matching_rows(one, other) == np.arange(len(one.before))).all()
+    other.before += [0, 0, 6]
+    with pytest.raises(Unusable, match="b.h5: not the skin of a.h5; two plans of one patient"):
+        rows_of_patient(one, other, ["a.h5", "b.h5"])
 
 
 # ----- landmarks

@@ -320,7 +320,7 @@ def skin_to_hand_back(h5, result):
     """Points, triangles and arrays of the predicted skin: of the model that was given, displaced, where
     a remeshed part of it was solved."""
     import numpy as np
-    from sheet.shown_skin import nearest, shown_skin, solved_skin
+    from sheet.shown_skin import matching_rows, shown_skin, solved_skin
     step = h5["step"][sorted(h5["step"])[-1]]
     solved, used = solved_skin(h5)
     skin = shown_skin(h5, str(result).removesuffix(".h5"))
@@ -331,7 +331,7 @@ def skin_to_hand_back(h5, result):
         unsure = step["point/discretisation_error"][:][used]
     if len(skin.before) != len(solved.before):
         arrays["computed"] = skin.solved
-        unsure = np.where(skin.solved > 0, unsure[nearest(solved.before, skin.before)], 0.0)
+        unsure = np.where(skin.solved > 0, unsure[matching_rows(solved, skin)], 0.0)
     if math.isfinite(error):
         arrays["uncertainty"] = error * (skin.solved > 0) + unsure
     return skin.after, skin.corners, arrays
