@@ -88,7 +88,8 @@ def described(session, plan_map, command, about):
     coefficients = np.abs(plan_map.kriging.predict(plan_map.u)).max(axis=0)
     said = {
         "pieces": [piece.name for piece in session.pieces], "least_bound": plan_map.least_bound,
-        "coordinates": box.coordinates, "half": box.half.tolist(),
+        "coordinates": box.coordinates, "half": box.half.tolist(), "box": session.box,
+        "axes": session.axes.tolist(),
         "scene_plan": session.scene_plan, "command": command, "about": about,
         "centroids": {piece.name: piece.centroid.tolist() for piece in session.pieces},
         "kriging": packed_kriging(pack, plan_map.kriging), "failed": doubles(pack, plan_map.failed),

@@ -104,9 +104,8 @@ class Planner {
       input.addEventListener("change", () => {
         const plan = copyOf(this.plan), value = Number(input.value);
         if (!Number.isFinite(value) || input.value === "") return this.showNumbers();
-        const {axes, box} = this.head, along = alongHead(axes, plan[this.chosen][key]);
-        along[axis] = sign * value;
-        plan[this.chosen][key] = within(box[key], alongScan(axes, along));
+        const {axes, box} = this.head, motion = plan[this.chosen];
+        motion[key] = withNumber(axes, box[key], motion[key], axis, sign * value);
         this.change(plan);
       });
       return input;

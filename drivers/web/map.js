@@ -5,6 +5,7 @@
 
 const byId = id => document.getElementById(id);
 const BEFORE = 0, NOW = 1;
+const SMALLEST = 0.05;   // mm or degrees: a number that moves less has no slider
 const MOST_ERROR = 0.5;  // mm: beyond, the face is gray
 
 function doubles(bytes, {at, count}) {
@@ -85,7 +86,7 @@ class MapPage {
   }
 
   makeView(bytes) {
-    this.viewer = new FaceViewer(byId("view"));
+    this.viewer = new FaceViewer(byId("view"), this.described.axes);
     this.skin = this.viewer.add({name: "skin", triangles: this.triangles,
                                  states: [this.initial, this.initial.slice()]});
     this.bones = this.described.bones.map(({name, points, triangles}) => {
@@ -99,21 +100,25 @@ class MapPage {
 
   makeSliders() {
     this.inputs = [];
-    const {coordinates, half, pieces} = this.described;
+    const {axes, box, pieces} = this.described;
     for (const piece of pieces) {
       const group = document.createElement("fieldset"), legend = document.createElement("legend");
       legend.textContent = piece;
       group.append(legend);
       for (const [label, key, axis, sign, unit] of NUMBERS) {
-        const row = coordinates.findIndex(([p, k, a]) => p === piece && k === key && a === axis);
-        if (row < 0) continue;
+        const reach = box[key].reduce((sum, half, a) => sum + half * Math.abs(axes[axis][a]), 0);
+        if (reach < SMALLEST) continue;
         const line = document.createElement("label"), input = document.createElement("input");
         const output = document.createElement("output");
-        Object.assign(input, {type: "range", min: -half[row], max: half[row], step: 0.1});
+        const most = Math.round(10 * reach) / 10;
+        Object.assign(input, {type: "range", min: -most, max: most, step: 0.1});
         input.setAttribute("aria-label", `${piece}: ${label}, ${unit}`);
         input.oninput = () => {
-          const plan = copyOf(this.plan);
-          plan[piece][key][axis] = sign * Number(input.value);
+          if (this.drag?.input !== input || this.drag.made !== this.plan)
+            this.drag = {input, plan: this.plan};  // a number that ends at the box takes others along
+          const plan = copyOf(this.drag.plan), motion = plan[piece];
+          motion[key] = withNumber(axes, box[key], motion[key], axis, sign * Number(input.value));
+          this.drag.made = plan;
           this.change(plan);
         };
         line.append(label, input, output);
@@ -187,7 +192,8 @@ class MapPage {
     this.color();
     this.showNumbers();
     this.showTrust();
-    const profile = position => profileOf(position, this.triangles, this.viewer.center.x);
+    const {axes} = this.described, middle = alongHead(axes, this.viewer.center.toArray())[0];
+    const profile = position => profileOf(turned(axes, position), this.triangles, middle);
     this.profileBefore ??= profile(this.initial);
     const said = drawProfiles(byId("profile"), this.profileBefore, profile(this.position));
     byId("measured").textContent = said && `; ${said}`;
@@ -205,7 +211,7 @@ class MapPage {
 
   showNumbers() {
     for (const {input, output, piece, key, axis, sign, unit} of this.inputs) {
-      const value = sign * this.plan[piece][key][axis];
+      const value = sign * alongHead(this.described.axes, this.plan[piece][key])[axis];
       input.value = String(value);
       output.textContent = `${value.toFixed(1).replace("-", "−").replace(/^−0\.0$/, "0.0")} ${unit}`;
     }
@@ -213,13 +219,14 @@ class MapPage {
 
   // The solved plan nearest to this one, in shares of the box: {row, share, mm, degrees}.
   nearest() {
-    const {samples, dimensions: d} = this.kriging, {coordinates, half} = this.described;
+    const {samples, dimensions: d} = this.kriging, {axes, pieces} = this.described;
     const distance = (points, i) => Math.hypot(...this.u.map((v, k) => v - points[i * d + k]));
     let row = 0;
     for (let i = 1; i < samples; ++i)
       if (distance(this.kriging.u, i) < distance(this.kriging.u, row)) row = i;
-    const most = key => coordinates.reduce((most, [, other, ], k) => other !== key ? most
-      : Math.max(most, half[k] * Math.abs(this.u[k] - this.kriging.u[row * d + k])), 0);
+    const solved = this.planOf(row), apart = (piece, key) => alongHead(axes,
+      this.plan[piece][key].map((x, a) => x - solved[piece][key][a])).map(Math.abs);
+    const most = key => Math.max(...pieces.flatMap(piece => apart(piece, key)));
     const share = distance(this.kriging.u, row);
     let failing = false;
     for (let i = 0; i * d < this.failed.length; ++i) failing ||= distance(this.failed, i) < share;
@@ -268,7 +275,8 @@ class MapPage {
     let text = "";
     if (hit?.surface === this.skin && hit.state === NOW) {
       const from = hit.at(this.initial, 3), shift = hit.at(this.position, 3).map((x, a) => x - from[a]);
-      text = `${shiftInWords(shift)}; error below ${hit.at(this.bound)[0].toFixed(2)} mm`;
+      text = `${shiftInWords(alongHead(this.described.axes, shift))}; error below ` +
+        `${hit.at(this.bound)[0].toFixed(2)} mm`;
     }
     byId("under").textContent = text;
   }

@@ -24,6 +24,13 @@ function turned(axes, position) {
 // Each component as near to its value as its range either way allows.
 const within = (range, values) => values.map((v, a) => Math.min(Math.max(v, -range[a]), range[a]));
 
+// A motion's vector of a kind with another number along an axis of the head, within the box of the plan.
+function withNumber(axes, range, vector, axis, value) {
+  const along = alongHead(axes, vector);
+  along[axis] = value;
+  return within(range, alongScan(axes, along));
+}
+
 const zero = () => ({translate: [0, 0, 0], rotate: [0, 0, 0]});
 const copyOf = plan => JSON.parse(JSON.stringify(plan));
 

@@ -154,6 +154,33 @@ def test_sliders_move_the_face_as_python_does(made):
     assert found["gray"] and found["nearest"] == "This plan was solved itself." and found["wide"] <= 0
 
 
+def test_sliders_follow_the_axes_of_the_head(made):
+    """As on the page of live.py; a chin that lies 16 degrees down."""
+    axes = [[1, 0, 0], [0, 0.96, 0.28], [0, -0.28, 0.96]]
+    page = made[0].with_name("turned_map.html")
+    text = made[0].with_name("one_map.html").read_text()
+    assert '"axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]' in text
+    page.write_text(re.sub(r'"axes": \[\[.*?\]\]', f'"axes": {axes}', text))
+    found = evaluate(page, """
+      const number = name => mapPage.inputs.find(one => one.input.ariaLabel.includes(name));
+      const set = (name, value) => { number(name).input.value = value; number(name).input.oninput(); };
+      document.getElementById("reset").click();
+      const names = mapPage.inputs.map(one => one.input.ariaLabel), range = number("forward").input.max;
+      set("forward", "3");
+      const plan = mapPage.plan.mandible.translate, told = mapPage.inputs.map(one => one.output.textContent);
+      set("up", "-2");
+      const ends = mapPage.plan.mandible.translate;
+      set("up", "0");
+      return {names, range, plan, told, ends, back: mapPage.plan.mandible.translate,
+              nearest: mapPage.nearest().mm, up: mapPage.viewer.three.camera.up.toArray()};""")
+    assert "error" not in found, found
+    assert [name.split(": ")[1].split(",")[0] for name in found["names"]] == ["forward", "up", "pitch"]
+    assert float(found["range"]) == pytest.approx(0.96 * 4 + 0.28 * 2), "how far the box reaches"
+    assert found["plan"] == pytest.approx([0, -2.88, -0.84]) and found["told"] == ["3.0 mm", "0.0 mm", "0.0 °"]
+    assert found["ends"] == pytest.approx([0, -2.88 + 0.56, -2]), "within the box"
+    assert found["back"] == pytest.approx(found["plan"]) and found["up"] == pytest.approx(axes[2])
+
+
 def test_a_changed_mesh_has_other_plans(tmp_path):
     mesh, scene = tmp_path / "skin.ply", tmp_path / "scene.yaml"
     mesh.write_text("a")

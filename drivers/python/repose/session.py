@@ -191,6 +191,7 @@ class Session:
                                                          ("centroid", "translate", "rotate")))
                        for one in head["pieces"]]
         self.box, self.accuracy = head["box"], head["accuracy"]
+        self.axes = np.array(head["axes"])  # rows left, back and up of the head
         self.initial = arrays["position"].astype(float)
         self.triangles = arrays["triangles"]
         self.given = None
