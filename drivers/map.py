@@ -40,7 +40,7 @@ try:
     import numpy as np
     import scipy.stats  # noqa: F401  here, so that it is missed at once
     import repose
-    from repose.map import MOST_MODES, PlanMap
+    from repose.map import LEAST_BOUNDED, MOST_MODES, PlanMap
     from repose.kriging import REACH, SPREAD_NUGGET
     from repose.samples import PlanBox, SampleStore, solve_all
     from sheet.meshes import Pack, coarser
@@ -88,6 +88,7 @@ def described(session, plan_map, command, about):
     coefficients = np.abs(plan_map.kriging.predict(plan_map.u)).max(axis=0)
     said = {
         "pieces": [piece.name for piece in session.pieces], "least_bound": plan_map.least_bound,
+        "bounded": plan_map.is_bounded, "least_bounded": LEAST_BOUNDED,
         "coordinates": box.coordinates, "half": box.half.tolist(), "box": session.box,
         "axes": session.axes.tolist(),
         "scene_plan": session.scene_plan, "command": command, "about": about,
@@ -120,9 +121,12 @@ def summary(plan_map, accuracy):
     return (f"Fitted to {len(errors)} plans solved to {accuracy:g} mm" +
             (f"; {failed} did not converge" if failed else "") +
             f". Plans left out of the fit are off by {np.median(np.percentile(errors, 95, axis=1)):.2f} mm "
-            f"on 95 % of the skin (median of plans), at most by {errors.max():.2f} mm. The error bound "
-            "holds for 95 % of plans at each point, against this model; it says nothing of how well the "
-            "model fits a patient. For planning and teaching.")
+            f"on 95 % of the skin (median of plans), at most by {errors.max():.2f} mm. " +
+            ("95 % of them keep the error bound at each point" if plan_map.is_bounded else
+             f"They keep the error bound, but {len(errors)} are too few to state how many other plans do: solve "
+             f"at least {LEAST_BOUNDED}") +
+            ". It is one against this model, and says nothing of how well the model fits a patient. For planning "
+            "and teaching.")
 
 
 def fitted_page(scene, session, box, samples, accuracy):

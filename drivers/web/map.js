@@ -77,6 +77,7 @@ class MapPage {
     this.factor = unpack(bytes, described.skin.factor);
     this.failed = doubles(bytes, described.failed);
     this.centroids = described.centroids;
+    this.below = described.bounded ? "below" : "about";
     this.makeView(bytes);
     this.makeSliders();
     this.connect();
@@ -238,10 +239,12 @@ class MapPage {
     const most = sorted[Math.floor(0.95 * (count - 1))];
     const gray = sorted.reduce((sum, v) => sum + (v > MOST_ERROR), 0) / count;
     const {mm, degrees, failing} = this.nearest();
-    byId("mark").className = failing || gray > 0.05 ? "preview" : "exact";
+    const {bounded, least_bounded: least} = this.described;
+    byId("mark").className = failing || gray > 0.05 || !bounded ? "preview" : "exact";
     byId("mark").textContent = failing
       ? "a plan near this one could not be solved: solve this one exactly"
-      : `within ${most.toFixed(2)} mm on 95 % of the skin` +
+      : `${bounded ? "within" : "about"} ${most.toFixed(2)} mm on 95 % of the skin` +
+        (bounded ? "" : `: ${this.kriging.samples} plans are solved, a bound needs ${least}`) +
         (gray > 0 ? `; ${(100 * gray).toFixed(gray < 0.01 ? 1 : 0)} % of it uncertain (gray)` : "");
     byId("nearest").textContent = mm < 0.05 && degrees < 0.05 ? "This plan was solved itself."
       : `The numbers of the nearest solved plan differ by at most ${mm.toFixed(1)} mm and ` +
@@ -262,7 +265,7 @@ class MapPage {
     const high = shown === "bound" ? MOST_ERROR
       : Math.max(1, Math.ceil(movement.reduce((most, v) => Math.max(most, v), 0)));
     byId("high").textContent = String(high);
-    byId("unit").textContent = shown === "bound" ? "error below, mm" : "movement, mm";
+    byId("unit").textContent = shown === "bound" ? `error ${this.below}, mm` : "movement, mm";
     byId("bar").hidden = shown === "none";
     this.viewer.setScale({low: 0, high});
     this.skin.setField(NOW, shown === "none" ? null : values,
@@ -275,7 +278,7 @@ class MapPage {
     let text = "";
     if (hit?.surface === this.skin && hit.state === NOW) {
       const from = hit.at(this.initial, 3), shift = hit.at(this.position, 3).map((x, a) => x - from[a]);
-      text = `${shiftInWords(alongHead(this.described.axes, shift))}; error below ` +
+      text = `${shiftInWords(alongHead(this.described.axes, shift))}; error ${this.below} ` +
         `${hit.at(this.bound)[0].toFixed(2)} mm`;
     }
     byId("under").textContent = text;

@@ -11,6 +11,7 @@ from conftest import PROJECT, finish, programs
 
 sys.path[:0] = [str(PROJECT / "drivers/python"), str(PROJECT / "drivers")]
 pytest.importorskip("scipy")
+import map as map_driver  # noqa: E402
 import repose  # noqa: E402
 from repose.kriging import Kriging, covariance  # noqa: E402
 from repose.map import PlanMap, bound_quantile  # noqa: E402
@@ -64,6 +65,7 @@ def test_a_page_is_made_and_says_what_it_rests_on(made):
     page = scene.with_name("one_map.html")
     assert 500_000 < page.stat().st_size < 5_000_000
     assert re.search(r"one_map.html: \d\.\d\d MB, 9 plans, \d+ modes", message.stdout)
+    assert "keep the error bound, but 9 are too few to state how many other plans do: solve at least 19" in message.stdout
     assert message.stderr.count("plans solved") == 1 and "9 of 9 plans solved" in message.stderr, "a quiet log"
     assert not re.search(r"(?:src|href)=[\"']?https?:|\bimport\(|\bfetch\(", page.read_text().split(
         "// three.js")[0]), "nothing is loaded"
@@ -150,7 +152,7 @@ def test_sliders_move_the_face_as_python_does(made):
     assert np.linalg.norm(moved - np.reshape(found["first"], (-1, 3)), axis=1).max() > 1
     assert np.allclose(found["bound"], plan_map.bound({"mandible": found["plan"]}), atol=0.01, rtol=0.01)
     assert "-plan '{\"mandible\":{\"translate\":[0,-3.5,0],\"rotate\":[-2,0,0]}}'" in found["command"]
-    assert re.match(r"within \d\.\d\d mm on 95 % of the skin", found["mark"])
+    assert re.match(r"about \d\.\d\d mm on 95 % of the skin: 9 plans are solved, a bound needs 19", found["mark"])
     assert found["gray"] and found["nearest"] == "This plan was solved itself." and found["wide"] <= 0
 
 
@@ -240,6 +242,11 @@ def test_the_bound_covers_and_failed_plans_are_left_out():
     samples = [Sample(u, displacement(u), slopes(u), True) for u in box.points(30)]
     samples[5].converged = False
     fitted = PlanMap(box, samples)
+    assert fitted.is_bounded and PlanMap(box, samples[6:25]).is_bounded and not PlanMap(box, samples[5:24]).is_bounded
+    assert "plans solved to 0.1 mm; 1 did not converge" in map_driver.summary(fitted, 0.1)
+    assert "95 % of them keep the error bound at each point." in map_driver.summary(fitted, 0.1)
+    kept = fitted.errors <= fitted.bound_factor * fitted.kriging.held_out_spread[:, None] * (1 + 1e-12)
+    assert (kept.mean(axis=0) >= 0.95).all()
     assert len(fitted.u) == 29 and len(fitted.failed) == 1 and len(fitted.modes.shapes) == 2
     held = box.held_out(100)
     error = [np.linalg.norm(fitted.displacement_at(u) - displacement(u), axis=1) for u in held]

@@ -10,6 +10,7 @@ SLOPE_SHARE = 0.5     # of derivatives beside displacements, in the choice of mo
 COARSE = 0.01         # mm at most that the modes leave out of the samples, if there are enough modes
 MOST_MODES = 60
 COVERAGE = 0.95
+LEAST_BOUNDED = 19    # values that have a 95 % quantile
 
 
 @dataclasses.dataclass
@@ -47,6 +48,7 @@ class PlanMap:
         if len(solved) < 3:
             raise ValueError(f"{len(solved)} of {len(samples)} plans converged; a map needs three")
         self.u = np.stack([one.u for one in solved])
+        self.is_bounded = len(solved) >= LEAST_BOUNDED
         self.modes = find_modes(solved, modes)
         shapes = self.modes.shapes.reshape(len(self.modes.shapes), -1)
         offset = np.stack([one.displacement - self.modes.mean for one in solved]).reshape(len(solved), -1)
@@ -66,7 +68,8 @@ class PlanMap:
         return self.modes.mean + np.tensordot(self.kriging.predict(u)[0], self.modes.shapes, 1)
 
     def bound(self, plan):
-        """[N] mm that the error of a point of the skin stays below, with 95 % of plans."""
+        """[N] mm that the error of a point of the skin stays below, with 95 % of plans; where `is_bounded` is
+        False, with less."""
         return self.bound_at(self.box.vector(plan))
 
     def bound_at(self, u):
@@ -79,7 +82,7 @@ class PlanMap:
 
 def bound_quantile(scores):
     """The 95 % quantile of each column that also holds for one more row: conformal prediction. With
-    fewer than 19 rows their largest."""
+    fewer than LEAST_BOUNDED rows their largest."""
     count = len(scores)
     row = min(int(np.ceil(COVERAGE * (count + 1))), count) - 1
     return np.sort(scores, axis=0)[row]
