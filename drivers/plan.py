@@ -332,7 +332,8 @@ def main():
                  folder / "face")
     picture = draw(HERE / "render.py", folder / "face", "-output", folder / "face.png")
     sheet = draw(HERE / "report.py", folder / "face", "-scene", scene, "-output", folder / "face.html")
-    print(f"{'not at rest' if status else 'solved'}: {folder / 'face.h5'}{picture}{sheet} ({time.monotonic() - begin:.0f} s)")
+    print(f"{'not at rest, or folded (see above)' if status else 'solved'}: {folder / 'face.h5'}{picture}{sheet} "
+          f"({time.monotonic() - begin:.0f} s)")
     return status
 
 

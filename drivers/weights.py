@@ -33,7 +33,7 @@ HEAD = ("| {} | ended | load | condition number | smallest eigenvalue, N/mm | it
 
 
 def solve(program, scene, options):
-    """Exit status and steps (attributes) of one run. Ends the script where the input is refused."""
+    """The steps (attributes) of one run. Ends the script where the input is refused."""
     with tempfile.TemporaryDirectory() as folder:
         name = os.path.join(folder, "result")
         done = subprocess.run([program, scene, *options, "-stability", "-output", name,
@@ -44,14 +44,14 @@ def solve(program, scene, options):
                   file=sys.stderr)
             sys.exit(max(done.returncode, 1))
         with h5py.File(name + ".h5") as h5:
-            return done.returncode, [dict(h5["step"][k].attrs) for k in sorted(h5["step"])]
+            return [dict(h5["step"][k].attrs) for k in sorted(h5["step"])]
 
 
-def row(weight, status, steps, unit):
+def row(weight, steps, unit):
     last, total = steps[-1], lambda name: sum(step[name] for step in steps)
     smallest = last["smallest_eigenvalue"]
     condition = f"{last['largest_eigenvalue'] / smallest:.1e}" if smallest > 0 else "–"
-    ended = "converged" if status == 0 else "NOT CONVERGED"
+    ended = "NOT CONVERGED" if not last["converged"] else "folded" if last["inverted_prisms"] else "converged"
     return (f"| {weight} | {ended} | {last['load']:.3g} | {condition} | {smallest:.2e} | "
             f"{total('iterations')} | {total('evaluations')} | {total('seconds') / unit:.2g} | "
             f"{last['volume_error_max']:.2g} | {last['inverted_prisms']} | "
@@ -91,9 +91,9 @@ def main():
     solve_by = lambda *options: solve(chosen.program, chosen.scene, options)
     penalties = {k: solve_by("-volume", "penalty", "-bulk_modulus", k) for k in MODULI}
     papers = {l: solve_by("-volume", "paper", "-lambda", l) for l in LAMBDAS}
-    unit = sum(step["seconds"] for step in penalties["1"][1])
-    text = table("κ, N/mm²", [row(k, *found, unit) for k, found in penalties.items()]) + "\n"
-    text += table("λ", [row(l, *found, unit) for l, found in papers.items()])
+    unit = sum(step["seconds"] for step in penalties["1"])
+    text = table("κ, N/mm²", [row(k, found, unit) for k, found in penalties.items()]) + "\n"
+    text += table("λ", [row(l, found, unit) for l, found in papers.items()])
     print(text)
     if page:
         target, before = page

@@ -288,6 +288,27 @@ def test_weights_end_at_the_first_refusal(script):
     assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (1, "", 1), done
 
 
+SOLVER = """#!{}
+import sys, h5py
+last, folded, slow = sys.argv[-3], "1e-6" in sys.argv, "1e-9" in sys.argv
+with h5py.File(last + ".h5", "w") as h5:
+    h5.create_group("step/0000").attrs.update(
+        smallest_eigenvalue=1.0, largest_eigenvalue=2.0, load=1.0, converged=int(not slow), iterations=1, evaluations=2,
+        seconds=1.0, volume_error_max=0.5, inverted_prisms=int(folded), displacement_error=0.01)
+sys.exit(2 if folded or slow else 0)
+"""
+
+
+def test_weights_tell_a_folded_rest_position_from_an_unfinished_search(script, tmp_path):
+    (tmp_path / "repose-solve").write_text(SOLVER.format(sys.executable))
+    (tmp_path / "repose-solve").chmod(0o755)
+    done = script("weights.py", "-bin", ".")
+    assert done.returncode == 0, done
+    ended = [line.split(" | ")[:2] for line in done.stdout.splitlines() if line.startswith(("| 1e", "| 1 "))]
+    assert ended[:4] == [["| 1e-6", "folded"], ["| 1e-4", "converged"], ["| 1e-2", "converged"], ["| 1", "converged"]]
+    assert ended[6:9] == [["| 1e-9", "NOT CONVERGED"], ["| 1e-6", "folded"], ["| 1e-3", "converged"]]
+
+
 def test_an_interrupt_ends_a_script_in_silence(tmp_path):
     slow = tmp_path / "repose-solve"
     slow.write_text("#!/bin/sh\ntouch started\nexec sleep 60\n")

@@ -422,11 +422,16 @@ def program():
 @pytest.mark.parametrize("error", [0.05, 0.1, 0.2, np.inf])
 @pytest.mark.parametrize("preview", [False, True])
 def test_an_accuracy_is_claimed_only_where_it_is_reached(program, status, error, preview):
-    report = {"load": 1.0, "displacement_error": error, "reason": b"why"}
+    report = {"load": 1.0, "displacement_error": error, "reason": b"why", "converged": 0, "inverted_prisms": 1}
     message = program["verdict"](status, report, 0.1, preview)
     reached = status == 0 and error <= 0.1
     assert message.startswith("ACCURACY NOT REACHED" if not reached else
                            "PREVIEW, to 0.1 mm" if preview else "accuracy reached: ")
+
+
+def test_a_folded_rest_position_is_named_as_such(program):
+    report = {"load": 1.0, "displacement_error": 0.05, "reason": b"why", "converged": 1, "inverted_prisms": 3}
+    assert program["verdict"](2, report, 0.1, False).startswith("FOLDED: 3 prisms of tissue are inside out")
 
 
 @pytest.fixture

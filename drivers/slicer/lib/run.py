@@ -374,6 +374,9 @@ def verdict(status, report, accuracy, preview):
             return (f"PREVIEW, to {accuracy:g} mm: the face is within {error:.3g} mm of rest; "
                     "apply without First look for the result")
         return f"accuracy reached: {error:.3g} mm of {accuracy:g} mm"
+    if report["converged"] and report["inverted_prisms"]:
+        return (f"FOLDED: {report['inverted_prisms']} prisms of tissue are inside out; move less, or release tissue "
+                "there in a scene")
     reason = report["reason"].decode() if isinstance(report["reason"], bytes) else str(report["reason"])
     near = f"about {error:.3g} mm" if math.isfinite(error) else "at no known distance"
     where = "" if load == 1 else f"; the bones have made {100 * load:.0f} % of their way only"
