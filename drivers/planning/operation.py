@@ -28,7 +28,7 @@ ORDER = ("Le Fort I", "sagittal split", "jaw", "genioplasty")
 NAMES = {"maxilla": "Le Fort I", "maxillary": "Le Fort I", "bsso": "sagittal split", "jaw": "jaw",
          "mandible": "jaw", "mandibular": "jaw", "genioplasty": "genioplasty", "chin": "genioplasty"}
 # Phrases, and the word that is read in place of each.
-PHRASES = {r"\ble[ -]?fort[ -]?(1|i)(?!\w|[.,]\d)": "maxilla", r"\bupper[ -]jaw\b": "maxilla",
+PHRASES = {r"\ble[ -]?fort[ -]?(1(?!\w|[.,]\d)|i(?!\w|\.\d))": "maxilla", r"\bupper[ -]jaw\b": "maxilla",
            r"\blower[ -]jaw\b": "jaw", r"\b(bilateral )?sagittal[ -]split\b": "bsso",
            r"\bset[ -]back\b": "setback", r"\bopen[ -]bite\b": ""}
 # Key of a clinical move, and its sign → words that mean it.
@@ -69,7 +69,7 @@ def tokenize(text):
     for phrase, word in PHRASES.items():
         text = re.sub(phrase, word, text)
     if re.search(r"\ble[ -]?fort", text):
-        raise NotUnderstood("'Le Fort' is understood as Le Fort I only: write Le Fort I")
+        raise NotUnderstood("'Le Fort' is understood as Le Fort I only: write Le Fort I, with a blank before a number")
     tokens = []
     for match in TOKEN.finditer(text):
         kind, word = match.lastgroup, match[0]

@@ -42,6 +42,7 @@ MAXILLA, SPLIT, JAW, CHIN = "Le Fort I", "sagittal split", "jaw", "genioplasty"
     # names, before, between and after the movements
     ("Le Fort 1 advance 5 mm", {MAXILLA: {"advance": 5}}),
     ("LeFort-1: impaction 4 mm", {MAXILLA: {"impaction": 4}}),
+    ("Le Fort I,5.5mm forward,2mm up", {MAXILLA: {"advance": 5.5, "impaction": 2}}),
     ("Le Fort I. Forward 5 mm", {MAXILLA: {"advance": 5}}),
     ("setback 9 mm up 2 mm of the maxilla", {MAXILLA: {"set_back": 9, "impaction": 2}}),
     ("upper jaw, 5 mm forward", {MAXILLA: {"advance": 5}}),
@@ -91,6 +92,8 @@ def test_a_text_is_read_as_operations(text, moves):
     ("Le Fort II, 5 mm forward", "Le Fort I only"),
     ("Le Fort 3 forward", "Le Fort I only"),
     ("Le Fort 1 mm forward", "'mm' has no number"),
+    ("Le Fort 1,5 mm forward", "write Le Fort I, with a blank before a number"),
+    ("Le Fort I.5 mm forward", "write Le Fort I, with a blank before a number"),
     ("genioplasty, 5,5 mm forward", "'5,5' is not a number"),
     ("Le Fort I, 3.5.2 mm forward", "'3.5.2' is not a number"),
     ("jaw .5 mm forward", "'.5' is not a number"),
