@@ -52,6 +52,7 @@ OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
                "sagittal split": ("mandible", "jaw", "sagittal_split"),
                "jaw": ("mandible", None, None),
                "genioplasty": ("mandible", "chin", "genioplasty")}
+SKIN, BONE = -300, 226  # HU, levels
 CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
 PROPOSED = "Proposed by drivers/plan.py"
@@ -275,8 +276,8 @@ def arguments():
     parser.add_argument("volumes", nargs="+", type=pathlib.Path)
     parser.add_argument("-operation", required=True)
     parser.add_argument("-output", default="plan", type=pathlib.Path)
-    parser.add_argument("-level", type=number_from(-32768, 65535, float), default=-300)
-    parser.add_argument("-bone", type=number_from(-32768, 65535, float), default=226)
+    parser.add_argument("-level", type=number_from(-32768, 65535, float), default=SKIN)
+    parser.add_argument("-bone", type=number_from(-32768, 65535, float), default=BONE)
     parser.add_argument("-apart", nargs=2, type=pathlib.Path)
     parser.add_argument("-edge", type=number_from(1, 20, float), default=4)
     parser.add_argument("-ranks", type=number_from(1, 1024), default=min(2, os.cpu_count() or 1))
@@ -301,6 +302,9 @@ def main():
     if folder.exists() and not folder.is_dir():
         refuse(f"-output {folder}: is a file, not a folder; choose another name")
     alone = len(options.volumes) == 1 and not volume.name.lower().endswith(".seg.nrrd")
+    if alone and options.bone <= options.level:
+        refuse(f"-level {options.level:g}: the skin's level must be below that of bone, -bone {options.bone:g}; give both in "
+               f"the values of the volume, such as -level {options.level:g} -bone {options.level + BONE - SKIN:g}")
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)
     begin_run(folder, operations, [*options.volumes, *(options.apart or [])])

@@ -135,6 +135,18 @@ def test_numbers_out_of_range_are_refused_before_a_folder_is_made(script, tmp_pa
     assert not (tmp_path / "plan").exists()
 
 
+def test_a_level_of_bone_below_the_skin_is_refused_at_once(script, tmp_path):
+    for name in ("ct.mhd", "labels.nii", "head.seg.nrrd"):
+        (tmp_path / name).touch()
+    for levels in (["-level", 724], ["-bone", -300], ["-level", 100, "-bone", 50]):
+        says(script("plan.py", "ct.mhd", "-operation", "jaw, 5 mm forward", *levels), "plan.py", f"{levels[-1]}",
+             "the skin's level must be below that of bone")
+    says(script("plan.py", "ct.mhd", "-operation", "jaw, 5 mm forward", "-level", 724), "plan.py", "-level 724 -bone 1250")
+    assert not (tmp_path / "plan").exists()
+    for volumes in (["ct.mhd", "labels.nii"], ["head.seg.nrrd"]):
+        assert "level" not in script("plan.py", *volumes, "-operation", "jaw, 5 mm forward", "-level", 724).stderr
+
+
 def test_a_file_in_place_of_the_folder_of_a_plan_is_refused(script, tmp_path):
     for name in ("head.mhd", "plan"):
         (tmp_path / name).touch()
