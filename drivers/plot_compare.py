@@ -7,12 +7,13 @@ Reads NAME.csv and writes NAME.png beside it.
 Needs: apt-get install --no-install-recommends python3-matplotlib
 """
 
-from sheet.script import reading, refuse_missing, run, words
+from sheet.script import refuse_missing, run, words
 from sheet.whole_file import Target, write_figure
 
 try:
     import matplotlib
-    import numpy as np
+
+    from sheet.columns import read_columns
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib")
 
@@ -23,9 +24,7 @@ import matplotlib.pyplot as plt
 def read(file):
     """Lower and upper end of each bin, mm, and its share of the area; what lies beyond the ends is
     in the outermost bins."""
-    with reading(file, "a histogram of repose-compare"):
-        table = np.genfromtxt(file, delimiter=",", names=True)
-        return table["low_mm"], table["high_mm"], table["share_of_area"]
+    return read_columns(file, "a histogram of repose-compare", ("low_mm", "high_mm", "share_of_area")).values()
 
 
 def draw(low, high, share, target):

@@ -26,6 +26,7 @@ import matplotlib.pyplot as plt
 
 LONGEST = 12  # mm of an arrow that few exceed
 MOST = 1500  # arrows
+SMALLEST = 1e-9  # N
 
 
 def spring_forces(model, which):
@@ -58,6 +59,9 @@ def initial_forces(file, gravity=None):
         free = (model["point/set"][()] == 0) & (model["point/layer"][()] == 0)
         before = weight + spring_forces(model, of_skin)
         after = before + spring_forces(model, ~of_skin)
+        if not np.abs(before[free]).max(initial=0) > SMALLEST:
+            raise Unusable(f"{file}: no forces to draw: its skin has neither tension nor weight; solve a scene with "
+                           "tissue.turgor, or with tissue.mass and scan_gravity")
         return model["point/position"][()][free], before[free], after[free]
 
 

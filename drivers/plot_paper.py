@@ -17,6 +17,8 @@ try:
     import h5py
     import matplotlib
     import numpy as np
+
+    from sheet.columns import read_columns
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib python3-h5py")
 
@@ -31,20 +33,16 @@ VIEWS = {"front": (0, -1, 0), "side": (1, 0, 0)}
 LIGHT = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
 SKIN = np.array([0.87, 0.68, 0.58])
 COLUMN = 3.2  # inches
+TABLE = "a table of repose-paper"
 SOURCES = ("laws.csv", "equilibrium.csv", "opening.h5", "forward.h5", "turned.h5")
-
-
-def columns_of(file):
-    """The columns of a CSV file by their names."""
-    with reading(file, "a table of repose-paper"):
-        return np.genfromtxt(file, delimiter=",", names=True)
 
 
 def draw_laws(source, target):
     """Fig. 3: tension over elongation."""
-    laws = columns_of(source)
+    styles = {"linear": ":", "quadratic": "--", "quartic": "-"}
+    laws = read_columns(source, TABLE, ("s", *styles))
     figure, axes = plt.subplots(figsize=(5, 3.4))
-    for name, style in (("linear", ":"), ("quadratic", "--"), ("quartic", "-")):
+    for name, style in styles.items():
         axes.plot(laws["s"], laws[name], "k" + style, label=name)
     axes.set(xlabel="elongation s, mm", ylabel="tension T / k0, mm")
     axes.axhline(0, color="0.8", lw=0.7, zorder=0)
@@ -55,11 +53,10 @@ def draw_laws(source, target):
 
 def draw_equilibrium(source, target):
     """Fig. 2: the forces on the points of the skin seen from the side, before and after."""
-    rows = columns_of(source)
-    rows = rows[rows["layer"] == 0]
-    stack = lambda *names: np.stack([rows[name] for name in names], axis=1)
-    draw_forces(stack("x", "y", "z"), *(stack(*(f"{state}_{k}" for k in "xyz"))
-                                        for state in ("before", "after")), target)
+    names = [[state + k for k in "xyz"] for state in ("", "before_", "after_")]
+    columns = read_columns(source, TABLE, ("layer", *sum(names, [])))
+    skin = columns["layer"] == 0
+    draw_forces(*(np.stack([columns[name][skin] for name in three], axis=1) for three in names), target)
 
 
 def read(file):

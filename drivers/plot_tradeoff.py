@@ -47,6 +47,8 @@ def read(name):
             rows = list(csv.DictReader(file))
         for row in rows:
             row.update({key: float(row[key]) for key in NUMBERS})
+    if not rows:
+        raise Unusable(f"{name}.csv: has no rows, and is not a table of repose-tradeoff; write it again")
     for row in rows:
         if row["study"] not in ("solver", *STUDIES):
             raise Unusable(f"{name}.csv: unknown study '{row['study']}'; this script draws solver, "

@@ -94,6 +94,22 @@ def test_springs_are_named_where_a_result_has_none(script, solved):
          "tissue.springs")
 
 
+def test_a_result_without_initial_forces_is_refused(script, solved, tmp_path):
+    pytest.importorskip("matplotlib")
+    says(script("plot_equilibrium.py", solved("paper_jaw_advance.yaml"), "picture.png"), "plot_equilibrium.py",
+         "no forces to draw: its skin has neither tension nor weight")
+    assert not (tmp_path / "picture.png").exists()
+
+
+def test_a_table_without_rows_is_refused(script, tmp_path):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "study.csv").write_text("study,method\n")
+    says(script("plot_tradeoff.py", "study"), "plot_tradeoff.py", "study.csv: has no rows")
+    for name in ("laws.csv", "equilibrium.csv", "opening.h5", "forward.h5", "turned.h5"):
+        (tmp_path / name).write_text("s,linear\n")
+    says(script("plot_paper.py", "."), "plot_paper.py", "laws.csv: has no rows")
+
+
 # ----- arguments
 
 OWN = sorted(SCRIPTS.keys() - {"paraview_repose.py", "plan.py", "Repose"})
