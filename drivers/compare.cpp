@@ -21,6 +21,7 @@
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
+#include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
 #include "repose/surface/write.h"
@@ -283,7 +284,8 @@ void write_results(const std::string& name, const surface::Surface& predicted,
 surface::Surface read_facing_outward(const std::string& file) {
   surface::Surface surface = surface::read_surface(file);
   const surface::Defects defects = surface::inspect(surface, false);
-  if (defects.border_edges > 0 || defects.misoriented_edges > 0 || defects.outward) return surface;
+  if (defects.border_edges > 0 || defects.misoriented_edges > 0 || surface::volume_of(surface) >= 0)
+    return surface;
   for (Triangle& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
   std::printf("note: triangles of %s point inward; they are turned\n", file.c_str());
   return surface;

@@ -98,16 +98,17 @@ Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface&
   HeadFrame frame = fit_head_frame(skull, mandible);
   require_lps(frame, mandible.name);
   constexpr int turns = 3;
+  const Mandible prepared(mandible);
   for (int turn = 0; turn < turns; ++turn) {
     Search search(frame, given);
-    search_bones(skull, mandible, search);
+    search_bones(skull, prepared, search);
     const Landmarks found = search.proposal().found;
     const auto nasion = found.find("nasion_bone"), pogonion = found.find("pogonion_bone");
     if (nasion == found.end() || pogonion == found.end()) break;
     frame = frame.upright(pogonion->second, nasion->second);
   }
   Search search(frame, given);
-  search_bones(skull, mandible, search);
+  search_bones(skull, prepared, search);
   search_skin(skin, search);
   remark_mirrored(mandible, search);
   return search.proposal();

@@ -9,7 +9,7 @@ namespace repose::anatomy {
 namespace {
 
 constexpr double least_area = 60;    // mm²
-constexpr double least_share = 0.5;  // of the area that faces that way; voxels of labels have steps
+constexpr double least_share = 0.5;  // of triangles with that normal; voxels of labels have steps
 constexpr double flat = 0.1;         // mm
 constexpr double directions = 2000;  // of normals, in a unit: they differ by less than 0.05°
 

@@ -5,8 +5,8 @@
 
 namespace repose::anatomy {
 
-/// The faces in which a surface was cut off where its scan ended: plane, at least 60 mm² large and
-/// half of what faces that way, with all of the surface behind them.
+/// Plane faces in which a surface was cut off where its scan ended. Their area is at least 60 mm²
+/// and half of that of all triangles with their normal, and no vertex lies in front of them.
 class ScanEnd {
  public:
   explicit ScanEnd(const surface::Surface& surface);

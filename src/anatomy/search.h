@@ -7,6 +7,7 @@
 #include "front_map.h"
 #include "repose/anatomy/propose.h"
 #include "repose/scene/landmark_names.h"
+#include "scan_end.h"
 
 namespace repose::anatomy {
 
@@ -69,8 +70,18 @@ class Search {
   std::vector<std::string> remarks_;
 };
 
+/// The mandible, with the vertices that triangles use and where its scan ended.
+struct Mandible {
+  explicit Mandible(const surface::Surface& surface);
+
+  const surface::Surface& surface;
+  std::vector<Vec3> points;
+  std::vector<char> at_rim;  ///< [points]
+  ScanEnd end;
+};
+
 /// Finds the landmarks of bone.
-void search_bones(const surface::Surface& skull, const surface::Surface& mandible, Search& search);
+void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search);
 /// Finds the landmarks of skin, after those of bone.
 void search_skin(const surface::Surface& skin, Search& search);
 

@@ -70,38 +70,18 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
              "no bone between pogonion and the lower incisors");
 }
 
-/// The mandible in the head frame.
-struct Mandible {
-  std::vector<Vec3> points;
-  std::vector<char> at_rim;  // [points]
-  ScanEnd end;
-};
-
-Mandible mandible_in(const HeadFrame& frame, const surface::Surface& surface) {
-  Mandible mandible{{}, {}, ScanEnd(surface)};
-  std::vector<char> used(surface.points.size());
-  for (const Triangle& triangle : surface.triangles)
-    for (const int64_t corner : triangle) used[corner] = 1;
-  const auto border = surface::border_vertices(surface::EdgeTable(surface.triangles), used.size());
-  for (size_t i = 0; i < used.size(); ++i) {
-    if (!used[i]) continue;
-    mandible.points.push_back(frame.to_frame(surface.points[i]));
-    mandible.at_rim.push_back(border[i]);
-  }
-  return mandible;
-}
-
 /// Returns whether the mandible ends at a condyle's top because its scan did.
-bool is_cut_off(const Mandible& mandible, const Vec3& top, const HeadFrame& frame) {
+bool is_cut_off(const Mandible& mandible, const Vec3& top) {
   constexpr double beside = 3;  // mm
-  if (mandible.end.within(frame.to_scan(top), condyle_reach)) return true;
+  if (mandible.end.within(top, condyle_reach)) return true;
   for (size_t i = 0; i < mandible.points.size(); ++i)
     if (mandible.at_rim[i] && (mandible.points[i] - top).norm() <= beside) return true;
   return false;
 }
 
 void search_condyle(const Mandible& mandible, int side, Search& search) {
-  const std::vector<Vec3>& points = mandible.points;
+  std::vector<Vec3> points;
+  for (const Vec3& p : mandible.points) points.push_back(search.frame().to_frame(p));
   const std::string name = side > 0 ? "left" : "right";
   double front = INFINITY, back = -INFINITY;
   for (const Vec3& p : points) {
@@ -121,7 +101,7 @@ void search_condyle(const Mandible& mandible, int side, Search& search) {
     return search.lack(fmt::format("condyle_{}_center", name),
                        fmt::format("MANDIBLE has no {} ramus", name));
   search.put(fmt::format("gonion_{}", name), *angle);
-  if (is_cut_off(mandible, *top, search.frame()))
+  if (is_cut_off(mandible, search.frame().to_scan(*top)))
     return search.lack(
         fmt::format("condyle_{}_center", name),
         fmt::format("MANDIBLE is cut off at its {} condyle, where the scan ends", name));
@@ -240,10 +220,21 @@ void search_upper_jaw(const FrontMap& map, Search& search) {
 
 }  // namespace
 
-void search_bones(const surface::Surface& skull, const surface::Surface& mandible, Search& search) {
-  const Mandible in_frame = mandible_in(search.frame(), mandible);
-  search_symphysis(FrontMap(mandible, search.frame()), in_frame.end, search);
-  for (const int side : {-1, 1}) search_condyle(in_frame, side, search);
+Mandible::Mandible(const surface::Surface& surface) : surface(surface), end(surface) {
+  std::vector<char> used(surface.points.size());
+  for (const Triangle& triangle : surface.triangles)
+    for (const int64_t corner : triangle) used[corner] = 1;
+  const auto border = surface::border_vertices(surface::EdgeTable(surface.triangles), used.size());
+  for (size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    points.push_back(surface.points[i]);
+    at_rim.push_back(border[i]);
+  }
+}
+
+void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search) {
+  search_symphysis(FrontMap(mandible.surface, search.frame()), mandible.end, search);
+  for (const int side : {-1, 1}) search_condyle(mandible, side, search);
   remark_uneven(search);
   search_upper_jaw(FrontMap(skull, search.frame()), search);
 }

@@ -117,11 +117,11 @@ void find_press(Mover& a, Mover& b, double more, BonePair& pair) {
   constexpr double close = 1e-3;  // of the load
   const double allowed = std::max(overlap(a, b, 0).depth, 0.0) + more;
   double low = 0, high = 0;
-  for (int step = 1; step <= steps; ++step, low = high) {
+  for (int step = 1; step <= steps && low < pair.load; ++step, low = high) {
     high = static_cast<double>(step) / steps;
     if (overlap(a, b, high).depth > allowed) break;
   }
-  if (low == 1 || low >= pair.load) return;
+  if (low == 1) return;
   while (high - low > close) {
     const double middle = (low + high) / 2;
     (overlap(a, b, middle).depth > allowed ? high : low) = middle;

@@ -22,9 +22,9 @@ struct HeadFrame {
 Vec3 fit_midsagittal_normal(const surface::Surface& bones);
 
 /// Fits the frame of a head by its bones alone, however it lies in the scan. The midsagittal plane
-/// is that of the skull (docs/guide/landmarks.md). In it the way from the mandible's
-/// symphysis to its rami leads back and rises by 22°, and the skull lies above. A mirrored head is
-/// taken for a turned one. Throws InputError where the mandible does not cross the plane.
+/// is that of the skull (docs/guide/landmarks.md). In it the way from the mandible's symphysis to
+/// its rami leads back and rises by 22°, and the skull lies above. A mirrored head is taken for a
+/// turned one. Throws InputError where the mandible does not cross the plane.
 HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& mandible);
 
 }  // namespace repose::anatomy

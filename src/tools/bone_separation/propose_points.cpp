@@ -103,20 +103,13 @@ class Head {
     return longest;
   }
 
-  /// Returns what of the jaw and of the chin's lowest bone lies in the border of the volume.
+  /// Returns what of the jaw lies in the border of the volume.
   Cut cut_of(const std::vector<int64_t>& jaw) const {
     Cut cut;
-    const auto add = [&](int64_t voxel) {
+    for (const int64_t voxel : jaw) {
       const double area = area_in_border(voxel);
       cut.area += area;
       cut.moment += area * volume_.center(voxel);
-    };
-    for (const int64_t voxel : jaw) add(voxel);
-    if (cut.area > 0) return cut;
-    for (const int64_t voxel : bone_) {
-      const Vec3 way = center(voxel) - chin_;
-      if (std::abs(way.x()) < profile_width && std::abs(way.z()) <= 2 && way.y() < chin_depth)
-        add(voxel);
     }
     return cut;
   }

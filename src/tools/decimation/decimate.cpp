@@ -38,13 +38,12 @@ void check_intersections(const Surface& result, const Surface& input) {
 void measure(Decimated& decimated, const Surface& input, double distance) {
   const double extent = bounding_diagonal(input.points);
   const bool bounded = std::isfinite(distance);
-  const double coarse = std::max(measure_accuracy * extent, 1e-300), coarsest = 10 * coarse;
-  const auto accuracy = [&](double share) {
-    return bounded ? std::clamp(share * distance, coarse, coarsest) : coarse;
-  };
-  decimated.to_input = one_sided_distance(
-      decimated.surface, input, std::min(accuracy(proof_accuracy), proof_accuracy * distance));
-  decimated.from_input = one_sided_distance(input, decimated.surface, accuracy(0.01));
+  const double fine = std::max(measure_accuracy * extent, 1e-300),
+               coarse = bounded ? 10 * fine : fine;
+  decimated.to_input =
+      one_sided_distance(decimated.surface, input, std::min(proof_accuracy * distance, coarse));
+  decimated.from_input =
+      one_sided_distance(input, decimated.surface, std::clamp(0.01 * distance, fine, coarse));
   if (!(decimated.to_input.upper <= distance))
     throw base::InternalError(fmt::format("{}: distance {} mm could not be proven, only {} mm",
                                           input.name, distance, decimated.to_input.upper));
