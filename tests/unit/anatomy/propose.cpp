@@ -180,6 +180,11 @@ TEST(ProposeLandmarks, CornersOfTheMouthAreInFrontWhereSkinIsMissing) {
     return head.skin.points[triangle[0]].x() < stomion.x() - 7 &&
            head.skin.points[triangle[0]].y() < stomion.y() + 60;
   });
+  const auto first = static_cast<int64_t>(head.skin.points.size());  // the neck, behind
+  for (const double x : {-90.0, 0.0})
+    for (const double z : {-60.0, 60.0}) head.skin.points.push_back(stomion + Vec3(x, 150, z));
+  head.skin.triangles.push_back({first, first + 1, first + 2});
+  head.skin.triangles.push_back({first + 1, first + 3, first + 2});
   const Landmarks found = propose(head).found;
   ASSERT_TRUE(found.contains("mouth_right"));
   EXPECT_LT(found.at("mouth_right").y(), stomion.y() + 30);
