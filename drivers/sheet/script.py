@@ -39,10 +39,12 @@ def refuse_missing(module, install):
 
 
 def run(main):
-    """Runs the main function of a script and ends the script: with status 1 and one line where a file or an
-    argument is unusable, with status 130 after Ctrl-C."""
+    """Runs the main function of a script. Ends the script with status 1 and one line where a file or an argument
+    is unusable, with status 130 after Ctrl-C, else with the status that `main` returns, where it returns one:
+    pvpython crashes at an exit once it has drawn."""
     try:
-        sys.exit(main())
+        if (status := main()):
+            sys.exit(status)
     except Unusable as reason:
         refuse(reason)
     except OSError as reason:
