@@ -49,8 +49,9 @@ Bones read_bones(const scene::Scene& scene, const surface::Surface* skin) {
           "left is left, and export the mesh again",
           raw.name));
   }
-  if (skin && scene.anatomy)
-    anatomy::require_same_head(scene.anatomy->landmarks, scene.anatomy->file.string(), *skin,
+  if (scene.anatomy)
+    anatomy::require_same_head(scene.anatomy->landmarks, scene.anatomy->file.string(),
+                               skin ? *skin : load_entry(scene.skin, surface::Role::raw),
                                bones.surfaces);
   for (size_t k = 0; k < scene.osteotomies.size(); ++k) {
     try {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "carrying_bone.h"
 #include "head_axes.h"
-#include "repose/base/text.h"
 
 namespace repose::scene {
 namespace {
@@ -16,20 +16,16 @@ const Osteotomy* cut_of(const Scene& scene, std::size_t bone) {
   return nullptr;
 }
 
-/// By the template that made the piece, or the name of a whole mandible.
+constexpr const char* upper_edge = "upper_incisor_edge";
+constexpr const char* lower_edge = "lower_incisor_edge";
+
+/// By the incisors that a piece carries, or the template that made it; of a whole bone the lower
+/// jaw alone.
 Jaw jaw_of(const Scene& scene, std::size_t bone) {
   const Osteotomy* cut = cut_of(scene, bone);
-  if (!cut) return base::lower(scene.bones[bone].name) == "mandible" ? Jaw::lower : Jaw::other;
-  if (!cut->made_by) return Jaw::other;
-  switch (*cut->made_by) {
-    case OsteotomyTemplate::le_fort_1:
-      return Jaw::upper;
-    case OsteotomyTemplate::sagittal_split:
-      return Jaw::lower;
-    case OsteotomyTemplate::genioplasty:
-      return Jaw::chin;
-  }
-  return Jaw::other;
+  if (carrying_bone(scene, lower_edge) == bone) return Jaw::lower;
+  if (cut && carrying_bone(scene, upper_edge) == bone) return Jaw::upper;
+  return cut && cut->made_by == OsteotomyTemplate::genioplasty ? Jaw::chin : Jaw::other;
 }
 
 /// The first of several bones whose jaw satisfies `matches`, or else the first of them.
@@ -50,6 +46,7 @@ class ClinicalMove {
   ClinicalMove(const Value& value, const Scene& scene, const std::vector<std::size_t>& bones)
       : map_(value),
         scene_(scene),
+        bones_(bones),
         bone_(first_of(bones, scene, [](Jaw jaw) { return jaw != Jaw::other; })),
         bone_with_teeth_(first_of(bones, scene, has_incisors)) {
     if (!scene.anatomy)
@@ -72,41 +69,44 @@ class ClinicalMove {
     return value ? value->number() : 0.0;
   }
 
-  /// Where a landmark of the head is now, on the bone in row `bone`.
-  Vec3 now(const char* name, std::size_t bone) const {
+  /// Where a landmark of the head was at first.
+  Vec3 recorded(const std::string& name) const {
     try {
-      return scene_.moves[bone].apply(
-          require_landmark(scene_.anatomy->landmarks, name, scene_.anatomy->file.string()));
+      return require_landmark(scene_.anatomy->landmarks, name, scene_.anatomy->file.string());
     } catch (const base::InputError& error) {
       map_.itself().refuse("needs a landmark: {}", error.what());
     }
+  }
+
+  /// Where it is now: with the bone that carries it, or else with the one that turns.
+  Vec3 now(const std::string& name) const {
+    return scene_.moves[carrying_bone(scene_, name).value_or(bone_)].apply(recorded(name));
   }
 
   Vec3 pivot() const {
     if (const auto place = map_.find("pivot")) {
       if (place->is_list()) return place->vector();
       const std::string name = standard_name(place->text());
-      return now((name.empty() ? place->text() : name).c_str(), bone_);
+      return now(name.empty() ? place->text() : name);
     }
     switch (jaw_of(scene_, bone_)) {
       case Jaw::upper:
-        return now("upper_incisor_edge", bone_);
+        return now(upper_edge);
       case Jaw::lower:
-        return now("lower_incisor_edge", bone_);
+        return now(lower_edge);
       case Jaw::chin:
-        return now("pogonion_bone", bone_);
+        return now("pogonion_bone");
       case Jaw::other:
         break;
     }
     map_.itself().refuse(
-        "turns a bone that no template made and that is not called mandible; give pivot");
+        "turns a bone of which it is not known that it carries incisors or the chin; give pivot");
   }
 
   RigidMotion rotation() const {
     RigidMotion whole;
     if (const double angle = number("open"); angle != 0) {
-      const Vec3 right = now("condyle_right_center", bone_),
-                 left = now("condyle_left_center", bone_);
+      const Vec3 right = now("condyle_right_center"), left = now("condyle_left_center");
       whole = RigidMotion::rotation(left - right, (right + left) / 2, angle);
     }
     const double yaw = number("yaw"), roll = number("roll"), pitch = number("pitch");
@@ -117,17 +117,21 @@ class ClinicalMove {
     return RigidMotion::rotation(axes_.up, center, yaw).after(whole);
   }
 
-  /// The row of the bone that carries the other jaw's teeth: a piece of a template, or the whole.
-  std::size_t opposite() const {
-    const Jaw own = jaw_of(scene_, bone_with_teeth_);
-    const Jaw expected = own == Jaw::upper ? Jaw::lower : Jaw::upper;
-    for (const Osteotomy& cut : scene_.osteotomies)
-      if (jaw_of(scene_, cut.piece) == expected) return cut.piece;
+  /// Where the edge of the other jaw's incisors is now. Refuses a `target` where the bone that
+  /// carries it is unknown and may have moved, or moves along.
+  Vec3 other_edge(const Value& target, const char* edge) const {
+    if (const auto bone = carrying_bone(scene_, edge)) {
+      if (std::find(bones_.begin(), bones_.end(), *bone) != bones_.end())
+        target.refuse("cannot be reached by moving both jaws as one; move one of them");
+      return scene_.moves[*bone].apply(recorded(edge));
+    }
     for (std::size_t b = 0; b < scene_.bones.size(); ++b)
-      if (jaw_of(scene_, b) == expected) return b;
-    for (std::size_t b = 0; b < scene_.bones.size(); ++b)
-      if (!cut_of(scene_, b) && b != bone_with_teeth_) return b;
-    return bone_with_teeth_;
+      if (b != bone_with_teeth_ && jaw_of(scene_, b) != Jaw::chin && !scene_.moves[b].is_identity())
+        target.refuse(
+            "needs to know whether '{}', which has moved, carries the landmark {}: cut jaws by a "
+            "template or by planes, and call whole bones skull and mandible",
+            scene_.bones[b].name, edge);
+    return recorded(edge);
   }
 
   /// mm, the move along `direction` (a unit vector) that brings the distance of the upper incisors
@@ -137,13 +141,12 @@ class ClinicalMove {
     const Jaw jaw = jaw_of(scene_, bone_with_teeth_);
     if (!has_incisors(jaw))
       target->refuse(
-          "needs a jaw with incisors: a piece of le_fort_1 or sagittal_split, or a bone called "
-          "mandible");
+          "needs a jaw with incisors: a piece of le_fort_1, of sagittal_split or by planes, or a "
+          "whole bone called mandible");
     const bool upper = jaw == Jaw::upper;
-    const std::size_t other = opposite();
-    const Vec3 own =
-        turned.apply(now(upper ? "upper_incisor_edge" : "lower_incisor_edge", bone_with_teeth_));
-    const Vec3 fixed = now(upper ? "lower_incisor_edge" : "upper_incisor_edge", other);
+    const Vec3 own = turned.apply(
+        scene_.moves[bone_with_teeth_].apply(recorded(upper ? upper_edge : lower_edge)));
+    const Vec3 fixed = other_edge(*target, upper ? lower_edge : upper_edge);
     const double distance = (upper ? own - fixed : fixed - own).dot(direction);
     return upper ? target->number() - distance : distance - target->number();
   }
@@ -167,6 +170,7 @@ class ClinicalMove {
 
   Map map_;
   const Scene& scene_;
+  const std::vector<std::size_t>& bones_;
   std::size_t bone_;  // carries pivot and condyles
   std::size_t bone_with_teeth_;
   HeadAxes axes_{};

@@ -67,7 +67,7 @@ void check_unit(const Value& file, const Landmarks& landmarks) {
   const double apart = (*left - *right).norm();
   if (!(apart >= low && apart <= high))
     file.refuse(
-        "has condyle_left_center {:.3g} mm from condyle_right_center, in a head {:g} to {:g} mm: "
+        "has condyle_left_center {:.6g} mm from condyle_right_center, in a head {:g} to {:g} mm: "
         "landmarks must be in mm; multiply them by 10 if they are in cm, by 1000 if in m",
         apart, low, high);
 }

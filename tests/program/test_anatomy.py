@@ -259,9 +259,11 @@ def test_landmarks_of_another_head_are_refused_in_one_line(run, tmp_path, head):
     (tmp_path / "far.json").write_text(json.dumps(head))
     write_scene(tmp_path, "moves: [{bone: mandible, clinical: {advance: 3}}]\n",
                 anatomy="landmarks: far.json")
-    result = run("repose-solve", "scene.yaml")
-    assert result.returncode == 1 and result.stderr.count("\n") == 1
-    assert "the landmarks are those of another head or in another frame" in result.stderr
+    for program in ["repose-solve"], ["repose-osteotomy", "-moved"], ["repose-collide"]:
+        result = run(program[0], "scene.yaml", *program[1:])
+        assert result.returncode == 1 and result.stderr.count("\n") == 1, program
+        assert "the landmarks are those of another head or in another frame" in result.stderr
+    assert not list(tmp_path.glob("*_mandible*.ply"))
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)
@@ -270,9 +272,11 @@ def test_a_plane_through_the_palate_is_reported(run, tmp_path, head):
     write_scene(tmp_path, f"osteotomies: [{{bone: skull, piece: part, planes: [{{point: [0, -60, "
                           f"{below}], normal: [0, 0, -1]}}, {{point: [0, -20, 0], normal: [0, -1, "
                           "0]}]}]\nmoves: [{bone: part, translate: [0, -2, 0]}]\n")
+    plan = run("repose-osteotomy", "scene.yaml")
     result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
-    assert result.returncode == 0, result
-    assert "osteotomies[0]: its plane passes 4.0 mm below the nasal spine" in result.stdout
+    assert (plan.returncode, result.returncode) == (0, 0), result
+    for text in (plan.stdout, result.stdout):
+        assert "osteotomies[0]: its plane passes 4.0 mm below the nasal spine" in text
     assert "the mouth is open in the scan" in result.stdout
     with h5py.File(tmp_path / "face.h5") as file:
         assert len(file["model"]) > 0

@@ -221,7 +221,8 @@ struct Bones {
 
 /// Reads the files of the scene's bones and makes its osteotomies in their order. Throws
 /// InputError naming the scene and the osteotomy where one cannot be made, and where the landmarks
-/// of the scene's anatomy are not those of the bones and of the skin, if one is given.
+/// of the scene's anatomy are not those of the bones and of the skin, the scene's where none is
+/// given.
 Bones read_bones(const scene::Scene& scene, const surface::Surface* skin = nullptr);
 
 }  // namespace repose::model

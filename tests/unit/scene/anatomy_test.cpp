@@ -330,6 +330,72 @@ TEST(ClinicalMove, ReachesTargetsFromWhereTheOtherJawIs) {
   expect_near(both.moves[3].apply(lower), both.moves[2].apply(upper) + Vec3(0, 2, 2));
 }
 
+constexpr const char* upper_by_planes =
+    "osteotomies:\n"
+    "  - {bone: skull, piece: maxilla, planes: [{point: [0, -80, 10], normal: [0, 0, -1]}]}\n"
+    "  - {bone: mandible, piece: jaw, template: sagittal_split}\n";
+
+TEST(ClinicalMove, ReachesTargetsFromAPieceThatPlanesCut) {
+  const Vec3 upper = head()["upper_incisor_edge"], lower = head()["lower_incisor_edge"];
+  const Scene scene = read(head(), std::string(upper_by_planes) +
+                                       "moves:\n"
+                                       "  - {bone: maxilla, translate: [0, -5, 1]}\n"
+                                       "  - {bone: jaw, clinical: {overjet: 2, overbite: 2}}\n");
+  expect_near(scene.moves[3].apply(lower), upper + Vec3(0, -5, 1) + Vec3(0, 2, 2));
+  const Scene second =
+      read(head(), std::string(upper_by_planes) +
+                       "moves:\n"
+                       "  - {bone: jaw, clinical: {advance: 3}}\n"
+                       "  - {bone: maxilla, clinical: {overjet: 2, overbite: 2}}\n");
+  expect_near(second.moves[2].apply(upper), lower + Vec3(0, -3, 0) - Vec3(0, 2, 2));
+}
+
+TEST(ClinicalMove, TurnsAboutLandmarksWhereTheirBoneIs) {
+  const Vec3 condyle = head()["condyle_left_center"], upper = head()["upper_incisor_edge"];
+  const std::string both =
+      "osteotomies:\n"
+      "  - {bone: skull, piece: maxilla, template: le_fort_1}\n"
+      "  - {bone: mandible, piece: jaw, template: sagittal_split}\n"
+      "moves:\n"
+      "  - {bone: maxilla, clinical: {advance: 6}}\n"
+      "  - {bone: jaw, clinical: {advance: 6}}\n";
+  const auto turned = [&](const char* turn) {
+    const Scene scene =
+        read(head(), both + fmt::format("  - {{bone: jaw, clinical: {{{}}}}}\n", turn));
+    return scene.moves[3].after(RigidMotion::translation({0, 6, 0}));
+  };
+  for (const char* turn : {"open: 5", "yaw: 5, pivot: condyle_left_center"})
+    expect_near(turned(turn).apply(condyle), condyle);
+  const Vec3 advanced = upper + Vec3(0, -6, 0);
+  expect_near(turned("yaw: 5, pivot: upper_incisor_edge").apply(advanced), advanced);
+}
+
+TEST(ClinicalMove, RefusesTargetsBesideAnUnknownJaw) {
+  const std::string by_disc =
+      "osteotomies:\n"
+      "  - {bone: skull, piece: maxilla, template: le_fort_1}\n"
+      "  - {bone: mandible, piece: jaw, planes: [{point: [0, -40, -30], normal: [0, -1, 0], "
+      "radius: 60}]}\n";
+  const std::string target = "  - {bone: maxilla, clinical: {overjet: 2}}\n";
+  const auto says = [&](const std::string& moves) {
+    return refused(head(), by_disc + "moves:\n" + moves);
+  };
+  EXPECT_NE(says("  - {bone: jaw, translate: [0, -6, 0]}\n" + target)
+                .find("needs to know whether 'jaw', which has moved, carries the landmark "
+                      "lower_incisor_edge"),
+            std::string::npos);
+  const Vec3 upper = head()["upper_incisor_edge"], lower = head()["lower_incisor_edge"];
+  const Scene unmoved = read(head(), by_disc + "moves:\n" + target);
+  EXPECT_NEAR((lower - unmoved.moves[2].apply(upper)).y(), 2, 1e-9);
+  EXPECT_NE(refused(head(), split + "moves: [{bone: mandible, clinical: {overjet: 2}}]\n")
+                .find("needs a jaw with incisors"),
+            std::string::npos);
+  EXPECT_NE(refused(head(), std::string(upper_by_planes) +
+                                "moves: [{bone: [maxilla, jaw], clinical: {overjet: 2}}]\n")
+                .find("cannot be reached by moving both jaws as one"),
+            std::string::npos);
+}
+
 /// The motions of mandible and chin by one entry, after `before`.
 std::pair<RigidMotion, RigidMotion> moved_together(const std::string& bones,
                                                    const std::string& form,
