@@ -274,7 +274,8 @@ std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part
     elements.points = base::gather(comm, std::move(elements.points));
     elements.numbers = base::gather(comm, std::move(elements.numbers));
     const model::TermElements unsorted = std::move(elements);
-    elements = {unsorted.term, unsorted.points_each, unsorted.numbers_each, {}, {}};
+    elements = {unsorted.term,       unsorted.points_each, unsorted.numbers_each, {}, {},
+                unsorted.bone_number};
     std::map<int64_t, size_t> by_point;
     for (size_t e = 0; e < unsorted.size(); ++e) by_point[unsorted.points_of(e)[0]] = e;
     for (const auto& [point, e] : by_point) append(unsorted, e, elements);

@@ -80,7 +80,7 @@ void Objective::limit_bulk(double max_bulk) {
 double Objective::add_terms(double scale, std::span<Vec3> gradient) const {
   double value = 0;
   for (const mechanics::TermLoop& loop : loops_.terms)
-    value += loop.add_gradient(positions_.local(), scale, gradient);
+    value += loop.add_gradient(positions_.local(), positions_.poses(), scale, gradient);
   return value;
 }
 
@@ -97,9 +97,10 @@ std::vector<Vec3> Objective::contact_force() {
 std::vector<Objective::Block> Objective::term_blocks(bool exact) const {
   std::vector<Block> blocks;
   for (const mechanics::TermLoop& loop : loops_.terms)
-    loop.for_each_block(positions_.local(), exact, [&](int32_t p, int32_t q, const Mat3& block) {
-      blocks.push_back({p, q, weights_.elastic * block});
-    });
+    loop.for_each_block(positions_.local(), positions_.poses(), exact,
+                        [&](int32_t p, int32_t q, const Mat3& block) {
+                          blocks.push_back({p, q, weights_.elastic * block});
+                        });
   return blocks;
 }
 
@@ -167,6 +168,18 @@ void Objective::hessian_action(std::span<const Vec3> direction, Vec product, boo
   positions_.restrict_to_owned(work_, product);
 }
 
+void Objective::add_carried(double load, Vec change) {
+  const std::vector<Mat4> poses = positions_.poses_at(load);
+  std::fill(work_.begin(), work_.end(), Vec3::Zero());
+  for (const mechanics::TermLoop& loop : loops_.terms) {
+    loop.add_gradient(positions_.local(), poses, weights_.elastic, work_);
+    loop.add_gradient(positions_.local(), positions_.poses(), -weights_.elastic, work_);
+  }
+  const base::VecHandle part = positions_.make_vector();
+  positions_.restrict_to_owned(work_, part);
+  base::check(VecAXPY(change, 1, part));
+}
+
 std::vector<Vec3> Objective::residual_force() {
   const Part& part = positions_.part();
   std::fill(work_.begin(), work_.end(), Vec3::Zero());
@@ -186,7 +199,7 @@ std::vector<Vec3> Objective::residual_force() {
 }
 
 mechanics::Totals Objective::totals() const {
-  mechanics::Totals t = mechanics::totals(loops_, positions_.local());
+  mechanics::Totals t = mechanics::totals(loops_, positions_.local(), positions_.poses());
   MPI_Comm comm = positions_.comm();
   t.spring_energy = base::sum_over_ranks(comm, t.spring_energy);
   t.solid_energy = base::sum_over_ranks(comm, t.solid_energy - initial_.solid_energy);

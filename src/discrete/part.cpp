@@ -275,7 +275,7 @@ void share_globals(MPI_Comm comm, bool averaged, const Numbers& numbers, Piece& 
   m.bones.resize(bones);
   m.elements.resize(terms);
   for (model::TermElements& elements : m.elements) {
-    share(elements.term, elements.points_each, elements.numbers_each);
+    share(elements.term, elements.points_each, elements.numbers_each, elements.bone_number);
   }
   copy_bodies(share, m.contact.bodies);
   if (m.contact.bodies.empty()) m.bone_surfaces.clear();

@@ -173,7 +173,7 @@ void pick_solid(Piece& piece, LocalNumbers& local, int rank, Part& part) {
 /// Those of further terms that a rank owns the first point of, or an unknown.
 model::TermElements pick_elements(const Piece& piece, const model::TermElements& all,
                                   LocalNumbers& local, int rank) {
-  model::TermElements mine{all.term, all.points_each, all.numbers_each, {}, {}};
+  model::TermElements mine{all.term, all.points_each, all.numbers_each, {}, {}, all.bone_number};
   for (size_t e = 0; e < all.size(); ++e) {
     const auto points = all.points_of(e);
     const auto numbers = all.numbers_of(e);

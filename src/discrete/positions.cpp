@@ -8,7 +8,11 @@ namespace repose::discrete {
 using base::check;
 
 Positions::Positions(MPI_Comm comm, const Part& part)
-    : comm_(comm), part_(part), motion_(part.model), local_(part.model.points.position) {
+    : comm_(comm),
+      part_(part),
+      motion_(part.model),
+      local_(part.model.points.position),
+      poses_(poses_at(0)) {
   std::vector<PetscInt> blocks;
   for (size_t i = 0; i < part.unknown.size(); ++i) {
     if (part.unknown[i] >= 0) {
@@ -42,8 +46,16 @@ Vec3 Positions::prescribed(int64_t row, double load) const {
   return motion_.at(part_.model, row, load);
 }
 
+std::vector<Mat4> Positions::poses_at(double load) const {
+  std::vector<Mat4> poses;
+  for (int32_t b = 0; b < static_cast<int32_t>(part_.model.bones.size()); ++b)
+    poses.push_back(motion_.bone_matrix(b, load));
+  return poses;
+}
+
 void Positions::set_load(double load) {
   load_ = load;
+  poses_ = poses_at(load);
   ++revision_;
   for (int32_t i : fixed_) local_[i] = prescribed(i, load);
 }

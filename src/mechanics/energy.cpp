@@ -303,7 +303,7 @@ double solid_energy(const EdgeLoop& edges, const PrismLoop& prisms,
 
 }  // namespace
 
-Totals totals(const Loops& loops, std::span<const Vec3> position) {
+Totals totals(const Loops& loops, std::span<const Vec3> position, BonePoses poses) {
   Totals sum;
   for (const SpringLoop& loop : loops.springs)
     with_exponent(loop.exponent, [&]<int p>() {
@@ -318,7 +318,7 @@ Totals totals(const Loops& loops, std::span<const Vec3> position) {
         solid_energy(loops.edges, loops.prisms, position) + nodal_energy(loops.nodal, position);
     sum.fixed_energy = solid_energy(loops.fixed_edges, loops.fixed_prisms, position);
   }
-  for (const TermLoop& loop : loops.terms) sum.term_energy += loop.value(position);
+  for (const TermLoop& loop : loops.terms) sum.term_energy += loop.value(position, poses);
   for (int64_t e = 0; e < loops.prisms.counted; ++e) {
     const double v = prism_volume(base::pick(position, loops.prisms.points[e]).data());
     const double v0 = loops.prisms.rest_volume[e], change = v - v0;

@@ -54,40 +54,51 @@ TermLoop::TermLoop(const model::TermElements& elements, const model::Points& poi
       if (!soft || (of[0] < owned) != counts) continue;
       points_.insert(points_.end(), of.begin(), of.end());
       numbers_.insert(numbers_.end(), numbers.begin(), numbers.end());
+      bone_.push_back(elements.bone_of(e));
     }
     if (counts) counted_ = size();
   }
 }
 
-std::vector<Vec3> TermLoop::places(size_t e, std::span<const Vec3> position) const {
+Mat4 TermLoop::pose_of(size_t e, BonePoses poses) const {
+  return bone_[e] < 0 || poses.empty() ? Mat4(Mat4::Identity()) : poses[bone_[e]];
+}
+
+std::vector<Vec3> TermLoop::places(size_t e, std::span<const Vec3> position,
+                                   BonePoses poses) const {
+  const Mat4 pose = pose_of(e, poses);
+  const Mat3 back = pose.topLeftCorner<3, 3>().transpose();
   std::vector<Vec3> x;
-  for (const int32_t p : points_of(e)) x.push_back(position[p]);
+  for (const int32_t p : points_of(e)) x.push_back(back * (position[p] - pose.col(3).head<3>()));
   return x;
 }
 
-double TermLoop::value(std::span<const Vec3> position) const {
+double TermLoop::value(std::span<const Vec3> position, BonePoses poses) const {
   double value = 0;
   Eigen::VectorXd slope;
   for (size_t e = 0; e < counted_; ++e)
-    value += term_->gradient(places(e, position), numbers_of(e), slope);
+    value += term_->gradient(places(e, position, poses), numbers_of(e), slope);
   return value;
 }
 
-double TermLoop::add_gradient(std::span<const Vec3> position, double scale,
+double TermLoop::add_gradient(std::span<const Vec3> position, BonePoses poses, double scale,
                               std::span<Vec3> gradient) const {
   double value = 0;
   Eigen::VectorXd slope;
   for (size_t e = 0; e < size(); ++e) {
-    const double here = term_->gradient(places(e, position), numbers_of(e), slope);
+    const double here = term_->gradient(places(e, position, poses), numbers_of(e), slope);
     if (e < counted_) value += here;
+    const Mat3 turn = pose_of(e, poses).topLeftCorner<3, 3>();
     for (size_t i = 0; i < each_; ++i)
-      gradient[points_of(e)[i]] += scale * slope.segment<3>(static_cast<Eigen::Index>(3 * i));
+      gradient[points_of(e)[i]] +=
+          scale * turn * slope.segment<3>(static_cast<Eigen::Index>(3 * i));
   }
   return value;
 }
 
-Eigen::MatrixXd TermLoop::hessian_of(size_t e, std::span<const Vec3> position, bool exact) const {
-  Eigen::MatrixXd hessian = term_->hessian(places(e, position), numbers_of(e));
+Eigen::MatrixXd TermLoop::hessian_of(size_t e, std::span<const Vec3> position, BonePoses poses,
+                                     bool exact) const {
+  Eigen::MatrixXd hessian = term_->hessian(places(e, position, poses), numbers_of(e));
   if (exact) return hessian;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(hessian);
   return of.eigenvectors() * of.eigenvalues().cwiseMax(0).asDiagonal() *

@@ -4,7 +4,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <optional>
 
 #include "repose/surface/triangle_tree.h"
 
@@ -14,25 +13,6 @@ namespace {
 constexpr double crown = 11;   // mm, of an incisor, from its edge
 constexpr double rough = 0.6;  // mm, by which mucosa may end farther from teeth than the gap
 constexpr double range = 2;    // mm off the plane, for 1/√2 of the largest tension
-
-/// Three columns that end in a bone, far from one line; none where there are no such.
-std::optional<std::array<int64_t, 3>> frame_of(const ColumnLayout& layout, int32_t bone) {
-  constexpr double smallest = 1;  // mm², of the triangle, twice
-  const std::vector<Vec3>& x = layout.columns.deep;
-  std::vector<int64_t> held;
-  for (size_t c = 0; c < x.size(); ++c)
-    if (!layout.rim[c] && layout.attachment.bone[c] == bone)
-      held.push_back(static_cast<int64_t>(c));
-  if (held.size() < 3) return {};
-  const int64_t a = held.front();
-  const auto along = [&](int64_t c) { return Vec3(x[c] - x[a]); };
-  const int64_t b =
-      *std::ranges::max_element(held, {}, [&](int64_t c) { return along(c).squaredNorm(); });
-  const auto area = [&](int64_t c) { return along(b).cross(along(c)).norm(); };
-  const int64_t c = *std::ranges::max_element(held, {}, area);
-  if (!(area(c) > smallest)) return {};
-  return std::array{a, b, c};
-}
 
 /// z of the line between the lips at x, along the head's axes: through stomion and the corners of
 /// the mouth.
@@ -50,9 +30,8 @@ Vec3 incisor_edge(const scene::AnatomyPlan& plan, bool upper) {
 /// Elements of one jaw.
 class JawAdhesion {
  public:
-  JawAdhesion(const AdhesionRule& rule, size_t jaw, const surface::Surface& bone,
-              const std::array<int64_t, 3>& frame)
-      : rule_(rule), jaw_(rule.jaws[jaw]), tree_(bone), frame_(frame) {}
+  JawAdhesion(const AdhesionRule& rule, size_t jaw, const surface::Surface& bone)
+      : rule_(rule), jaw_(rule.jaws[jaw]), tree_(bone) {}
 
   /// Adds the element of a pair, if the point is in the vestibule at the teeth of its own jaw.
   void add(size_t pair, const Vec3& skin, const Model& model, TermElements& elements) const {
@@ -66,31 +45,25 @@ class JawAdhesion {
     const auto tooth = tree_.nearest(x[point], jaw_.reach * jaw_.reach);
     if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();
-    const Vec3 first = x[frame_[1]] - x[frame_[0]], second = x[frame_[2]] - x[frame_[0]];
-    Mat3 axes;
-    axes << first, second, first.cross(second);
-    const Vec3 parts = axes.inverse() * normal;
-    elements.points.insert(elements.points.end(), {point, frame_[0], frame_[1], frame_[2]});
-    elements.numbers.insert(elements.numbers.end(),
-                            {parts.x(), parts.y(), parts.z(), normal.dot(x[point] - x[frame_[0]]),
-                             rule_.tension * pairs.area[pair], rule_.range});
+    elements.points.push_back(point);
+    elements.numbers.insert(
+        elements.numbers.end(),
+        {normal.x(), normal.y(), normal.z(), normal.dot(x[point]), rule_.tension * pairs.area[pair],
+         rule_.range, static_cast<double>(jaw_.bone)});
   }
 
  private:
   const AdhesionRule& rule_;
   const AdhesionRule::Jaw& jaw_;
   surface::TriangleTree tree_;
-  std::array<int64_t, 3> frame_;  // points
 };
 
 }  // namespace
 
 std::vector<AdheringJaw> adhering_jaws(const scene::AnatomyPlan& plan, const ColumnLayout& layout) {
   std::vector<AdheringJaw> jaws;
-  for (const bool upper : {true, false}) {
-    const int32_t bone = layout.field.nearest(incisor_edge(plan, upper)).bone;
-    if (const auto frame = frame_of(layout, bone)) jaws.push_back({upper, bone, *frame});
-  }
+  for (const bool upper : {true, false})
+    jaws.push_back({upper, layout.field.nearest(incisor_edge(plan, upper)).bone});
   return jaws;
 }
 
@@ -118,15 +91,12 @@ AdhesionRule adhesion_rule(const scene::AnatomyPlan& plan, const std::vector<Adh
 
 void add_adhesion(const scene::AnatomyPlan& plan, const std::vector<surface::Surface>& bones,
                   const Piece& piece, Model& model) {
-  TermElements elements{"adhesion", 4, 6, {}, {}};
+  TermElements elements{"adhesion", 1, 7, {}, {}, 6};
   const auto layers = static_cast<int64_t>(model.points.position.size() / piece.column.size());
   const AdhesionRule rule = adhesion_rule(plan, piece.jaws);
   std::vector<JawAdhesion> jaws;
-  for (size_t k = 0; k < piece.jaws.size(); ++k) {
-    std::array<int64_t, 3> frame = piece.jaws[k].frame;
-    for (int64_t& column : frame) column = column * layers + layers - 1;
-    jaws.emplace_back(rule, k, bones[piece.jaws[k].bone], frame);
-  }
+  for (size_t k = 0; k < piece.jaws.size(); ++k)
+    jaws.emplace_back(rule, k, bones[piece.jaws[k].bone]);
   const ContactPairs& pairs = model.contact.pairs;
   for (size_t c = 0; c < pairs.point.size(); ++c) {
     const int64_t column = pairs.point[c] / layers;

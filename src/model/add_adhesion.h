@@ -11,8 +11,7 @@ inline bool adheres(const scene::Scene& scene) {
   return scene.anatomy && scene.anatomy->vestibule && scene.anatomy->adhesion > 0;
 }
 
-/// Returns the jaws that lips adhere to, which have three columns that end in them far from one
-/// line, in rows of the whole skin.
+/// Returns the jaws that lips adhere to.
 std::vector<AdheringJaw> adhering_jaws(const scene::AnatomyPlan& plan, const ColumnLayout& layout);
 
 /// Returns the rule by which the elements of add_adhesion() are made, without columns of cuts.

@@ -155,11 +155,8 @@ std::vector<std::vector<int64_t>> ColumnGeometry::held() const {
 Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   const ColumnLayout& layout = state_->layout;
   Piece piece;
-  std::vector<int64_t> centers = columns;
-  for (const AdheringJaw& jaw : state_->jaws)
-    centers.insert(centers.end(), jaw.frame.begin(), jaw.frame.end());
   piece.triangle =
-      triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, centers)));
+      triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, columns)));
   piece.column = vertices_of(layout.mesh, piece.triangle);
   piece.slope = state_->slope;
   for (const int64_t t : piece.triangle)
@@ -183,8 +180,7 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
     return columns;
   };
   for (const int64_t t : piece.triangle) piece.corner.push_back(rows_of(layout.mesh.triangles[t]));
-  for (const AdheringJaw& jaw : state_->jaws)
-    piece.jaws.push_back({jaw.upper, jaw.bone, rows_of(jaw.frame)});
+  piece.jaws = state_->jaws;
   return piece;
 }
 

@@ -72,7 +72,8 @@ void check_edges(const Edges& edges, size_t points, const ArrayCheck& check) {
   check.numbers("edge/weight", edges.weight, edges.points.size(), any);
 }
 
-void check_elements(const std::vector<TermElements>& all, size_t points, const ArrayCheck& check) {
+void check_elements(const std::vector<TermElements>& all, size_t points, size_t bones,
+                    const ArrayCheck& check) {
   constexpr int64_t max_points = 32, max_numbers = 1024;
   for (size_t k = 0; k < all.size(); ++k) {
     const std::string name = fmt::format("element/{}", k);
@@ -83,6 +84,14 @@ void check_elements(const std::vector<TermElements>& all, size_t points, const A
                    static_cast<int64_t>(points) - 1);
     check.numbers(name + "/numbers", of.numbers, of.size() * static_cast<size_t>(of.numbers_each),
                   any);
+    check.integer(name, 0, of.bone_number, -1, of.numbers_each - 1);
+    if (of.bone_number < 0) continue;
+    for (size_t e = 0; e < of.size(); ++e) {
+      const double bone = of.numbers_of(e)[of.bone_number];
+      if (!(bone >= 0 && bone < static_cast<double>(bones) && bone == std::floor(bone)))
+        check.refuse(name + "/numbers",
+                     "element {} names bone {:g}, expected a row of bone below {}", e, bone, bones);
+    }
   }
 }
 
@@ -182,7 +191,7 @@ void check_arrays(const Model& m, const ArrayCheck& check) {
   check_springs(m.springs, points, m.spring_sets.size(), check);
   check_prisms(m.prisms, points, is_solid(m) || !m.edges.points.empty(), check);
   check_edges(m.edges, points, check);
-  check_elements(m.elements, points, check);
+  check_elements(m.elements, points, m.bones.size(), check);
   check.indices("skin/points", m.skin, points);
   check_bones(m, check);
   if (m.adhesion) check_adhesion(m, check);

@@ -62,6 +62,7 @@ std::vector<model::TermElements> read_elements(const Reader& in) {
     of.term = in.text(group, "term");
     of.points_each = in.integer(group, "points_each");
     of.numbers_each = in.integer(group, "numbers_each");
+    if (in.has_attribute(group, "bone_number")) of.bone_number = in.integer(group, "bone_number");
     of.points = in.integers<int64_t>(group + "/points", Shape::any);
     of.numbers = in.numbers(group + "/numbers", {Shape::any, {}});
   }

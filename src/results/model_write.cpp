@@ -43,6 +43,7 @@ void write_elements(hid_t model, const std::vector<model::TermElements>& all) {
     write_attribute(own, "term", of.term);
     write_attribute(own, "points_each", of.points_each);
     write_attribute(own, "numbers_each", of.numbers_each);
+    if (of.bone_number >= 0) write_attribute(own, "bone_number", of.bone_number);
     write_array(own, "points", of.points);
     write_array(own, "numbers", of.numbers);
   }

@@ -38,6 +38,7 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   subtract_contact();
   qp_.gaps().linearize(displacement, load, travel);
   objective_.hessian_action(travel, trial_, false);
+  objective_.add_carried(load, trial_);
   check(VecAXPY(slope_, 1.0, trial_));
   return qp_.solve(displacement, slope_, predicted_to, increment);
 }

@@ -348,6 +348,7 @@ bool Predictor::predict(Vec displacement, double load, Vec increment) {
     if (part.unknown[i] < 0)
       direction[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
   objective_.hessian_action(direction, force_);
+  objective_.add_carried(load, force_);
   check(VecScale(force_, -1));
   check(VecSet(increment, 0));
   // A weak preconditioner's norm does not see smooth errors: after 1e-2 of it an increment can miss

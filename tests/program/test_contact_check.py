@@ -171,7 +171,7 @@ def adhering(tmp_path_factory, environment):
 def elements(change):
     def spoil(h5):
         group = h5["model/element/0"]
-        points, numbers = group["points"][:].reshape(-1, 4), group["numbers"][:].reshape(-1, 6)
+        points, numbers = group["points"][:].reshape(-1, 1), group["numbers"][:].reshape(-1, 7)
         points, numbers = change(points, numbers)
         for name, values in (("points", points), ("numbers", numbers)):
             del group[name]
@@ -218,7 +218,9 @@ SPOILED_ADHESION = {
     "planes of other points": (elements(next_points), "adhesion, "),
     "planes that face the teeth": (elements(other_side), "adhesion, normals"),
     "planes half a millimeter off": (elements(lambda points, numbers: (
-        points, numbers + [0, 0, 0, 0.5, 0, 0])), "adhesion, initial openings"),
+        points, numbers + [0, 0, 0, 0.5, 0, 0, 0])), "adhesion, initial openings"),
+    "the other jaw": (elements(lambda points, numbers: (
+        points, [0, 0, 0, 0, 0, 0, 1] + numbers * [1, 1, 1, 1, 1, 1, -1])), "but by its place to"),
     "twice the tension": (scaled(4, 2), "adhesion, tensions"),
     "twice the range": (scaled(5, 2), "adhesion, ranges"),
     "another tension in the rule": (weak_film, "residual_force"),

@@ -71,9 +71,9 @@ def test_every_number_of_every_step_follows_from_the_page(result, contact):
 
 def test_adhesion_follows_from_the_page(lips):
     films = adhering(lips)
-    elements = lips.model["element/0/points"].reshape(-1, 4)
-    assert [film[0] for film in films] == list(elements[:, 0]) and len(films) > 10
-    assert (lips.model["point/bone"][elements[:, 1:]].T == [film[1] for film in films]).all()
+    points, numbers = lips.model["element/0/points"], lips.model["element/0/numbers"].reshape(-1, 7)
+    assert [film[0] for film in films] == list(points) and len(films) > 10
+    assert [film[1] for film in films] == list(numbers[:, 6])
     arrays, numbers = lips.steps[-1]
     energy, _ = adhesion(lips, films, arrays["point/position"], numbers["load"])
     assert energy > 0.01

@@ -15,6 +15,8 @@ class Objective : public Function {
   /// (∂²Φ/∂x²) d with `direction` [local points], at the state of the last update; on request
   /// without contact.
   void hessian_action(std::span<const Vec3> direction, Vec product, bool contact = true);
+  /// Adds what bones that go on to `load` change of the gradient by elements that move with them.
+  void add_carried(double load, Vec change);
 
   /// A block of the Hessian between two local points; where they differ, its transpose is that of
   /// the second and the first.

@@ -26,7 +26,11 @@ class Positions {
   Vec3 prescribed(int64_t local_row, double load) const;
 
   /// 4×4 matrix that takes a bone from load 0 to the load.
-  Mat4 bone_matrix(int32_t bone) const { return motion_.bone_matrix(bone, load_); }
+  const Mat4& bone_matrix(int32_t bone) const { return poses_[bone]; }
+  /// [bones] these matrices.
+  std::span<const Mat4> poses() const { return poses_; }
+  /// [bones] those at a load.
+  std::vector<Mat4> poses_at(double load) const;
 
   /// Longest way of any fixed point from load 0 to 1, mm. Collective.
   double largest_travel() const;
@@ -56,6 +60,7 @@ class Positions {
   base::VecHandle ghosted_;     // [3 soft_]
   base::ScatterHandle scatter_;
   std::vector<Vec3> local_;
+  std::vector<Mat4> poses_;
   double load_ = 0;
   int64_t revision_ = 0;
 };

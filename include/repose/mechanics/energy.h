@@ -52,6 +52,6 @@ struct Totals {
   double volume_error_max = 0;  ///< max |v/v_0 − 1|
   int64_t inverted = 0;         ///< prisms with v ≤ 0
 };
-Totals totals(const Loops& loops, std::span<const Vec3> position);
+Totals totals(const Loops& loops, std::span<const Vec3> position, BonePoses poses = {});
 
 }  // namespace repose::mechanics

@@ -121,24 +121,33 @@ void add_term(const std::string& name) {
 /// The term of elements. InputError where it is unknown, or has other numbers of points or numbers.
 const Term& term_of(const model::TermElements& elements);
 
-/// The elements of one term that touch soft tissue.
+/// [bones] where bones are, from the initial state on; empty: there.
+using BonePoses = std::span<const Mat4>;
+
+/// The elements of one term that touch soft tissue. Those that move with a bone have the energy of
+/// their points' places in its frame.
 class TermLoop {
  public:
   /// Those of a part in local numbers; elements whose first point is before `owned` count here.
   TermLoop(const model::TermElements& elements, const model::Points& points, int64_t owned);
 
-  double value(std::span<const Vec3> position) const;  ///< over the counted elements, N·mm
+  /// Over the counted elements, N·mm.
+  double value(std::span<const Vec3> position, BonePoses poses = {}) const;
   /// Adds scale · gradient; returns the value, unscaled.
-  double add_gradient(std::span<const Vec3> position, double scale, std::span<Vec3> gradient) const;
+  double add_gradient(std::span<const Vec3> position, BonePoses poses, double scale,
+                      std::span<Vec3> gradient) const;
   /// Calls visit(p, q, block) with p ≤ q in each element: the Hessian, or its positive semidefinite
   /// part.
   template <class Visit>
-  void for_each_block(std::span<const Vec3> position, bool exact, Visit&& visit) const {
+  void for_each_block(std::span<const Vec3> position, BonePoses poses, bool exact,
+                      Visit&& visit) const {
     for (size_t e = 0; e < size(); ++e) {
-      const Eigen::MatrixXd hessian = hessian_of(e, position, exact);
+      const Mat3 turn = pose_of(e, poses).topLeftCorner<3, 3>();
+      const Eigen::MatrixXd hessian = hessian_of(e, position, poses, exact);
       for (Eigen::Index i = 0; i < term_->points(); ++i)
         for (Eigen::Index j = i; j < term_->points(); ++j)
-          visit(points_of(e)[i], points_of(e)[j], Mat3(hessian.block<3, 3>(3 * i, 3 * j)));
+          visit(points_of(e)[i], points_of(e)[j],
+                Mat3(turn * hessian.block<3, 3>(3 * i, 3 * j) * turn.transpose()));
     }
   }
   /// Calls visit(p, q) for the points of each element, both ways.
@@ -155,14 +164,17 @@ class TermLoop {
   std::span<const double> numbers_of(size_t e) const {
     return {numbers_.data() + e * term_->numbers(), static_cast<size_t>(term_->numbers())};
   }
-  std::vector<Vec3> places(size_t e, std::span<const Vec3> position) const;
-  Eigen::MatrixXd hessian_of(size_t e, std::span<const Vec3> position, bool exact) const;
+  Mat4 pose_of(size_t e, BonePoses poses) const;
+  std::vector<Vec3> places(size_t e, std::span<const Vec3> position, BonePoses poses) const;
+  Eigen::MatrixXd hessian_of(size_t e, std::span<const Vec3> position, BonePoses poses,
+                             bool exact) const;
 
   const Term* term_;
   size_t each_;
   size_t counted_ = 0;  // elements that come first
   std::vector<int32_t> points_;
   std::vector<double> numbers_;
+  std::vector<int32_t> bone_;  // [elements] with which each moves, −1: none
 };
 
 }  // namespace repose::mechanics

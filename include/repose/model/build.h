@@ -103,7 +103,6 @@ struct ColumnLoads {
 struct AdheringJaw {
   bool upper;
   int32_t bone;
-  std::array<int64_t, 3> frame;  ///< columns, whose deepest points tell where the bone is
 };
 
 /// Columns of tissue, ascending, and the triangles of skin between them.
@@ -114,7 +113,7 @@ struct Piece {
   std::vector<char> rim;     ///< [C] 1: held in whole
   std::vector<char> parted;  ///< [C] 1: on the path of an incision
   ColumnLoads loads;
-  std::vector<AdheringJaw> jaws;  ///< frames in rows of the piece
+  std::vector<AdheringJaw> jaws;
   std::vector<Triangle> corner;   ///< [F] rows of the piece
   std::vector<int64_t> triangle;  ///< [F] rows of the whole skin's triangles
   std::vector<int64_t> edge;      ///< [E] rows of the whole skin's edges

@@ -62,6 +62,9 @@ struct TermElements {
   int64_t points_each = 1, numbers_each = 0;
   std::vector<int64_t> points;  ///< [E, points_each]
   std::vector<double> numbers;  ///< [E, numbers_each] in the term's units
+  /// Which of the numbers is the row of a bone with which the element moves as one; −1: it does
+  /// not.
+  int64_t bone_number = -1;
   size_t size() const { return points.size() / static_cast<size_t>(points_each); }
   std::span<const int64_t> points_of(size_t e) const {
     return std::span(points).subspan(e * static_cast<size_t>(points_each),
@@ -70,6 +73,9 @@ struct TermElements {
   std::span<const double> numbers_of(size_t e) const {
     return std::span(numbers).subspan(e * static_cast<size_t>(numbers_each),
                                       static_cast<size_t>(numbers_each));
+  }
+  int32_t bone_of(size_t e) const {
+    return bone_number < 0 ? -1 : static_cast<int32_t>(numbers_of(e)[bone_number]);
   }
 };
 

@@ -89,21 +89,18 @@ void check_planes(const Model& model, const model::TermElements& elements,
   for (size_t e = 0; e < elements.size(); ++e) element_of[elements.points_of(e)[0]] = e;
   for (const Film& film : films) {
     const size_t e = element_of.at(film.point);
-    const auto points = elements.points_of(e);
     const auto numbers = elements.numbers_of(e);
-    const Vec3 &at = x[points[0]], &corner = x[points[1]];
-    const Vec3 first = x[points[2]] - corner, second = x[points[3]] - corner;
-    const Vec3 normal = numbers[0] * first + numbers[1] * second + numbers[2] * first.cross(second);
+    const Vec3 &at = x[film.point], normal(numbers[0], numbers[1], numbers[2]);
     for (int a = 0; a < 3; ++a) {
       normals.push_back(normal[a]);
       own_normals.push_back(film.normal[a]);
     }
-    openings.push_back(normal.dot(at - corner) - numbers[3]);
+    openings.push_back(normal.dot(at) - numbers[3]);
     tensions.push_back(numbers[4]);
     own_tensions.push_back(film.tension);
     ranges.push_back(numbers[5]);
     own_ranges.push_back(model.adhesion->range);
-    size = std::max({size, at.lpNorm<Eigen::Infinity>(), corner.lpNorm<Eigen::Infinity>()});
+    size = std::max(size, at.lpNorm<Eigen::Infinity>());
     nearest = std::min(nearest, film.distance);
     tension = std::max(tension, film.tension);
   }
@@ -157,8 +154,10 @@ void check_adhesion(const Model& model, const std::vector<Film>& films, Comparis
   if (!elements && !model.adhesion) return;
   const bool known = model.adhesion.has_value();
   comparison.statement("the model states where lips adhere (adhesion)", known);
-  const bool shaped = !elements || (elements->points_each == 4 && elements->numbers_each == 6);
-  comparison.statement("elements of adhesion have 4 points and 6 numbers", shaped);
+  const bool shaped = !elements || (elements->points_each == 1 && elements->numbers_each == 7 &&
+                                    elements->bone_number == 6);
+  comparison.statement(
+      "elements of adhesion have 1 point and 7 numbers, of which the last is the bone", shaped);
   if (!known || !shaped) return;
   const auto& cut = model.adhesion->cut_columns;
   comparison.statement("columns that cuts double do not adhere",
@@ -166,21 +165,14 @@ void check_adhesion(const Model& model, const std::vector<Film>& films, Comparis
                          return std::ranges::find(cut, column) != cut.end();
                        }));
   std::map<int64_t, int32_t> stored;
-  bool framed = true;
   std::string wrong;
-  for (size_t e = 0; elements && e < elements->size(); ++e) {
-    const auto points = elements->points_of(e);
-    const int32_t bone = model.points.bone[points[1]];
-    for (int k = 1; k < 4; ++k)
-      framed = framed && bone >= 0 && model.points.bone[points[k]] == bone;
-    if (!stored.emplace(points[0], bone).second)
-      wrong = fmt::format("point {} adheres twice", points[0]);
-  }
-  comparison.statement("each plane of adhesion is carried by three points of one bone", framed);
-  if (framed && wrong.empty()) wrong = difference(stored, films, model);
+  for (size_t e = 0; elements && e < elements->size(); ++e)
+    if (!stored.emplace(elements->points_of(e)[0], elements->bone_of(e)).second)
+      wrong = fmt::format("point {} adheres twice", elements->points_of(e)[0]);
+  if (wrong.empty()) wrong = difference(stored, films, model);
   comparison.statement(wrong.empty() ? "points adhere that lie at the teeth of their jaw" : wrong,
                        wrong.empty());
-  if (elements && framed && wrong.empty()) check_planes(model, *elements, films, comparison);
+  if (elements && wrong.empty()) check_planes(model, *elements, films, comparison);
 }
 
 std::vector<FilmState> evaluate(const Model& model, const std::vector<Film>& films,

@@ -71,8 +71,7 @@ void check_step(const model::Model& model, const model::PrescribedMotion& motion
                 Comparison& comparison) {
   const model::StepNumbers& numbers = step.numbers;
   const model::StepRows& rows = step.rows;
-  const RecomputedStep again = recompute(
-      model, numbers, rows, films, evaluate(model, films, motion, numbers.load, rows.position));
+  const RecomputedStep again = recompute(model, motion, numbers, rows, films);
   check_ranges(numbers, comparison);
   check_numbers(numbers, again, comparison);
   const std::vector<Vec3> fixed = prescribed(model, motion, numbers.load, rows.position);

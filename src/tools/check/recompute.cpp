@@ -55,15 +55,16 @@ std::array<Vec3, 6> volume_gradient(std::array<Vec3, 6> corners, double step) {
 
 class Recomputation {
  public:
-  Recomputation(const model::Model& model, const model::StepNumbers& claimed,
-                const model::StepRows& rows, const std::vector<Film>& films,
-                const std::vector<FilmState>& adhesion)
+  Recomputation(const model::Model& model, const model::PrescribedMotion& motion,
+                const model::StepNumbers& claimed, const model::StepRows& rows,
+                const std::vector<Film>& films)
       : model_(model),
+        motion_(motion),
         claimed_(claimed),
         x_(rows.position),
         fields_(rows.point_fields),
         films_(films),
-        film_states_(adhesion) {}
+        film_states_(evaluate(model, films, motion, claimed.load, rows.position)) {}
 
   RecomputedStep run() {
     points();
@@ -107,11 +108,12 @@ class Recomputation {
   void force_functional_gradient();
 
   const model::Model& model_;
+  const model::PrescribedMotion& motion_;
   const model::StepNumbers& claimed_;
   const std::vector<Vec3>& x_;
   const std::vector<model::PointField>& fields_;
   const std::vector<Film>& films_;
-  const std::vector<FilmState>& film_states_;
+  const std::vector<FilmState> film_states_;
   double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;        // [N] Σ noise of the forces there, N
   std::vector<double> nodal_pressure_;  // [N] e/C of averaged volumes, N/mm², or empty
@@ -281,11 +283,18 @@ void Recomputation::terms() {
       const auto numbers = elements.numbers_of(e);
       const double before =
           term.gradient(base::pick(model_.points.position, points), numbers, slope);
-      const double now = term.gradient(base::pick(x_, points), numbers, slope);
+      const int32_t bone = elements.bone_of(e);
+      const Mat4 pose =
+          bone < 0 ? Mat4(Mat4::Identity()) : motion_.bone_matrix(bone, claimed_.load);
+      const Mat3 turn = pose.topLeftCorner<3, 3>();
+      std::vector<Vec3> places;
+      for (const int64_t p : points)
+        places.push_back(turn.transpose() * (x_[p] - pose.topRightCorner<3, 1>()));
+      const double now = term.gradient(places, numbers, slope);
       step_.f_e.value += now - before;
       uncertain += std::abs(now) + std::abs(before);
       for (size_t i = 0; i < points.size(); ++i) {
-        const Vec3 part = slope.segment<3>(static_cast<Eigen::Index>(3 * i));
+        const Vec3 part = turn * slope.segment<3>(static_cast<Eigen::Index>(3 * i));
         if (soft(points[i])) step_.rows.residual_force[points[i]] -= part;
         at_point_[points[i]] += part.norm();
       }
@@ -444,10 +453,10 @@ void Recomputation::gradient() {
 
 }  // namespace
 
-RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
-                         const model::StepRows& rows, const std::vector<Film>& films,
-                         const std::vector<FilmState>& adhesion) {
-  RecomputedStep step = Recomputation(model, claimed, rows, films, adhesion).run();
+RecomputedStep recompute(const model::Model& model, const model::PrescribedMotion& motion,
+                         const model::StepNumbers& claimed, const model::StepRows& rows,
+                         const std::vector<Film>& films) {
+  RecomputedStep step = Recomputation(model, motion, claimed, rows, films).run();
   step.rows.position = rows.position;
   return step;
 }

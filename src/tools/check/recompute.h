@@ -32,9 +32,9 @@ struct RecomputedStep {
 /// Computes a step again by plain serial loops over the whole model, sharing with the solver only
 /// the formulas of spring_law.h and prism_geometry.h. Of `claimed` it takes what defines the
 /// objective: functional, volume, lambda, bulk_modulus, epsilon; of `rows`, the position.
-/// `adhesion` is what find_films() of the model are at that position and load.
-RecomputedStep recompute(const model::Model& model, const model::StepNumbers& claimed,
-                         const model::StepRows& rows, const std::vector<Film>& films,
-                         const std::vector<FilmState>& adhesion);
+/// `films` are those of the model.
+RecomputedStep recompute(const model::Model& model, const model::PrescribedMotion& motion,
+                         const model::StepNumbers& claimed, const model::StepRows& rows,
+                         const std::vector<Film>& films);
 
 }  // namespace repose::tools::check

@@ -96,7 +96,7 @@ TYPED_TEST(Terms, ItsLoopCountsWhatItOwnsAndShowsBlocksOfItsHessian) {
   const TermLoop all(elements, m.points, 100), one(elements, m.points, 6),
       none(elements, m.points, 0);
   std::vector<Vec3> gradient(x.size(), Vec3::Zero());
-  EXPECT_DOUBLE_EQ(all.add_gradient(x, 2.0, gradient), all.value(x));
+  EXPECT_DOUBLE_EQ(all.add_gradient(x, {}, 2.0, gradient), all.value(x));
   EXPECT_EQ(none.value(x), 0);
   EXPECT_NE(one.value(x), all.value(x));
   Eigen::VectorXd slope;
@@ -105,7 +105,7 @@ TYPED_TEST(Terms, ItsLoopCountsWhatItOwnsAndShowsBlocksOfItsHessian) {
   EXPECT_LE((gradient[1] - 2 * slope.head<3>()).norm(), 1e-14 * slope.norm());
   const auto form = [&](bool exact) {  // of one direction
     double sum = 0;
-    all.for_each_block(x, exact, [&](int32_t p, int32_t q, const Mat3& block) {
+    all.for_each_block(x, {}, exact, [&](int32_t p, int32_t q, const Mat3& block) {
       sum += (p == q ? 1 : 2) *
              Vec3(1, -2, 3).normalized().dot(block * Vec3(1, -2, 3).normalized()) *
              (p % 2 ? 1 : -1) * (q % 2 ? 1 : -1);
