@@ -26,7 +26,7 @@ using base::OptionKind;
 
 std::vector<base::Option> option_table() {
   const auto triple = [](const char* name, const char* help) {
-    return base::Option{name, OptionKind::number, "", help, {}, "mm", {}, {}, 3};
+    return base::Option{name, OptionKind::number, "", help, {-1e7, 1e7}, "mm", {}, {}, 3};
   };
   return {triple("point", "A point of the cutting plane."),
           triple("normal", "Normal of the plane, towards the piece."),

@@ -195,6 +195,10 @@ BAD_BONES = {
     "no cut": (lambda f: ["head_mandible.ply"], ["-point", "-normal"]),
     "half a plane": (lambda f: ["head_mandible.ply", "-point", "0", "0", "0"], ["-normal"]),
     "too few numbers": (lambda f: ["head_mandible.ply", "-point", "0", "0"], ["-point"]),
+    "a normal whose square overflows": (
+        lambda f: ["head_mandible.ply", *PLANE_OPTIONS[:-1], "1e155"], ["-normal", "1e155", "1e+07"]),
+    "a point beyond any body": (
+        lambda f: ["head_mandible.ply", *PLANE_OPTIONS, "-point", "0", "0", "1e300"], ["-point", "1e300"]),
     "an open bone": (lambda f: ["head_skin.ply", *PLANE_OPTIONS], ["head_skin.ply", "open"]),
     "a bone that intersects itself": (
         lambda f: [crossed_bone(f), *PLANE_OPTIONS], ["crossed.ply", "intersects itself"]),
