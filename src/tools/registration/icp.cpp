@@ -49,7 +49,8 @@ Similarity shortened(const Similarity& step, double share) {
 class Icp {
  public:
   Icp(const Surface& moving, const Surface& fixed, const IcpOptions& options)
-      : fixed_(fixed),
+      : moving_name_(moving.name),
+        fixed_(fixed),
         options_(options),
         tree_(fixed),
         border_edge_(fixed.triangles.size()),
@@ -113,23 +114,36 @@ class Icp {
     return false;
   }
 
+  /// Throws InputError where nearly all pairs are of triangles that face opposite ways.
+  void require_same_side(size_t opposed, size_t agreeing) const {
+    constexpr size_t many = 10;
+    if (opposed <= many * agreeing) return;
+    base::refuse(
+        "ICP: triangles of {} face the other way than those of {} at {} of {} samples; turn those "
+        "of the one that faces inward in a mesh editor, or check the landmarks",
+        moving_name_, fixed_.name, opposed, points_.size());
+  }
+
   /// The nearest share of the pairs that may count.
   std::vector<Pair> match(const Similarity& transform) const {
     std::vector<Pair> pairs;
+    size_t opposed = 0;
     for (size_t i = 0; i < points_.size(); ++i) {
       const Vec3 from = transform.apply(points_[i]);
       const auto nearest = tree_.nearest(from);
-      const Vec3 normal = scaled_normal(tree_.corners_of(nearest.triangle)).normalized();
-      if (!((transform.rotation * normals_[i]).dot(normal) > min_cosine)) continue;
       if (at_border(nearest.triangle, nearest.point)) continue;
-      pairs.push_back({from, nearest.point, normal, nearest.squared});
+      const Vec3 normal = scaled_normal(tree_.corners_of(nearest.triangle)).normalized();
+      const double cosine = (transform.rotation * normals_[i]).dot(normal);
+      opposed += cosine < -min_cosine;
+      if (cosine > min_cosine) pairs.push_back({from, nearest.point, normal, nearest.squared});
     }
+    require_same_side(opposed, pairs.size());
     const auto kept = static_cast<int64_t>(options_.trim * static_cast<double>(pairs.size()));
     if (kept < 6)
       base::refuse(
-          "ICP: {} of {} samples have a partner on the fixed surface, six are needed; the start is "
-          "too far off: check the landmarks",
-          kept, points_.size());
+          "ICP: {} of {} samples of {} have a partner on {}, six are needed; the start is too far "
+          "off: give landmarks of both, or check them",
+          kept, points_.size(), moving_name_, fixed_.name);
     std::nth_element(pairs.begin(), pairs.begin() + kept - 1, pairs.end(),
                      [](const Pair& a, const Pair& b) { return a.squared < b.squared; });
     pairs.resize(kept);
@@ -180,6 +194,7 @@ class Icp {
     return result;
   }
 
+  std::string moving_name_;
   const Surface& fixed_;
   IcpOptions options_;
   TriangleTree tree_;

@@ -238,9 +238,19 @@ TEST(Register, icp_ignores_a_bump_that_the_other_lacks) {
 }
 
 TEST(Register, icp_without_partners_is_refused) {
-  Surface far = moved(sheet(5), {1, Mat3::Identity(), {0, 0, 5000}});
-  for (auto& t : far.triangles) turn(t);
-  EXPECT_NE(refusal([&] { refine_by_icp(far, sheet(5), {}, {}); }).find("landmarks"),
+  const Mat3 upright = Eigen::AngleAxisd(1.5, Vec3::UnitY()).toRotationMatrix();
+  const Surface far = moved(sheet(5), {1, upright, {0, 0, 5000}});
+  EXPECT_NE(refusal([&] { refine_by_icp(far, sheet(5), {}, {}); }).find("give landmarks"),
+            std::string::npos);
+}
+
+TEST(Register, icp_of_a_mesh_that_faces_the_other_way_is_refused) {
+  Surface turned = sheet(20);
+  for (auto& t : turned.triangles) turn(t);
+  turned.name = "turned.ply";
+  EXPECT_NE(refusal([&] {
+              refine_by_icp(turned, sheet(20), {}, {});
+            }).find("triangles of turned.ply face the other way"),
             std::string::npos);
 }
 

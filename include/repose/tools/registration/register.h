@@ -71,7 +71,7 @@ struct IcpResult {
 /// on the fixed one, drops pairs on the fixed surface's border and those whose normals differ by
 /// over 60°, keeps the nearest share, and turns and shifts (never scales) by the linearized least
 /// squares. A step that does not lower the trimmed error is halved. Throws InputError where fewer
-/// than six pairs remain.
+/// than six pairs remain, or nearly all are of triangles that face opposite ways.
 IcpResult refine_by_icp(const Surface& moving, const Surface& fixed, const Similarity& start,
                         const IcpOptions& options);
 
