@@ -198,8 +198,12 @@ void print_vertices(const surface::Surface& predicted, const surface::Surface& a
                     const meshtools::SignedDistance& to_actual) {
   if (predicted.triangles != actual.triangles || predicted.points.size() != actual.points.size())
     return;
+  std::vector<bool> used(actual.points.size(), false);
+  for (const Triangle& triangle : actual.triangles)
+    for (const int64_t vertex : triangle) used[vertex] = true;
   std::vector<Sample> apart;
   for (size_t i = 0; i < actual.points.size(); ++i) {
+    if (!used[i]) continue;
     const Vec3& point = predicted.points[i];
     const double distance = (point - actual.points[i]).norm();
     apart.push_back({point, 1, std::copysign(distance, to_actual.at(point).distance), false});

@@ -75,6 +75,15 @@ def test_corresponding_vertices_have_the_sign_of_the_surface(run, tmp_path):
         assert found[1:] == pytest.approx([signed, 2, 2, 2, 2, 2], abs=1e-3)
 
 
+def test_vertices_in_no_triangle_take_no_part(run, tmp_path):
+    for name, radius, stray in (("a", 38, 900), ("b", 40, -900)):
+        mesh = meshio.read(sphere(tmp_path / f"{name}.ply", radius, n=20))
+        points = np.concatenate([mesh.points, np.full((50, 3), stray)])
+        meshio.Mesh(points, mesh.cells).write(tmp_path / f"{name}.ply")
+    found = rows(run("repose-compare", "a.ply", "b.ply").stdout)["corresponding vertices"]
+    assert found == pytest.approx([2 + 19 * 40, -2, 2, 2, 2, 2, 2], abs=1e-3)
+
+
 def test_regions_by_a_label_map(run, tmp_path):
     labels = np.zeros((40, 50, 48), "<i2")
     labels[:20], labels[20:] = 1, 2
@@ -240,13 +249,19 @@ CASES = {
                                      ["marks.csv", "pronasale is missing"]),
     "registered by nothing": (["a.ply", "a.ply", "-register", "upper"], ["-landmarks"]),
     "spacing of zero": (["a.ply", "a.ply", "-spacing", "0"], ["-spacing"]),
+    "registered to an open mesh that faces inward": (
+        ["half.ply", "inward.ply", "-register", "all"], ["triangles of inward.ply face the other way", "half.ply"]),
 }
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_bad_input_is_refused(run, tmp_path, case):
     arguments, words = CASES[case]
-    sphere(tmp_path / "a.ply", 30, n=6)
+    mesh = meshio.read(sphere(tmp_path / "a.ply", 30, n=6))
+    half = mesh.cells_dict["triangle"]
+    half = half[mesh.points[half][:, :, 1].mean(axis=1) < 0]
+    for name, triangles in (("half", half), ("inward", half[:, ::-1])):
+        meshio.Mesh(mesh.points, [("triangle", triangles)]).write(tmp_path / f"{name}.ply")
     (tmp_path / "text.ply").write_text("no mesh\n")
     (tmp_path / "marks.csv").write_text("# CoordinateSystem = LPS\ntop, 0, 0, 40\n")
     before = sorted(tmp_path.iterdir())
