@@ -91,11 +91,12 @@ Vec3 movement_at(const Vec3& place, const surface::TriangleTree& tree,
 
 std::string describe_movement(const std::vector<model::FacePlace>& places, const Mat3& axes,
                               const surface::Surface& initial, const std::vector<Vec3>& moved) {
+  if (moved.empty()) return "The model has no skin/points; point/displacement states movements.";
   size_t farthest = 0;
   const auto moved_by = [&](size_t i) { return Vec3(moved[i] - initial.points[i]); };
   for (size_t i = 1; i < moved.size(); ++i)
     if (moved_by(i).squaredNorm() > moved_by(farthest).squaredNorm()) farthest = i;
-  const double largest = moved.empty() ? 0 : moved_by(farthest).norm();
+  const double largest = moved_by(farthest).norm();
   if (largest < still) return "The face does not move.";
   if (largest < unmoved) return fmt::format("The face moves {:.2g} mm at most.", largest);
   std::string text;

@@ -60,5 +60,10 @@ TEST(Movement, OfLessThanATenthOfAMillimeterIsStated) {
   EXPECT_EQ(moved_by(0.05), "The face moves 0.05 mm at most.");
 }
 
+TEST(Movement, WithoutASkinIsNotCalledNone) {
+  EXPECT_EQ(describe_movement({}, Mat3::Identity(), {}, {}),
+            "The model has no skin/points; point/displacement states movements.");
+}
+
 }  // namespace
 }  // namespace repose::app
