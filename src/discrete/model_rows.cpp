@@ -84,7 +84,7 @@ double modulus_of(MPI_Comm comm, const Model& rows) {
 double validate(MPI_Comm comm, Model& rows, const std::string& file) {
   require_points(comm, rows, file);
   auto bones = rows.bones.size(), sets = rows.spring_sets.size();
-  base::broadcast(comm, bones, sets);
+  base::broadcast(comm, bones, sets, rows.bone_transform);
   rows.bones.resize(bones);
   rows.spring_sets.resize(sets);
   const OwnModel own(comm, rows);
@@ -100,7 +100,10 @@ double validate(MPI_Comm comm, Model& rows, const std::string& file) {
     if (const int64_t row = model::find_floating(set, {pairs}); row >= 0)
       base::refuse("{}: /model/point: row {} is soft tissue, and nothing holds it", file, row);
   });
-  if (base::rank(comm) > 0) rows.spring_sets.clear();
+  if (base::rank(comm) > 0) {
+    rows.spring_sets.clear();
+    rows.bone_transform.clear();
+  }
   return modulus_of(comm, rows);
 }
 

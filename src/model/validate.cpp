@@ -217,6 +217,24 @@ void require_rigid(const Model& m, const ArrayCheck& check) {
     }
 }
 
+// Held points, and bone points without a bone_transform, may go anywhere.
+void require_targets(const Model& m, const ArrayCheck& check) {
+  constexpr double tolerance = 1e-5;  // of the coordinates: single precision, a nearly rigid matrix
+  std::vector<scene::RigidMotion> motion;
+  for (const Mat4& matrix : m.bone_transform)
+    motion.push_back(scene::RigidMotion::from_matrix(matrix));
+  for (size_t i = 0; i < m.points.set.size(); ++i) {
+    const bool on_bone = m.points.set[i] == PointSet::bone;
+    if (m.points.set[i] == PointSet::held || (on_bone && motion.empty())) continue;
+    const Vec3 &from = m.points.position[i], &target = m.points.target[i];
+    const Vec3 expected = on_bone ? motion[m.points.bone[i]].apply(from) : from;
+    if ((target - expected).norm() <= tolerance * (from.norm() + target.norm())) continue;
+    check.refuse("point/target", "row {} is {} mm, expected {} mm: {}", i, target, expected,
+                 on_bone ? "write where bone_transform moves the point, or leave bone_transform out"
+                         : "write point/position, only bone (set 2) and held points (3) are moved");
+  }
+}
+
 // A millionth, and what rounding the coordinates to single precision may do to the volume.
 double volume_tolerance(const Vec3 corners[6]) {
   double coordinate = 0, extent = 0;
@@ -401,6 +419,7 @@ void validate(const Model& model, const std::string& file) {
   require_parts_of_moduli(model.prisms, check);
   require_one_tissue(model, check);
   require_rigid(model, check);
+  require_targets(model, check);
   require_bodies(model, check);
   refuse_unattached(model, file);
   refuse_floating(model, file);

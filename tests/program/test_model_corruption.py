@@ -113,7 +113,7 @@ ALLOWED = {
         "prism/nodal_modulus")),
     ("skin/points", "empty"), ("adhesion/cut_column", "empty"),
     *((name, "-1") for name in (
-        "point/external_force", "point/target", "edge/weight", "prism/target_volume",
+        "point/external_force", "edge/weight", "prism/target_volume",
         "contact/body_push", "adhesion/lip_line", "adhesion/box")),
     ("point/layer", "huge"), ("point/column", "huge"), ("adhesion/cut_column", "huge"),
 }
@@ -221,6 +221,10 @@ BESIDE_OTHERS = {
     "a prism with a point twice": (set_rows("prism/points", (0, 1), 3), ["prism/points: row 0"]),
     "a bone moved by 1e300 mm": (set_rows("bone_transform", (0, 0, 3), 1e300),
                                  ["bone_transform: row 0"]),
+    "a bone point that its bone does not take along": (
+        set_rows("point/target", (5, 1), 11), ["point/target: row 5", "11", "bone_transform"]),
+    "a soft point with a target of its own": (
+        set_rows("point/target", (1, 1), 1), ["point/target: row 1", "point/position"]),
 }
 
 
