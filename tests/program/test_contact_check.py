@@ -60,9 +60,22 @@ def grown_bones(h5):
 
 
 def moved_bone(h5):
-    transform = h5["model/bone_transform"][:]
+    transform, point = h5["model/bone_transform"][:], h5["model/point"]
     transform[1, 1, 3] += 1
     h5["model/bone_transform"][...] = transform
+    target = point["target"][:]
+    target[(point["set"][:] == 2) & (point["bone"][:] == 1), 1] += 1
+    point["target"][...] = target
+
+
+def larger_pressures(h5):
+    pressure = last_step(h5)["point/contact_pressure"]
+    pressure[...] = pressure[:] * 1.01
+
+
+def larger_areas(h5):
+    area = h5["model/contact/area"]
+    area[...] = area[:] * 1.01
 
 
 SPOILED = {
@@ -75,6 +88,9 @@ SPOILED = {
     "a force that pulls": (in_array("contact_force", lambda v: -v), "force"),
     "a force twice as large": (in_array("contact_force", lambda v: 2 * v), "contact_force of point"),
     "no pressures": (no_pressures, "contact_force"),
+    "a pressure twice as large": (in_array("contact_pressure", lambda v: 2 * v), "contact_pressure of point"),
+    "pressures a hundredth larger": (larger_pressures, "contact_pressure of point"),
+    "areas a hundredth larger": (larger_areas, "contact_pressure of point"),
     "thicker bones": (grown_bones, "contact_gap of point"),
     "a bone elsewhere": (moved_bone, "position"),
 }

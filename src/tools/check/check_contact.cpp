@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "cut_faces.h"
@@ -30,13 +32,21 @@ double slack_of(const model::StepNumbers& numbers) {
   return std::max(1e-9, numbers.displacement_error);
 }
 
+/// Weights of a uniform cubic B-spline's four coefficients at the share t of an interval, and their
+/// derivatives.
+std::array<std::array<double, 4>, 2> spline_weights(double t) {
+  const double u = 1 - t;
+  return {{{u * u * u / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * u * u + 3 * u * u * u) / 6,
+            t * t * t / 6},
+           {-u * u / 2, (3 * t * t - 4 * t) / 2, (4 * u - 3 * u * u) / 2, t * t / 2}}};
+}
+
 /// Recomputed contact of one point.
 struct AtPoint {
   double gap = considered;  // mm, the smaller of the next two
   double body_gap = considered, wall_gap = considered;
-  int32_t body = -1;      // that it is to; −1: the side of a cut
-  int near = 0;           // bodies that may press, …
-  int32_t pressing = -1;  // … the last one of them
+  int32_t body = -1;          // that it is to; −1: the side of a cut
+  std::vector<int32_t> near;  // bodies that may press
   bool slides = false, mesh = false, wall = false;
   double area = 0;  // mm², that the point stands for
 };
@@ -95,8 +105,41 @@ class Bodies {
   Vec3 normal(int32_t body, const Vec3& point, double radius) const {
     return poses_[body].topLeftCorner<3, 3>() * shapes_[body].normal(beside(body, point), radius);
   }
+  /// Gradient at a point in space of the distance that the solver uses.
+  Vec3 gradient(int32_t body, const Vec3& point) const {
+    if (!is_mesh(body)) return normal(body, point, 0);
+    return poses_[body].topLeftCorner<3, 3>() * spline_gradient(body, beside(body, point));
+  }
 
  private:
+  /// Gradient of the cubic B-spline on the solver's grid (docs/reference/formats.md).
+  Vec3 spline_gradient(int32_t body, const Vec3& beside) const {
+    const Vec3 origin = shapes_[body].low_corner() - Vec3::Constant(kept_ + 4 * spacing_);
+    const Vec3 at = (beside - origin) / spacing_, first = at.array().floor() - 1;
+    std::array<std::array<std::array<double, 4>, 2>, 3> weights;
+    for (int a = 0; a < 3; ++a) weights[a] = spline_weights(at[a] - first[a] - 1);
+    constexpr int side = 6;  // the coefficients, and a neighbor on each side
+    std::array<double, side * side * side> value;
+    for (int n = 0; n < side * side * side; ++n) {
+      const Vec3 node(n / 36, n / 6 % 6, n % 6);
+      value[n] = shapes_[body].distance(origin + spacing_ * (first + node - Vec3::Ones()), kept_);
+    }
+    Vec3 gradient = Vec3::Zero();
+    for (int n = 0; n < 64; ++n) {
+      const std::array<int, 3> node{n / 16, n / 4 % 4, n % 4};
+      const int here = 36 * (node[0] + 1) + 6 * (node[1] + 1) + node[2] + 1;
+      const double beside_it = value[here - 36] + value[here + 36] + value[here - 6] +
+                               value[here + 6] + value[here - 1] + value[here + 1];
+      const double coefficient = 2 * value[here] - beside_it / 6;
+      for (int a = 0; a < 3; ++a) {
+        double weight = 1 / spacing_;
+        for (int b = 0; b < 3; ++b) weight *= weights[b][a == b][node[b]];
+        gradient[a] += weight * coefficient;
+      }
+    }
+    return gradient;
+  }
+
   /// With the distances themselves as coefficients.
   double averaged_distance(int32_t body, const Vec3& beside, bool in_cell) const {
     static const std::vector<std::pair<double, double>> at_point = {
@@ -137,10 +180,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     point.slides = point.slides || slides;
     point.mesh = point.mesh || mesh;
     point.area = pairs.area[c];
-    if (slides || gap <= slack + (mesh ? bound : 0)) {
-      ++point.near;
-      point.pressing = body;
-    }
+    if (slides || gap <= slack + (mesh ? bound : 0)) point.near.push_back(body);
     if (gap <= point.gap) {
       point.gap = point.body_gap = gap;
       point.body = body;
@@ -205,6 +245,8 @@ class Claims {
   void check_depths(const std::vector<double>& gap);
   void check_pressures(const std::vector<double>& gap, const std::vector<double>& pressure);
   void check_forces(const std::vector<double>& pressure, const std::vector<double>& force);
+  void check_pressures_of_forces(const std::vector<double>& pressure,
+                                 const std::vector<double>& force);
 
  private:
   double smoothed_gap(int64_t point, bool in_cell) const;
@@ -325,10 +367,11 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
             "contact_force of point {}: stated {:.4g} N, pressure times area {:.4g} N", i,
             stated.norm(), pressed);
       });
-    if (point.near != 1 || point.pressing < 0) continue;
-    const bool mesh = bodies_.is_mesh(point.pressing);
+    if (point.near.size() != 1) continue;
+    const int32_t pressing = point.near.front();
+    const bool mesh = bodies_.is_mesh(pressing);
     const double around = 2.5 * model_.contact.spacing + std::abs(point.gap);
-    const Vec3 expected = pressed * bodies_.normal(point.pressing, position_[i], around);
+    const Vec3 expected = pressed * bodies_.normal(pressing, position_[i], around);
     if (!mesh)
       for (int a = 0; a < 3; ++a) {
         forces.push_back(stated[a]);
@@ -340,12 +383,45 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
     oblique.offer(off - aside * std::abs(pressed), [&] {
       return fmt::format(
           "contact_force of point {} on {}: stated {:.4g} N, by the triangles' normal {:.4g} N", i,
-          name_of(point.pressing), stated, expected);
+          name_of(pressing), stated, expected);
     });
   }
   comparison_.array("point/contact_force", forces, again, largest);
   too_large.state("contact forces are no larger than pressure times area", comparison_);
   oblique.state("contact forces are along the meshes' normals", comparison_);
+}
+
+/// A point's pressure is w · force where w · area ∇φ = 1 for each body that may press; no such w
+/// exists between bodies that press against each other.
+void Claims::check_pressures_of_forces(const std::vector<double>& pressure,
+                                       const std::vector<double>& force) {
+  constexpr double steepest = 10;                                        // of w, times the area
+  const double rounding = 1e-5 / std::min(1.0, model_.contact.spacing);  // of grids of floats
+  Worst worst;
+  int64_t recomputed = 0, others = 0;
+  for (size_t i = 0; i < position_.size(); ++i) {
+    const AtPoint& point = truth_.points[i];
+    const Vec3 stated = Vec3::Map(force.data() + 3 * i);
+    if (stated.isZero(0) && pressure[i] == 0) continue;
+    Eigen::MatrixXd slopes(point.near.size(), 3);
+    for (size_t k = 0; k < point.near.size(); ++k)
+      slopes.row(k) = bodies_.gradient(point.near[k], position_[i]);
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(slopes.rows());
+    const Vec3 w = slopes.completeOrthogonalDecomposition().solve(ones);
+    const bool known =
+        !point.wall && point.area > 0 && w.norm() < steepest && (slopes * w - ones).norm() < 1e-9;
+    ++(known ? recomputed : others);
+    if (!known) continue;
+    const double again = w.dot(stated) / point.area, off = std::abs(pressure[i] - again);
+    worst.offer(off - rounding * w.norm() * stated.norm() / point.area, [&] {
+      return fmt::format(
+          "contact_pressure of point {}: stated {:.6g} N/mm², by its force {:.6g} N/mm²", i,
+          pressure[i], again);
+    });
+  }
+  worst.state(fmt::format("contact pressures are those of the forces ({} recomputed, {} not)",
+                          recomputed, others),
+              comparison_);
 }
 
 }  // namespace
@@ -366,6 +442,7 @@ void check_contact(const model::Model& model, const model::PrescribedMotion& mot
   claims.check_depths(*gap);
   claims.check_pressures(*gap, *pressure);
   claims.check_forces(*pressure, *force);
+  claims.check_pressures_of_forces(*pressure, *force);
 }
 
 }  // namespace repose::tools::check

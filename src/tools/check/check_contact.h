@@ -13,7 +13,9 @@ namespace repose::tools::check {
 /// that of the deepest stated gap, the exact penetration that of the triangles within 1e-4 mm.
 /// Forces must be pressure times area along the body's normal where that is well defined, never
 /// pull except where points slide, and not act across a gap wider than the step's displacement
-/// error. Gaps between the sides of cuts come from the solver's own surfaces.
+/// error. Pressures must be those that the forces determine, by the gradient of the smoothed
+/// distances, but at the sides of cuts. Gaps between the sides of cuts come from the solver's own
+/// surfaces.
 void check_contact(const model::Model& model, const model::PrescribedMotion& motion,
                    const model::StepNumbers& numbers, const model::StepRows& rows,
                    Comparison& comparison);

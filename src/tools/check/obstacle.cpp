@@ -73,10 +73,12 @@ TriangleGrid::TriangleGrid(const surface::Surface& surface) {
   double area = 0;
   low_.setConstant(std::numeric_limits<double>::infinity());
   high_ = -low_;
+  low_corner_ = low_;
   for (const Triangle& t : surface.triangles) {
     Corners corners;
     for (int k = 0; k < 3; ++k) {
       corners[k] = oblique() * surface.points[t[k]];
+      low_corner_ = low_corner_.cwiseMin(surface.points[t[k]]);
       low_ = low_.cwiseMin(corners[k]);
       high_ = high_.cwiseMax(corners[k]);
     }

@@ -15,6 +15,7 @@ class TriangleGrid {
  public:
   explicit TriangleGrid(const surface::Surface& surface);
 
+  const Vec3& low_corner() const { return low_corner_; }
   /// mm to the closest triangle, `reach` where none is nearer.
   double distance(const Vec3& point, double reach) const;
   /// The closest point of the triangles, none where none is within `reach` (mm).
@@ -38,8 +39,9 @@ class TriangleGrid {
   void visit_near(const Vec3& point, double radius, Visit&& visit) const;
 
   std::vector<Corners> triangles_;
+  Vec3 low_corner_;  // mm, of the box around all as the surface lies
   bool closed_ = false;
-  Vec3 low_, high_;  // mm, of the box around all
+  Vec3 low_, high_;  // mm, of the box around all, turned
   double edge_ = 1;  // mm, of a cell
   Cell size_{};
   std::vector<std::vector<int32_t>> cells_;    // triangles whose boxes meet a cell
@@ -52,6 +54,8 @@ class Obstacle {
   Obstacle(const model::Model& model, const model::Body& body);
 
   bool is_mesh() const { return std::holds_alternative<TriangleGrid>(shape_); }
+  /// mm, of a mesh's box: the least coordinates of its triangles.
+  const Vec3& low_corner() const { return std::get<TriangleGrid>(shape_).low_corner(); }
   /// Signed distance in mm, negative inside; `reach` where it is larger.
   double distance(const Vec3& point, double reach) const;
   /// Outward unit normal at the closest point; of a mesh only where all triangles within `radius`
