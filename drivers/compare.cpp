@@ -21,6 +21,7 @@
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
+#include "repose/scene/placement.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/read.h"
@@ -284,22 +285,51 @@ void write_results(const std::string& name, const surface::Surface& predicted,
               name.c_str());
 }
 
+void turn(surface::Surface& surface, const std::string& file) {
+  for (Triangle& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
+  std::printf("note: triangles of %s point inward; they are turned\n", file.c_str());
+}
+
 /// Reads a surface; the triangles of one that is closed and faces inward are turned, with a note.
 surface::Surface read_facing_outward(const std::string& file) {
   surface::Surface surface = surface::read_surface(file);
   const surface::Defects defects = surface::inspect(surface, false);
   if (defects.border_edges > 0 || defects.misoriented_edges > 0 || surface::volume_of(surface) >= 0)
     return surface;
-  for (Triangle& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
-  std::printf("note: triangles of %s point inward; they are turned\n", file.c_str());
+  turn(surface, file);
   return surface;
+}
+
+/// Mean cosine, by area, between the normals of triangles and the ways to them from the middle of
+/// all: 1 of a sphere, above 0 of the outside of a face.
+double outwardness(const surface::Surface& surface) {
+  const Vec3 middle = scene::centroid(surface.points, surface.triangles);
+  double sum = 0, area = 0;
+  for (const Triangle& triangle : surface.triangles) {
+    const auto corners = surface::corners(surface, triangle);
+    const Vec3 normal = surface::scaled_normal(corners),
+               way = (corners[0] + corners[1] + corners[2]) / 3 - middle;
+    if (way.norm() > 0) sum += normal.dot(way.normalized());
+    area += normal.norm();
+  }
+  return sum / area;
+}
+
+/// Turns the triangles of one of two surfaces, of which the other faces outward, with a note.
+void turn_opposed(surface::Surface& first, surface::Surface& second,
+                  const std::vector<std::string>& files) {
+  constexpr double clear = 0.1;  // more than of a flat surface
+  const double of_first = outwardness(first), of_second = outwardness(second);
+  if (of_first < -clear && of_second > clear) turn(first, files[0]);
+  if (of_second < -clear && of_first > clear) turn(second, files[1]);
 }
 
 void run(const base::Options& options) {
   require_landmarks(options);
   base::require_writable(options.text("output") + ".vtp");
-  const surface::Surface predicted = read_facing_outward(options.arguments()[0]);
+  surface::Surface predicted = read_facing_outward(options.arguments()[0]);
   surface::Surface actual = read_facing_outward(options.arguments()[1]);
+  turn_opposed(predicted, actual, options.arguments());
   const Marks marks = marks_of(options, "landmarks"),
               actual_marks = marks_of(options, "actual_landmarks");
   base::Similarity brought;

@@ -87,7 +87,7 @@ class Bodies {
     const Mat4& pose = poses_[body];
     return pose.topLeftCorner<3, 3>().transpose() * (point - pose.topRightCorner<3, 1>());
   }
-  /// mm, of a point given by beside().
+  /// mm, of a point given by beside(); to a mesh at most `reach`.
   double distance(int32_t body, const Vec3& beside) const {
     return shapes_[body].distance(beside, reach);
   }
@@ -174,7 +174,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     const bool mesh = bodies.is_mesh(body);
     const double now = bodies.distance(body, bodies.beside(body, position[row]));
     double initial = slides || now < 0 ? bodies.distance(body, model.points.position[row]) : 0;
-    if (slides && initial >= considered) initial = now;  // distances are kept no farther
+    if (mesh && slides && initial >= considered) initial = now;  // distances are kept no farther
     const double gap = now - (slides ? initial : std::min(initial, 0.0));
     AtPoint& point = truth.points[row];
     point.slides = point.slides || slides;

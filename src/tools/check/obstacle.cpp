@@ -255,7 +255,7 @@ double Obstacle::distance(const Vec3& point, double reach) const {
         if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, TriangleGrid>)
           return reach;
         else
-          return std::min(reach, signed_distance(shape, point));
+          return signed_distance(shape, point);
       },
       shape_);
 }

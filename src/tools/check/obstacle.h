@@ -56,7 +56,7 @@ class Obstacle {
   bool is_mesh() const { return std::holds_alternative<TriangleGrid>(shape_); }
   /// mm, of a mesh's box: the least coordinates of its triangles.
   const Vec3& low_corner() const { return std::get<TriangleGrid>(shape_).low_corner(); }
-  /// Signed distance in mm, negative inside; `reach` where it is larger.
+  /// Signed distance in mm, negative inside; to a mesh `reach` where it is larger.
   double distance(const Vec3& point, double reach) const;
   /// Outward unit normal at the closest point; of a mesh only where all triangles within `radius`
   /// agree on it, zero elsewhere.
