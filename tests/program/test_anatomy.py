@@ -217,6 +217,19 @@ def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_lips_adhere_to_a_maxilla_that_holds_no_tissue(run, tmp_path, head):
+    write_scene(tmp_path, "osteotomies: [{bone: skull, piece: maxilla, template: le_fort_1, kerf: 3}]\n"
+                          "moves: [{bone: maxilla, clinical: {set_back: 3}}]\n", tissue="layers: 4, edge: 6, release: 50")
+    result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    model = model_of(tmp_path / "face.h5")
+    maxilla = list(model["bone"]).index(b"maxilla")
+    assert maxilla not in model["point/bone"]
+    assert maxilla in model["element/0/numbers"].reshape(-1, 7)[:, 6]
+    assert run("repose-check", "face.h5").returncode == 0
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_ranks_make_the_parts_of_lips_that_adhere(run, tmp_path, head):
     """The mouth of this head is open: no cut parts its lips."""
     write_scene(tmp_path, "moves: [{bone: mandible, clinical: {set_back: 3}}]\n")
