@@ -1,10 +1,12 @@
 #include "listener.h"
 
 #include <arpa/inet.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -27,6 +29,16 @@ bool equal(const std::string& a, const std::string& b) {
   for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
     different |= static_cast<unsigned char>(a[i] ^ b[i]);
   return different == 0;
+}
+
+using Clock = std::chrono::steady_clock;
+
+/// Waits until there is something to read, at most until `deadline`.
+bool becomes_readable(int client, Clock::time_point deadline) {
+  using std::chrono::milliseconds;
+  const auto left = std::chrono::duration_cast<milliseconds>(deadline - Clock::now());
+  pollfd watched{client, POLLIN, 0};
+  return left.count() > 0 && poll(&watched, 1, static_cast<int>(left.count())) > 0;
 }
 
 }  // namespace
@@ -64,20 +76,16 @@ Listener::~Listener() { close(socket_); }
 /// Reads the first line, without what follows it.
 bool Listener::knows_token(int client) const {
   constexpr size_t longest = 200;
-  const timeval patience{.tv_sec = 5, .tv_usec = 0};
-  setsockopt(client, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  const Clock::time_point deadline = Clock::now() + std::chrono::seconds(5);
   std::string line;
-  for (char letter = 0; line.size() < longest && ::read(client, &letter, 1) == 1;) {
+  for (char letter = 0; line.size() < longest && becomes_readable(client, deadline) &&
+                        ::read(client, &letter, 1) == 1;) {
     if (letter == '\n') break;
     line += letter;
   }
   const auto request = nlohmann::json::parse(line, nullptr, false);
-  const bool good = request.is_object() && request.contains("token") &&
-                    request["token"].is_string() &&
-                    equal(request["token"].get<std::string>(), token_);
-  const timeval forever{};
-  setsockopt(client, SOL_SOCKET, SO_RCVTIMEO, &forever, sizeof forever);
-  return good;
+  return request.is_object() && request.contains("token") && request["token"].is_string() &&
+         equal(request["token"].get<std::string>(), token_);
 }
 
 int Listener::accept() const {

@@ -258,6 +258,28 @@ def test_a_client_that_vanishes_leaves_the_solver_to_others(listening):
     third.close()
 
 
+def test_a_client_that_sends_its_first_line_slowly_is_refused(listening):
+    port, token = listening
+    slow = socket.create_connection(("127.0.0.1", port), timeout=60)
+    client, stream = greeted(port, token)
+    client.sendall(b'{"do": "solve"}\n')
+    client.settimeout(1)  # between two blanks of the slow one
+    began = time.monotonic()
+    while True:
+        try:
+            slow.sendall(b" ")
+        except OSError:
+            pass  # it has been closed
+        try:
+            assert client.recv(1)
+            break
+        except TimeoutError:
+            assert time.monotonic() - began < 15, "a client without the token holds back the one behind it"
+    stream.close()
+    client.close()
+    slow.close()
+
+
 def test_the_search_of_a_client_that_vanishes_ends(listening, tmp_path):
     port, token = listening
     gone, stream = greeted(port, token)
