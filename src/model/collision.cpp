@@ -51,15 +51,20 @@ struct Mover {
   const surface::Surface& surface;
   const scene::RigidMotion& motion;
   surface::CollisionTree tree;
-  std::unique_ptr<surface::DistanceTree> inside;  // made when needed, with the box
   Eigen::AlignedBox3d box;
+  std::vector<Vec3> of_parts;                     // a point of each connected part
+  std::unique_ptr<surface::DistanceTree> inside;  // made when needed
 
   bool contains(const Vec3& point) {
-    if (!inside) {
-      inside = std::make_unique<surface::DistanceTree>(surface);
-      box = surface::bounding_box(surface.points);
-    }
-    return box.contains(point) && inside->contains(point);
+    if (!box.contains(point)) return false;
+    if (!inside) inside = std::make_unique<surface::DistanceTree>(surface);
+    return inside->contains(point);
+  }
+
+  /// Returns whether a part of a bone, placed by `pose`, that does not touch this one is inside.
+  bool encloses_part_of(const Mover& other, const Mat4& pose) {
+    return std::ranges::any_of(other.of_parts,
+                               [&](const Vec3& point) { return contains(placed(pose, point)); });
   }
 
   /// The deepest of `points`, placed by `pose`, inside this bone; in its frame.
@@ -83,12 +88,15 @@ struct Mover {
   }
 };
 
-/// Where two bones lie deepest inside one another at a load; negative where they do not touch.
+/// Where two bones lie deepest inside one another at a load; negative where they are apart.
 Deepest overlap(Mover& a, Mover& b, double load) {
-  const Mat4 pose = relative(a.motion, b.motion, load);
-  if (!surface::touch(a.tree, b.tree, pose)) return {.depth = -1};
+  const Mat4 pose = relative(a.motion, b.motion, load),
+             reverse = relative(b.motion, a.motion, load);
+  if (!surface::touch(a.tree, b.tree, pose) && !a.encloses_part_of(b, pose) &&
+      !b.encloses_part_of(a, reverse))
+    return {.depth = -1};
   Deepest in_a = a.deepest_of(b.surface.points, pose),
-          in_b = b.deepest_of(a.surface.points, relative(b.motion, a.motion, load));
+          in_b = b.deepest_of(a.surface.points, reverse);
   in_a.at = a.motion.apply(in_a.at, load);
   in_b.at = b.motion.apply(in_b.at, load);
   return in_a.depth > in_b.depth ? in_a : in_b;
@@ -115,7 +123,7 @@ std::pair<surface::CollisionTree, surface::CollisionTree> finer(const Mover& a, 
 void find_press(Mover& a, Mover& b, double more, BonePair& pair) {
   constexpr int steps = 16;
   constexpr double close = 1e-3;  // of the load
-  const double allowed = std::max(overlap(a, b, 0).depth, 0.0) + more;
+  const double allowed = std::max(-pair.gap, 0.0) + more;
   double low = 0, high = 0;
   for (int step = 1; step <= steps && low < pair.load; ++step, low = high) {
     high = static_cast<double>(step) / steps;
@@ -161,11 +169,20 @@ void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pai
       surface::pairs_within(a.tree, b.tree, end, surface::contact_margin).size());
 }
 
+std::vector<Vec3> points_of_parts(const surface::Surface& bone) {
+  std::vector<Vec3> points;
+  surface::UnionFind parts = connected(bone.triangles, surface::EdgeTable(bone.triangles));
+  for (int64_t t = 0; t < static_cast<int64_t>(bone.triangles.size()); ++t)
+    if (parts.find(t) == t) points.push_back(bone.points[bone.triangles[t][0]]);
+  return points;
+}
+
 std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves) {
   std::vector<Mover> movers;
   for (size_t k = 0; k < bones.size(); ++k)
-    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]), nullptr, {}});
+    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]),
+                      surface::bounding_box(bones[k].points), points_of_parts(bones[k]), nullptr});
   return movers;
 }
 
@@ -219,7 +236,9 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
     for (size_t j = i + 1; j < bones.size(); ++j) {
       if (move_alike(moves[i], moves[j])) continue;
       BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
-      pair.gap = surface::nearest(movers[i].tree, movers[j].tree, Mat4::Identity())->distance;
+      pair.gap = -overlap(movers[i], movers[j], 0).depth;
+      if (pair.gap > 0)
+        pair.gap = surface::nearest(movers[i].tree, movers[j].tree, Mat4::Identity())->distance;
       follow(movers[i], movers[j], requested, pair);
       report.safe_load = std::min(report.safe_load, pair.load);
       report.pairs.push_back(pair);
@@ -231,17 +250,23 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
                                   const scene::Collision& requested) {
   std::vector<std::string> lines;
   for (const BonePair& pair : report.pairs) {
-    const std::string start = pair.gap > 0 ? fmt::format("{:.2f} mm apart", pair.gap) : "touching";
+    constexpr double shown = 0.005;  // mm, with two decimals
+    const bool overlapping = pair.gap < -shown;
+    const std::string start = overlapping ? fmt::format("{:.2f} mm inside one another", -pair.gap)
+                              : pair.gap > 0 ? fmt::format("{:.2f} mm apart", pair.gap)
+                                             : "touching";
     std::string line =
         fmt::format("bones '{}' and '{}', {} at the start: ", scene.bones[pair.a].name,
                     scene.bones[pair.b].name, start);
-    if (!pair.contact())
+    if (!pair.contact() && overlapping)
+      line += "go no deeper";
+    else if (!pair.contact())
       line += requested.clearance > 0 ? fmt::format("stay {:g} mm apart", requested.clearance)
                                       : std::string("do not come to touch");
     else
       line += fmt::format("come within {:g} mm at load {:.4f}, at {:.1f}",
                           requested.clearance + requested.tolerance, pair.load, pair.at);
-    if (pair.crossings > 0)
+    if (pair.crossings > 0 || pair.depth > 0)
       line += fmt::format("; at the end {} pairs of triangles cross, {:.2f} mm deep",
                           pair.crossings, pair.depth);
     if (pair.ignored > 0)

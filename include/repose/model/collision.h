@@ -12,7 +12,7 @@ namespace repose::model {
 /// Two bones that move differently. Positions and distances in mm.
 struct BonePair {
   int32_t a, b;            ///< rows of the scene's bones
-  double gap;              ///< between them before all moves
+  double gap;              ///< between them before all moves, −depth where they overlap
   int64_t ignored = 0;     ///< triangles that touch from the start and are not counted
   double load = 2;         ///< of first contact, 0 … 1; greater: none
   Vec3 at = Vec3::Zero();  ///< where, at that load

@@ -6,6 +6,7 @@
 
 #include "repose/base/error.h"
 #include "repose/meshtools/osteotomy.h"
+#include "repose/surface/component.h"
 
 namespace repose::model {
 namespace collision_test {
@@ -104,6 +105,56 @@ TEST(Collisions, bones_that_overlap_may_part_but_not_press) {
     EXPECT_EQ(safe({0, 0, -10}), 1) << "apart";
     EXPECT_NEAR(safe({0, 0, 4}), 0.1 / 4, 0.003) << "deeper by 0.1 mm";
   }
+}
+
+/// Surfaces of bones of which one lies inside the other do not touch.
+TEST(Collisions, a_bone_inside_another_overlaps_it) {
+  const surface::Surface outer = box("upper", {0, 0, 0}, {30, 30, 30}),
+                         inner = box("lower", {5, 5, 5}, {20, 20, 20});
+  surface::Surface parts =
+      box("lower", {80, 0, 0}, {9, 9, 9});  // beside the outer one, then inside
+  surface::append(inner, parts);
+  const std::vector<RigidMotion> moves = {{}, RigidMotion::translation({1, 0, 0})};
+  for (const surface::Surface& bone : {inner, parts})
+    for (const std::vector<surface::Surface>& bones : {std::vector{outer, bone}, {bone, outer}}) {
+      scene::Scene scene = scene_of(bones, moves);
+      std::vector<std::string> warnings;
+      report_initial_overlaps(bones, scene, warnings);
+      ASSERT_EQ(warnings.size(), 1u);
+      EXPECT_NE(warnings[0].find("lie 5.0 mm inside one another before they move"),
+                std::string::npos)
+          << warnings[0];
+      std::vector<std::string> remarks;
+      resolve_collisions(bones, scene, remarks);
+      ASSERT_EQ(remarks.size(), 1u);
+      EXPECT_NE(remarks[0].find("end 5.0 mm inside one another"), std::string::npos) << remarks[0];
+      const CollisionReport report = follow_moves(bones, moves, {});
+      EXPECT_NEAR(report.pairs[0].gap, -5, 1e-9);
+      EXPECT_NE(describe(report, scene, {})[0].find(
+                    "5.00 mm inside one another at the start: go no deeper"),
+                std::string::npos);
+    }
+}
+
+TEST(Collisions, a_bone_that_ends_inside_another_overlaps_it) {
+  const std::vector<surface::Surface> bones = {box("upper", {0, 0, 0}, {30, 30, 30}),
+                                               box("lower", {5, 5, 50}, {20, 20, 20})};
+  const std::vector<RigidMotion> moves = {{}, RigidMotion::translation({0, 0, -45})};
+  const CollisionReport report = follow_moves(bones, moves, {});
+  EXPECT_EQ(report.pairs[0].crossings, 0);
+  EXPECT_NEAR(report.pairs[0].depth, 5, 1e-9);
+  const std::string line = describe(report, scene_of(bones, moves), {})[0];
+  EXPECT_NE(line.find("at the end 0 pairs of triangles cross, 5.00 mm deep"), std::string::npos)
+      << line;
+}
+
+TEST(Collisions, a_bone_in_a_cavity_overlaps_nothing) {
+  surface::Surface hollow = box("upper", {0, 0, 0}, {30, 30, 30});
+  surface::append(box("cavity", {4, 4, 4}, {22, 22, 22}), hollow);
+  const std::vector<surface::Surface> bones = {hollow, box("lower", {5, 5, 5}, {20, 20, 20})};
+  const CollisionReport report = follow_moves(bones, {{}, RigidMotion::translation({2, 0, 0})}, {});
+  EXPECT_NEAR(report.pairs[0].gap, 1, 1e-9);
+  EXPECT_NEAR(report.safe_load, 0.5, 0.03);
 }
 
 TEST(Collisions, clamp_shortens_all_moves_alike) {
