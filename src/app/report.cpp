@@ -297,7 +297,8 @@ std::string describe_finished(const std::string& file, const model::StepNumbers&
                            : "");
 }
 
-std::string describe_failure(const solve::Summary& s, bool stretched, bool adheres) {
+std::string describe_failure(const solve::Summary& s, bool stretched, bool adheres,
+                             const std::string& options) {
   if (s.path.complete()) return "";
   const bool by_adhesion = adheres && (s.path.halvings.failed > 0 || !s.path.last.stopped);
   return fmt::format(
@@ -306,10 +307,13 @@ std::string describe_failure(const solve::Summary& s, bool stretched, bool adher
           ? fmt::format("an estimated {:.3g} mm", s.last.displacement_error)
           : "an unknown distance",
       s.last.reason,
-      remedy(s, stretched) + (by_adhesion
-                                  ? " Lips adhere to teeth here, which keeps some searches from "
-                                    "ending: anatomy.adhesion: 0 leaves adhesion out."
-                                  : ""));
+      (options.empty() || s.path.last.stopped
+           ? ""
+           : fmt::format(" Leave out {} first, which may stop the search short.", options)) +
+          remedy(s, stretched) +
+          (by_adhesion ? " Lips adhere to teeth here, which keeps some searches from "
+                         "ending: anatomy.adhesion: 0 leaves adhesion out."
+                       : ""));
 }
 
 std::string describe_run(const solve::Summary& s, const solve::Settings& settings, int ranks,

@@ -80,8 +80,10 @@ std::string describe_finished(const std::string& file, const model::StepNumbers&
                               double accuracy, bool folded);
 
 /// One-line failure message with a remedy; empty on success.
-/// `stretched`: it began in an initial equilibrium; `adheres`: lips adhere to teeth.
-std::string describe_failure(const solve::Summary& summary, bool stretched, bool adheres);
+/// `stretched`: it began in an initial equilibrium; `adheres`: lips adhere to teeth; `options`: of
+/// PETSc, which the search was given.
+std::string describe_failure(const solve::Summary& summary, bool stretched, bool adheres,
+                             const std::string& options);
 
 /// Describes the end of a run: load, accuracy, reason, work, inverted prisms, and time and memory
 /// of each stage.

@@ -337,7 +337,8 @@ base::Exit Run::solve() {
   });
   print(answer);
   print(folds + describe_failure(summary, job_.reference_state.has_value(),
-                                 job_.local_model.global_metadata.adhesion.has_value()));
+                                 job_.local_model.global_metadata.adhesion.has_value(),
+                                 solve::given_search_options()));
   print(describe_run(summary, strategy_.settings, base::size(comm), stages_));
   print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
         describe_tangents(writer.point_fields()));

@@ -100,6 +100,21 @@ void require_supported_numbers() {
   for (const auto& [name, value] : base::petsc_options()) require_number(name, value);
 }
 
+std::string given_search_options() {
+  std::vector<std::string> options;
+  for (const SupportedTypes& types : supported_types()) options.push_back(types.option);
+  for (const SupportedNumbers& numbers : supported_numbers())
+    options.insert(options.end(), numbers.options.begin(), numbers.options.end());
+  std::erase_if(options, [](const std::string& option) { return option.starts_with("eps_"); });
+  std::vector<std::string> given;
+  for (const auto& [name, value] : base::petsc_options())
+    if (std::ranges::any_of(options, [&, lower = base::lower(name)](const std::string& option) {
+          return matches(option, lower);
+        }))
+      given.push_back(fmt::format("-{} {}", name, value));
+  return fmt::format("{}", fmt::join(given, ", "));
+}
+
 std::string describe_supported_types() {
   std::string text = "| option | values | chooses |\n|---|---|---|\n";
   for (const SupportedTypes& types : supported_types()) {

@@ -132,3 +132,8 @@ def test_options_at_which_petsc_fails_during_the_solve_are_named(run, scenes, tm
 def test_ordinary_options_of_petsc_do_no_harm(run, scenes, words):
     result = run("repose-solve", scenes / "solid.yaml", *words)
     assert (result.returncode, result.stderr) == (0, ""), result
+
+
+def test_a_search_that_an_option_stops_short_names_it(run):
+    result = run("repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-ksp_max_it", 1)
+    assert result.returncode == 2 and "). Leave out -ksp_max_it 1 first" in result.stdout, result

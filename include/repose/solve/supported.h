@@ -34,6 +34,10 @@ const std::vector<SupportedNumbers>& supported_numbers();
 /// for any option (InputError): PETSc takes these without a word. Not collective.
 void require_supported_numbers();
 
+/// The options of PETSc that choose a type or a number of the search, as "-ksp_max_it 1, -pc_type
+/// none"; empty where there are none. Not collective.
+std::string given_search_options();
+
 /// The tables in Markdown, as docs/guide/solver.md has them.
 std::string describe_supported_types();
 std::string describe_supported_numbers();

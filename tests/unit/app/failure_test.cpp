@@ -10,13 +10,25 @@ TEST(Failure, NamesAdhesionWhereLoadStepsFailedWithIt) {
   solve::Summary summary;
   summary.path.last.stopped = true;
   const auto names = [&](bool adheres) {
-    return describe_failure(summary, false, adheres).find("anatomy.adhesion: 0") !=
+    return describe_failure(summary, false, adheres, "").find("anatomy.adhesion: 0") !=
            std::string::npos;
   };
   EXPECT_FALSE(names(true)) << "stopped on its way";
   summary.path.halvings.failed = 2;
   EXPECT_TRUE(names(true));
   EXPECT_FALSE(names(false));
+}
+
+TEST(Failure, NamesOptionsThatMayStopTheSearchShort) {
+  solve::Summary summary;
+  const auto names = [&](const std::string& options) {
+    return describe_failure(summary, false, false, options)
+               .find("). Leave out -ksp_max_it 1 first") != std::string::npos;
+  };
+  EXPECT_TRUE(names("-ksp_max_it 1"));
+  EXPECT_FALSE(names(""));
+  summary.path.last.stopped = true;
+  EXPECT_FALSE(names("-ksp_max_it 1")) << "a time limit";
 }
 
 /// Advice about springs is given to springs only: in the remark on a hard path, and where the rest

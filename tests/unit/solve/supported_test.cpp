@@ -113,6 +113,17 @@ TEST(SupportedNumbers, NoOptionTakesNan) {
   EXPECT_EQ(refusal_of("-pc_sor_omega", "1.5"), "accepted");
 }
 
+TEST(SupportedTypes, GivenOptionsOfTheSearchAreListed) {
+  EXPECT_EQ(given_search_options(), "");
+  const base::ScopedOption maximum("-ksp_max_it", "1"), share("-tao_ntr_ksp_rtol", "1"),
+      monitor("-ksp_monitor", ""), stability("-eps_tol", "0.1");
+  const std::string given = given_search_options();
+  EXPECT_NE(given.find("-ksp_max_it 1"), std::string::npos) << given;
+  EXPECT_NE(given.find("-tao_ntr_ksp_rtol 1"), std::string::npos) << given;
+  EXPECT_EQ(given.find("monitor"), std::string::npos) << given;
+  EXPECT_EQ(given.find("eps"), std::string::npos) << given;
+}
+
 TEST(SupportedTypes, DocumentationHoldsTheTable) {
   std::ifstream page(REPOSE_MESHES "/../docs/guide/solver.md");
   const std::string text{std::istreambuf_iterator<char>(page), {}};
