@@ -157,6 +157,32 @@ def test_contact_is_told_where_there_is_any(report, opened, tmp_path):
     assert page.rows["deepest that anything passes what it touches, mm"] == ["0.021"]
 
 
+def test_the_page_warns_of_what_the_summary_warns_of(report, run, tmp_path):
+    done = run("repose-solve", PROJECT / "meshes/head_split.yaml", "-output", "split")
+    assert done.returncode == 0
+    one, other, deep = re.search(r"bones '(\w+)' and '(\w+)' end (\S+) mm inside", done.stdout).groups()
+    (apart,) = re.search(r"other rest position +the skin is up to (\S+) mm away", done.stdout).groups()
+    page = page_of(report, tmp_path, tmp_path / "split.h5").text["p"]
+    assert f"The bones {one} and {other} end {deep} mm inside one another" in page
+    assert f"another rest position, of more energy: the skin is up to {apart} mm away" in page
+    for words in ("Bone pierces", "Skin rests on bone", "inside what it touches"):
+        assert words not in page
+    with h5py.File(tmp_path / "split.h5", "r+") as h5:
+        model, step = h5["model"], h5["step"][sorted(h5["step"])[-1]]
+        step.attrs["penetration_exact"] = 0.46
+        touches = model["contact/point"][:]
+        point = touches[model["point/layer"][:][touches] == 0][0]
+        bones, position = step["bone_surface/points"][:] + (0, -8, 0), step["point/position"][:]
+        pressure = np.zeros(len(position))
+        position[point], pressure[point] = bones[0], 0.5
+        for name, values in (("bone_surface/points", bones), ("point/position", position),
+                             ("point/contact_pressure", pressure)):
+            step[name][:] = values
+    page = page_of(report, tmp_path, tmp_path / "split.h5").text["p"]
+    assert re.search(r"Bone pierces tissue by up to [1-9]\.\d mm, deepest ", page)
+    assert "Skin rests on bone, most " in page and "Tissue ends up to 0.46 mm inside what it touches" in page
+
+
 def test_lips_that_part_are_measured(report, opened, tmp_path):
     row = "lips and cuts open by at most, mm"
     assert row not in page_of(report, tmp_path, opened).rows
