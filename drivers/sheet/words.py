@@ -76,7 +76,8 @@ def cautions(result, known, parts, guessed):
     yield from mesh_caution(result, parts)
     if guessed:
         yield ("Not all landmarks were given: " + ", ".join(guessed) + " were found by the shape of "
-               "the profile. Check them in the drawing before using numbers that need them.")
+               "the profile. Check them in the drawing before using numbers that need them. The summary of "
+               "repose-solve has other points for a scene without landmarks, by the teeth: its numbers differ.")
 
 
 def contact_cautions(result, known, parts):

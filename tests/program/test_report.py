@@ -183,6 +183,19 @@ def test_the_page_warns_of_what_the_summary_warns_of(report, run, tmp_path):
     assert "Skin rests on bone, most " in page and "Tissue ends up to 0.46 mm inside what it touches" in page
 
 
+def test_the_page_and_the_summary_name_the_same_points_by_landmarks(report, run, tmp_path):
+    scene = PROJECT / "meshes/head_solid.yaml"
+    done = run("repose-solve", scene, "-output", "solid")
+    down, back = re.search(r"^Chin (\S+) mm down, (\S+) back;", done.stdout, re.M).groups()
+    page_of(report, tmp_path, tmp_path / "solid.h5", "-scene", scene)
+    text = (tmp_path / "page.html").read_text()
+    assert f"<h3>Chin</h3><b>{down}<small> mm down</small></b><p>{back} mm back</p>" in text
+    assert "by the teeth: its numbers differ" not in text
+    stated = re.search(r"of this head.* ([\d.]+) mm down and ([\d.]+) back", (PROJECT / "docs/guide/report.md").read_text())
+    assert stated.groups() == (down, back)
+    assert "by the teeth: its numbers differ" in page_of(report, tmp_path, tmp_path / "solid.h5").text["p"]
+
+
 def test_lips_that_part_are_measured(report, opened, tmp_path):
     row = "lips and cuts open by at most, mm"
     assert row not in page_of(report, tmp_path, opened).rows
