@@ -62,6 +62,8 @@ def cautions(result, known, parts, guessed):
                f"{100 * end['load']:.0f} % of the planned motion.")
     if end["displacement_error"] > LARGE_ERROR:
         yield "The face is not known to half a millimeter."
+    if end.get("smallest_eigenvalue", 1) <= 0:
+        yield "The rest position is not stable: the tissue may buckle."
     where = [place_in_words(place, known, parts) for place in result.places[result.ratio <= 0]]
     if end["inverted_prisms"]:
         named = f" {where[0]}" if where else ""

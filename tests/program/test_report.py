@@ -165,11 +165,11 @@ def test_the_page_warns_of_what_the_summary_warns_of(report, run, tmp_path):
     page = page_of(report, tmp_path, tmp_path / "split.h5").text["p"]
     assert f"The bones {one} and {other} end {deep} mm inside one another" in page
     assert f"another rest position, of more energy: the skin is up to {apart} mm away" in page
-    for words in ("Bone pierces", "Skin rests on bone", "inside what it touches"):
+    for words in ("not stable", "Bone pierces", "Skin rests on bone", "inside what it touches"):
         assert words not in page
     with h5py.File(tmp_path / "split.h5", "r+") as h5:
         model, step = h5["model"], h5["step"][sorted(h5["step"])[-1]]
-        step.attrs["penetration_exact"] = 0.46
+        step.attrs["penetration_exact"], step.attrs["smallest_eigenvalue"] = 0.46, -0.01
         touches = model["contact/point"][:]
         point = touches[model["point/layer"][:][touches] == 0][0]
         bones, position = step["bone_surface/points"][:] + (0, -8, 0), step["point/position"][:]
@@ -180,6 +180,7 @@ def test_the_page_warns_of_what_the_summary_warns_of(report, run, tmp_path):
             step[name][:] = values
     page = page_of(report, tmp_path, tmp_path / "split.h5").text["p"]
     assert re.search(r"Bone pierces tissue by up to [1-9]\.\d mm, deepest ", page)
+    assert "The rest position is not stable" in page
     assert "Skin rests on bone, most " in page and "Tissue ends up to 0.46 mm inside what it touches" in page
 
 
