@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from conftest import PROJECT, programs
+from conftest import PROJECT, TIME_LIMIT, programs
 from tissue import apart, last, steps
 
 SCENE = PROJECT / "meshes/head_springs_opening.yaml"
@@ -39,7 +39,7 @@ def interrupted(folder, environment, command, sent):
     process = begin(folder, environment, SCENE, "-output", "early", ranks=2 if command else 1)
     text = iterations(process, 1)
     process.send_signal(sent)
-    rest, _ = process.communicate(timeout=60)
+    rest, _ = process.communicate(timeout=TIME_LIMIT)
     return process.returncode, text + rest
 
 
@@ -80,7 +80,7 @@ def test_a_signal_before_the_search_leaves_no_file(environment, tmp_path, sent):
     temporary.mkdir()
     process = building(tmp_path, {**environment, "TMPDIR": str(temporary)})
     process.send_signal(sent)
-    process.communicate(timeout=60)
+    process.communicate(timeout=TIME_LIMIT)
     assert process.returncode == -sent
     assert [path for path in tmp_path.rglob("*") if "/ompi." not in str(path)] == [temporary]
 
@@ -89,7 +89,7 @@ def test_a_run_that_ignores_hang_ups_goes_on(environment, tmp_path):
     """nohup makes a run ignore them."""
     process = building(tmp_path, environment, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
     process.send_signal(signal.SIGHUP)
-    process.communicate(timeout=60)
+    process.communicate(timeout=TIME_LIMIT)
     assert process.returncode == 0 and (tmp_path / "early.h5").exists()
 
 
@@ -110,7 +110,7 @@ def test_ctrl_c_at_mpirun_leaves_a_result_though_ranks_are_killed(run, environme
     process = begin(tmp_path, environment, SCENE, "-output", "early", ranks=2)
     iterations(process, lines)
     process.send_signal(signal.SIGINT)
-    text, _ = process.communicate(timeout=60)
+    text, _ = process.communicate(timeout=TIME_LIMIT)
     assert process.returncode != 0
     step = last(tmp_path / "early.h5")
     assert step["converged"] == (step["load"] == 1)  # it may end before it is killed
@@ -126,7 +126,7 @@ def test_a_batch_system_that_ends_the_ranks_is_heard(run, environment, tmp_path)
     assert len(ranks_of(process)) == 2
     for rank in ranks_of(process):
         os.kill(rank, signal.SIGTERM)
-    text, _ = process.communicate(timeout=60)
+    text, _ = process.communicate(timeout=TIME_LIMIT)
     assert process.returncode == 2 and "NOT CONVERGED" in text
     assert run("repose-check", "early.h5").returncode == 0
 
@@ -155,7 +155,7 @@ def test_a_signal_ends_all_rounds(run, environment, tmp_path, rounds, row, lines
                     "-accuracy", 1e-9)
     iterations(process, lines)
     process.send_signal(signal.SIGTERM)
-    text, errors = process.communicate(timeout=60)
+    text, errors = process.communicate(timeout=TIME_LIMIT)
     assert (process.returncode, errors) == (2, "") and "NOT CONVERGED" in text
     assert re.search(row, text)
     end = last(tmp_path / "early.h5")

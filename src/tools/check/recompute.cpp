@@ -63,8 +63,7 @@ class Recomputation {
         claimed_(claimed),
         x_(rows.position),
         fields_(rows.point_fields),
-        films_(films),
-        film_states_(evaluate(model, films, motion, claimed.load, rows.position)) {}
+        films_(films) {}
 
   RecomputedStep run() {
     points();
@@ -113,7 +112,6 @@ class Recomputation {
   const std::vector<Vec3>& x_;
   const std::vector<model::PointField>& fields_;
   const std::vector<Film>& films_;
-  const std::vector<FilmState> film_states_;
   double smooth_force_ = 0;             // Σ (√(|F|² + ε²) − ε)
   std::vector<double> at_point_;        // [N] Σ noise of the forces there, N
   std::vector<double> nodal_pressure_;  // [N] e/C of averaged volumes, N/mm², or empty
@@ -305,10 +303,11 @@ void Recomputation::terms() {
 
 // All films are closed at the initial state.
 void Recomputation::adhesion() {
+  const std::vector<FilmState> states = evaluate(model_, films_, motion_, claimed_.load, x_);
   double uncertain = 0;
   for (size_t f = 0; f < films_.size(); ++f) {
     const int64_t point = films_[f].point;
-    const FilmState& state = film_states_[f];
+    const FilmState& state = states[f];
     step_.f_e.value += state.energy;
     uncertain += state.energy + step_.scale.position * state.force.norm();
     if (soft(point)) step_.rows.residual_force[point] += state.force;
