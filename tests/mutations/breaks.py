@@ -439,12 +439,12 @@ BREAKS = [
         "return number.has_value();",
         r"^base\.",
     ),
-    ("unknown options are taken", "unknown_.push_back(name);\n    return is_value", "return is_value", r"^base\."),
+    ("unknown options are taken", "remarks_.unknown.push_back(name);\n    return is_value", "return is_value", r"^base\."),
     # parts that ranks make themselves
     (
         "a piece lacks its second ring",
-        "triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, centers)))",
-        "triangles_at(layout.mesh, centers)",
+        "triangles_at(layout.mesh, vertices_of(layout.mesh, triangles_at(layout.mesh, columns)))",
+        "triangles_at(layout.mesh, columns)",
         f"{SOLVE}on_",
     ),
     ("a column's rows are all its first", "begin[k] + next++", "begin[k] + 0 * next++", f"{SOLVE}on_"),
