@@ -88,7 +88,7 @@ const std::vector<SupportedNumbers>& supported_numbers() {
       {{"tao_ls_max_funcs"}, Range::at_least(1), true},
       {{"ksp_rtol", "tao_*_ksp_rtol"}, Range::between(0, 1)},
       {{"ksp_atol", "tao_*_ksp_atol"}, Range::at_least(0)},
-      {{"ksp_divtol", "tao_*_ksp_divtol"}, Range::above(0)},
+      {{"ksp_divtol", "tao_*_ksp_divtol"}, Range::above(1)},
       {{"ksp_max_it", "tao_*_ksp_max_it"}, Range::at_least(1), true},
       {{"pc_renewal_price"}, Range::at_least(-1)},
       {{"eps_tol"}, {.min = 0, .max = 1, .min_excluded = true}},

@@ -102,6 +102,7 @@ TEST(SupportedNumbers, ValuesOutOfRangeAreRefusedWithTheRange) {
   EXPECT_EQ(refusal_of("-tao_gatol", ""), "-tao_gatol (no value): must be a number, ≥ 0");
   EXPECT_EQ(refusal_of("-tao_ntr_ksp_rtol", "1.5"),
             "-tao_ntr_ksp_rtol 1.5: must be a number, 0 … 1");
+  EXPECT_EQ(refusal_of("-ksp_divtol", "1"), "-ksp_divtol 1: must be a number, > 1");
   EXPECT_EQ(refusal_of("-tao_max_it", "2.5"), "-tao_max_it 2.5: must be a whole number, ≥ -1");
   for (const char* value : {"0", "1e-3", ".5"})
     EXPECT_EQ(refusal_of("-tao_gatol", value), "accepted");
