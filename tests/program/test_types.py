@@ -89,7 +89,7 @@ def test_a_type_of_the_table_works(run, scenes, tmp_path, expected, option, valu
 @pytest.mark.parametrize("option, value", [
     ("tao_type", "nm"), ("tao_type", "pounders"), ("tao_type", "tron"), ("tao_type", "almm"),
     ("tao_type", "fast"), ("ksp_type", "gmres"), ("pc_type", "lmvm"), ("tao_*_ksp_type", "gltr"),
-    ("tao_ls_type", "owarmijo"), ("tao_*_mat_type", "dense")], ids=lambda word: word)
+    ("tao_ls_type", "owarmijo"), ("tao_*_mat_type", "dense"), ("ksp_norm_type", "none")], ids=lambda word: word)
 def test_any_other_type_is_refused(run, scenes, option, value, ranks):
     result = run("repose-solve", scenes / "springs.yaml", *options(option, value), ranks=ranks)
     assert (result.returncode, result.stdout) == (1, ""), result
