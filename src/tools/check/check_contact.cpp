@@ -46,7 +46,8 @@ struct AtPoint {
   double gap = considered;  // mm, the smaller of the next two
   double body_gap = considered, wall_gap = considered;
   int32_t body = -1;          // that it is to; −1: the side of a cut
-  std::vector<int32_t> near;  // bodies that may press
+  std::vector<int32_t> near;  // bodies that may press, …
+  std::vector<int32_t> any;   // … and those that may where an edge is rounded
   bool slides = false, mesh = false, wall = false;
   double area = 0;  // mm², that the point stands for
 };
@@ -181,6 +182,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     point.mesh = point.mesh || mesh;
     point.area = pairs.area[c];
     if (slides || gap <= slack + (mesh ? bound : 0)) point.near.push_back(body);
+    if (slides || gap <= slack + (mesh ? model.contact.spacing : 0)) point.any.push_back(body);
     if (gap <= point.gap) {
       point.gap = point.body_gap = gap;
       point.body = body;
@@ -403,13 +405,13 @@ void Claims::check_pressures_of_forces(const std::vector<double>& pressure,
     const AtPoint& point = truth_.points[i];
     const Vec3 stated = Vec3::Map(force.data() + 3 * i);
     if (stated.isZero(0) && pressure[i] == 0) continue;
-    Eigen::MatrixXd slopes(point.near.size(), 3);
-    for (size_t k = 0; k < point.near.size(); ++k)
-      slopes.row(k) = bodies_.gradient(point.near[k], position_[i]);
+    Eigen::MatrixXd slopes(point.any.size(), 3);
+    for (size_t k = 0; k < point.any.size(); ++k)
+      slopes.row(k) = bodies_.gradient(point.any[k], position_[i]);
     const Eigen::VectorXd ones = Eigen::VectorXd::Ones(slopes.rows());
     const Vec3 w = slopes.completeOrthogonalDecomposition().solve(ones);
-    const bool known =
-        !point.wall && point.area > 0 && w.norm() < steepest && (slopes * w - ones).norm() < 1e-9;
+    const bool known = !point.any.empty() && !point.wall && point.area > 0 && w.norm() < steepest &&
+                       (slopes * w - ones).norm() < 1e-9;
     ++(known ? recomputed : others);
     if (!known) continue;
     const double again = w.dot(stated) / point.area, off = std::abs(pressure[i] - again);
