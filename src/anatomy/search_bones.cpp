@@ -15,6 +15,7 @@ constexpr double condyle_reach = 12;  // mm before and behind its top
 constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
 constexpr double dentate = 34;        // mm, height of a symphysis with teeth at least
 constexpr double uneven = 0.8;        // of the rami's lengths, that a head may have
+constexpr double coronoid = 9;        // mm above the condyle's top, that a head may have
 
 /// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell from the
 /// height of `start` to `to_z`, within the incisors' width and `reach` of the depth of `start`.
@@ -92,8 +93,10 @@ void search_condyle(const Mandible& mandible, int side, Search& search) {
   const auto aside = [&](const Vec3& p) { return side * p.x() > 15; };
   const Vec3* top = nullptr;
   const Vec3* angle = nullptr;
+  double highest = -INFINITY;
   for (const Vec3& p : points) {
     if (!aside(p)) continue;
+    highest = std::max(highest, p.z());
     if (p.y() >= from && (!top || p.z() > top->z())) top = &p;
     if (!angle || p.y() - p.z() > angle->y() - angle->z()) angle = &p;
   }
@@ -105,6 +108,11 @@ void search_condyle(const Mandible& mandible, int side, Search& search) {
     return search.lack(
         fmt::format("condyle_{}_center", name),
         fmt::format("MANDIBLE is cut off at its {} condyle, where the scan ends", name));
+  if (highest - top->z() > coronoid)
+    search.remark(fmt::format(
+        "the {} ramus ends {:.0f} mm higher in front, at the coronoid process, than behind: check "
+        "whether its condyle is in MANDIBLE; the axes of the head follow the condyles",
+        name, highest - top->z()));
   Vec3 low = *top, high = *top;
   for (const Vec3& p : points)
     if (aside(p) && p.z() >= top->z() - condyle_depth &&

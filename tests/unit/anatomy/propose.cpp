@@ -173,6 +173,21 @@ TEST(ProposeLandmarks, RemarksOnARamusThatIsFarShorter) {
   }));
 }
 
+TEST(ProposeLandmarks, RemarksOnRamiThatEndFarBelowTheirCoronoids) {
+  const auto remarked = [](const Head& head) {
+    return std::ranges::count_if(propose(head).remarks, [](const std::string& line) {
+      return line.find("at the coronoid process") != std::string::npos;
+    });
+  };
+  Head head = shipped();
+  EXPECT_EQ(remarked(head), 0);
+  const Vec3 condyle = propose(head).found.at("condyle_left_center");
+  const double limit = condyle.z() - 12;
+  for (Vec3& p : head.mandible.points)
+    if (p.y() > condyle.y() - 12 && p.z() > limit) p.z() = limit + 0.1 * (p.z() - limit);
+  EXPECT_EQ(remarked(head), 2);
+}
+
 TEST(ProposeLandmarks, CornersOfTheMouthAreInFrontWhereSkinIsMissing) {
   Head head = shipped();
   const Vec3 stomion = propose(head).found.at("stomion");
