@@ -57,7 +57,7 @@ CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
 PROPOSED = "Proposed by drivers/plan.py"
 # Files of a run in its folder, which the next run removes.
-WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "mandible.ply", "bone_1.ply", "bone_2.ply", "bone_1.mrk.json",
+WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "skull_and_maxilla.ply", "mandible.ply", "bone_1.ply", "bone_2.ply", "bone_1.mrk.json",
            "bone_2.mrk.json", "landmarks.mrk.json", "landmarks.svg", "scene.yaml", "proposal.png", "face.h5",
            "face_skin.xdmf", "face_tissue.xdmf", "face_bones.xdmf", "face_blocks.xdmf", "face_given_skin.vtp",
            "face.png", "face.html")
@@ -187,7 +187,10 @@ def extract_labels(labels, folder, work):
         with reading(labels, "a segmentation of 3D Slicer"):
             segmentation = Segmentation(labels)
         map_file = work / "segment.nrrd"
-        for role, names in segmentation.roles().items():
+        roles = segmentation.roles()
+        if "skull" in roles and "maxilla" in roles:  # where landmarks of the skull are searched
+            roles["skull_and_maxilla"] = roles["skull"] + roles["maxilla"]
+        for role, names in roles.items():
             print(f"{role}: {', '.join(names)}", flush=True)
             segmentation.write(names, map_file)
             run(program("repose-isosurface"), map_file, "-label", 1, "-largest", "-voxel", 2, "-output",
@@ -320,8 +323,9 @@ def main():
     missing = [part for part in NEEDED if not (folder / f"{part}.ply").exists()]
     if missing:
         refuse(f"{labels}: no segment is named as {' or '.join(missing)}")
-    run(program("repose-landmarks"), folder / "skin.ply", "-skull", folder / "skull.ply", "-mandible",
-        folder / "mandible.ply", "-output", folder / "landmarks")
+    whole = folder / "skull_and_maxilla.ply"
+    run(program("repose-landmarks"), folder / "skin.ply", "-skull", whole if whole.exists() else folder / "skull.ply",
+        "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
     scene.write_text(scene_text(operations, options.edge, bones))

@@ -4,6 +4,7 @@
 
 #include "carrying_bone.h"
 #include "head_axes.h"
+#include "repose/base/text.h"
 
 namespace repose::scene {
 namespace {
@@ -19,12 +20,12 @@ const Osteotomy* cut_of(const Scene& scene, std::size_t bone) {
 constexpr const char* upper_edge = "upper_incisor_edge";
 constexpr const char* lower_edge = "lower_incisor_edge";
 
-/// By the incisors that a piece carries, or the template that made it; of a whole bone the lower
-/// jaw alone.
+/// By the incisors that a bone carries, or the template that made it; a skull with them is no jaw.
 Jaw jaw_of(const Scene& scene, std::size_t bone) {
   const Osteotomy* cut = cut_of(scene, bone);
   if (carrying_bone(scene, lower_edge) == bone) return Jaw::lower;
-  if (cut && carrying_bone(scene, upper_edge) == bone) return Jaw::upper;
+  const bool apart = cut || base::lower(scene.bones[bone].name) == "maxilla";
+  if (apart && carrying_bone(scene, upper_edge) == bone) return Jaw::upper;
   return cut && cut->made_by == OsteotomyTemplate::genioplasty ? Jaw::chin : Jaw::other;
 }
 
@@ -142,7 +143,7 @@ class ClinicalMove {
     if (!has_incisors(jaw))
       target->refuse(
           "needs a jaw with incisors: a piece of le_fort_1, of sagittal_split or by planes, or a "
-          "whole bone called mandible");
+          "whole bone called maxilla or mandible");
     const bool upper = jaw == Jaw::upper;
     const Vec3 own = turned.apply(
         scene_.moves[bone_with_teeth_].apply(recorded(upper ? upper_edge : lower_edge)));

@@ -361,6 +361,25 @@ def test_voxels_of_the_shipped_head_become_a_scene(parts, written, tmp_path, env
         assert np.linalg.norm(place[name] - given[name]) < 5
 
 
+def test_landmarks_are_searched_on_skull_and_maxilla_together(parts, tmp_path, environment):
+    z, y = (ORIGIN[axis] + SPACING * np.arange(SIZE[axis]) for axis in (2, 1))
+    given, places = json.loads((PROJECT / "meshes/head_landmarks.json").read_text()), []
+    for names in (["Soft tissue", "Cranium", "Lower jaw"], ["Soft tissue", "Cranium", "Lower jaw", "Maxilla"]):
+        labels = parts["skin"] * 1
+        labels[parts["skull"]], labels[parts["mandible"]] = 2, 3
+        if "Maxilla" in names:
+            front = (z < given["upper_incisor_edge"][2] + 30)[:, None, None] & (y < -30)[None, :, None]
+            labels[parts["skull"] & front] = 4
+        folder = tmp_path / names[-1]
+        folder.mkdir()
+        file = volumes.write_segmentation(folder / "head.seg.nrrd", labels, names, ORIGIN, SPACING)
+        scene, _, place = propose(folder, environment, file, "-operation", "Le Fort I, overjet 3 mm")
+        places.append(place)
+    assert "name: maxilla" in scene and "le_fort_1" not in scene
+    assert places[0].keys() == places[1].keys()
+    assert max(np.linalg.norm(places[0][name] - places[1][name]) for name in places[0]) < 1e-6
+
+
 @pytest.mark.parametrize("operation", [
     "genioplasty, 6 mm forward", pytest.param("Le Fort I, 4 mm up, 3 degrees yaw", marks=pytest.mark.long)])
 def test_a_head_that_is_turned_in_the_scan_has_the_same_plan(parts, tmp_path, environment, operation):
