@@ -45,7 +45,7 @@ except ImportError as missing:
 
 TEETH = r"(teeth|tooth|dent)"
 ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
-         "maxilla": r"maxill|upper.?jaw", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
+         "maxilla": r"^(?!.*(skull|crani)).*(maxill|upper.?jaw)", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
 OUTSIDE = r"table|head.?rest|background|^air$"
 # Operation → bone, piece that is cut from it, and template.
 OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
@@ -322,7 +322,7 @@ def main():
             "-largest", "-output", folder / "skin.ply")
     missing = [part for part in NEEDED if not (folder / f"{part}.ply").exists()]
     if missing:
-        refuse(f"{labels}: no segment is named as {' or '.join(missing)}")
+        refuse(f"{labels}: no segment is named as {' or '.join(missing)}: name segments skin, skull, mandible")
     whole = folder / "skull_and_maxilla.ply"
     run(program("repose-landmarks"), folder / "skin.ply", "-skull", whole if whole.exists() else folder / "skull.ply",
         "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")

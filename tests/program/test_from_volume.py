@@ -176,14 +176,14 @@ def test_a_printed_command_can_be_given_to_a_shell(tmp_path, capfd):
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["Unix", "Windows"])
 def test_segments_of_slicer_are_known_by_their_names(tmp_path, end):
-    names = ["Mandible", "Lower teeth", "Soft tissue (skin)", "Upper skull", "Upper teeth", "Spine", "Table"]
+    names = ["Mandible", "Lower teeth", "Soft tissue (skin)", "Maxilla & Upper Skull", "Upper teeth", "Spine", "Table"]
     labels = np.arange(8, dtype="u1").reshape(2, 2, 2)
     file = volumes.write_segmentation(tmp_path / "head.seg.nrrd", labels, names, (0, 0, 0), 1.0)
     head, blank, data = file.read_bytes().partition(b"\n\n")
     file.write_bytes((head + blank).replace(b"\n", end) + data)
     segmentation = plan.Segmentation(file)
     assert segmentation.roles() == {
-        "skin": names[:6], "mandible": names[:2], "skull": ["Upper skull", "Upper teeth"]}
+        "skin": names[:6], "mandible": names[:2], "skull": ["Maxilla & Upper Skull", "Upper teeth"]}
     segmentation.write(names[:2], tmp_path / "jaw.nrrd")
     assert (tmp_path / "jaw.nrrd").read_bytes().endswith(b"\n\n" + bytes([0, 1, 1, 0, 0, 0, 0, 0]))
 
