@@ -38,7 +38,7 @@ void report(const base::Options& options) {
   if (options.has("clearance")) requested.clearance = options.number("clearance");
   if (options.has("tolerance")) requested.tolerance = options.number("tolerance");
   const model::Bones bones = model::read_bones(scene);
-  for (const auto& lines : {bones.remarks, scene.remarks, bones.warnings})
+  for (const auto& lines : {bones.remarks, scene.remarks, bones.warnings, scene.warnings})
     for (const std::string& line : lines) std::printf("  %s\n", line.c_str());
   const double start = MPI_Wtime();
   const model::CollisionReport found = model::follow_moves(bones.surfaces, scene.moves, requested);

@@ -97,7 +97,7 @@ Parts parts_of_scene(const base::Options& options, const std::filesystem::path& 
     base::refuse("{}: has no osteotomies to make", input.string());
   model::Bones bones = model::read_bones(scene);
   Parts parts{std::move(bones.surfaces), {}, std::move(bones.remarks), {}};
-  for (const auto& lines : {scene.remarks, bones.warnings})
+  for (const auto& lines : {scene.remarks, bones.warnings, scene.warnings})
     parts.remarks.insert(parts.remarks.end(), lines.begin(), lines.end());
   if (moved) parts.moves = scene.moves;
   for (const scene::BoneEntry& bone : scene.bones) parts.names.push_back(bone.name);

@@ -447,11 +447,11 @@ def write(plans, norms, scene, appearance, frame):
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width,initial-scale=1"><title>{title}</title>
-<style>{style()}</style></head><body><main>
+<style>{style()}</style></head><body><main><div class="page-one">
 <header><h1>{title}</h1><span class="soft">predicted face after the planned surgery</span></header>
 <section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{message}</div></section>
 <div class="stills" id="stills"></div>
-<section><h2>The plan</h2>{plan_table(plans, frame)}</section>
+<section><h2>The plan</h2>{plan_table(plans, frame)}</section></div>
 <section class="two"><div><h2 class="page-two">Profile</h2>{profile_section(plans)}</div>
 <div><h2 class="page-two">How far the skin follows the bone</h2>{ratio_table(plans)}
 <h2>Parts of the face</h2>{region_table(plans)}</div></section>

@@ -1,17 +1,18 @@
 """A result file as the planning sheet reads it: the skin to show, bones, and the steps' numbers."""
 
 import math
+import re
 
 import h5py
 import numpy as np
 
-from sheet.depth import overlaps, pierced, touching
 from sheet.script import Unusable, reading
 from sheet.shown_skin import matching_rows, opened, read_given, read_places, read_rows, solved_skin
 
-
-OVERLAP, PIERCED = 1.0, 1.2  # mm: least depths that the summary of repose-solve states
-TOUCHING = 0.5               # mm: skin that presses on a smoothed bone is no farther from it
+# Rows of the summary of repose-solve that the page repeats, and words that only those have that warn
+CAUTIONS = {"warning": "", "other rest position": "", "pierced by bone": "", "pierced by instrument": "",
+            "skin on bone": "", "exact penetration": "points are deeper", "self-contact": "", "path": "DEPENDS"}
+PLACE = re.compile(r"(?:at|about) \((\S+), (\S+), (\S+)\)(?: mm)?")
 
 
 class Figure(str):
@@ -48,7 +49,7 @@ class Result:
             self.skin = opened(self.given, self.solved) if self.given else self.solved
             self.read_tissue(h5["model"], last)
             self.read_bones(h5["model"], last)
-            self.read_contact(h5["model"], last)
+            self.read_summary(h5)
             self.read_uncertainty(last, used)
 
     def read_tissue(self, model, step):
@@ -58,8 +59,8 @@ class Result:
                         "skin triangles": len(self.solved.corners),
                         "layers": int(model["point/layer"][:].max()) + 1}
         self.volume, self.ratio = model["prism/rest_volume"][:], step["prism/volume_ratio"][:]
-        self.initial = model["point/position"][:]
-        self.places = self.initial[read_rows(model, "prism/points", len(self.initial))].mean(1) \
+        points = model["point/position"][:]
+        self.places = points[read_rows(model, "prism/points", len(points))].mean(1) \
             if len(self.ratio) else np.zeros((0, 3))
         self.strain = {label: three_digits(step[name][:]) for label, name in (
             ("largest tension of a spring, N", "spring/tension"),
@@ -84,43 +85,29 @@ class Result:
             faces = read_rows(surfaces, f"{b}/triangles", len(points))
             after = points if moved is None else moved[first:first + len(points)]
             first += len(points)
-            self.bones.append({"row": b, "name": name, "corners": faces, "before": points, "after": after,
+            self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
                                "motion": rigid(points, after)})
 
-    def read_contact(self, model, step):
-        """What the summary of repose-solve warns of: bones inside one another, and as (number, row of point)
-        another rest position, tissue that bone pierces, and skin that presses on bone."""
-        self.overlaps = list(overlaps(self.bones, OVERLAP))
-        self.other_rest = self.pierced = self.skin_on_bone = 0.0, 0
-        if "contact" not in model:
-            return
-        before, after = self.initial, step["point/position"][:]
-        layer, column = model["point/layer"][:], model["point/column"][:]
-        if "point/other_rest_displacement" in step:
-            other = before + step["point/other_rest_displacement"][:]
-            apart = np.where(layer == 0, np.linalg.norm(other - after, axis=1), 0)
-            self.other_rest = float(apart.max()), int(apart.argmax())
-        body_bone = model["contact/body_bone"][:]
-        bones = [bone for bone in self.bones if bone["row"] in body_bone]
-        last = np.flatnonzero((layer[1:] == layer.max()) & (layer[:-1] == layer.max() - 1) &
-                              (column[1:] == column[:-1]))
-        row, deepest = pierced(*(np.stack([at[last], at[last + 1]], 1) for at in (before, after)), bones, PIERCED)
-        self.pierced = deepest, int(last[row]) if deepest else 0
-        if "point/contact_pressure" in step:
-            on_bone = body_bone[read_rows(model, "contact/body_row", len(body_bone))] >= 0
-            pressure = np.zeros(len(layer))
-            points = np.unique(read_rows(model, "contact/point", len(layer))[on_bone])
-            pressure[points] = np.nan_to_num(step["point/contact_pressure"][:])[points]
-            for point in np.flatnonzero((pressure > self.skin_on_bone[0]) & (layer == 0)):
-                if pressure[point] > self.skin_on_bone[0] and \
-                        any(touching(after[point], bone["after"], bone["corners"], TOUCHING) for bone in bones):
-                    self.skin_on_bone = float(pressure[point]), int(point)
+    def read_summary(self, h5):
+        """Warnings of the summary of repose-solve: [(name of the row, text before a place, place or None, text
+        after it)]."""
+        self.cautions = []
+        for line in map(text, h5["summary"][()]) if "summary" in h5 else ():
+            name, told = line[:24].strip(), line[25:]
+            if name not in CAUTIONS or CAUTIONS[name] not in told:
+                continue
+            found = PLACE.search(told)
+            place = np.array([float(number) for number in found.groups()]) if found else None
+            before, after = (told[:found.start()], told[found.end():]) if found else (told, "")
+            self.cautions.append((name, before, place, after))
 
     def turn(self, axes):
         """Takes all places to axes that are given as rows."""
         for skin in {self.solved, self.given, self.skin} - {None}:
             skin.turn(axes)
-        self.places, self.initial = self.places @ axes.T, self.initial @ axes.T
+        self.places = self.places @ axes.T
+        self.cautions = [(name, before, None if place is None else axes @ place, after)
+                         for name, before, place, after in self.cautions]
         for bone in self.bones:
             bone["before"], bone["after"] = bone["before"] @ axes.T, bone["after"] @ axes.T
             bone["motion"] = rigid(bone["before"], bone["after"])

@@ -9,7 +9,6 @@ import numpy as np
 from sheet.landmarks import Parts, place_in_words
 
 LARGE_VOLUME, LARGE_ERROR = 0.2, 0.5  # relative, mm: beyond, the page warns
-PENETRATION = 0.1  # mm: deeper, the page warns, as the summary of repose-solve does
 RIM_MOVES = 1.0  # mm: skin that moves by more where the solved part ends
 PUBLISHED = (
     ("whole face", "0.9 ± 0.3 mm on average, 90 % of it within 1.9 mm", "Liebregts 2015, 100 patients"),
@@ -73,7 +72,7 @@ def cautions(result, known, parts, guessed):
         kind = "stretched" if result.ratio[worst] > 1 else "squeezed"
         yield (f"Tissue is {kind} by {100 * end['volume_error_max']:.0f} % of its volume "
                f"{place_in_words(result.places[worst], known, parts)}: less certain there.")
-    yield from contact_cautions(result, known, parts)
+    yield from summary_cautions(result, known, parts)
     yield from rim_caution(result, known, parts)
     yield from mesh_caution(result, parts)
     if guessed:
@@ -82,27 +81,13 @@ def cautions(result, known, parts, guessed):
                "repose-solve has other points for a scene without landmarks, by the teeth: its numbers differ.")
 
 
-def contact_cautions(result, known, parts):
-    """What the summary of repose-solve states about bones and what touches them."""
-    def place(row):
-        return place_in_words(result.initial[row], known, parts)
-
-    for one, other, depth in result.overlaps:
-        yield (f"The bones {one.replace('_', ' ')} and {other.replace('_', ' ')} end {depth:.1f} mm inside one "
-               "another (repose-collide says where).")
-    (apart, other), (depth, row), (pressure, point) = result.other_rest, result.pierced, result.skin_on_bone
-    if apart > 0:
-        yield (f"The tissue has another rest position, of more energy: the skin is up to {apart:.2g} mm away "
-               f"there, most {place(other)}. Less certain there.")
-    if depth > 0:
-        yield (f"Bone pierces tissue by up to {depth:.1f} mm, deepest {place(row)}: less certain there. A finer "
-               "skin (tissue.edge) or a smaller move helps.")
-    if pressure > 0:
-        yield (f"Skin rests on bone, most {place(point)}: lips or cheeks that bones catch may rest in several "
-               "ways.")
-    if result.end.get("penetration_exact", 0) > PENETRATION:
-        yield (f"Tissue ends up to {result.end['penetration_exact']:.2g} mm inside what it touches: a finer "
-               "contact.grid helps.")
+def summary_cautions(result, known, parts):
+    """Warnings of the summary of repose-solve."""
+    for name, before, place, after in result.cautions:
+        where = "" if place is None else place_in_words(place, known, parts)
+        told = f"{before}{where}{after}".replace("THE REST POSITION", "the rest position")
+        line = told if name == "warning" else f"{name}: {told}"
+        yield f"{line[0].upper()}{line[1:]}."
 
 
 def rim_caution(result, known, parts):

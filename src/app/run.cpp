@@ -22,7 +22,7 @@
 #include "repose/base/interrupt.h"
 #include "repose/base/whole_file.h"
 #include "repose/discrete/natural_rows.h"
-#include "repose/results/given_skin.h"
+#include "repose/results/additions.h"
 #include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
@@ -157,6 +157,7 @@ void Run::copy_result(const std::filesystem::path& file) const {
                            discrete::NaturalRows::of_model(comm, job_.local_model));
   copy.keep(file, results::step_count(file));
   copy.commit();
+  base::on_root(comm, [&] { results::copy_summary(file, name_ + ".h5"); });
 }
 
 std::optional<base::Exit> Run::restart(const std::filesystem::path& file) {
@@ -335,17 +336,19 @@ base::Exit Run::solve() {
     answer = describe_answer(skin, now, summary, writer);
     if (summary.path.complete()) self_contact = skin.describe_self_contact(now);
   });
-  print(answer);
-  print(folds + describe_failure(summary, job_.reference_state.has_value(),
-                                 job_.local_model.global_metadata.adhesion.has_value(),
-                                 solve::given_search_options()));
-  print(describe_run(summary, strategy_.settings, base::size(comm), stages_));
-  print(coarser.report + writer.comparison() + sensitivity + describe_tearing(tearing) +
-        describe_tangents(writer.point_fields()));
-  if (path) print(describe_path(*path));
-  print(writer.reactions() + describe_contact(job_.bodies, summary) +
-        describe_pierced(job_.bodies, summary));
-  print(self_contact + report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) + given);
+  const std::string text =
+      answer + folds +
+      describe_failure(summary, job_.reference_state.has_value(),
+                       job_.local_model.global_metadata.adhesion.has_value(),
+                       solve::given_search_options()) +
+      describe_run(summary, strategy_.settings, base::size(comm), stages_) + coarser.report +
+      writer.comparison() + sensitivity + describe_tearing(tearing) +
+      describe_tangents(writer.point_fields()) + (path ? describe_path(*path) : "") +
+      writer.reactions() + describe_contact(job_.bodies, summary) +
+      describe_pierced(job_.bodies, summary) + self_contact +
+      report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) + given;
+  print(text);
+  base::on_root(comm, [&] { results::add_summary(name_ + ".h5", text); });
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;
 }

@@ -23,8 +23,9 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   anatomy.remarks = std::move(bones.remarks);
   anatomy.warnings = std::move(bones.warnings);
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
+  anatomy.warnings.insert(anatomy.warnings.end(), scene.warnings.begin(), scene.warnings.end());
   anatomy::complete(anatomy.skin, anatomy.scene, anatomy.remarks);
-  resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks);
+  resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks, anatomy.warnings);
   report_initial_overlaps(anatomy.bones, scene, anatomy.warnings);
   if (scene.tissue.edge)
     remesh_skin(anatomy);

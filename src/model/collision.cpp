@@ -10,6 +10,7 @@
 #include "repose/surface/collision.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::model {
 namespace {
@@ -41,6 +42,27 @@ Vec3 placed(const Mat4& pose, const Vec3& point) {
   return pose.topLeftCorner<3, 3>() * point + pose.topRightCorner<3, 1>();
 }
 
+/// Length (mm) that triangles which may touch shall have at most: small, but not so that a cut
+/// through a large bone has too many.
+double small_side(const surface::Surface& surface) {
+  return std::max(1.0, surface::bounding_diagonal(surface.points) / 200);
+}
+
+/// The points of a surface, and points of triangles with a side longer than `side` mm, no farther
+/// than that from one another.
+std::vector<Vec3> samples_of(const surface::Surface& surface, double side) {
+  std::vector<Vec3> points = surface.points;
+  for (const Triangle& triangle : surface.triangles) {
+    const auto [a, b, c] = surface::corners(surface, triangle);
+    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    const int parts = static_cast<int>(std::ceil(longest / side));
+    for (int i = 0; parts > 1 && i <= parts; ++i)
+      for (int j = 0; i + j <= parts; ++j)
+        points.push_back(a + (i * (b - a) + j * (c - a)) / parts);
+  }
+  return points;
+}
+
 struct Deepest {
   double depth = 0;  // mm
   Vec3 at = Vec3::Zero();
@@ -50,6 +72,7 @@ struct Deepest {
 struct Mover {
   const surface::Surface& surface;
   const scene::RigidMotion& motion;
+  std::vector<Vec3> samples;
   surface::CollisionTree tree;
   Eigen::AlignedBox3d box;
   std::vector<Vec3> of_parts;                     // a point of each connected part
@@ -95,17 +118,10 @@ Deepest overlap(Mover& a, Mover& b, double load) {
   if (!surface::touch(a.tree, b.tree, pose) && !a.encloses_part_of(b, pose) &&
       !b.encloses_part_of(a, reverse))
     return {.depth = -1};
-  Deepest in_a = a.deepest_of(b.surface.points, pose),
-          in_b = b.deepest_of(a.surface.points, reverse);
+  Deepest in_a = a.deepest_of(b.samples, pose), in_b = b.deepest_of(a.samples, reverse);
   in_a.at = a.motion.apply(in_a.at, load);
   in_b.at = b.motion.apply(in_b.at, load);
   return in_a.depth > in_b.depth ? in_a : in_b;
-}
-
-/// Length (mm) that triangles which touch from the start shall have at most: small, but not so that
-/// a cut through a large bone has too many.
-double small_side(const surface::Surface& surface) {
-  return std::max(1.0, surface::bounding_diagonal(surface.points) / 200);
 }
 
 /// The trees of two bones, finer where they touch from the start.
@@ -181,14 +197,15 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves) {
   std::vector<Mover> movers;
   for (size_t k = 0; k < bones.size(); ++k)
-    movers.push_back({bones[k], moves[k], surface::CollisionTree(bones[k]),
-                      surface::bounding_box(bones[k].points), points_of_parts(bones[k]), nullptr});
+    movers.push_back({bones[k], moves[k], samples_of(bones[k], 2 * small_side(bones[k])),
+                      surface::CollisionTree(bones[k]), surface::bounding_box(bones[k].points),
+                      points_of_parts(bones[k]), nullptr});
   return movers;
 }
 
-/// Remarks on bones that end inside others, of a scene that has no key collision.
+/// Warns of bones that end inside others.
 void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
-                     std::vector<std::string>& remarks) {
+                     std::vector<std::string>& warnings) {
   constexpr double worth_saying = 1;  // mm: segmented teeth overlap by some tenths
   const auto as_the_first = [&](const scene::RigidMotion& m) {
     return move_alike(m, scene.moves[0]);
@@ -199,10 +216,10 @@ void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Sc
     for (size_t j = i + 1; j < bones.size(); ++j) {
       if (move_alike(scene.moves[i], scene.moves[j])) continue;
       if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > worth_saying)
-        remarks.push_back(
+        warnings.push_back(
             fmt::format("bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide "
-                        "reports where they "
-                        "meet, and collision: {{mode: clamp}} moves them no farther",
+                        "reports where they meet, and collision: {{mode: clamp}} moves them no "
+                        "farther",
                         scene.bones[i].name, scene.bones[j].name, depth));
     }
 }
@@ -279,12 +296,14 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
 }
 
 void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                        std::vector<std::string>& remarks) {
-  if (!scene.collision) return report_overlaps(bones, scene, remarks);
+                        std::vector<std::string>& remarks, std::vector<std::string>& warnings) {
+  if (!scene.collision) return report_overlaps(bones, scene, warnings);
   const CollisionReport report = follow_moves(bones, scene.moves, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
   remarks.insert(remarks.end(), lines.begin(), lines.end());
-  if (report.safe_load >= 1 || scene.collision->mode == scene::CollisionMode::report) return;
+  if (scene.collision->mode == scene::CollisionMode::report)
+    return report_overlaps(bones, scene, warnings);
+  if (report.safe_load >= 1) return;
   if (scene.collision->mode == scene::CollisionMode::stop) {
     const auto first =
         std::min_element(report.pairs.begin(), report.pairs.end(),
@@ -294,7 +313,7 @@ void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene
   }
   for (scene::RigidMotion& move : scene.moves)
     move = scene::RigidMotion::from_matrix(move.matrix(report.safe_load));
-  remarks.push_back(fmt::format(
+  warnings.push_back(fmt::format(
       "all moves end at load {:.4f} of the plan, before the first contact", report.safe_load));
 }
 

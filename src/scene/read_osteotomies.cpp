@@ -61,7 +61,7 @@ void read_osteotomies(const Value& list, Scene& scene) {
     scene.bones.push_back({name, scene.bones[cut.bone].surface});
     if (scene.anatomy)
       for (const std::string& warning : check_cut(*scene.anatomy, cut))
-        scene.remarks.push_back(
+        scene.warnings.push_back(
             fmt::format("osteotomies[{}]: {}", scene.osteotomies.size(), warning));
     scene.osteotomies.push_back(std::move(cut));
   }

@@ -17,7 +17,6 @@ import live  # noqa: E402
 from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
-from sheet.depth import depths, inside, overlaps, pierced, touching  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.measures import read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
@@ -90,55 +89,6 @@ def test_equal_skins_are_compared_row_by_row():
     other.before += [0, 0, 6]
     with pytest.raises(Unusable, match="b.h5: not the skin of a.h5; two plans of one patient"):
         rows_of_patient(one, other, ["a.h5", "b.h5"])
-
-
-# ----- bones inside one another
-
-
-def box(low, high, shift=(0, 0, 0), cells=1):
-    """A closed box of triangles as a bone that moves by a shift; its corners are shared by other boxes."""
-    grid = np.stack(np.meshgrid(*[np.arange(cells + 1)] * 2, indexing="ij"), -1).reshape(-1, 2) / cells
-    row = np.arange((cells + 1)**2).reshape(cells + 1, -1)
-    a, b, c, d = row[:-1, :-1].ravel(), row[1:, :-1].ravel(), row[1:, 1:].ravel(), row[:-1, 1:].ravel()
-    face = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    sides = [np.insert(grid, axis, end, axis=1) for axis in range(3) for end in (0.0, 1.0)]
-    points, shared = np.unique(np.concatenate(sides), axis=0, return_inverse=True)
-    corners = shared.ravel()[np.concatenate([face + k * len(grid) for k in range(6)])]
-    before = np.array(low) + points * np.subtract(high, low)
-    return {"name": f"box {low}", "before": before, "after": before + shift, "corners": corners,
-            "motion": (np.eye(3), np.array(shift, float))}
-
-
-@pytest.mark.parametrize("cells", [1, 3, 24])
-def test_depths_in_a_closed_surface_are_those_to_its_triangles(cells):
-    bone = box((0, 0, 0), (20, 24, 30), cells=cells)
-    points = np.random.default_rng(1).uniform(-5, 35, (3000, 3))
-    points[:9] = np.stack(np.meshgrid([5, 10, 15], [6, 12, 18], 10), -1).reshape(9, 3)  # on edges seen along x
-    within = ((points > 0) & (points < (20, 24, 30))).all(1)
-    depth = np.minimum(points, (20, 24, 30) - points).min(1)
-    assert (inside(points, bone["before"], bone["corners"]) == within).all()
-    found = depths(points, bone["before"], bone["corners"], 2)
-    assert np.allclose(found, np.where(within & (depth >= 2), depth, 0), atol=1e-9)
-    for point, near in (((-0.4, 3, 3), True), ((-0.6, 3, 3), False), ((10, 12, 15), True)):
-        assert touching(np.array(point), bone["before"], bone["corners"], 0.5) == near
-
-
-def test_bones_that_end_inside_one_another_are_named_with_their_depth():
-    still, moves = box((0, 0, 0), (20, 24, 30), cells=12), (-2.4, 0.3, 0)
-    bones = [still, box((20, 0, 0), (30, 24, 30), moves, cells=12), box((25, 5, 5), (29, 9, 9), moves),
-             box((0, 0, 31), (5, 5, 35), (0, 0, -1.5))]
-    assert [(*names, round(depth, 9)) for *names, depth in overlaps(bones, 1.0)] == [
-        ("box (0, 0, 0)", "box (20, 0, 0)", 2.4)], "bones that move alike and 0.5 mm do not count"
-
-
-def test_a_segment_that_bone_pierces_is_found_between_its_ends():
-    bone = box((0, 0, 0), (10, 10, 10), (8, 0, 0), cells=4)
-    before = np.array([[[20, y, 5], [24, y, 5]] for y in (-3.0, 2.0, 4.0)] + [[[4, 4, 4], [6, 6, 6]]])
-    after = before - [[[9, 0, 0], [5, 0, 0]]]
-    row, depth = pierced(before, after, [bone], 1.2)
-    assert row == 2 and depth == pytest.approx(4), "below the side y = 0"
-    assert pierced(before[3:], before[3:] + (8, 0, 0), [bone], 1.2)[1] == 0, "it was pierced at the start"
-    assert pierced(before[:0], after[:0], [bone], 1.2)[1] == 0
 
 
 # ----- landmarks

@@ -39,11 +39,11 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
                              const scene::Collision& requested);
 
-/// Resolves contacts as the scene requests: moves are shortened, remarks added; where it requests
-/// nothing, a remark on bones that end more than 1 mm inside one another. Throws InputError naming
-/// the scene and the first contact in mode stop.
+/// Resolves contacts as the scene requests: moves are shortened, of which a warning is added, and a
+/// remark on each pair. Adds a warning for bones that end more than 1 mm inside one another. Throws
+/// InputError naming the scene and the first contact in mode stop.
 void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                        std::vector<std::string>& remarks);
+                        std::vector<std::string>& remarks, std::vector<std::string>& warnings);
 
 /// Adds a warning for every two bones that lie more than 2 mm inside one another before all moves.
 void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,

@@ -326,6 +326,7 @@ struct Scene {
   Solve solve;
   std::map<std::string, Vec3> landmarks;  ///< mm, by name; of the file `landmarks`
   std::vector<std::string> remarks;       ///< lines for a person
+  std::vector<std::string> warnings;      ///< implausible properties, a line each
   std::optional<double> tearing;          ///< N, tension above which springs tear; unset: none does
 };
 

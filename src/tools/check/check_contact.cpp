@@ -45,9 +45,8 @@ std::array<std::array<double, 4>, 2> spline_weights(double t) {
 struct AtPoint {
   double gap = considered;  // mm, the smaller of the next two
   double body_gap = considered, wall_gap = considered;
-  int32_t body = -1;          // that it is to; −1: the side of a cut
-  std::vector<int32_t> near;  // bodies that may press, …
-  std::vector<int32_t> any;   // … and those that may where an edge is rounded
+  int32_t body = -1;              // that it is to; −1: the side of a cut
+  std::vector<int32_t> pressing;  // bodies that may press
   bool slides = false, mesh = false, wall = false;
   double area = 0;  // mm², that the point stands for
 };
@@ -103,13 +102,11 @@ class Bodies {
         second_differences += averaged_distance(body, beside + side * Vec3::Unit(a), in_cell);
     return here - second_differences / 6;
   }
-  Vec3 normal(int32_t body, const Vec3& point, double radius) const {
-    return poses_[body].topLeftCorner<3, 3>() * shapes_[body].normal(beside(body, point), radius);
-  }
   /// Gradient at a point in space of the distance that the solver uses.
   Vec3 gradient(int32_t body, const Vec3& point) const {
-    if (!is_mesh(body)) return normal(body, point, 0);
-    return poses_[body].topLeftCorner<3, 3>() * spline_gradient(body, beside(body, point));
+    const Vec3 at = beside(body, point);
+    return poses_[body].topLeftCorner<3, 3>() *
+           (is_mesh(body) ? spline_gradient(body, at) : shapes_[body].normal(at));
   }
 
  private:
@@ -167,7 +164,6 @@ class Bodies {
 void add_bodies(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
                 double slack, Truth& truth) {
   const model::ContactPairs& pairs = model.contact.pairs;
-  const double bound = smoothing_bound(model.contact.spacing);
   for (size_t c = 0; c < pairs.point.size(); ++c) {
     const int64_t row = pairs.point[c];
     const int32_t body = pairs.body[c];
@@ -181,8 +177,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     point.slides = point.slides || slides;
     point.mesh = point.mesh || mesh;
     point.area = pairs.area[c];
-    if (slides || gap <= slack + (mesh ? bound : 0)) point.near.push_back(body);
-    if (slides || gap <= slack + (mesh ? model.contact.spacing : 0)) point.any.push_back(body);
+    if (slides || gap <= slack + (mesh ? model.contact.spacing : 0)) point.pressing.push_back(body);
     if (gap <= point.gap) {
       point.gap = point.body_gap = gap;
       point.body = body;
@@ -247,8 +242,6 @@ class Claims {
   void check_depths(const std::vector<double>& gap);
   void check_pressures(const std::vector<double>& gap, const std::vector<double>& pressure);
   void check_forces(const std::vector<double>& pressure, const std::vector<double>& force);
-  void check_pressures_of_forces(const std::vector<double>& pressure,
-                                 const std::vector<double>& force);
 
  private:
   double smoothed_gap(int64_t point, bool in_cell) const;
@@ -353,77 +346,56 @@ void Claims::check_pressures(const std::vector<double>& gap, const std::vector<d
     comparison_.statement("pressure is where gaps are closed", across <= slack_of(numbers_));
 }
 
+/// The force on a point is Σ p area ∇φ over the bodies that may press, its pressure Σ p: that is
+/// w · force where w · area ∇φ = 1 for each of them; no such w exists between bodies that press
+/// against each other.
 void Claims::check_forces(const std::vector<double>& pressure, const std::vector<double>& force) {
-  constexpr double aside = 0.6;  // of a force, where normals are within 30° of one another
-  std::vector<double> forces, again;
-  double largest = 0;
-  Worst too_large, oblique;
-  for (size_t i = 0; i < position_.size(); ++i) {
-    const AtPoint& point = truth_.points[i];
-    const Vec3 stated = Vec3::Map(force.data() + 3 * i);
-    const double pressed = pressure[i] * point.area;
-    if (point.wall) continue;
-    if (!point.slides)
-      too_large.offer(stated.norm() - largest_slope * pressed * (1 + 1e-9), [&] {
-        return fmt::format(
-            "contact_force of point {}: stated {:.4g} N, pressure times area {:.4g} N", i,
-            stated.norm(), pressed);
-      });
-    if (point.near.size() != 1) continue;
-    const int32_t pressing = point.near.front();
-    const bool mesh = bodies_.is_mesh(pressing);
-    const double around = 2.5 * model_.contact.spacing + std::abs(point.gap);
-    const Vec3 expected = pressed * bodies_.normal(pressing, position_[i], around);
-    if (!mesh)
-      for (int a = 0; a < 3; ++a) {
-        forces.push_back(stated[a]);
-        again.push_back(expected[a]);
-        largest = std::max(largest, std::abs(stated[a]));
-      }
-    const double off = (stated - expected).norm();
-    if (!mesh || expected.isZero(0)) continue;
-    oblique.offer(off - aside * std::abs(pressed), [&] {
-      return fmt::format(
-          "contact_force of point {} on {}: stated {:.4g} N, by the triangles' normal {:.4g} N", i,
-          name_of(pressing), stated, expected);
-    });
-  }
-  comparison_.array("point/contact_force", forces, again, largest);
-  too_large.state("contact forces are no larger than pressure times area", comparison_);
-  oblique.state("contact forces are along the meshes' normals", comparison_);
-}
-
-/// A point's pressure is w · force where w · area ∇φ = 1 for each body that may press; no such w
-/// exists between bodies that press against each other.
-void Claims::check_pressures_of_forces(const std::vector<double>& pressure,
-                                       const std::vector<double>& force) {
   constexpr double steepest = 10;                                        // of w, times the area
   const double rounding = 1e-5 / std::min(1.0, model_.contact.spacing);  // of grids of floats
-  Worst worst;
+  Worst aside, unequal, too_large;
   int64_t recomputed = 0, others = 0;
   for (size_t i = 0; i < position_.size(); ++i) {
     const AtPoint& point = truth_.points[i];
     const Vec3 stated = Vec3::Map(force.data() + 3 * i);
-    if (stated.isZero(0) && pressure[i] == 0) continue;
-    Eigen::MatrixXd slopes(point.any.size(), 3);
-    for (size_t k = 0; k < point.any.size(); ++k)
-      slopes.row(k) = bodies_.gradient(point.any[k], position_[i]);
-    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(slopes.rows());
-    const Vec3 w = slopes.completeOrthogonalDecomposition().solve(ones);
-    const bool known = !point.any.empty() && !point.wall && point.area > 0 && w.norm() < steepest &&
-                       (slopes * w - ones).norm() < 1e-9;
-    ++(known ? recomputed : others);
-    if (!known) continue;
-    const double again = w.dot(stated) / point.area, off = std::abs(pressure[i] - again);
-    worst.offer(off - rounding * w.norm() * stated.norm() / point.area, [&] {
+    const double size = stated.norm(), pressed = pressure[i] * point.area;
+    if (size == 0 && pressure[i] == 0) continue;
+    if (point.wall || point.pressing.empty()) {
+      ++others;
+      continue;
+    }
+    Eigen::MatrixXd slopes(3, point.pressing.size());
+    for (size_t k = 0; k < point.pressing.size(); ++k)
+      slopes.col(k) = bodies_.gradient(point.pressing[k], position_[i]);
+    const Eigen::MatrixXd rows = slopes.transpose();
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(rows.rows());
+    const Vec3 w = rows.completeOrthogonalDecomposition().solve(ones),
+               sum = slopes * slopes.completeOrthogonalDecomposition().solve(stated);
+    aside.offer((stated - sum).norm() - rounding * std::max(size, std::abs(pressed)), [&] {
       return fmt::format(
-          "contact_pressure of point {}: stated {:.6g} N/mm², by its force {:.6g} N/mm²", i,
-          pressure[i], again);
+          "contact_force of point {} on {}: stated {:.4g} N, along the gradients of distance "
+          "{:.4g} N",
+          i, name_of(point.pressing.front()), stated, sum);
     });
+    const bool known = w.norm() < steepest && (rows * w - ones).norm() < 1e-9;
+    ++(known ? recomputed : others);
+    if (known)
+      unequal.offer(std::abs(pressed - w.dot(stated)) - rounding * w.norm() * size, [&] {
+        return fmt::format(
+            "contact_pressure of point {}: stated {:.6g} N/mm², by its force {:.6g} N/mm²", i,
+            pressure[i], w.dot(stated) / point.area);
+      });
+    else if (!point.slides)
+      too_large.offer(size - largest_slope * pressed, [&] {
+        return fmt::format(
+            "contact_force of point {}: stated {:.4g} N, pressure times area {:.4g} N", i, size,
+            pressed);
+      });
   }
-  worst.state(fmt::format("contact pressures are those of the forces ({} recomputed, {} not)",
-                          recomputed, others),
-              comparison_);
+  aside.state("contact forces are along the gradients of distances", comparison_);
+  unequal.state(fmt::format("contact pressures are those of the forces ({} recomputed, {} not)",
+                            recomputed, others),
+                comparison_);
+  too_large.state("contact forces are no larger than pressure times area", comparison_);
 }
 
 }  // namespace
@@ -444,7 +416,6 @@ void check_contact(const model::Model& model, const model::PrescribedMotion& mot
   claims.check_depths(*gap);
   claims.check_pressures(*gap, *pressure);
   claims.check_forces(*pressure, *force);
-  claims.check_pressures_of_forces(*pressure, *force);
 }
 
 }  // namespace repose::tools::check

@@ -175,24 +175,6 @@ double TriangleGrid::winding_number(const Vec3& point) const {
   return angle / (4 * std::numbers::pi);
 }
 
-Vec3 TriangleGrid::uniform_normal(const Vec3& point, double radius) const {
-  constexpr double narrow = 0.866;  // cos 30°
-  const Vec3 p = oblique() * point;
-  Vec3 mean = Vec3::Zero();
-  std::vector<Vec3> normals;
-  visit_near(p, radius, [&](const Corners& t) {
-    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-    if (!(normal.norm() > 0) || (p - closest_on_triangle(p, t)).norm() > radius) return;
-    mean += normal;
-    normals.push_back(normal.normalized());
-  });
-  if (!(mean.norm() > 0)) return Vec3::Zero();
-  mean.normalize();
-  const bool agree = std::all_of(normals.begin(), normals.end(),
-                                 [&](const Vec3& n) { return n.dot(mean) > narrow; });
-  return agree ? Vec3(oblique().transpose() * mean) : Vec3::Zero();
-}
-
 namespace {
 
 double signed_distance(const scene::Sphere& ball, const Vec3& p) {
@@ -260,9 +242,7 @@ double Obstacle::distance(const Vec3& point, double reach) const {
       shape_);
 }
 
-Vec3 Obstacle::normal(const Vec3& point, double radius) const {
-  if (const auto* mesh = std::get_if<TriangleGrid>(&shape_))
-    return mesh->uniform_normal(point, radius);
+Vec3 Obstacle::normal(const Vec3& point) const {
   return std::visit(
       [&](const auto& shape) -> Vec3 {
         if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, TriangleGrid>)

@@ -26,9 +26,6 @@ class TriangleGrid {
   /// The solid angles of all triangles (van Oosterom & Strackee 1983) over 4π: 1 inside a surface
   /// that faces outward, 0 outside.
   double winding_number(const Vec3& point) const;
-  /// The mean normal of the triangles within `radius` of a point; zero where there is none or where
-  /// one differs from the mean by more than 30°.
-  Vec3 uniform_normal(const Vec3& point, double radius) const;
 
  private:
   using Corners = std::array<Vec3, 3>;
@@ -58,9 +55,8 @@ class Obstacle {
   const Vec3& low_corner() const { return std::get<TriangleGrid>(shape_).low_corner(); }
   /// Signed distance in mm, negative inside; to a mesh `reach` where it is larger.
   double distance(const Vec3& point, double reach) const;
-  /// Outward unit normal at the closest point; of a mesh only where all triangles within `radius`
-  /// agree on it, zero elsewhere.
-  Vec3 normal(const Vec3& point, double radius) const;
+  /// Outward unit normal at the closest point; zero for a mesh.
+  Vec3 normal(const Vec3& point) const;
 
  private:
   std::variant<scene::Sphere, scene::Capsule, scene::Box, scene::HalfSpace, TriangleGrid> shape_;

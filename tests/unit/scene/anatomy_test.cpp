@@ -269,7 +269,7 @@ std::vector<std::string> warnings(const std::string& bone, double z) {
   return read(head(), fmt::format("osteotomies: [{{bone: {}, piece: a, planes: [{{point: [0, -80, "
                                   "{}], normal: [0, 0, -1]}}]}}]\n",
                                   bone, z))
-      .remarks;
+      .warnings;
 }
 
 TEST(OsteotomyWarnings, NamePalateRootsAndCanal) {

@@ -1,9 +1,12 @@
 #pragma once
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "repose/base/geometry.h"
 
+/// Additions to a result that is complete before and after. A result that has one already is left
+/// alone. For one process; InputError where the disk refuses.
 namespace repose::results {
 
 /// The skin that a scene names, in the place of which another was solved, at the end of a run.
@@ -13,9 +16,11 @@ struct GivenSkin {
   const std::vector<Vec3>& displacement;   ///< mm, [vertices]
   const std::vector<double>& solved;       ///< [vertices] 1 over the solved skin, 0 beyond
 };
-
-/// Adds the group given_skin to a result, which is complete before and after. A result that has one
-/// is left alone. For one process; InputError where the disk refuses.
 void add_given_skin(const std::filesystem::path& file, const GivenSkin& skin);
+
+/// Adds the end-of-run summary, a row for each line of the text.
+void add_summary(const std::filesystem::path& file, const std::string& text);
+/// Adds the summary of another result, if that has one.
+void copy_summary(const std::filesystem::path& from, const std::filesystem::path& file);
 
 }  // namespace repose::results
