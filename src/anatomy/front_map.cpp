@@ -88,41 +88,36 @@ std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, doub
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
                                                 int sign) {
+  constexpr double flat = 0.25;  // mm
+  if (profile.empty()) return std::nullopt;
   const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
-  std::optional<ProfilePoint> best;
-  double maximum = -nothing;
+  const auto distance = [&](const ProfilePoint& p) { return sign * ahead.dot(p - a); };
+  double maximum = -nothing, weights = 0, moment = 0;
+  for (const ProfilePoint& p : profile) maximum = std::max(maximum, distance(p));
   for (const ProfilePoint& p : profile) {
-    const double distance = sign * ahead.dot(p - a);
-    if (!(distance > maximum)) continue;
-    maximum = distance;
-    best = p;
+    const double weight = std::max(distance(p) - maximum + flat, 0.0);
+    weights += weight;
+    moment += weight * p.y();
   }
-  return best;
+  const double height = std::clamp(moment / weights, profile.front().y(), profile.back().y());
+  const auto above =
+      std::ranges::lower_bound(profile, height, {}, [](const ProfilePoint& p) { return p.y(); });
+  if (above == profile.begin()) return *above;
+  const ProfilePoint low = *std::prev(above), rise = *above - low;
+  return low + (height - low.y()) / rise.y() * rise;
 }
 
 std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile) {
-  constexpr double flat = 0.25;  // mm
-  const auto best = farthest_from_chord(profile, {0, 0}, {0, 1}, 1);
-  if (!best) return best;
-  double low = best->y(), high = low;
-  for (const ProfilePoint& p : profile)
-    if (p.x() <= best->x() + flat) {
-      low = std::min(low, p.y());
-      high = std::max(high, p.y());
-    }
-  ProfilePoint middle = *best;
-  for (const ProfilePoint& p : profile)
-    if (std::abs(p.y() - (low + high) / 2) < std::abs(middle.y() - (low + high) / 2)) middle = p;
-  return middle;
+  return farthest_from_chord(profile, {0, 0}, {0, 1}, 1);
 }
 
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z) {
-  constexpr double end = 1;  // mm
+  constexpr double end = 0.5;  // mm
   const std::vector<ProfilePoint> inside = between(profile, from_z, to_z);
   const auto foremost = foremost_of(inside);
-  if (!foremost || foremost->y() < to_z - end) return foremost;
+  if (!foremost || foremost->y() < inside.back().y() - end) return foremost;
   return farthest_from_chord(inside, inside.front(), inside.back(), 1);
 }
 

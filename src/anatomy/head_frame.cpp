@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
+#include <map>
 #include <numbers>
 
 #include "repose/base/error.h"
@@ -22,10 +24,39 @@ struct Plane {
   Vec3 within(const Vec3& way) const { return way - normal.dot(way) * normal; }
 };
 
-std::vector<Vec3> thinned(const std::vector<Vec3>& points, size_t number) {
+/// The point nearest to the center of each cell of a grid, whatever the order of the points.
+std::vector<Vec3> nearest_to_centers(const std::vector<Vec3>& points, const Vec3& low,
+                                     double size) {
+  struct Chosen {
+    double squared;
+    std::array<double, 3> place;
+    auto operator<=>(const Chosen&) const = default;
+  };
+  std::map<std::array<double, 3>, Chosen> cells;
+  for (const Vec3& p : points) {
+    const Vec3 cell = ((p - low) / size).array().floor();
+    const Chosen candidate{((p - low) / size - cell - Vec3::Constant(0.5)).squaredNorm(),
+                           {p.x(), p.y(), p.z()}};
+    const auto [place, fresh] = cells.try_emplace({cell.x(), cell.y(), cell.z()}, candidate);
+    if (!fresh && candidate < place->second) place->second = candidate;
+  }
   std::vector<Vec3> chosen;
-  const size_t step = 1 + points.size() / number;
-  for (size_t i = 0; i < points.size(); i += step) chosen.push_back(points[i]);
+  for (const auto& [cell, nearest] : cells) chosen.emplace_back(nearest.place.data());
+  return chosen;
+}
+
+/// At most `number` points, by the finest grid that holds no more.
+std::vector<Vec3> thinned(const std::vector<Vec3>& points, size_t number) {
+  constexpr int finest = 40;
+  if (points.size() <= number) return points;
+  const Eigen::AlignedBox3d box = surface::bounding_box(points);
+  double size = box.sizes().maxCoeff();
+  std::vector<Vec3> chosen;
+  for (int level = 0; level < finest && size > 0; ++level, size /= std::numbers::sqrt2) {
+    std::vector<Vec3> finer = nearest_to_centers(points, box.min(), size);
+    if (finer.size() > number) break;
+    chosen = std::move(finer);
+  }
   return chosen;
 }
 
@@ -113,16 +144,18 @@ Fit refine(Plane plane, const MirrorFit& fit) {
   return {plane, fit.off(plane)};
 }
 
-/// Many directions are tried on few points, and the best planes refined on more.
+/// Many directions are tried on few points, the best planes refined on more, and the best of these
+/// on so many that a turned head, which the grid meets otherwise, has the same plane.
 Plane fit_plane(const surface::Surface& skull) {
   const surface::TriangleTree tree(skull);
-  const std::vector<Vec3> few = thinned(skull.points, 300), many = thinned(skull.points, 3000);
-  const MirrorFit coarse(tree, few, 10), fine(tree, many, 2);
+  const std::vector<Vec3> few = thinned(skull.points, 300), more = thinned(skull.points, 3000),
+                          many = thinned(skull.points, 40000);
+  const MirrorFit coarse(tree, few, 10), fine(tree, more, 2), finest(tree, many, 2);
   std::vector<Fit> fits = best_of(first_planes(mean_of(few), coarse), 12);
   for (Fit& fit : fits) fit = refine(fit.plane, coarse);
   fits = best_of(std::move(fits), 3);
   for (Fit& fit : fits) fit = refine(fit.plane, fine);
-  return best_of(std::move(fits), 1).front().plane;
+  return refine(best_of(std::move(fits), 1).front().plane, finest).plane;
 }
 
 /// The middles of the symphysis, near the plane, and of both rami, the parts farthest from it.

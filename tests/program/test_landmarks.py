@@ -33,12 +33,12 @@ def test_writes_landmarks_and_a_picture(run, tmp_path):
     assert "remark: the mouth is open in SKIN" in result.stdout
 
 
-def turned(folder, head, change):
-    """Arguments with the surfaces of a head, each point multiplied by a matrix."""
+def turned(folder, head, change, shift=lambda points: 0):
+    """Arguments with the surfaces of a head, each point multiplied by a matrix and shifted."""
     surfaces = []
     for part in ("skin", "skull", "mandible"):
         mesh = meshio.read(f"{head}{part}.ply")
-        mesh.points = mesh.points @ change.T
+        mesh.points = mesh.points @ change.T + shift(mesh.points)
         mesh.write(folder / f"{part}.ply")
         surfaces += [f"-{part}", f"{part}.ply"] if surfaces else [f"{part}.ply"]
     return surfaces
@@ -54,6 +54,16 @@ def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, head, pitch, yaw, r
     upright, found = (points(tmp_path / f"{name}.mrk.json") for name in ("upright", "turned"))
     assert len(found) == len(upright) == 23
     assert max(np.linalg.norm(turn.T @ place - upright[name]) for name, place in found.items()) < 0.5
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+def test_noise_moves_a_flat_nasion_little(run, tmp_path):
+    random, found = np.random.default_rng(0), []
+    for noise in (0, 0.1, 0.1, 0.1):
+        surfaces = turned(tmp_path, f"{DATA}/", np.eye(3), lambda points: random.normal(0, noise, points.shape))
+        assert run("repose-landmarks", *surfaces).returncode == 0
+        found.append(points(tmp_path / "landmarks.mrk.json")["nasion_bone"])
+    assert np.linalg.norm(np.subtract(found[1:], found[0]), axis=1).max() < 1.5
 
 
 @pytest.mark.parametrize("change, line", [

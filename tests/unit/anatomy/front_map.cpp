@@ -24,5 +24,23 @@ TEST(FrontMap, TheChinStandsOutThoughTheProfileRecedesBelowTheTeeth) {
   EXPECT_FALSE(chin_of(chin(0), 30, 40));
 }
 
+/// A valley that is flat, 8 mm deep, from z = 12 to 19, with one point that is deeper by `pit`.
+std::vector<ProfilePoint> valley(double pit_at, double pit) {
+  std::vector<ProfilePoint> profile;
+  for (double z = 0; z <= 31; z += 0.5)
+    profile.emplace_back(8 - 0.7 * std::max({0.0, 12 - z, z - 19}) + (z == pit_at ? pit : 0), z);
+  return profile;
+}
+
+TEST(FrontMap, OfAFlatValleyTheMiddleIsTaken) {
+  for (const double pit_at : {12.0, 15.5, 19.0}) {
+    const auto found = farthest_from_chord(valley(pit_at, 0.05), {0, 0}, {0, 31}, -1);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->y(), 15.5, 0.3) << pit_at;
+    EXPECT_NEAR(found->x(), 8, 0.06);
+  }
+  EXPECT_FALSE(farthest_from_chord({}, {0, 0}, {0, 31}, -1));
+}
+
 }  // namespace
 }  // namespace repose::anatomy

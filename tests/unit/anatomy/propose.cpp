@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <random>
 
 #include "../../folder.h"
 #include "repose/anatomy/picture.h"
@@ -64,6 +66,32 @@ TEST(ProposeLandmarks, TurnWithTheHead) {
     ASSERT_EQ(tilted.found.size(), upright.found.size());
     for (const auto& [name, place] : upright.found)
       EXPECT_LT((tilted.found.at(name) - turn * place).norm(), 0.5) << name << " " << pitch;
+  }
+}
+
+surface::Surface shuffled(const surface::Surface& part, std::mt19937& random) {
+  std::vector<int64_t> place(part.points.size());
+  std::iota(place.begin(), place.end(), 0);
+  std::shuffle(place.begin(), place.end(), random);
+  surface::Surface result = part;
+  for (size_t i = 0; i < place.size(); ++i) result.points[place[i]] = part.points[i];
+  for (Triangle& triangle : result.triangles)
+    for (int64_t& corner : triangle) corner = place[corner];
+  std::shuffle(result.triangles.begin(), result.triangles.end(), random);
+  return result;
+}
+
+TEST(ProposeLandmarks, DoNotDependOnTheOrderOfVerticesAndTriangles) {
+  const Landmarks expected = propose(shipped()).found;
+  std::mt19937 random(1);
+  for (int order = 0; order < 3; ++order) {
+    Head head = shipped();
+    for (surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
+      *part = shuffled(*part, random);
+    const Landmarks found = propose(head).found;
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto& [name, place] : expected)
+      EXPECT_LT((found.at(name) - place).norm(), 1e-6) << name;
   }
 }
 
