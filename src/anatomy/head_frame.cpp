@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "repose/base/error.h"
+#include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 #include "search.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <vector>
 
 namespace repose::anatomy {
@@ -10,6 +11,7 @@ namespace {
 
 constexpr double least_area = 60;    // mm²
 constexpr double least_share = 0.5;  // of triangles with that normal; voxels of labels have steps
+constexpr size_t least_corners = 6;  // a large triangle of a decimated surface has three
 constexpr double flat = 0.1;         // mm
 constexpr double directions = 2000;  // of normals, in a unit: they differ by less than 0.05°
 
@@ -46,14 +48,16 @@ ScanEnd::ScanEnd(const surface::Surface& surface) {
     double end = -INFINITY, area = 0;
     for (const Vec3& p : surface.points) end = std::max(end, normal.dot(p));
     std::vector<Triangle> cut;
+    std::set<int64_t> vertices;
     for (const int64_t t : facing.triangles) {
       const surface::Corners corners = surface::corners(surface, surface.triangles[t]);
       if (std::ranges::any_of(corners, [&](const Vec3& p) { return normal.dot(p) < end - flat; }))
         continue;
       cut.push_back(surface.triangles[t]);
+      vertices.insert(cut.back().begin(), cut.back().end());
       area += surface::scaled_normal(corners).norm() / 2;
     }
-    if (area >= std::max(least_area, least_share * facing.area))
+    if (vertices.size() >= least_corners && area >= std::max(least_area, least_share * facing.area))
       faces.triangles.insert(faces.triangles.end(), cut.begin(), cut.end());
   }
   if (!faces.triangles.empty()) faces_.emplace(faces);

@@ -5,8 +5,9 @@
 
 namespace repose::anatomy {
 
-/// Plane faces in which a surface was cut off where its scan ended. Their area is at least 60 mm²
-/// and half of that of all triangles with their normal, and no vertex lies in front of them.
+/// Plane faces in which a surface was cut off where its scan ended. They have six vertices or more,
+/// their area is at least 60 mm² and half of that of all triangles with their normal, and no vertex
+/// lies in front of them.
 class ScanEnd {
  public:
   explicit ScanEnd(const surface::Surface& surface);
