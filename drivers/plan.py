@@ -30,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import unicodedata
 import zlib
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -43,10 +44,15 @@ try:
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
 
-TEETH = r"(teeth|tooth|dent)"
-ROLES = {"mandible": rf"mandib|lower.?(jaw|{TEETH})", "upper teeth": rf"upper.?{TEETH}|{TEETH}.*upper",
-         "maxilla": r"^(?!.*(skull|crani)).*(maxill|upper.?jaw)", "skin": r"skin|soft|face", "skull": r"skull|crani|bone"}
-OUTSIDE = r"table|head.?rest|background|^air$"
+# Names of segments in English, German, French and Spanish, without accents.
+TEETH = r"(teeth|tooth|dent|zahn|zaehn|dient)"
+LOWER, UPPER = r"(lower|unter|unten|inf|bas\b)", r"(upper|ober|oben|sup|haut\b)"
+ROLES = {"mandible": rf"mandib|unterkiefer|{LOWER}.?(jaw|{TEETH})|({TEETH}|machoire).*{LOWER}",
+         "upper teeth": rf"{UPPER}.*{TEETH}|{TEETH}.*{UPPER}",
+         "maxilla": r"^(?!.*(skull|cran|schae?del)).*(maxil|oberkiefer|upper.?jaw|machoire)",
+         "skin": r"skin|soft|face|haut|weichteil|peau|visage|piel", "skull": r"skull|cran|schae?del|bone"}
+UNDERSTOOD = "skin (Haut, peau, piel), skull (Schädel, crâne, cráneo), mandible (Unterkiefer, mandibule, mandíbula)"
+OUTSIDE = r"table|\btisch|head.?rest|background|hintergrund|^(air|luft)$"
 # Operation → bone, piece that is cut from it, and template.
 OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
                "sagittal split": ("mandible", "jaw", "sagittal_split"),
@@ -92,6 +98,11 @@ def draw(script, *arguments):
     return ""
 
 
+def plain(name):
+    """A name in lower case and without accents."""
+    return "".join(c for c in unicodedata.normalize("NFKD", name.lower()) if not unicodedata.combining(c))
+
+
 class Segmentation:
     """A segmentation of 3D Slicer (.seg.nrrd): labels in one or several layers, with names."""
 
@@ -120,13 +131,13 @@ class Segmentation:
         """Names of the segments of each role that a plan needs; the skin holds all that it surrounds."""
         found = {}
         for name in self.segments:
-            role = next((role for role, words in ROLES.items() if re.search(words, name.lower())), None)
+            role = next((role for role, words in ROLES.items() if re.search(words, plain(name))), None)
             found.setdefault(role, []).append(name)
         upper = found.pop("upper teeth", [])
         if upper:
             found.setdefault("maxilla" if "maxilla" in found else "skull", []).extend(upper)
         if "skin" in found:
-            found["skin"] = [name for name in self.segments if not re.search(OUTSIDE, name.lower())]
+            found["skin"] = [name for name in self.segments if not re.search(OUTSIDE, plain(name))]
         found.pop(None, None)
         return found
 
@@ -180,7 +191,7 @@ def begin_run(folder, operations, inputs):
     scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, whose run has not ended.\n")
 
 
-def extract_labels(labels, folder, work):
+def extract_labels(labels, folder, work, with_skin):
     """Writes a mesh of each bone; without names the largest label is the skull, and that before and below its
     middle the mandible."""
     if labels.name.lower().endswith(".seg.nrrd"):
@@ -188,6 +199,10 @@ def extract_labels(labels, folder, work):
             segmentation = Segmentation(labels)
         map_file = work / "segment.nrrd"
         roles = segmentation.roles()
+        missing = [part for part in NEEDED if part not in roles and (part != "skin" or with_skin)]
+        if missing:
+            refuse(f"{labels}: no segment is named as {' or '.join(missing)} among "
+                   f"{', '.join(segmentation.segments) or 'none'}; names that are understood: {UNDERSTOOD}")
         if "skull" in roles and "maxilla" in roles:  # where landmarks of the skull are searched
             roles["skull_and_maxilla"] = roles["skull"] + roles["maxilla"]
         for role, names in roles.items():
@@ -316,13 +331,10 @@ def main():
         extract_bones(volume, options, folder)
     else:
         with tempfile.TemporaryDirectory(prefix="labels_", dir=folder) as work:
-            extract_labels(labels, folder, pathlib.Path(work))
+            extract_labels(labels, folder, pathlib.Path(work), segmented)
     if not segmented:
         run(program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
             "-largest", "-output", folder / "skin.ply")
-    missing = [part for part in NEEDED if not (folder / f"{part}.ply").exists()]
-    if missing:
-        refuse(f"{labels}: no segment is named as {' or '.join(missing)}: name segments skin, skull, mandible")
     whole = folder / "skull_and_maxilla.ply"
     run(program("repose-landmarks"), folder / "skin.ply", "-skull", whole if whole.exists() else folder / "skull.ply",
         "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")

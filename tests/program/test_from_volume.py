@@ -188,6 +188,29 @@ def test_segments_of_slicer_are_known_by_their_names(tmp_path, end):
     assert (tmp_path / "jaw.nrrd").read_bytes().endswith(b"\n\n" + bytes([0, 1, 1, 0, 0, 0, 0, 0]))
 
 
+@pytest.mark.parametrize("names, roles", [
+    (["Unterkiefer", "Schädel", "Haut", "Oberkiefer", "Zähne unten", "Obere Zähne", "Luft"], "mkhxmx-"),
+    (["mâchoire inférieure", "crâne", "peau", "mâchoire supérieure", "Dents du bas", "dents du haut", "air"], "mkhxmx-"),
+    (["Mandíbula", "Cráneo", "Piel", "Maxilar", "dientes inferiores", "Dientes superiores", "background"], "mkhxmx-"),
+    (["Schädel mit Oberkiefer", "Mandible", "Skin"], "kmh"),
+])
+def test_names_of_segments_are_understood_in_other_languages(tmp_path, names, roles):
+    labels = np.arange(8, dtype="u1").reshape(2, 2, 2)
+    found = plan.Segmentation(volumes.write_segmentation(tmp_path / "head.seg.nrrd", labels, names, (0, 0, 0), 1.0)).roles()
+    for letter, role in (("m", "mandible"), ("k", "skull"), ("x", "maxilla")):
+        assert found.get(role, []) == [name for name, its in zip(names, roles) if its == letter]
+    assert found["skin"] == [name for name, its in zip(names, roles) if its != "-"]
+
+
+def test_segments_whose_names_are_not_understood_are_named(tmp_path, environment):
+    volumes.write_segmentation(tmp_path / "head.seg.nrrd", np.arange(8, dtype="u1").reshape(2, 2, 2),
+                               ["Segment_1", "Żuchwa", "Skin"], (0, 0, 0), 1.0)
+    result = finish([sys.executable, SCRIPT, "head.seg.nrrd", "-operation", "jaw, 5 mm forward"], tmp_path, environment, 60)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1, result
+    assert "no segment is named as skull or mandible among Segment_1, Żuchwa, Skin" in result.stderr
+    assert "mandible (Unterkiefer" in result.stderr
+
+
 def test_segments_that_overlap_are_in_layers(tmp_path):
     labels = np.array([[[[1, 0], [1, 1], [0, 1], [0, 0]]] * 2] * 2, dtype="u1")  # z, y, x, layer
     file = volumes.write_segmentation(tmp_path / "head.seg.nrrd", labels, ["Skin", "Skull"], (0, 0, 0), 1.0)
