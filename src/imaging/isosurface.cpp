@@ -163,8 +163,8 @@ class Marching {
 Surface isosurface(const Volume& volume, double level, VolumeBorder border, const Watch& watch) {
   const auto [minimum, greatest] = value_range(volume);
   if (!(level > minimum && level <= greatest))
-    base::refuse("{}: no surface at level {:g}: its values go from {:g} to {:g}; choose between",
-                 volume.name, level, minimum, greatest);
+    base::refuse("{}: no surface at level {:g}; choose one in between: {}", volume.name, level,
+                 describe_values(volume));
   Surface surface = Marching(volume, level, border).run(watch);
   surface.name = volume.name;
   return surface;

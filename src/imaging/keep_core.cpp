@@ -54,8 +54,8 @@ void widen(const Volume& volume, int axis, int64_t reach, Mask& mask) {
 Volume keep_core(const Volume& volume, double core, double reach) {
   const auto [least, greatest] = value_range(volume);
   if (core > greatest)
-    base::refuse("{}: no value is at or above that of the core, {:g}; values are {:g} to {:g}",
-                 volume.name, core, least, greatest);
+    base::refuse("{}: no value is at or above that of the core, {:g}: {}", volume.name, core,
+                 describe_values(volume));
   Mask kept = largest_part(volume, core);
   for (int axis = 0; axis < 3; ++axis)
     widen(volume, axis, std::lround(reach / volume.spacing(axis)), kept);

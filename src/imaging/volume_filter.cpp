@@ -18,6 +18,17 @@ std::array<float, 2> value_range(const Volume& volume) {
   return {minimum, greatest};
 }
 
+std::string describe_values(const Volume& volume) {
+  const auto [minimum, greatest] = value_range(volume);
+  const bool narrow = minimum >= -128 && greatest <= 255;
+  return fmt::format(
+      "its values go from {:g} to {:g}{}", minimum, greatest,
+      narrow
+          ? ", as 8 bits hold them; a CT in Hounsfield units, from -1000 in air to 1000 and more "
+            "in bone, needs 16: export it again"
+          : "");
+}
+
 double otsu_level(const Volume& volume) {
   constexpr int bins = 1024;
   const auto [minimum, greatest] = value_range(volume);

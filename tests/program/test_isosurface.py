@@ -224,6 +224,15 @@ CASES = {
         ["ct.mha", "5000", "its values go from", "1921"]),
     "level below the data": (
         lambda f: v.write_meta(f / "ct.mha", v.samples()), ["-level", "-9000"], ["ct.mha", "-9000"]),
+    "a CT of 8 bits": (
+        lambda f: v.write_nrrd(f / "ct.nrrd", np.clip(v.samples(), -128, 127).astype("<i2")), [],
+        ["no surface at level 1000; choose one in between: its values go from -128 to 127, as 8 bits hold them", "needs 16"]),
+    "the bone of a CT of 8 bits": (
+        lambda f: v.write_nrrd(f / "ct.nrrd", np.clip(v.samples(), -128, 127).astype("<i2"), spacing=3 * v.SPACING), ["-jaw"],
+        ["values of 1000 or more; choose the level of bone: its values go from -128 to 127", "needs 16"]),
+    "the core of a CT of 8 bits": (
+        lambda f: v.write_nrrd(f / "ct.nrrd", np.clip(v.samples(), -128, 127).astype("<i2")), ["-level", "0", "-core", "400"],
+        ["the core, 400: its values go from -128 to 127", "needs 16"]),
     "two levels": (
         lambda f: v.write_meta(f / "ct.mha", v.samples()), ["-otsu"], ["-level", "-otsu"]),
     "a CT as label map": (

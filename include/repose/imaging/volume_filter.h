@@ -1,4 +1,6 @@
 #pragma once
+#include <string>
+
 #include "repose/imaging/volume.h"
 
 /// From one volume to another, or to a number, before a surface is taken from it.
@@ -6,6 +8,10 @@ namespace repose::imaging {
 
 /// Least and greatest value.
 std::array<float, 2> value_range(const Volume& volume);
+
+/// Returns a phrase of the range of values and, where 8 bits hold them, of what Hounsfield units
+/// need.
+std::string describe_values(const Volume& volume);
 
 /// The threshold that parts the values into two classes of greatest between-class variance (Otsu,
 /// 1979), from a histogram of 1024 bins. Throws InputError where all values are equal.

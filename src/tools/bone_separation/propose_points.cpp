@@ -73,8 +73,9 @@ class Head {
       : volume_(volume), level_(level), leveling_(leveling) {
     find_bone();
     if (bone_.empty())
-      base::refuse("{}: no part of {:g} cm³ has values of {:g} or more; choose the level of bone",
-                   volume.name, part_volume / 1000, level);
+      base::refuse(
+          "{}: no part of {:g} cm³ has values of {:g} or more; choose the level of bone: {}",
+          volume.name, part_volume / 1000, level, imaging::describe_values(volume));
     find_middle();
     find_chin();
     find_teeth();
