@@ -62,17 +62,21 @@ std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job) {
 
 std::string describe_tangents(const std::vector<model::PointField>& fields) {
   int columns = 0, found = 0;
+  bool of_strata = false;
   for (const model::PointField& field : fields) {
     if (!field.name.starts_with("tangent_")) continue;
     ++columns;
+    of_strata = of_strata || field.name.starts_with("tangent_young");
     found += std::ranges::all_of(field.flags, [](const auto& flag) { return flag.second; });
   }
   if (columns == 0) return "";
   const std::string missing =
       found == columns ? "" : "; the others are 0, and their flags finished and convex say why";
-  return report_row("tangents",
-                    "{} of {} derivatives by motions of pieces and stiffnesses of strata{}", found,
-                    columns, missing);
+  return report_row("tangents", "{} of {} derivatives by motions of pieces{}{}", found, columns,
+                    of_strata ? " and stiffnesses of strata"
+                              : "; none by stiffnesses, which need a scene with tissue.material, "
+                                "without turgor, gravity, tone of lips and dilatation: nodal",
+                    missing);
 }
 
 }  // namespace repose::app

@@ -71,8 +71,8 @@ std::string remedy(const solve::Summary& s, bool stretched) {
   if (s.path.last.stopped) return "";
   if (s.pierced_by_instrument.columns > 0)
     return " The instrument is inside tissue or bone, because only points of the skin touch it: "
-           "push it less far, use a finer skin (tissue.edge), or let the skin stick to it "
-           "(skin: stick).";
+           "push it less far, use a finer skin (tissue.edge), keep instruments apart or, where the "
+           "skin slides on it, let it stick (skin: stick).";
   if (s.path.last.overlapped > 0)
     return " Move these bones less, or trim them: repose-collide says where they meet. The tissue "
            "there rests on one of the two alone.";
@@ -159,7 +159,7 @@ std::string describe_pierced(const std::vector<std::string>& bodies, const solve
   if (by.columns > 0)
     text += report_row("pierced by instrument",
                        "{} columns, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; push it "
-                       "less far, use a finer skin (tissue.edge) or skin: stick",
+                       "less far, use a finer skin (tissue.edge) or, where it slides, skin: stick",
                        by.columns, by.depth, bodies[by.body], by.where);
   return text;
 }

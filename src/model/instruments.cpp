@@ -127,23 +127,32 @@ std::optional<Stretch> PushedShape::along(const Vec3& p) const {
 
 namespace {
 
-/// Refuses an instrument that reaches no free column; one to which the skin sticks holds those it
-/// reaches.
+/// Refuses an instrument that reaches no column that is still free; one to which the skin sticks
+/// holds those it reaches.
 void meet(const scene::Instrument& instrument, int32_t number, const std::vector<Vec3>& skin,
           const std::vector<char>& rim, ColumnLoads& loads) {
   const PushedShape shape(instrument);
   const double push = instrument.push.norm();
   bool met = false;
+  int32_t holder = -1;  // of points that it reaches, too
   for (size_t c = 0; c < skin.size() && !(met && instrument.slide); ++c) {
-    if (rim[c] || loads.instrument[c] >= 0) continue;
+    if (rim[c]) continue;
     const auto part = shape.along(skin[c]);
     if (!part || part->enter > push || part->leave <= 0) continue;
+    if (loads.instrument[c] >= 0) {
+      holder = loads.instrument[c];
+      continue;
+    }
     met = true;
     if (instrument.slide) continue;
     loads.instrument[c] = number;
     loads.target[c] = skin[c] + part->leave / push * instrument.push;
   }
-  if (!met) base::refuse("it reaches no free point of the skin; move it or push it farther");
+  if (met) return;
+  if (holder >= 0)
+    base::refuse("all points of the skin that it reaches are held by instruments[{}]; move it",
+                 holder);
+  base::refuse("it reaches no free point of the skin; move it or push it farther");
 }
 
 }  // namespace

@@ -30,7 +30,11 @@ Outcome ForceSearch::run(Vec displacement, double accuracy) {
     if (stage > 0) outcome.displacement_error += moved;
     outcome.converged = stage > 0 && outcome.displacement_error <= accuracy;
     if (outcome.converged) break;
-    outcome.reason = "the minimum still moves as the smoothing of the forces goes down";
+    outcome.reason = fmt::format(
+        "the minimum still moves as the smoothing of the forces goes down: an accuracy of {:g} mm "
+        "is "
+        "finer than the estimate of this functional reaches; choose a larger -accuracy",
+        accuracy);
   }
   outcome.iterations = iterations;
   return outcome;

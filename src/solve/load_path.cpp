@@ -166,7 +166,6 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
                                           : search_.run(displacement, settings_.accuracy);
   result_.iterations += result_.last.iterations;
   require_value(result_.last, result_.load);
-  ++result_.steps;
   objective_.positions().update(displacement);
   refuse_end();
   on_step(result_.last, result_.load, watch.seconds());

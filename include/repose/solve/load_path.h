@@ -46,7 +46,7 @@ struct Halvings {
 struct PathOutcome {
   Outcome last;
   double load = 0;    ///< reached
-  int64_t steps = 0;  ///< accepted
+  int64_t steps = 0;  ///< accepted, without the state at which the path begins
   Halvings halvings;
   int64_t iterations = 0;
   bool leapt = false;  ///< it came from a guess, not along the path

@@ -99,7 +99,7 @@ TEST(LoadPath, EndsWithContactInAutomaticStepsFromTheStart) {
   Path path;
   const solve::PathOutcome result = run_with_contact(path);
   EXPECT_TRUE(result.complete());
-  EXPECT_EQ(result.steps, 5);
+  EXPECT_EQ(result.steps, 4);
   EXPECT_EQ(path.loads, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
   EXPECT_LT(depth(path), 2.5) << "one automatic step";
 }
@@ -119,7 +119,7 @@ TEST(LoadPath, ContinuesAlongItsStepsWhereAutomaticOnesFail) {
   };
   const solve::PathOutcome result = run_with_contact(path);
   EXPECT_TRUE(result.complete());
-  EXPECT_EQ(result.steps, 5);
+  EXPECT_EQ(result.steps, 4);
   EXPECT_GT(depth(path), 3.5) << "four steps";
 }
 
