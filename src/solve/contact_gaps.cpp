@@ -149,6 +149,11 @@ void ContactGaps::set_direction(Vec direction) {
   for (size_t k = 0; k < gaps_.size(); ++k) state_[k].closing = change(gaps_[k], moved_);
 }
 
+void ContactGaps::set_changes(std::span<const double> bodies, std::span<const double> cut_faces) {
+  for (size_t k = 0; k < gaps_.size(); ++k)
+    state_[k].closing = (k < touching_ ? bodies : cut_faces)[gaps_[k].constraint];
+}
+
 double ContactGaps::line_search(double slope, double curvature) const {
   constexpr int max_pieces = 30;
   constexpr double flat = 1e-3;

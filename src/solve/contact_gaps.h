@@ -38,6 +38,9 @@ class ContactGaps {
   void add_forces(Vec to);
   /// Takes δ as the direction in which d changes next. Collective.
   void set_direction(Vec direction);
+  /// Takes changes of gaps, mm [constraints of bodies, of cut faces], in place of those by a
+  /// direction. Not collective.
+  void set_changes(std::span<const double> bodies, std::span<const double> cut_faces);
   /// Adds the forces that the active gaps have by the change of d by the direction. Collective.
   void add_change_of_forces(Vec to);
   /// Returns the share of the direction that leads to the least value, of a function with `slope`

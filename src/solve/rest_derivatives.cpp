@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "held_response.h"
 #include "repose/base/collective.h"
 #include "repose/mechanics/prism_volume.h"
 #include "repose/model/material.h"
@@ -18,52 +19,11 @@ using base::check;
 namespace {
 
 constexpr double difference = 1e-6;  // mm or degrees
-constexpr double close = 1e-4;       // relative residual of the linear solves
-constexpr double stiffer = 16;       // the penalty that holds what presses at its body
-constexpr double apart = 1;          // mm that what does not press would have to come nearer
 
-/// Contact whose active set does not change, while it lives: what presses keeps its pressure at the
-/// present gap and is held there by a stiffer penalty, all else stays off.
-class FrozenContact {
- public:
-  explicit FrozenContact(Problem& problem)
-      : problem_(problem), stiffness_(body_contact().stiffness()) {
-    const auto p = body_contact().multipliers(), q = cut_face_contact().multipliers();
-    touch_multipliers_.assign(p.begin(), p.end());
-    wall_multipliers_.assign(q.begin(), q.end());
-    const auto position = problem.objective().positions().local();
-    body_contact().update_all_gaps(position);
-    cut_face_contact().update_gaps(position);
-    const double stiff = stiffer * stiffness_;
-    const auto frozen = [&](double pressure, double gap) {
-      return pressure != 0 ? pressure + stiff * gap : stiff * (gap - apart);
-    };
-    std::vector<double> pressing(touch_multipliers_.size()), parting(wall_multipliers_.size());
-    for (size_t c = 0; c < pressing.size(); ++c)
-      pressing[c] = frozen(body_contact().pressure(c), body_contact().gaps()[c]);
-    for (size_t w = 0; w < parting.size(); ++w)
-      parting[w] = frozen(cut_face_contact().pressure(w), cut_face_contact().gap(w));
-    set(stiff, pressing, parting);
-  }
-  ~FrozenContact() { set(stiffness_, touch_multipliers_, wall_multipliers_); }
-  FrozenContact(FrozenContact&&) = delete;
-
- private:
-  mechanics::BodyContact& body_contact() { return problem_.objective().contact().bodies(); }
-  mechanics::CutFaceContact& cut_face_contact() {
-    return problem_.objective().contact().cut_faces();
-  }
-  void set(double stiffness, std::span<const double> pressing, std::span<const double> parting) {
-    body_contact().set_stiffness(stiffness);
-    cut_face_contact().set_stiffness(stiffness);
-    body_contact().set_multipliers(pressing);
-    cut_face_contact().set_multipliers(parting);
-    problem_.tangent().forget_contact();
-  }
-
-  Problem& problem_;
-  double stiffness_;
-  std::vector<double> touch_multipliers_, wall_multipliers_;
+/// Derivatives by a parameter with the points that are solved for at rest.
+struct Change {
+  std::vector<Vec3> travel;               // [local points] of fixed points, mm
+  std::vector<double> bodies, cut_faces;  // [constraints] of gaps, mm
 };
 
 scene::Placement changed(scene::Placement placement, int component, double by) {
@@ -71,25 +31,41 @@ scene::Placement changed(scene::Placement placement, int component, double by) {
   return placement;
 }
 
-/// The derivative of the gradient, into `slope`, and of the fixed points, mm, by a component of a
+/// Positions and gaps at the objective's latest evaluation.
+Change state_of(discrete::Objective& objective) {
+  const auto position = objective.positions().local();
+  const auto gaps = objective.contact().bodies().gaps();
+  Change state{{position.begin(), position.end()}, {gaps.begin(), gaps.end()}, {}};
+  const mechanics::CutFaceContact& cut_faces = objective.contact().cut_faces();
+  for (size_t w = 0; w < cut_faces.size(); ++w) state.cut_faces.push_back(cut_faces.gap(w));
+  return state;
+}
+
+/// The derivative of the gradient, into `slope`, and of fixed points and gaps by a component of a
 /// piece's placement.
-std::vector<Vec3> differentiate_by(discrete::Objective& objective, Vec displacement,
-                                   const PlanPiece& piece, int component, Vec slope) {
+Change differentiate_by(discrete::Objective& objective, Vec displacement, const PlanPiece& piece,
+                        int component, Vec slope) {
   discrete::Positions& positions = objective.positions();
   const base::VecHandle before = positions.make_vector();
   const auto evaluate = [&](double by, Vec gradient) {
     const scene::Placement placement = changed(piece.placement, component, by);
     positions.set_motion(piece.bone, scene::motion_of(placement, piece.centroid));
     objective.evaluate(displacement, gradient);
-    return std::vector<Vec3>(positions.local().begin(), positions.local().end());
+    return state_of(objective);
   };
-  const std::vector<Vec3> from = evaluate(-difference, before);
-  std::vector<Vec3> travel = evaluate(difference, slope);
+  const Change from = evaluate(-difference, before);
+  Change to = evaluate(difference, slope);
   check(VecAXPY(slope, -1.0, before));
   check(VecScale(slope, 1 / (2 * difference)));
-  for (size_t i = 0; i < travel.size(); ++i) travel[i] = (travel[i] - from[i]) / (2 * difference);
+  const auto differentiate = [](auto& values, const auto& earlier) {
+    for (size_t i = 0; i < values.size(); ++i)
+      values[i] = (values[i] - earlier[i]) / (2 * difference);
+  };
+  differentiate(to.travel, from.travel);
+  differentiate(to.bodies, from.bodies);
+  differentiate(to.cut_faces, from.cut_faces);
   evaluate(0, before);
-  return travel;
+  return to;
 }
 
 /// Forces of the strata of a solid: the derivatives of ∇Φ by ln E.
@@ -162,72 +138,49 @@ class StrataForces {
   std::vector<std::vector<double>> share_;  // [prisms][strata]
 };
 
-/// The linear solves of derivatives at one rest position.
-class LinearResponse {
- public:
-  LinearResponse(Problem& problem, Vec displacement)
-      : solver_(problem.elastic_solver()), displacement_(displacement) {
-    solver_.refresh(displacement);
-  }
-
-  /// Solves H response = load; 0 where that fails. Collective.
-  void solve(Vec load, Vec response) {
-    convex_ = solver_.solve(displacement_, load, response, close);
-    // Where iterations ran out, the next solve renews the preconditioner or takes factors.
-    if (convex_ && !solver_.finished())
-      convex_ = solver_.solve(displacement_, load, response, close);
-    finished_ = solver_.finished();
-    if (!succeeded()) check(VecSet(response, 0));
-  }
-  bool finished() const { return finished_; }
-  bool convex() const { return convex_; }
-  bool succeeded() const { return finished_ && convex_; }
-
- private:
-  linear::TangentSolver& solver_;
-  Vec displacement_;
-  bool finished_ = false, convex_ = false;
-};
-
 /// The adjoint λ of a scalar Σ w · x: the derivative by a parameter is w · ∂x_b/∂p − λ · ∂(∇Φ)/∂p,
-/// x_b the fixed points.
+/// x_b the fixed points, and that by what holds the gaps.
 class Adjoint {
  public:
-  Adjoint(LinearResponse& response, const discrete::Positions& positions, std::vector<Vec3> weight)
-      : positions_(positions), weight_(std::move(weight)), lambda_(positions.make_vector()) {
-    const base::VecHandle load = positions.make_vector();
+  Adjoint(HeldResponse& response, const discrete::Positions& positions, std::vector<Vec3> weight)
+      : positions_(positions),
+        weight_(std::move(weight)),
+        lambda_(positions.make_vector()),
+        earlier_(positions.make_vector()) {
+    const base::VecHandle load = positions.make_vector(), none = positions.make_vector();
     positions.restrict_to_owned(weight_, load);
-    response.solve(load, lambda_);
+    response.solve(load, none, lambda_, earlier_);
     result_.finished = response.finished();
     result_.convex = response.convex();
   }
 
-  double derivative(Vec slope, std::span<const Vec3> travel) const {
+  double derivative(Vec slope, Vec forces, std::span<const Vec3> travel) const {
     if (!result_.finished || !result_.convex) return 0;
     double carried = 0;
     for (size_t i = 0; i < weight_.size() && !travel.empty(); ++i)
       carried += weight_[i].dot(travel[i]);
     carried = base::sum_over_ranks(positions_.comm(), carried);
-    PetscReal resisted = 0;
+    PetscReal resisted = 0, held = 0;
     check(VecDot(lambda_, slope, &resisted));
-    return carried - resisted;
+    check(VecDot(earlier_, forces, &held));
+    return carried - resisted + held;
   }
   Gradient& result() { return result_; }
 
  private:
   const discrete::Positions& positions_;
   std::vector<Vec3> weight_;  // [owned points]
-  base::VecHandle lambda_;
+  base::VecHandle lambda_, earlier_;
   Gradient result_;
 };
 
 /// The field of a column ∂x/∂p whose fixed points `travel`.
-model::PointField tangent_field(LinearResponse& response, const discrete::Positions& positions,
+model::PointField tangent_field(HeldResponse& response, const discrete::Positions& positions,
                                 const discrete::NaturalRows& natural, const std::string& name,
-                                const char* unit, Vec slope, std::vector<Vec3> travel) {
-  const base::VecHandle column = positions.make_vector();
+                                const char* unit, Vec slope, Vec forces, std::vector<Vec3> travel) {
+  const base::VecHandle column = positions.make_vector(), earlier = positions.make_vector();
   check(VecScale(slope, -1.0));
-  response.solve(slope, column);
+  response.solve(slope, forces, column, earlier);
   if (!response.succeeded()) std::ranges::fill(travel, Vec3::Zero());
   positions.scatter_to_local(column, travel);
   model::PointField field = natural.field(name, travel);
@@ -244,21 +197,23 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
   constexpr std::string_view axes = "xyz";
   discrete::Objective& objective = problem.objective();
   discrete::Positions& positions = objective.positions();
-  const base::VecHandle slope = positions.make_vector();
+  const base::VecHandle slope = positions.make_vector(), forces = positions.make_vector();
   std::optional<Adjoint> adjoint;
   positions.update(displacement);
   objective.contact().place_bodies();
   {
-    const FrozenContact frozen(problem);
-    LinearResponse response(problem, displacement);
+    HeldResponse response(problem, displacement);
     if (!requested.functional.empty())
       adjoint.emplace(response, positions, natural.owned(requested.functional));
-    const auto add = [&](const std::string& name, const char* unit, std::vector<Vec3> travel,
+    const auto add = [&](const std::string& name, const char* unit, Change change,
                          std::vector<double> Gradient::*derivatives) {
-      if (adjoint) (adjoint->result().*derivatives).push_back(adjoint->derivative(slope, travel));
+      response.forces_of_gaps(change.bodies, change.cut_faces, forces);
+      if (adjoint)
+        (adjoint->result().*derivatives)
+            .push_back(adjoint->derivative(slope, forces, change.travel));
       if (requested.fields)
-        fields.push_back(
-            tangent_field(response, positions, natural, name, unit, slope, std::move(travel)));
+        fields.push_back(tangent_field(response, positions, natural, name, unit, slope, forces,
+                                       std::move(change.travel)));
     };
     for (const PlanPiece& piece : requested.pieces)
       for (int c = 0; c < 6; ++c)
@@ -267,10 +222,13 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
             differentiate_by(objective, displacement, piece, c, slope), &Gradient::by_pieces);
     positions.update(displacement);
     const StrataForces strata(positions, requested.strata);
+    const mechanics::BodyContact& bodies = objective.contact().bodies();
+    const Change unchanged{std::vector<Vec3>(positions.local().size(), Vec3::Zero()),
+                           std::vector<double>(bodies.gaps().size(), 0.0),
+                           std::vector<double>(objective.contact().cut_faces().size(), 0.0)};
     for (size_t s = 0; s < requested.strata.size(); ++s) {
       strata.restrict_to_owned(s, slope);
-      add(fmt::format("tangent_young_{}", s), "mm",
-          std::vector<Vec3>(positions.local().size(), Vec3::Zero()), &Gradient::by_strata);
+      add(fmt::format("tangent_young_{}", s), "mm", unchanged, &Gradient::by_strata);
     }
   }
   objective.evaluate(displacement, slope);

@@ -12,12 +12,12 @@ namespace repose::solve {
 /// per degree), <bone> the row of Model::bones, and `tangent_young_<k>` (mm, by ln E of stratum k).
 /// Each solves
 ///     H ∂x/∂p = −∂(∇Φ)/∂p
-/// where points that press on a body stay pressed, and the penalty is 16 times as stiff about their
-/// pressures, which holds them at the body. For a piece the right-hand side is a difference of
-/// gradients with the piece moved by ±1e-6; of a stratum, in which ∇Φ is linear, its forces. The
-/// gradient of a scalar Σ w · x is wᵀ ∂x/∂p by one solve, H λ = w. One preconditioner serves all
-/// right-hand sides. The flags `finished` and `convex` say whether a linear solve reached the
-/// tolerance and met no negative curvature; where either is false its result is 0. Collective.
+/// where points that press on a body stay pressed and at the body (held_response.h). For a piece
+/// the right-hand side is a difference of gradients with the piece moved by ±1e-6; of a stratum, in
+/// which ∇Φ is linear, its forces. The gradient of a scalar Σ w · x is wᵀ ∂x/∂p by one solve,
+/// H λ = w. One preconditioner serves all right-hand sides. The flags `finished` and `convex` say
+/// whether a linear solve reached the tolerance and met no negative curvature; where either is
+/// false its result is 0. Collective.
 std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalRows& natural,
                                       Vec displacement, const Derivatives& requested,
                                       std::vector<model::PointField>& fields);

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT
+from heads import box, write
 from tissue import Tissue, as_springs, last, model_of
 
 SHIPPED = as_springs((PROJECT / "meshes/head_instrument.yaml").read_text()).replace(
@@ -166,3 +167,45 @@ def test_bad_instruments_are_refused_in_one_line(run, folder, case):
     assert len(result.stderr.splitlines()) == 1, result.stderr
     assert [word for word in words if word not in result.stderr] == [], result.stderr
     assert sorted(folder.iterdir()) == before
+
+
+def test_tangents_of_what_slides_along_a_ball_are_differences_of_faces(run, folder):
+    """A flat slab whose material and bone change by little: no point begins or ends to press."""
+    grid = np.arange(-27, 28, 3.0)
+    points = np.array([(x, y, 15) for y in grid for x in grid], float)
+    corner = np.arange(len(points), dtype=np.int32).reshape(len(grid), -1)[:-1, :-1].ravel()
+    right, up = corner + 1, corner + len(grid)
+    write(folder / "slab_skin.ply", points,
+          np.concatenate([np.column_stack([corner, right, up + 1]),
+                          np.column_stack([corner, up + 1, up])]))
+    below = box((-60.0, -60.0, -10.0), (60.0, 60.0, 0.0)).reshape(-1, 3)
+    write(folder / "slab_bone.ply", below, np.arange(36, dtype=np.int32).reshape(-1, 3))
+
+    def solve(name, young, along, *options):
+        (folder / f"{name}.yaml").write_text(f"""skin: slab_skin.ply
+bones: [{{name: base, file: slab_bone.ply}}]
+tissue:
+  layers: 4
+  edge: given
+  attach_within: 200
+  material: {{young: 0.01, poisson: 0.4, strata: [{{thickness: 2, young: {young}, poisson: 0.4}}]}}
+boundary: {{rim: fixed}}
+instruments: [{{sphere: {{center: [4, 1, 21.3], radius: 6}}, push: [0, 0, -1.5], skin: slide}}]
+moves: [{{bone: base, translate: [{along}, 0.2, -0.3]}}]
+""")
+        result = run("repose-solve", f"{name}.yaml", "-accuracy", 1e-7, *options, cwd=folder)
+        assert result.returncode == 0, result
+        return last(folder / f"{name}.h5")
+
+    at = solve("at", 0.05, 0.5, "-tangents")
+    for name, change, ends in (
+            ("tangent_0_tx", 0.002, [(0.05, 0.499), (0.05, 0.501)]),
+            ("tangent_young_0", 0.002, [(0.05 * np.exp(t), 0.5) for t in (-0.001, 0.001)])):
+        first, second = (solve("other", *end) for end in ends)
+        pressed = [np.linalg.norm(step["point/contact_force"], axis=1) > 0
+                   for step in (first, at, second)]
+        assert pressed[0].sum() > 2 and (pressed[0] == pressed[1]).all()
+        assert (pressed[1] == pressed[2]).all()
+        difference = (second["point/position"] - first["point/position"]) / change
+        off = np.linalg.norm(at[f"point/{name}"] - difference, axis=1).max()
+        assert off < 2e-3 * np.linalg.norm(difference, axis=1).max(), name

@@ -63,6 +63,60 @@ TEST(RestDerivatives, AreTheDifferencesOfRestPositions) {
   }
 }
 
+/// `carried` with a plate of the piece that presses on the upper face.
+model::Model pressed(const scene::Placement& placement) {
+  model::Model m = carried(placement, 0);
+  surface::Surface& plate = m.bone_surfaces[0];
+  for (int k = 0; k < 8; ++k)
+    plate.points.emplace_back(k & 1 ? 32 : 8, k & 2 ? 21 : 3, k & 4 ? 10.5 : 0.5);
+  plate.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  m.contact.bodies = {{.name = "piece", .bone = 0}};
+  m.contact.stiffness = 0.005;
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    if (m.points.layer[i] != 0 || m.points.set[i] != PointSet::soft_tissue) continue;
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(20);
+  }
+  return m;
+}
+
+TEST(RestDerivatives, OfWhatSlidesAlongABodyAreDifferencesAndTheAdjointIsTheirTranspose) {
+  constexpr double step = 1e-4;  // mm, degrees
+  const scene::Placement at{{0.3, -0.2, -1.8}, {0.5, -1, 0.4}};
+  solve::Settings settings = testing::settings(1e-9);
+  settings.derivatives.pieces = {{0, centroid, at}};
+  std::vector<Vec3> weight(carried(at).points.position.size(), Vec3::Zero());
+  weight[(2 * columns + 4) * layers] = {1, 0.5, -0.7};  // below the plate
+  settings.derivatives.functional = base::scatter(MPI_COMM_WORLD, weight);
+  const testing::Rest rest = testing::find_rest(pressed(at), settings);
+  ASSERT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  EXPECT_GE(rest.summary.contacts[0].points, 4);
+  ASSERT_TRUE(rest.summary.gradient && rest.summary.gradient->finished);
+  for (int c = 0; c < 6; ++c) {
+    scene::Placement before = at, after = at;
+    (c < 3 ? before.translation : before.rotation)[c % 3] -= step;
+    (c < 3 ? after.translation : after.rotation)[c % 3] += step;
+    const testing::Rest from = testing::find_rest(pressed(before), testing::settings(1e-9)),
+                        to = testing::find_rest(pressed(after), testing::settings(1e-9));
+    const auto field = std::ranges::find(
+        rest.rows.point_fields, fmt::format("tangent_0_{}{}", c < 3 ? 't' : 'r', "xyz"[c % 3]),
+        &model::PointField::name);
+    double error = 0, largest = 0, forward = 0;
+    for (size_t i = 0; i < weight.size(); ++i) {
+      const Vec3 difference = (to.rows.position[i] - from.rows.position[i]) / (2 * step);
+      const Vec3 tangent = Vec3::Map(&field->values[3 * i]);
+      largest = std::max(largest, difference.norm());
+      error = std::max(error, (tangent - difference).norm());
+      forward += weight[i].dot(tangent);
+    }
+    EXPECT_LT(error, 1e-3 * largest) << field->name;
+    EXPECT_NEAR(rest.summary.gradient->by_pieces[c], forward, 1e-3 * largest) << field->name;
+  }
+}
+
 /// `carried` whose prisms of the first layer are `times` as stiff.
 model::Model stiffened(const scene::Placement& placement, double times) {
   model::Model m = carried(placement, 0);

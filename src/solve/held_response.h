@@ -1,0 +1,60 @@
+#pragma once
+#include <vector>
+
+#include "contact_gaps.h"
+#include "repose/solve/problem.h"
+
+namespace repose::solve {
+
+/// Contact whose active set does not change, while it lives: what presses keeps its pressure at the
+/// present gap and has a stiffer penalty about it, all else stays off.
+class FrozenContact {
+ public:
+  explicit FrozenContact(Problem& problem);
+  ~FrozenContact();
+  FrozenContact(FrozenContact&&) = delete;
+
+ private:
+  mechanics::BodyContact& body_contact() { return problem_.objective().contact().bodies(); }
+  mechanics::CutFaceContact& cut_face_contact() {
+    return problem_.objective().contact().cut_faces();
+  }
+  void set(double stiffness, std::span<const double> pressing, std::span<const double> parting);
+
+  Problem& problem_;
+  double stiffness_;
+  std::vector<double> touch_multipliers_, wall_multipliers_;
+};
+
+/// Linear solves with the Hessian at one rest position, the gaps of what presses held: rounds of an
+/// augmented Lagrangian, each of which adds the forces of the changes of gaps that the penalty K
+/// left. Contact is frozen while it lives.
+class HeldResponse {
+ public:
+  HeldResponse(Problem& problem, Vec displacement);  ///< collective
+
+  /// −K ∇gᵀ c, N, of changes c of the gaps of bodies and cut faces that the response is to undo, mm
+  /// [constraints]. Collective.
+  void forces_of_gaps(std::span<const double> bodies, std::span<const double> cut_faces,
+                      Vec forces);
+  /// Solves H x = load with ∇g · x = −c, of which load has the −K ∇gᵀ c in `forces`; 0 where that
+  /// fails. `earlier` is the sum of the iterates before the last one: ∇g K (earlier + x) is what
+  /// holds. Collective.
+  void solve(Vec load, Vec forces, Vec response, Vec earlier);
+  bool finished() const { return finished_; }
+  bool convex() const { return convex_; }
+  bool succeeded() const { return finished_ && convex_; }
+
+ private:
+  void solve_once(Vec response, double tolerance);
+  void hold(Vec forces, Vec response, Vec earlier);
+
+  FrozenContact frozen_;
+  linear::TangentSolver& solver_;
+  Vec displacement_;
+  ContactGaps gaps_;
+  base::VecHandle left_, change_, product_;
+  bool finished_ = false, convex_ = false;
+};
+
+}  // namespace repose::solve
