@@ -21,24 +21,6 @@ double random_sign(uint64_t number) {
   return (bits >> 63) == 0 ? 1.0 : -1.0;
 }
 
-/// Solves with conjugate gradients, as long as it lives, where the preconditioner alone is chosen.
-class CgInPlaceOfPreonly {
- public:
-  explicit CgInPlaceOfPreonly(KSP krylov) : krylov_(krylov) {
-    check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPPREONLY, &replaced_));
-    if (replaced_) check(KSPSetType(krylov_, KSPCG));
-  }
-  ~CgInPlaceOfPreonly() {
-    if (replaced_) static_cast<void>(KSPSetType(krylov_, KSPPREONLY));
-  }
-  CgInPlaceOfPreonly(CgInPlaceOfPreonly&&) = delete;
-  bool replaced() const { return replaced_ == PETSC_TRUE; }
-
- private:
-  KSP krylov_;
-  PetscBool replaced_ = PETSC_FALSE;
-};
-
 }  // namespace
 
 NewtonEstimate::NewtonEstimate(TangentSolver& solver)

@@ -102,4 +102,13 @@ void TangentSolver::product_of_solution(Vec rhs, Vec product) {
   check(VecWAXPY(product, -1.0, left, rhs));
 }
 
+CgInPlaceOfPreonly::CgInPlaceOfPreonly(KSP krylov) : krylov_(krylov) {
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPPREONLY, &replaced_));
+  if (replaced_) check(KSPSetType(krylov_, KSPCG));
+}
+
+CgInPlaceOfPreonly::~CgInPlaceOfPreonly() {
+  if (replaced_) static_cast<void>(KSPSetType(krylov_, KSPPREONLY));
+}
+
 }  // namespace repose::linear

@@ -74,6 +74,7 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) 
 }
 
 bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
+  const linear::CgInPlaceOfPreonly cg(solver_.krylov());
   const std::vector<double> multipliers = gaps_.multipliers();
   bool found = search(displacement, slope, tolerance, step);
   reduced_ = !found;

@@ -100,6 +100,7 @@ void HeldResponse::hold(Vec forces, Vec response, Vec earlier) {
 }
 
 void HeldResponse::solve(Vec load, Vec forces, Vec response, Vec earlier) {
+  const linear::CgInPlaceOfPreonly cg(solver_.krylov());
   check(VecSet(earlier, 0));
   check(VecCopy(load, left_));
   solve_once(response, close);

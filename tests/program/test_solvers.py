@@ -131,3 +131,13 @@ def test_petscs_log_tells_where_the_time_goes(run, tmp_path):
     assert all(re.search(rf"^{event} ", before, re.M) for event in (
         "RpSurfaces", "RpBuild", "RpPartition"))
     assert "There are no unused options" in result.stdout and "type: columns" in result.stdout
+
+
+def test_the_preconditioner_alone_takes_conjugate_gradients_for_contact(run, tmp_path):
+    solid = PROJECT / "meshes/head_solid.yaml"
+    for name, options in ("plain", []), ("alone", ["-ksp_type", "preonly"]):
+        result = run("repose-solve", solid, "-accuracy", 0.02, "-tangents", "-output", name, *options)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        whole = re.search(r"tangents +(\d+) of (\d+) derivatives", result.stdout)
+        assert whole[1] == whole[2] != "0"
+    assert apart(last(tmp_path / "alone.h5"), last(tmp_path / "plain.h5")) <= 0.04

@@ -52,4 +52,18 @@ class TangentSolver {
   bool finished_ = false;
 };
 
+/// Solves with conjugate gradients, as long as it lives, where the preconditioner alone is chosen
+/// (`-ksp_type preonly`), which bounds no residual.
+class CgInPlaceOfPreonly {
+ public:
+  explicit CgInPlaceOfPreonly(KSP krylov);
+  ~CgInPlaceOfPreonly();
+  CgInPlaceOfPreonly(CgInPlaceOfPreonly&&) = delete;
+  bool replaced() const { return replaced_ == PETSC_TRUE; }
+
+ private:
+  KSP krylov_;
+  PetscBool replaced_ = PETSC_FALSE;
+};
+
 }  // namespace repose::linear
