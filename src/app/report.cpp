@@ -189,12 +189,15 @@ std::string describe_penetration(const std::vector<std::string>& bodies, const s
   return text;
 }
 
-std::string describe_other_rest(const solve::Outcome& last) {
-  if (!last.other) return "";
+std::string describe_other_rest(const std::vector<std::string>& bodies,
+                                const solve::Outcome& last) {
+  if (!last.other || bodies.empty()) return "";  // rank 0 has their names
+  std::vector<std::string> names;
+  for (const int32_t body : last.other->bodies) names.push_back(bodies[body]);
   return report_row("other rest position",
                     "the skin is up to {:.2g} mm away there, most at {:.1f} mm: tissue rests on "
-                    "either side of an edge of bone, and this result has less energy",
-                    last.other->distance, last.other->place);
+                    "either side of an edge of {}, and this result has less energy",
+                    last.other->distance, last.other->place, fmt::join(names, " or "));
 }
 
 }  // namespace
@@ -219,7 +222,7 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
                      "bones catch may rest in several ways; move the bones less far together",
                      on.skin.points, on.skin.where);
   }
-  return text + describe_penetration(bodies, s) + describe_other_rest(s.path.last);
+  return text + describe_penetration(bodies, s) + describe_other_rest(bodies, s.path.last);
 }
 
 std::string describe_tearing(const solve::Tearing& t) {
@@ -262,15 +265,15 @@ std::string describe_path(const PathCheck& c) {
       fmt::format("{:.2g} mm apart at most, 95 % within {:.2g} mm", c.largest, c.percentile_95);
   if (c.holds())
     return row(fmt::format("verified: {} the same rest position, {}", repetition, apart));
-  return row(
-      fmt::format("THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about {:.1f} "
-                  "mm; its objective is {:.6g}, that of the result {:.6g}: look there before you "
-                  "trust it; {}",
-                  repetition, apart, c.place, c.again.last.objective, c.objective,
-                  c.springs ? "springs buckle where they are pressed together (raise the volume "
-                              "stiffness, or make the tissue a solid)"
-                            : "tissue folds or catches on an edge of bone there (a finer mesh, or "
-                              "a smaller move, may decide)"));
+  return row(fmt::format(
+      "THE REST POSITION DEPENDS ON IT: {} another one, {}, the farthest about {:.1f} "
+      "mm; its objective is {:.6g}, that of the result {:.6g}: look there before you "
+      "trust it; {}",
+      repetition, apart, c.place, c.again.last.objective, c.objective,
+      c.springs ? "springs buckle where they are pressed together (raise the volume "
+                  "stiffness, or make the tissue a solid)"
+                : "tissue folds or catches on an edge there (a finer mesh, or a smaller "
+                  "move, may decide)"));
 }
 
 std::string describe_stages(const base::Stages& stages) {

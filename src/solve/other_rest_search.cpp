@@ -26,13 +26,21 @@ void OtherRestSearch::begin(Vec prediction) {
   check(VecCopy(prediction, start_));
 }
 
-/// True if a point presses on a body near an edge of it. Collective.
-bool OtherRestSearch::presses_near_edge(Vec displacement) {
+/// Returns the bodies on which points press near edges, ascending. Collective.
+std::vector<int32_t> OtherRestSearch::pressed_near_edges(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   mechanics::BodyContact& contact = objective_.contact().bodies();
   contact.update_gaps(positions.local());
-  return base::on_any_rank(positions.comm(), !contact.other_sides(positions.local()).empty());
+  std::set<int32_t> here;
+  for (const mechanics::LinearGap& gap : contact.other_sides(positions.local()))
+    here.insert(contact.pairs().body[gap.constraint]);
+  const std::vector<int32_t> all =
+      base::gather(positions.comm(), std::vector<int32_t>(here.begin(), here.end()));
+  here.insert(all.begin(), all.end());
+  std::vector<int32_t> bodies(here.begin(), here.end());
+  base::broadcast(positions.comm(), bodies);
+  return bodies;
 }
 
 /// Takes displacements of this rank's points as another rest position of a state of the skin: finds
@@ -166,12 +174,14 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
 
 void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_passes = 3;  // after a change, other points may follow
-  if (!presses_near_edge(displacement)) return;
+  const std::vector<int32_t> bodies = pressed_near_edges(displacement);
+  if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   std::set<size_t> tried;
   consider_other(displacement, accuracy, outcome);
   for (int pass = 0; pass < max_passes; ++pass)
     if (!change_sides(displacement, accuracy, tried, outcome)) break;
+  if (outcome.other) outcome.other->bodies = bodies;
   programs_.evaluate(displacement);
   evaluations_ += objective_.evaluations() - evaluated;
 }

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <set>
+#include <vector>
 
 #include "contact_descent.h"
 #include "contact_sides.h"
@@ -24,7 +26,7 @@ class OtherRestSearch {
 
  private:
   using End = ContactPrograms::End;
-  bool presses_near_edge(Vec displacement);
+  std::vector<int32_t> pressed_near_edges(Vec displacement);
   void consider_other(Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);

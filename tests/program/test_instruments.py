@@ -169,20 +169,21 @@ def test_bad_instruments_are_refused_in_one_line(run, folder, case):
     assert sorted(folder.iterdir()) == before
 
 
-def test_tangents_of_what_slides_along_a_ball_are_differences_of_faces(run, folder):
-    """A flat slab whose material and bone change by little: no point begins or ends to press."""
+@pytest.fixture
+def slab(run, tmp_path):
+    """slab(instrument, young, along, *options) → the run and result of a flat slab on a bone that moves."""
     grid = np.arange(-27, 28, 3.0)
     points = np.array([(x, y, 15) for y in grid for x in grid], float)
     corner = np.arange(len(points), dtype=np.int32).reshape(len(grid), -1)[:-1, :-1].ravel()
     right, up = corner + 1, corner + len(grid)
-    write(folder / "slab_skin.ply", points,
+    write(tmp_path / "slab_skin.ply", points,
           np.concatenate([np.column_stack([corner, right, up + 1]),
                           np.column_stack([corner, up + 1, up])]))
     below = box((-60.0, -60.0, -10.0), (60.0, 60.0, 0.0)).reshape(-1, 3)
-    write(folder / "slab_bone.ply", below, np.arange(36, dtype=np.int32).reshape(-1, 3))
+    write(tmp_path / "slab_bone.ply", below, np.arange(36, dtype=np.int32).reshape(-1, 3))
 
-    def solve(name, young, along, *options):
-        (folder / f"{name}.yaml").write_text(f"""skin: slab_skin.ply
+    def solve(instrument, young, along, *options, ranks=1):
+        (tmp_path / "slab.yaml").write_text(f"""skin: slab_skin.ply
 bones: [{{name: base, file: slab_bone.ply}}]
 tissue:
   layers: 4
@@ -190,18 +191,24 @@ tissue:
   attach_within: 200
   material: {{young: 0.01, poisson: 0.4, strata: [{{thickness: 2, young: {young}, poisson: 0.4}}]}}
 boundary: {{rim: fixed}}
-instruments: [{{sphere: {{center: [4, 1, 21.3], radius: 6}}, push: [0, 0, -1.5], skin: slide}}]
+instruments: [{{{instrument}, skin: slide}}]
 moves: [{{bone: base, translate: [{along}, 0.2, -0.3]}}]
 """)
-        result = run("repose-solve", f"{name}.yaml", "-accuracy", 1e-7, *options, cwd=folder)
+        result = run("repose-solve", "slab.yaml", *options, ranks=ranks)
         assert result.returncode == 0, result
-        return last(folder / f"{name}.h5")
+        return result, last(tmp_path / "slab.h5")
+    return solve
 
-    at = solve("at", 0.05, 0.5, "-tangents")
+
+def test_tangents_of_what_slides_along_a_ball_are_differences_of_faces(slab):
+    """The bone moves by so little that no point begins or ends to press."""
+    ball = "sphere: {center: [4, 1, 21.3], radius: 6}, push: [0, 0, -1.5]"
+    solve = lambda *change: slab(ball, *change, "-accuracy", 1e-7)[1]
+    _, at = slab(ball, 0.05, 0.5, "-accuracy", 1e-7, "-tangents")
     for name, change, ends in (
             ("tangent_0_tx", 0.002, [(0.05, 0.499), (0.05, 0.501)]),
             ("tangent_young_0", 0.002, [(0.05 * np.exp(t), 0.5) for t in (-0.001, 0.001)])):
-        first, second = (solve("other", *end) for end in ends)
+        first, second = (solve(*end) for end in ends)
         pressed = [np.linalg.norm(step["point/contact_force"], axis=1) > 0
                    for step in (first, at, second)]
         assert pressed[0].sum() > 2 and (pressed[0] == pressed[1]).all()
@@ -209,3 +216,11 @@ moves: [{{bone: base, translate: [{along}, 0.2, -0.3]}}]
         difference = (second["point/position"] - first["point/position"]) / change
         off = np.linalg.norm(at[f"point/{name}"] - difference, axis=1).max()
         assert off < 2e-3 * np.linalg.norm(difference, axis=1).max(), name
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_another_rest_position_at_an_edge_names_the_instrument(slab, ranks):
+    plate = "box: {center: [1, -1, 17.3], size: [8, 6, 4]}, push: [2, 0, -2]"
+    result, _ = slab(plate, 0.05, 0, "-accuracy", 0.001, ranks=ranks)
+    assert re.search(r"other rest position .* on either side of an edge of instruments\[0\], and",
+                     result.stdout), result

@@ -29,6 +29,7 @@ struct OtherRest {
   double distance = 0;        ///< mm, the largest of the skin from the one that was chosen
   Vec3 place = Vec3::Zero();  ///< mm, where on the initial skin
   std::vector<Vec3> displacement = {};  ///< mm, [owned points] of this rank
+  std::vector<int32_t> bodies = {};     ///< near edges of which points pressed, ascending
 };
 
 /// Multipliers of contact between two searches, N/mm².
