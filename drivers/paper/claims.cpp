@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "page.h"
 
@@ -36,8 +38,17 @@ const Comparison* find(const Findings& findings, int layers, bool force, bool vo
   return nullptr;
 }
 
-std::string claim(const std::string& title, bool holds, const std::string& why) {
-  return fmt::format("**{}** {} {}\n\n", title, holds ? "Holds." : "Does not hold.", why);
+/// Without a verdict where the runs give none.
+std::string claim(const std::string& title, std::optional<bool> holds, const std::string& why) {
+  const std::string verdict = !holds   ? "Cannot be judged, as too few runs converged."
+                              : *holds ? "Holds."
+                                       : "Does not hold.";
+  return fmt::format("**{}** {} {}\n\n", title, verdict, why);
+}
+
+/// A verdict on a comparison of two sets of runs, of which there must be some that converged.
+std::optional<bool> verdict(bool known, bool holds) {
+  return known ? std::optional(holds) : std::nullopt;
 }
 
 std::string default_times(const Findings& findings, bool force) {
@@ -55,7 +66,8 @@ std::string energy_or_force(const Findings& findings) {
   const Score energy = score(findings, [](const Functional& f) { return !f.force; });
   const Score force = score(findings, [](const Functional& f) { return f.force; });
   return claim(
-      "Energy is faster and more robust than force.", energy.share() > force.share(),
+      "Energy is faster and more robust than force.",
+      verdict(energy.arrived + force.arrived > 0, energy.share() > force.share()),
       fmt::format("Of the one-step searches {} of {} reach a minimum of the energy, {} "
                   "of {} a minimum of the force\nfunctional. Our default, which follows the "
                   "bones, needs {}\nfor the energy and {} for forces without f_v. f_f is "
@@ -87,10 +99,11 @@ std::string volume_ratios(const Findings& findings) {
 std::string closest(const Findings& findings, bool volume) {
   std::string text;
   for (const Comparison& comparison : findings.comparisons)
-    if (comparison.functional.force && comparison.functional.volume == volume &&
-        !comparison.entries.empty())
-      text +=
-          fmt::format("{}{:.2g} mm", text.empty() ? "" : ", ", comparison.entries.front().distance);
+    if (comparison.functional.force && comparison.functional.volume == volume)
+      text += (text.empty() ? "" : ", ") +
+              (comparison.entries.empty()
+                   ? "an unknown distance"
+                   : fmt::format("{:.2g} mm", comparison.entries.front().distance));
   return text;
 }
 
@@ -100,16 +113,18 @@ std::string volume_and_force(const Findings& findings) {
   };
   const Score without = score(findings, of(true, false)), with = score(findings, of(true, true));
   const Score energy = score(findings, of(false, false)), both = score(findings, of(false, true));
-  return claim("f_v helps force minimization.", with.arrived > without.arrived,
+  return claim("f_v helps force minimization.",
+               verdict(with.arrived + without.arrived > 0, with.arrived > without.arrived),
                fmt::format("One-step searches that converge: {} of {} with f_v, {} of {} without "
                            "it. The paper's method\ncame within {} with f_v and {} without it.",
                            with.arrived, with.run, without.arrived, without.run,
                            closest(findings, true), closest(findings, false))) +
          claim(
-             "f_v does not help energy minimization.", both.other >= energy.other,
-             fmt::format("Not in evaluations: with f_v a method that converges takes "
-                         "{}\nthose without. But it makes the minimum unique: {} of {} one-step "
-                         "searches reach another minimum\nwith f_v, {} of {} without.",
+             "f_v does not help energy minimization.",
+             verdict(both.arrived > 0 && energy.arrived > 0, both.other >= energy.other),
+             fmt::format("With f_v a one-step search that converges takes {} the evaluations of "
+                         "that without.\nThose that reach another minimum: {} of {} with f_v, {} "
+                         "of {} without.",
                          volume_ratios(findings), both.other, both.run, energy.other, energy.run));
 }
 
@@ -123,6 +138,11 @@ std::string memory(const Findings& findings) {
     minimum = std::min(minimum, each);
     maximum = std::max(maximum, each);
   }
+  if (findings.sizes.size() < 2)
+    return fmt::format(
+        "**Memory grows linearly.** Cannot be judged from one size. Bytes per "
+        "spring: {}.\n\n",
+        text);
   return claim("Memory grows linearly.", maximum <= 1.5 * minimum,
                fmt::format("Bytes per spring, Newton's method included: {}. From 2 thousand to a "
                            "million points:\n[scaling](scaling.md).",
@@ -151,35 +171,59 @@ std::string evaluations_text(const Entry& e) {
   return fmt::format("{}{}", e.arrived() ? "" : "> ", e.evaluations);
 }
 
+/// The run that arrived with the fewest evaluations, or else may have come nearest to that.
+const Entry& best(const std::vector<Entry>& entries) {
+  const auto order = [](const Entry& e) {
+    return std::pair(e.arrived() ? 0 : e.end == Entry::End::limit ? 1 : 2, e.evaluations);
+  };
+  return *std::ranges::min_element(entries, {}, order);
+}
+
+/// Whether one run needs fewer evaluations than another, where the runs tell.
+std::optional<bool> needs_fewer(const Entry& one, const Entry& other) {
+  const auto exceeds = [](const Entry& ended, const Entry& arrived) {
+    return ended.end == Entry::End::elsewhere || ended.evaluations >= arrived.evaluations;
+  };
+  if (one.arrived() && other.arrived()) return one.evaluations < other.evaluations;
+  if (one.arrived() && exceeds(other, one)) return true;
+  if (other.arrived() && exceeds(one, other)) return false;
+  return {};
+}
+
+/// The verdict on all numbers of layers.
+std::optional<bool> all_of(const std::vector<std::optional<bool>>& verdicts) {
+  const auto no = [](const std::optional<bool>& v) { return v == false; };
+  const auto known = [](const std::optional<bool>& v) { return v.has_value(); };
+  if (std::ranges::any_of(verdicts, no)) return false;
+  return verdict(!verdicts.empty() && std::ranges::all_of(verdicts, known), true);
+}
+
 std::string motion(const Findings& findings) {
   std::string text;
-  bool paper_wins = true, ours_win = true;
+  std::vector<std::optional<bool>> paper_wins, ours_win;
   for (const MotionRun& m : findings.motions) {
     const Comparison* comparison = find(findings, m.layers, false, false);
-    int64_t fewest = INT64_MAX, newton = INT64_MAX;
-    for (const Entry& e : m.entries)
-      if (e.arrived()) fewest = std::min(fewest, e.evaluations);
-    for (const Entry& e : comparison->entries)
-      if (e.arrived()) newton = std::min(newton, e.evaluations);
-    const Entry& paper = comparison->entries.front();
-    paper_wins = paper_wins && paper.arrived() && paper.evaluations < fewest;
-    ours_win = ours_win && newton < fewest;
+    const Entry &paper = comparison->entries.front(), &direct = best(comparison->entries);
+    paper_wins.push_back(needs_fewer(paper, best(m.entries)));
+    ours_win.push_back(needs_fewer(direct, best(m.entries)));
     text += fmt::format(
         "{} layers: {} forces (Euler), {} (Runge–Kutta), against {} values "
         "(Polak–Ribière) and\n{} (best direct method). ",
         m.layers, evaluations_text(m.entries.front()), evaluations_text(m.entries.back()),
-        evaluations_text(paper), newton);
+        evaluations_text(paper), evaluations_text(direct));
   }
+  const std::optional<bool> ours = all_of(ours_win);
   return claim(
              "By the paper's method, direct minimization is faster than integrating the "
              "equations of motion.",
-             paper_wins,
+             all_of(paper_wins),
              text +
                  "\nEuler's figure is for the best damping and step, which follow from the "
                  "modes of the\nrest position. Its one evaluation per step needs no line "
                  "search, on which Brent's method spends most\nof its values.") +
-         claim("The same, by today's direct methods.", ours_win,
-               "Quasi-Newton and Newton methods need the fewest evaluations of all.");
+         claim("The same, by today's direct methods.", ours,
+               ours == true ? "Quasi-Newton and Newton methods need the fewest evaluations of all."
+                            : "Evaluations are those above.");
 }
 
 }  // namespace

@@ -42,6 +42,11 @@ def page(folder):
     return (folder / "paper.md").read_text(encoding="utf-8")
 
 
+def verdicts(claims):
+    """{title: verdict} of the claims."""
+    return dict(re.findall(r"^\*\*(.+?)\*\* (Holds|Does not hold|Cannot be judged)\b", claims, re.M))
+
+
 def test_table_1_is_the_papers(page):
     row = tables(page)[0][0]
     assert row[:4] == ["2", "954 (954)", "5881 (5881)", "874 (1748)"]
@@ -72,8 +77,17 @@ def test_force_rows_and_motion_are_there(page):
 
 def test_every_claim_has_a_verdict(page):
     claims = page.split("## The claims")[1].split("## Figures")[0]
-    verdicts = re.findall(r"^\*\*.+?\*\* (Holds|Does not hold)\.", claims, re.M)
-    assert len(verdicts) == len(re.findall(r"^\*\*", claims, re.M)) == 7
+    assert len(verdicts(claims)) == len(re.findall(r"^\*\*", claims, re.M)) == 7
+
+
+def test_claims_without_converged_runs_are_not_judged(run, tmp_path):
+    for limits in (["-limit", 5], ["-limit", 5, "-seconds", 0.01, "-path_seconds", 0.01]):
+        result = run("repose-paper", "-meshes", MESHES, "-layers", 3, *limits)
+        assert (result.returncode, result.stderr) == (0, ""), result
+        claims = (tmp_path / "paper/paper.md").read_text(encoding="utf-8").split("## The claims")[1]
+        assert "9223372036854775807" not in claims and "within  with" not in claims
+        judged = [title for title, words in verdicts(claims).items() if words != "Cannot be judged"]
+        assert judged == ["No preprocessing."], "the only one that needs no runs"
 
 
 def test_what_the_pictures_need_is_written(folder):
