@@ -19,6 +19,7 @@ constexpr double near = 2;          // mm, of a lip, beside the gap
 constexpr double before = 3;        // mm, that the lower lip lies before what is seen there
 constexpr double overjet = 25;      // mm, that the lower lip lies behind the upper one at most
 constexpr double widest_gap = 40;   // mm
+constexpr double middle = 4;  // mm beside the midline: a tooth or a wire may close some columns
 
 /// Lowest and highest place between open lips, in one column of the map.
 struct Gap {
@@ -60,11 +61,21 @@ std::optional<Gap> gap_between(const FrontMap& skin, double x, double top, doubl
   return std::nullopt;
 }
 
-/// The gap in the midline near a height.
+/// The gap near a height in the column nearest to the midline, if some of those there have one.
 std::optional<Gap> middle_gap(const FrontMap& skin, double z) {
   constexpr double minimum = 1.5, above = 14, below = 12;  // mm
-  const auto gap = gap_between(skin, 0, z + above, z - below);
-  return gap && gap->high - gap->low >= minimum ? gap : std::nullopt;
+  constexpr double parted = 0.3;                           // of the columns
+  std::optional<Gap> nearest;
+  int columns = 0, open = 0;
+  for (double x = 0; x <= middle; x += skin.spacing())
+    for (const int side : {-1, 1}) {
+      const auto gap = gap_between(skin, side * x, z + above, z - below);
+      ++columns;
+      if (!gap || gap->high - gap->low < minimum) continue;
+      ++open;
+      if (!nearest) nearest = gap;
+    }
+  return open >= parted * columns ? nearest : std::nullopt;
 }
 
 /// The height within `climb` of z at which the crease is deepest.
@@ -108,15 +119,18 @@ std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double dep
 }
 
 /// Follows the gap between open lips, and where it ends the crease between lips that touch.
-LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
+LipCrease follow_gap(const FrontMap& skin, const Gap& first) {
   LipCrease crease;
   crease.open = true;
   for (const int side : {-1, 1}) {
-    Gap last = middle;
+    Gap last = first;
     std::vector<Vec3> points;
     for (double x = 0; x <= widest_half; x += skin.spacing()) {
       const auto gap = gap_between(skin, side * x, last.high + near, last.low);
-      if (!gap || (x > 0 && std::abs(gap->middle() - last.middle()) > 2 * climb)) break;
+      if (!gap || (x > 0 && std::abs(gap->middle() - last.middle()) > 2 * climb)) {
+        if (x > middle) break;
+        continue;
+      }
       last = *gap;
       crease.gap = std::max(crease.gap, gap->high - gap->low);
       const double edge = gap->high + skin.spacing();
@@ -130,7 +144,8 @@ LipCrease follow_gap(const FrontMap& skin, const Gap& middle) {
       std::reverse(points.begin(), points.end());
       crease.points = points;
     } else {
-      crease.points.insert(crease.points.end(), points.begin() + 1, points.end());
+      const bool shared = !crease.points.empty() && points.front().x() == 0;
+      crease.points.insert(crease.points.end(), points.begin() + shared, points.end());
     }
   }
   return crease;

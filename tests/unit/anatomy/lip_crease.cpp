@@ -41,6 +41,20 @@ TEST(LipCrease, OpenLipsAreThoseOfTheGapAndNotWhatIsSeenThroughIt) {
   for (const Vec3& point : crease.points) EXPECT_NEAR(point.y(), 0, 0.1);
 }
 
+TEST(LipCrease, AWireInTheMidlineClosesNoMouth) {
+  surface::Surface skin = open_face();
+  add(skin, 2, {-1, -12}, {1, -3});
+  const FrontMap map(skin, HeadFrame{});
+  const auto gap = open_mouth(map, 1);
+  ASSERT_TRUE(gap);
+  const LipCrease crease = follow_crease(map, *gap, {}, {});
+  EXPECT_TRUE(crease.open);
+  EXPECT_NEAR(crease.points.front().x(), -20, 1);
+  EXPECT_NEAR(crease.points.back().x(), 20, 1);
+  for (size_t i = 1; i < crease.points.size(); ++i)
+    EXPECT_GT(crease.points[i].x(), crease.points[i - 1].x());
+}
+
 TEST(LipCrease, ASideOnWhichItIsLostIsFollowedAsFarAsTheOther) {
   surface::Surface skin;
   add(skin, 0, {-50, -2}, {50, 40});
