@@ -1,6 +1,7 @@
 """repose-check on contact: it measures by the bones' triangles, so that a result which is wrong
 about them is refused, whatever wrote it."""
 
+import re
 import shutil
 
 import h5py
@@ -145,7 +146,7 @@ def test_a_wrong_gap_between_the_sides_of_a_cut_is_refused(parted, tmp_path, env
     file = tmp_path / "spoiled.h5"
     shutil.copyfile(parted, file)
     with h5py.File(file, "r+") as h5:
-        wall = h5["model/contact/wall"]
+        wall = h5["model/contact/wall/point"]
         columns, rows = wall["net"][0]
         touching = np.flatnonzero(wall["area"][:columns * rows] > 0)
         point = wall["point"][wall["begin"][touching[len(touching) // 2]]]
@@ -251,3 +252,13 @@ SPOILED_ADHESION = {
 @pytest.mark.parametrize("case", SPOILED_ADHESION)
 def test_a_result_that_is_wrong_about_adhesion_is_refused(adhering, tmp_path, environment, case):
     refused(adhering, tmp_path, environment, *SPOILED_ADHESION[case])
+
+
+def test_pressures_that_are_not_checked_are_counted(run, tmp_path):
+    done = run("repose-solve", PROJECT / "meshes/head_incision.yaml", "-output", "cut")
+    assert done.returncode == 0, done
+    with h5py.File(tmp_path / "cut.h5", "r+") as h5:
+        walls = np.unique(h5["model/contact/wall/point"][:])
+        last_step(h5)["point/contact_pressure"][walls] = 1e-3
+    done = run("repose-check", "cut.h5")
+    assert re.search(rf"point/contact_pressure +{len(walls)}  NOT CHECKED", done.stdout), done.stdout

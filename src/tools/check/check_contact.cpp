@@ -353,7 +353,7 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
   constexpr double steepest = 10;                                        // of w, times the area
   const double rounding = 1e-5 / std::min(1.0, model_.contact.spacing);  // of grids of floats
   Worst aside, unequal, too_large;
-  int64_t recomputed = 0, others = 0;
+  int64_t others = 0;
   for (size_t i = 0; i < position_.size(); ++i) {
     const AtPoint& point = truth_.points[i];
     const Vec3 stated = Vec3::Map(force.data() + 3 * i);
@@ -377,7 +377,7 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
           i, name_of(point.pressing.front()), stated, sum);
     });
     const bool known = w.norm() < steepest && (rows * w - ones).norm() < 1e-9;
-    ++(known ? recomputed : others);
+    others += !known;
     if (known)
       unequal.offer(std::abs(pressed - w.dot(stated)) - rounding * w.norm() * size, [&] {
         return fmt::format(
@@ -392,9 +392,8 @@ void Claims::check_forces(const std::vector<double>& pressure, const std::vector
       });
   }
   aside.state("contact forces are along the gradients of distances", comparison_);
-  unequal.state(fmt::format("contact pressures are those of the forces ({} recomputed, {} not)",
-                            recomputed, others),
-                comparison_);
+  unequal.state("contact pressures are those of the forces", comparison_);
+  comparison_.unchecked("point/contact_pressure", others);
   too_large.state("contact forces are no larger than pressure times area", comparison_);
 }
 

@@ -148,8 +148,10 @@ std::string Comparison::summary() const {
     text += fmt::format("{:25} {:>10} {:>17.10g} {:>17.10g} {:>11.1e}  {:10} {}\n", row.name,
                         row.entries, row.stored, row.recomputed, row.difference, row.section,
                         verdict(row));
-  return text + others(Row::range_only, "ranges that hold") +
-         others(Row::stated, "statements that hold");
+  text += others(Row::range_only, "ranges that hold") + others(Row::stated, "statements that hold");
+  for (const auto& [name, numbers] : unchecked_)
+    if (numbers > 0) text += fmt::format("{:25} {:>10}  NOT CHECKED\n", name, numbers);
+  return text;
 }
 
 }  // namespace repose::tools::check

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ class Comparison {
   void range(const std::string& name, double stored, double minimum, double maximum);
   /// A statement about the file that holds or does not.
   void statement(const std::string& text, bool holds);
+  /// Adds numbers that cannot be checked.
+  void unchecked(const std::string& name, int64_t numbers) { unchecked_[name] += numbers; }
 
   double tolerance() const { return tolerance_; }
   int64_t compared() const { return compared_; }
@@ -36,7 +39,7 @@ class Comparison {
   std::string table() const;
   /// One line for each name that was recomputed, of its worst row in any section, with the number
   /// of entries that it stands for; one line for all ranges and one for all statements, and those
-  /// that do not hold.
+  /// that do not hold; one line for each name of which numbers were not checked.
   std::string summary() const;
 
  private:
@@ -56,6 +59,7 @@ class Comparison {
   double tolerance_;
   std::string section_;
   std::vector<Row> rows_;
+  std::map<std::string, int64_t> unchecked_;
   int64_t compared_ = 0, disagreeing_ = 0;
 };
 
