@@ -146,7 +146,7 @@ def test_a_wrong_gap_between_the_sides_of_a_cut_is_refused(parted, tmp_path, env
     file = tmp_path / "spoiled.h5"
     shutil.copyfile(parted, file)
     with h5py.File(file, "r+") as h5:
-        wall = h5["model/contact/wall/point"]
+        wall = h5["model/contact/wall"]
         columns, rows = wall["net"][0]
         touching = np.flatnonzero(wall["area"][:columns * rows] > 0)
         point = wall["point"][wall["begin"][touching[len(touching) // 2]]]
