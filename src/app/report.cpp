@@ -88,6 +88,11 @@ std::string remedy(const solve::Summary& s, bool stretched) {
            "contact.grid to the program, or move less.";
   if (!std::isfinite(s.last.displacement_error))
     return " Bring the stiffnesses of the tissue closer together.";
+  if (s.path.last.too_fine)
+    return fmt::format(
+        " The accuracy is finer than the estimate of this functional reaches: try -accuracy "
+        "{:.1g} or larger.",
+        10 * s.last.displacement_error);
   return " Check the units and stiffnesses, move the bones less, or try more -load_steps.";
 }
 

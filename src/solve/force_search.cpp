@@ -9,14 +9,17 @@ using base::check;
 ForceSearch::ForceSearch(discrete::ForceFunctional& functional, Minimizer& minimizer)
     : functional_(functional),
       minimizer_(minimizer),
-      before_(functional.positions().make_vector()) {}
+      before_(functional.positions().make_vector()),
+      nearest_(functional.positions().make_vector()) {}
 
 Outcome ForceSearch::run(Vec displacement, double accuracy) {
   constexpr int max_stages = 10;
   constexpr double shrink = 0.1, minimum = 1e-6;  // of ε, at each stage and N at last
+  constexpr double fine = 0.1;                    // mm, of estimates that rounding limits
   const bool same_minimum = functional_.weights().volume == mechanics::VolumeTerm::none;
   double epsilon = std::max(functional_.largest_force(displacement), minimum);
-  Outcome outcome;
+  Outcome outcome, nearest;
+  double nearest_epsilon = epsilon;
   int64_t iterations = 0;
   for (int stage = 0; stage < max_stages; ++stage, epsilon *= shrink) {
     functional_.set_epsilon(epsilon);
@@ -30,11 +33,19 @@ Outcome ForceSearch::run(Vec displacement, double accuracy) {
     if (stage > 0) outcome.displacement_error += moved;
     outcome.converged = stage > 0 && outcome.displacement_error <= accuracy;
     if (outcome.converged) break;
-    outcome.reason = fmt::format(
-        "the minimum still moves as the smoothing of the forces goes down: an accuracy of {:g} mm "
-        "is "
-        "finer than the estimate of this functional reaches; choose a larger -accuracy",
-        accuracy);
+    if (!same_minimum)
+      outcome.reason = "the minimum still moves as the smoothing of the forces goes down";
+    // At the smallest ε rounding keeps the estimate from getting better.
+    if (stage > 1 && !(outcome.displacement_error < nearest.displacement_error)) continue;
+    nearest = outcome;
+    nearest_epsilon = epsilon;
+    check(VecCopy(displacement, nearest_));
+  }
+  if (!outcome.converged && !outcome.stopped) {
+    outcome = nearest;
+    outcome.too_fine = !same_minimum && outcome.displacement_error < fine;
+    functional_.set_epsilon(nearest_epsilon);
+    check(VecCopy(nearest_, displacement));
   }
   outcome.iterations = iterations;
   return outcome;

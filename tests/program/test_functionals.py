@@ -1,10 +1,13 @@
 """The force functional: where it must meet the energy, what the result holds, and what is refused."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from conftest import PROJECT
+from heads import box, write
 from tissue import Tissue, apart, last, model_of, steps
 
 ADVANCE, OPENING = "paper_jaw_advance.yaml", "paper_jaw_opening.yaml"
@@ -89,6 +92,36 @@ def test_first_order_force_that_runs_out_of_steps_says_so(run, tmp_path):
                  "-functional", "force", "-tao_type", "lmvm", "-tao_max_it", 3, "-accuracy", 1e-6, "-output", "short")
     assert result.returncode == 2 and "NOT CONVERGED" in result.stdout
     assert last(tmp_path / "short.h5")["converged"] == 0
+
+
+def test_an_accuracy_finer_than_rounding_allows_is_named_with_one_that_is_reached(run, tmp_path):
+    x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(-12, 12, 5), np.linspace(-9, 9, 4)))
+    corner = np.arange(20, dtype=np.int32).reshape(4, 5)[:-1, :-1].ravel()
+    write(tmp_path / "skin.ply", np.column_stack([x, y, 8 + 0.02 * x**2 + 0.3 * np.sin(y)]),
+          np.concatenate([np.column_stack([corner, corner + 1, corner + 6]),
+                          np.column_stack([corner, corner + 6, corner + 5])]))
+    below = box((-40.0, -35.0, -12.0), (40.0, 35.0, 0.0)).reshape(-1, 3)
+    write(tmp_path / "bone.ply", below, np.arange(36, dtype=np.int32).reshape(-1, 3))
+    (tmp_path / "sheet.yaml").write_text("""skin: skin.ply
+bones: [{name: base, file: bone.ply}]
+tissue:
+  layers: 3
+  edge: given
+  attach_within: 200
+  springs: {default: {stiffness: 0.5, law: quartic, reference: 1.0}}
+boundary: {rim: free}
+forces: [{at: [3, 2, 8], radius: 8, force: [0.4, 0.3, -0.05]}]
+moves: [{bone: base, translate: [1.5, 0.2, 1.0]}]
+solve: {functional: force, volume: {form: paper}}
+""")
+    solve = lambda accuracy: run("repose-solve", "sheet.yaml", "-accuracy", accuracy)
+    result = solve(1e-8)
+    assert result.returncode == 2 and "more -load_steps" not in result.stdout, result
+    looser = re.search(r"than the estimate of this functional reaches: try -accuracy (\S+) or larger",
+                       result.stdout)
+    fine = last(tmp_path / "sheet.h5")
+    assert looser and fine["displacement_error"] < float(looser[1]) < 1e-2, result
+    assert solve(looser[1]).returncode == 0
 
 
 def test_force_takes_no_penalty(run, tmp_path):

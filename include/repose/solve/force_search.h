@@ -5,7 +5,8 @@
 namespace repose::solve {
 
 /// Finds the rest position as the minimum of the force functional, whose smoothing ε goes down
-/// towards zero. Without volume term every ε has the same minimum, F = 0.
+/// towards zero. Without volume term every ε has the same minimum, F = 0. Where none is within the
+/// accuracy, the state with the smallest estimate is returned.
 class ForceSearch : public RestSearch {
  public:
   ForceSearch(discrete::ForceFunctional& functional, Minimizer& minimizer);
@@ -14,7 +15,7 @@ class ForceSearch : public RestSearch {
  private:
   discrete::ForceFunctional& functional_;
   Minimizer& minimizer_;
-  base::VecHandle before_;
+  base::VecHandle before_, nearest_;
 };
 
 }  // namespace repose::solve

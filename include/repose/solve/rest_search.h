@@ -42,6 +42,7 @@ struct Outcome {
   bool converged = false;         ///< the estimated distance is below the accuracy requested
   bool stopped = false;           ///< it was stopped early
   bool stable = false;            ///< no negative curvature was met at the end
+  bool too_fine = false;          ///< not converged, as rounding limits the estimated distance
   double displacement_error = 0;  ///< mm, estimate of the largest distance to the rest position
   double objective = 0;
   double gradient_max = 0;  ///< N
