@@ -28,6 +28,8 @@ struct Job {
   std::vector<std::string> bodies;         ///< that the tissue may touch, on rank 0
   std::vector<model::Cut> cuts;            ///< on rank 0
   std::optional<double> tearing;           ///< N, on rank 0
+  /// Of the scene's material, on all ranks.
+  std::vector<scene::MaterialRegion> regions;
 };
 
 /// Reads a scene (.yaml) with changes or a model (.h5), builds the scene's model with its initial

@@ -10,6 +10,7 @@
 #include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/model/material.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/landmark_names.h"
@@ -68,6 +69,7 @@ struct PlanSession::State {
   std::vector<Piece> pieces;
   std::vector<solve::PlanPiece> plan;
   std::vector<solve::Stratum> strata;
+  std::vector<char> in_region;  // as in solve::Derivatives
   scene::Plan box;
   solve::Settings settings;
   std::list<Base> bases;  // the latest first
@@ -191,6 +193,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
   s.settings.finds_other_rest = false;
   s.plan = plan_pieces(comm, s.job);
   s.strata = plan_strata(comm, s.job);
+  s.in_region = model::in_regions(s.job.regions, s.job.local_model.part.model);
   for (const solve::PlanPiece& piece : s.plan) {
     std::string name =
         base::rank(comm) == 0 ? s.job.local_model.global_metadata.bones[piece.bone] : "";
@@ -244,7 +247,8 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   with.path.accuracy = request.accuracy;
   with.finds_other_rest = request.other_rest;
   with.abandoned = request.abandoned;
-  with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional)};
+  with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional),
+                      s.in_region};
   answer.summary = s.search(with, start);
   answer.from_base = answer.summary.path.leapt;
   answer.position = base::gather(s.comm, s.last->second.position);

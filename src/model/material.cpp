@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <unordered_map>
 
 #include "region.h"
 #include "repose/base/error.h"
@@ -78,26 +79,32 @@ void set_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
   prisms.modulus[prism] = here.volume;
 }
 
-Place place_of(const Model& model, size_t m) {
-  Vec3 skin = Vec3::Zero();
-  for (int c = 0; c < 3; ++c) {
-    const int64_t p = model.prisms.points[m][c];
-    skin += model.points.position[p - model.points.layer[p]] / 3;
-  }
-  return {middle_of(corners_of(model, m)), skin};
+/// `skin` [points] is the row of the point at the top of the column.
+Place place_of(const Model& model, size_t m, const std::vector<int64_t>& skin) {
+  Vec3 top = Vec3::Zero();
+  for (int c = 0; c < 3; ++c) top += model.points.position[skin[model.prisms.points[m][c]]] / 3;
+  return {middle_of(corners_of(model, m)), top};
+}
+
+/// Calls visit(prism) for each prism that a region holds.
+template <class Visit>
+void for_each_prism_in(const scene::MaterialRegion& region, const Model& model,
+                       const std::vector<int64_t>& skin, const Visit& visit) {
+  const Inside inside = inside_of(region.where);
+  for (size_t m = 0; m < model.prisms.points.size(); ++m)
+    if (inside(place_of(model, m, skin))) visit(m);
 }
 
 /// [regions] how many prisms each holds.
-std::vector<int64_t> set_region_moduli(const scene::Material& material, Model& model) {
+std::vector<int64_t> set_region_moduli(const scene::Material& material,
+                                       const std::vector<int64_t>& skin, Model& model) {
   std::vector<int64_t> found;
   for (const scene::MaterialRegion& region : material.regions) {
-    const Inside inside = inside_of(region.where);
     found.push_back(0);
-    for (size_t m = 0; m < model.prisms.points.size(); ++m) {
-      if (!inside(place_of(model, m))) continue;
+    for_each_prism_in(region, model, skin, [&](size_t m) {
       set_moduli(moduli(region.elasticity), m, model.prisms);
       ++found.back();
-    }
+    });
   }
   return found;
 }
@@ -242,6 +249,25 @@ void assemble_edges(const std::string& file, Model& model) {
   }
 }
 
+std::vector<int64_t> skin_rows(const Points& points) {
+  std::unordered_map<int64_t, int64_t> top;
+  for (size_t i = 0; i < points.layer.size(); ++i)
+    if (points.layer[i] == 0) top[points.column[i]] = static_cast<int64_t>(i);
+  std::vector<int64_t> rows;
+  for (const int64_t column : points.column) rows.push_back(top.at(column));
+  return rows;
+}
+
+std::vector<char> in_regions(const std::vector<scene::MaterialRegion>& regions,
+                             const Model& model) {
+  std::vector<char> held(model.prisms.points.size(), 0);
+  if (regions.empty()) return held;
+  const std::vector<int64_t> skin = skin_rows(model.points);
+  for (const scene::MaterialRegion& region : regions)
+    for_each_prism_in(region, model, skin, [&](size_t m) { held[m] = 1; });
+  return held;
+}
+
 std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string& file,
                                   Model& model) {
   const scene::Material& material = *tissue.material;
@@ -254,7 +280,7 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
     skin.push_back(static_cast<int64_t>(i) - model.points.layer[i]);
   for (size_t m = 0; m < count; ++m)
     set_moduli(mean_moduli(material, depth_of(model, prisms.points[m], skin)), m, prisms);
-  std::vector<int64_t> found = set_region_moduli(material, model);
+  std::vector<int64_t> found = set_region_moduli(material, skin, model);
   if (material.dilatation == scene::Dilatation::nodal)
     for (size_t m = 0; m < count; ++m)
       prisms.nodal_modulus.push_back(prisms.modulus[m] - prisms.shear_modulus[m]);

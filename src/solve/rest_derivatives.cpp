@@ -4,7 +4,6 @@
 #include <cmath>
 #include <span>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 
 #include "held_response.h"
@@ -72,14 +71,14 @@ Change differentiate_by(discrete::Objective& objective, Vec displacement, const 
 class StrataForces {
  public:
   /// At the positions' last update.
-  StrataForces(const discrete::Positions& positions, const std::vector<Stratum>& strata)
-      : positions_(positions), strata_(strata) {
-    if (strata.empty()) return;
+  StrataForces(const discrete::Positions& positions, const Derivatives& requested)
+      : positions_(positions), strata_(requested.strata), in_region_(requested.in_region) {
+    if (strata_.empty()) return;
     const model::Model& model = positions.part().model;
     std::vector<double> thickness;
-    for (const Stratum& stratum : std::span(strata).first(strata.size() - 1))
+    for (const Stratum& stratum : std::span(strata_).first(strata_.size() - 1))
       thickness.push_back(stratum.thickness);
-    const std::vector<int64_t> skin = tops(model.points);
+    const std::vector<int64_t> skin = model::skin_rows(model.points);
     for (const auto& prism : model.prisms.points)
       share_.push_back(model::strata_shares(thickness, model::depth_of(model, prism, skin)));
   }
@@ -93,28 +92,8 @@ class StrataForces {
   }
 
  private:
-  /// [local points] The point at the top of the column of each.
-  static std::vector<int64_t> tops(const model::Points& points) {
-    std::unordered_map<int64_t, int64_t> top;
-    for (size_t i = 0; i < points.layer.size(); ++i)
-      if (points.layer[i] == 0) top[points.column[i]] = static_cast<int64_t>(i);
-    std::vector<int64_t> rows;
-    for (const int64_t column : points.column) rows.push_back(top.at(column));
-    return rows;
-  }
-
   /// False for a prism of a region, which has moduli of its own.
-  bool is_of_strata(size_t m) const {
-    constexpr double rounding = 1e-9;
-    const model::Prisms& prisms = positions_.part().model.prisms;
-    double shear = prisms.shear_modulus[m], bulk = prisms.modulus[m];
-    for (size_t s = 0; s < strata_.size(); ++s) {
-      shear -= share_[m][s] * strata_[s].shear;
-      bulk -= share_[m][s] * strata_[s].bulk;
-    }
-    return std::abs(shear) <= rounding * prisms.shear_modulus[m] &&
-           std::abs(bulk) <= rounding * prisms.modulus[m];
-  }
+  bool is_of_strata(size_t m) const { return in_region_.empty() || !in_region_[m]; }
 
   void add(size_t m, double share, size_t stratum, std::vector<Vec3>& force) const {
     const model::Model& model = positions_.part().model;
@@ -135,6 +114,7 @@ class StrataForces {
 
   const discrete::Positions& positions_;
   const std::vector<Stratum>& strata_;
+  const std::vector<char>& in_region_;
   std::vector<std::vector<double>> share_;  // [prisms][strata]
 };
 
@@ -221,7 +201,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
             c < 3 ? "mm/mm" : "mm/degree",
             differentiate_by(objective, displacement, piece, c, slope), &Gradient::by_pieces);
     positions.update(displacement);
-    const StrataForces strata(positions, requested.strata);
+    const StrataForces strata(positions, requested);
     const mechanics::BodyContact& bodies = objective.contact().bodies();
     const Change unchanged{std::vector<Vec3>(positions.local().size(), Vec3::Zero()),
                            std::vector<double>(bodies.gaps().size(), 0.0),

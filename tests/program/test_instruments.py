@@ -171,7 +171,7 @@ def test_bad_instruments_are_refused_in_one_line(run, folder, case):
 
 @pytest.fixture
 def slab(run, tmp_path):
-    """slab(instrument, young, along, *options) → the run and result of a flat slab on a bone that moves."""
+    """slab(instruments, young, along, *options) → the run and result of a flat slab on a bone that moves."""
     grid = np.arange(-27, 28, 3.0)
     points = np.array([(x, y, 15) for y in grid for x in grid], float)
     corner = np.arange(len(points), dtype=np.int32).reshape(len(grid), -1)[:-1, :-1].ravel()
@@ -182,27 +182,27 @@ def slab(run, tmp_path):
     below = box((-60.0, -60.0, -10.0), (60.0, 60.0, 0.0)).reshape(-1, 3)
     write(tmp_path / "slab_bone.ply", below, np.arange(36, dtype=np.int32).reshape(-1, 3))
 
-    def solve(instrument, young, along, *options, ranks=1):
+    def solve(instruments, young, along, *options, deep=0.01, regions="", ranks=1, status=0):
         (tmp_path / "slab.yaml").write_text(f"""skin: slab_skin.ply
 bones: [{{name: base, file: slab_bone.ply}}]
 tissue:
   layers: 4
   edge: given
   attach_within: 200
-  material: {{young: 0.01, poisson: 0.4, strata: [{{thickness: 2, young: {young}, poisson: 0.4}}]}}
+  material: {{young: {deep}, poisson: 0.4, strata: [{{thickness: 2, young: {young}, poisson: 0.4}}]{regions}}}
 boundary: {{rim: fixed}}
-instruments: [{{{instrument}, skin: slide}}]
+instruments: [{instruments}]
 moves: [{{bone: base, translate: [{along}, 0.2, -0.3]}}]
 """)
         result = run("repose-solve", "slab.yaml", *options, ranks=ranks)
-        assert result.returncode == 0, result
-        return result, last(tmp_path / "slab.h5")
+        assert result.returncode == status, result
+        return result, last(tmp_path / "slab.h5") if status != 1 else None
     return solve
 
 
 def test_tangents_of_what_slides_along_a_ball_are_differences_of_faces(slab):
     """The bone moves by so little that no point begins or ends to press."""
-    ball = "sphere: {center: [4, 1, 21.3], radius: 6}, push: [0, 0, -1.5]"
+    ball = "{sphere: {center: [4, 1, 21.3], radius: 6}, push: [0, 0, -1.5], skin: slide}"
     solve = lambda *change: slab(ball, *change, "-accuracy", 1e-7)[1]
     _, at = slab(ball, 0.05, 0.5, "-accuracy", 1e-7, "-tangents")
     for name, change, ends in (
@@ -219,8 +219,28 @@ def test_tangents_of_what_slides_along_a_ball_are_differences_of_faces(slab):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
+def test_a_region_with_the_modulus_of_a_stratum_is_none_of_the_strata(slab, ranks):
+    scar = ", regions: [{sphere: {center: [0, 0, 10], radius: 9}, young: 0.01, poisson: 0.4}]"
+    solve = lambda deep, *options: slab("", 0.05, 0.5, "-accuracy", 1e-6, *options, deep=deep, regions=scar,
+                                        ranks=ranks)[1]
+    column = solve(0.01, "-tangents")["point/tangent_young_1"]
+    ends = [solve(0.01 * np.exp(by))["point/position"] for by in (-0.001, 0.001)]
+    difference = (ends[1] - ends[0]) / 0.002
+    off = np.linalg.norm(column - difference, axis=1).max()
+    assert off < 5e-3 * np.linalg.norm(difference, axis=1).max()
+
+
+def test_points_that_one_instrument_slides_on_and_another_holds_belong_to_the_other(slab):
+    ball = "{sphere: {center: [4, 1, 21.3], radius: 6}, push: [0, 0, -1.5], skin: slide}"
+    plate = "{box: {center: [4, 1, 17.3], size: [20, 20, 4]}, push: [0, 0, -1]}"
+    result, _ = slab(f"{ball}, {plate}", 0.05, 0, status=1)
+    assert "instruments[0]: all points of the skin that it reaches are held by instruments[1]" \
+        in result.stderr, result
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_another_rest_position_at_an_edge_names_the_instrument(slab, ranks):
-    plate = "box: {center: [1, -1, 17.3], size: [8, 6, 4]}, push: [2, 0, -2]"
+    plate = "{box: {center: [1, -1, 17.3], size: [8, 6, 4]}, push: [2, 0, -2], skin: slide}"
     result, _ = slab(plate, 0.05, 0, "-accuracy", 0.001, ranks=ranks)
     assert re.search(r"other rest position .* on either side of an edge of instruments\[0\], and",
                      result.stdout), result

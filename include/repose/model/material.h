@@ -26,6 +26,12 @@ std::vector<double> strata_shares(const std::vector<double>& thickness,
 std::array<double, 2> depth_of(const Model& model, const std::array<int64_t, 6>& prism,
                                const std::vector<int64_t>& skin);
 
+/// [points] The row of the point at the top of the column of each.
+std::vector<int64_t> skin_rows(const Points& points);
+
+/// [prisms] 1 where a region of a material holds a prism. Reads the regions' meshes and volumes.
+std::vector<char> in_regions(const std::vector<scene::MaterialRegion>& regions, const Model& model);
+
 /// Initial positions of a prism's points, mm.
 std::array<Vec3, 6> corners_of(const Model& model, size_t prism);
 

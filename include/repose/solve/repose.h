@@ -44,6 +44,9 @@ struct Derivatives {
   bool fields = true;                  ///< point fields `tangent_…` of the last step
   /// [points] w, this rank's slab: Summary::gradient is that of Σ w · x; empty: none.
   std::vector<Vec3> functional = {};
+  /// [prisms of this rank's part] 1 where a region's material, not that of the strata, is; empty:
+  /// nowhere.
+  std::vector<char> in_region = {};
 
   bool requested() const {
     return (fields || !functional.empty()) && !(pieces.empty() && strata.empty());

@@ -129,6 +129,20 @@ model::Model stiffened(const scene::Placement& placement, double times) {
   return m;
 }
 
+TEST(RestDerivatives, APrismOfARegionIsNoneOfTheStrataThoughItsModuliAre) {
+  const scene::Placement at{{0.5, -1, 0.3}, {4, -2, 6}};
+  const model::Model block = carried(at, 0);
+  const double shear = block.prisms.shear_modulus[0], bulk = block.prisms.modulus[0];
+  solve::Settings settings = testing::settings(1e-8);
+  settings.derivatives.strata = {{0, shear, bulk}};
+  settings.derivatives.in_region.assign(block.prisms.points.size(), 1);
+  const testing::Rest rest = testing::find_rest(block, settings);
+  const auto field =
+      std::ranges::find(rest.rows.point_fields, "tangent_young_0", &model::PointField::name);
+  ASSERT_NE(field, rest.rows.point_fields.end());
+  EXPECT_EQ(std::ranges::count(field->values, 0.0), std::ssize(field->values));
+}
+
 TEST(RestDerivatives, ByStiffnessesAreDifferencesAndTheAdjointIsTheirTranspose) {
   constexpr double step = 1e-3, depth = 3;  // mm, of a layer
   const scene::Placement at{{0.5, -1, 0.3}, {4, -2, 6}};
