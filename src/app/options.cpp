@@ -74,8 +74,8 @@ std::vector<base::Option> run_options() {
        "each."},
       {"tangents", OptionKind::flag, "",
        "Add the derivatives of the rest position by the motions of the plan's pieces, or of the "
-       "bones that move, and by the stiffnesses of the material's strata (without turgor, gravity, "
-       "tone of lips and nodal dilatation), to the result."},
+       "bones that move, and by the stiffnesses of the material's strata (of a scene without "
+       "turgor, gravity and nodal dilatation), to the result."},
       {"monitor_mm", OptionKind::flag, "",
        "Print time, evaluations and the estimated distance to go after each iteration."},
       {.name = "time_limit",

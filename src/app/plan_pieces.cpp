@@ -28,11 +28,9 @@ std::vector<solve::PlanPiece> find_pieces(const Job& job) {
 
 /// On rank 0.
 std::vector<solve::Stratum> find_strata(const Job& job) {
-  if (!job.local_model.part.solid || !job.anatomy || job.initial_equilibrium) return {};
+  if (!job.local_model.part.solid || !job.anatomy || job.reference_state) return {};
   const scene::Tissue& tissue = job.anatomy->scene.tissue;
-  if (!tissue.material || tissue.turgor > 0 ||
-      tissue.material->dilatation == scene::Dilatation::nodal)
-    return {};
+  if (!tissue.material || tissue.material->dilatation == scene::Dilatation::nodal) return {};
   std::vector<solve::Stratum> strata;
   const auto add = [&](double thickness, const scene::Elasticity& elasticity) {
     const model::Moduli moduli = model::moduli(elasticity);
@@ -75,7 +73,7 @@ std::string describe_tangents(const std::vector<model::PointField>& fields) {
   return report_row("tangents", "{} of {} derivatives by motions of pieces{}{}", found, columns,
                     of_strata ? " and stiffnesses of strata"
                               : "; none by stiffnesses, which need a scene with tissue.material, "
-                                "without turgor, gravity, tone of lips and dilatation: nodal",
+                                "without turgor, gravity and dilatation: nodal",
                     missing);
 }
 

@@ -9,8 +9,8 @@ namespace repose::app {
 std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job);
 
 /// Returns the strata by whose stiffnesses a rest position is differentiated, from the skin down:
-/// none where the tissue is springs, the skin is stretched initially (turgor), volumes are
-/// averaged, or an initial equilibrium was found. On all ranks. Collective.
+/// none where the tissue is springs, turgor or gravity is balanced initially, or volumes are
+/// averaged. On all ranks. Collective.
 std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job);
 
 /// Row of the report: how many derivatives were found. On rank 0.

@@ -72,6 +72,28 @@ def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
     assert np.percentile(error, 95) < 0.01 and error.max() < 0.1
 
 
+@pytest.mark.parametrize("change", [
+    ("preset: face", "preset: face, dilatation: nodal"), ("  release: 5 ", "  density: 1.0e-6\n  release: 5 "), ()],
+    ids=["nodal dilatation", "gravity that opens an incision", "neither"])
+def test_tangents_by_stiffnesses_are_left_out_with_the_reason(run, scene, tmp_path, change):
+    path = scene(JAWS % -2)
+    text = path.read_text().replace(*change) if change else path.read_text()
+    if "density" in text:
+        text += ("gravity: [0, 0, -9.8]\nincisions:\n"
+                 "  - {path: [[47, -80, 8], [49, -75, -8], [46.5, -70, -24]], layers: 2}\n")
+    path.write_text(text)
+    result = run("repose-solve", path, "-tangents", "-output", "face")
+    assert result.returncode == 0, result
+    none = bool(change)
+    row = re.search(r"tangents +(\d+) of \d+ .*", result.stdout)
+    assert row[1] == ("12" if none else "13")
+    reason = "none by stiffnesses, which need a scene with tissue.material, without turgor, gravity and"
+    assert (reason in row[0]) == none
+    with h5py.File(tmp_path / "face.h5") as file:
+        last = file["step"][sorted(file["step"])[-1]]["point"]
+        assert any("young" in name for name in last) != none
+
+
 def test_moves_outside_the_plan_are_refused(run, scene):
     for moves, plan, words in (
             (JAWS % -9, PLAN, "plan.box: 'chin' moves out of it: translation -9 mm along y"),
