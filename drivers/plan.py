@@ -45,12 +45,13 @@ except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
 
 # Names of segments in English, German, French and Spanish, without accents.
-TEETH = r"(teeth|tooth|dent|zahn|zaehn|dient)"
-LOWER, UPPER = r"(lower|unter|unten|inf|bas\b)", r"(upper|ober|oben|sup|haut\b)"
-ROLES = {"mandible": rf"mandib|unterkiefer|{LOWER}.?(jaw|{TEETH})|({TEETH}|machoire).*{LOWER}",
-         "upper teeth": rf"{UPPER}.*{TEETH}|{TEETH}.*{UPPER}",
+TEETH = r"teeth|tooth|dent|zahn|zaehn|dient"
+LOWER, UPPER = r"lower|unter|unten|inf|bas\b", r"upper|ober|oben|sup|haut\b"
+ROLES = {"mandible": rf"mandib|unterkiefer|({LOWER}).*jaw|(maxil|machoire).*({LOWER})",
          "maxilla": r"^(?!.*(skull|cran|schae?del)).*(maxil|oberkiefer|upper.?jaw|machoire)",
-         "skin": r"skin|soft|face|haut|weichteil|peau|visage|piel", "skull": r"skull|cran|schae?del|bone"}
+         "skin": r"skin|soft|face|haut|weich|gesicht|peau|mous|visage|piel|bland|\bcara\b",
+         "skull": r"skull|cran|schae?del|bone"}
+NO_BONE = r"sinus|cavit|hohle|airway|hyoid|cervic|vertebr|spine|wirbel"
 UNDERSTOOD = "skin (Haut, peau, piel), skull (Schädel, crâne, cráneo), mandible (Unterkiefer, mandibule, mandíbula)"
 OUTSIDE = r"table|\btisch|head.?rest|background|hintergrund|^(air|luft)$"
 # Operation → bone, piece that is cut from it, and template.
@@ -103,6 +104,17 @@ def plain(name):
     return "".join(c for c in unicodedata.normalize("NFKD", name.lower()) if not unicodedata.combining(c))
 
 
+def role_of(name):
+    """The part that a segment's name stands for; None where it stands for none."""
+    name = re.sub(r"\b(without|ohne|sans|sin)\b.*", "", plain(name))
+    if re.search(NO_BONE, name):
+        return None
+    if re.search(TEETH, name):
+        lower, upper = (re.search(words, name) is not None for words in (LOWER, UPPER))
+        return "teeth" if lower == upper else "mandible" if lower else "upper teeth"
+    return next((role for role, words in ROLES.items() if re.search(words, name)), None)
+
+
 class Segmentation:
     """A segmentation of 3D Slicer (.seg.nrrd): labels in one or several layers, with names."""
 
@@ -112,6 +124,10 @@ class Segmentation:
         self.header = begin.decode(errors="replace").replace("\r", "")
         fields = dict(re.findall(r"^([a-z ]+): *(.*?) *$", self.header, re.M))
         keys = dict(re.findall(r"^(Segment\d+_\w+):=(.*?)\s*$", self.header, re.M))
+        names = [keys[key] for key in keys if key.endswith("_Name")]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice:
+            refuse(f"{file}: two segments are named {twice}: rename one")
         sizes = [int(n) for n in fields["sizes"].split()]
         kinds = {"unsigned char": "u1", "uchar": "u1", "uint8": "u1", "short": "i2", "unsigned short": "u2",
                  "int": "i4", "signed char": "i1"}
@@ -131,8 +147,10 @@ class Segmentation:
         """Names of the segments of each role that a plan needs; the skin holds all that it surrounds."""
         found = {}
         for name in self.segments:
-            role = next((role for role, words in ROLES.items() if re.search(words, plain(name))), None)
-            found.setdefault(role, []).append(name)
+            found.setdefault(role_of(name), []).append(name)
+        if "teeth" in found:
+            refuse(f"{self.file}: {found['teeth'][0]}: not known whether teeth of the upper or the lower jaw: part the "
+                   "segment, and name its parts upper and lower teeth")
         upper = found.pop("upper teeth", [])
         if upper:
             found.setdefault("maxilla" if "maxilla" in found else "skull", []).extend(upper)

@@ -179,7 +179,8 @@ const Entry& best(const std::vector<Entry>& entries) {
   return *std::ranges::min_element(entries, {}, order);
 }
 
-/// Whether one run needs fewer evaluations than another, where the runs tell.
+/// Returns true if one run needs fewer evaluations than another; nothing if the runs do not show
+/// it.
 std::optional<bool> needs_fewer(const Entry& one, const Entry& other) {
   const auto exceeds = [](const Entry& ended, const Entry& arrived) {
     return ended.end == Entry::End::elsewhere || ended.evaluations >= arrived.evaluations;

@@ -26,7 +26,6 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   anatomy.warnings.insert(anatomy.warnings.end(), scene.warnings.begin(), scene.warnings.end());
   anatomy::complete(anatomy.skin, anatomy.scene, anatomy.remarks);
   resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks, anatomy.warnings);
-  report_initial_overlaps(anatomy.bones, scene, anatomy.warnings);
   if (scene.tissue.edge)
     remesh_skin(anatomy);
   else if (!given.obstacle.empty() && !replace_given_skin(anatomy, given.obstacle))

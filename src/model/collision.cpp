@@ -203,55 +203,34 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
   return movers;
 }
 
-/// Warns of bones that end inside others.
-void report_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
+/// Warns of bones that lie inside others before all moves and, if requested, at their end.
+void report_overlaps(std::vector<Mover>& movers, const scene::Scene& scene, bool at_end,
                      std::vector<std::string>& warnings) {
-  constexpr double worth_saying = 1;  // mm: segmented teeth overlap by some tenths
-  const auto as_the_first = [&](const scene::RigidMotion& m) {
-    return move_alike(m, scene.moves[0]);
-  };
-  if (std::all_of(scene.moves.begin(), scene.moves.end(), as_the_first)) return;
-  std::vector<Mover> movers = movers_of(bones, scene.moves);
-  for (size_t i = 0; i < bones.size(); ++i)
-    for (size_t j = i + 1; j < bones.size(); ++j) {
-      if (move_alike(scene.moves[i], scene.moves[j])) continue;
-      if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > worth_saying)
-        warnings.push_back(
-            fmt::format("bones '{}' and '{}' end {:.1f} mm inside one another; repose-collide "
-                        "reports where they meet, and collision: {{mode: clamp}} moves them no "
-                        "farther",
-                        scene.bones[i].name, scene.bones[j].name, depth));
+  constexpr double initial_limit = 2, final_limit = 1;  // mm: segmented teeth overlap by tenths
+  for (size_t i = 0; i < movers.size(); ++i)
+    for (size_t j = i + 1; j < movers.size(); ++j) {
+      const std::string pair =
+          fmt::format("bones '{}' and '{}'", scene.bones[i].name, scene.bones[j].name);
+      if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > initial_limit)
+        warnings.push_back(fmt::format(
+            "{} lie {:.1f} mm inside one another before they move: check that both come from one "
+            "scan and in one frame, or separate their segmentations",
+            pair, depth));
+      if (!at_end || move_alike(movers[i].motion, movers[j].motion)) continue;
+      if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > final_limit)
+        warnings.push_back(fmt::format(
+            "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
+            "collision: {{mode: clamp}} moves them no farther",
+            pair, depth));
     }
 }
 
-}  // namespace
-
-bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
-  constexpr double same = 1e-9;  // largest difference of matrix entries, mm or none
-  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same;
-}
-
-void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
-                             std::vector<std::string>& warnings) {
-  constexpr double worth_saying = 2;  // mm: segmented teeth overlap by some tenths
-  std::vector<Mover> movers = movers_of(bones, scene.moves);
-  for (size_t i = 0; i < bones.size(); ++i)
-    for (size_t j = i + 1; j < bones.size(); ++j)
-      if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > worth_saying)
-        warnings.push_back(fmt::format(
-            "bones '{}' and '{}' lie {:.1f} mm inside one another before they move: check that "
-            "both come from one scan and in one frame, or separate their segmentations",
-            scene.bones[i].name, scene.bones[j].name, depth));
-}
-
-CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
-                             const std::vector<scene::RigidMotion>& moves,
-                             const scene::Collision& requested) {
-  std::vector<Mover> movers = movers_of(bones, moves);
+/// Follows all pairs that move differently.
+CollisionReport follow_all(std::vector<Mover>& movers, const scene::Collision& requested) {
   CollisionReport report;
-  for (size_t i = 0; i < bones.size(); ++i)
-    for (size_t j = i + 1; j < bones.size(); ++j) {
-      if (move_alike(moves[i], moves[j])) continue;
+  for (size_t i = 0; i < movers.size(); ++i)
+    for (size_t j = i + 1; j < movers.size(); ++j) {
+      if (move_alike(movers[i].motion, movers[j].motion)) continue;
       BonePair pair{.a = static_cast<int32_t>(i), .b = static_cast<int32_t>(j), .gap = 0};
       pair.gap = -overlap(movers[i], movers[j], 0).depth;
       if (pair.gap > 0)
@@ -261,6 +240,20 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
       report.pairs.push_back(pair);
     }
   return report;
+}
+
+}  // namespace
+
+bool move_alike(const scene::RigidMotion& a, const scene::RigidMotion& b) {
+  constexpr double same = 1e-9;  // largest difference of matrix entries, mm or none
+  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff() <= same;
+}
+
+CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
+                             const std::vector<scene::RigidMotion>& moves,
+                             const scene::Collision& requested) {
+  std::vector<Mover> movers = movers_of(bones, moves);
+  return follow_all(movers, requested);
 }
 
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,
@@ -297,14 +290,16 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
 
 void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
                         std::vector<std::string>& remarks, std::vector<std::string>& warnings) {
-  if (!scene.collision) return report_overlaps(bones, scene, warnings);
-  const CollisionReport report = follow_moves(bones, scene.moves, *scene.collision);
+  using Mode = scene::CollisionMode;
+  std::vector<Mover> movers = movers_of(bones, scene.moves);
+  report_overlaps(movers, scene, !scene.collision || scene.collision->mode == Mode::report,
+                  warnings);
+  if (!scene.collision) return;
+  const CollisionReport report = follow_all(movers, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
   remarks.insert(remarks.end(), lines.begin(), lines.end());
-  if (scene.collision->mode == scene::CollisionMode::report)
-    return report_overlaps(bones, scene, warnings);
-  if (report.safe_load >= 1) return;
-  if (scene.collision->mode == scene::CollisionMode::stop) {
+  if (scene.collision->mode == Mode::report || report.safe_load >= 1) return;
+  if (scene.collision->mode == Mode::stop) {
     const auto first =
         std::min_element(report.pairs.begin(), report.pairs.end(),
                          [](const BonePair& p, const BonePair& q) { return p.load < q.load; });

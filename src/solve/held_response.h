@@ -6,8 +6,8 @@
 
 namespace repose::solve {
 
-/// Contact whose active set does not change, while it lives: what presses keeps its pressure at the
-/// present gap and has a stiffer penalty about it, all else stays off.
+/// Keeps the active set of contact while it lives: a constraint that presses has its pressure at
+/// the present gap and a stiffer penalty about it, and the others are off.
 class FrozenContact {
  public:
   explicit FrozenContact(Problem& problem);
@@ -26,9 +26,9 @@ class FrozenContact {
   std::vector<double> touch_multipliers_, wall_multipliers_;
 };
 
-/// Linear solves with the Hessian at one rest position, the gaps of what presses held: rounds of an
-/// augmented Lagrangian, each of which adds the forces of the changes of gaps that the penalty K
-/// left. Contact is frozen while it lives.
+/// Solves linear systems with the Hessian at a rest position under the constraint that closed gaps
+/// stay closed, by rounds of an augmented Lagrangian with the penalty K (docs/theory/plan.md).
+/// Contact is frozen while it lives.
 class HeldResponse {
  public:
   HeldResponse(Problem& problem, Vec displacement);  ///< collective

@@ -118,8 +118,8 @@ class StrataForces {
   std::vector<std::vector<double>> share_;  // [prisms][strata]
 };
 
-/// The adjoint λ of a scalar Σ w · x: the derivative by a parameter is w · ∂x_b/∂p − λ · ∂(∇Φ)/∂p,
-/// x_b the fixed points, and that by what holds the gaps.
+/// The adjoint λ of a scalar Σ w · x: the derivative by a parameter is w · ∂x_b/∂p − λ · ∂(∇Φ)/∂p
+/// with x_b the fixed points, and the term of the held gaps (docs/theory/plan.md).
 class Adjoint {
  public:
   Adjoint(HeldResponse& response, const discrete::Positions& positions, std::vector<Vec3> weight)

@@ -193,6 +193,8 @@ def test_segments_of_slicer_are_known_by_their_names(tmp_path, end):
     (["mâchoire inférieure", "crâne", "peau", "mâchoire supérieure", "Dents du bas", "dents du haut", "air"], "mkhxmx-"),
     (["Mandíbula", "Cráneo", "Piel", "Maxilar", "dientes inferiores", "Dientes superiores", "background"], "mkhxmx-"),
     (["Schädel mit Oberkiefer", "Mandible", "Skin"], "kmh"),
+    (["Maxilar inferior", "Skull without mandible", "Tejidos blandos", "Maxilar superior", "Untere Zähne"], "mkhxm"),
+    (["Maxillaire inférieur", "Hyoid bone", "Weichgewebe", "Maxillary sinus", "Cervical spine bone", "Cranium"], "m.h..k"),
 ])
 def test_names_of_segments_are_understood_in_other_languages(tmp_path, names, roles):
     labels = np.arange(8, dtype="u1").reshape(2, 2, 2)
@@ -200,6 +202,18 @@ def test_names_of_segments_are_understood_in_other_languages(tmp_path, names, ro
     for letter, role in (("m", "mandible"), ("k", "skull"), ("x", "maxilla")):
         assert found.get(role, []) == [name for name, its in zip(names, roles) if its == letter]
     assert found["skin"] == [name for name, its in zip(names, roles) if its != "-"]
+
+
+@pytest.mark.parametrize("names, words", [
+    (["Mandible", "Skull", "Skin", "Upper and lower teeth"], "Upper and lower teeth: not known whether"),
+    (["Mandible", "Skull", "Skin", "Zähne"], "Zähne: not known whether"),
+    (["Mandible", "Skull", "Skin", "Mandible"], "two segments are named Mandible"),
+])
+def test_segments_that_are_ambiguous_are_refused(tmp_path, environment, names, words):
+    volumes.write_segmentation(tmp_path / "head.seg.nrrd", np.arange(8, dtype="u1").reshape(2, 2, 2), names, (0, 0, 0), 1.0)
+    result = finish([sys.executable, SCRIPT, "head.seg.nrrd", "-operation", "jaw, 5 mm forward"], tmp_path, environment, 60)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1, result
+    assert f"head.seg.nrrd: {words}" in result.stderr
 
 
 def test_segments_whose_names_are_not_understood_are_named(tmp_path, environment):

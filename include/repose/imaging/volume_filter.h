@@ -9,8 +9,8 @@ namespace repose::imaging {
 /// Least and greatest value.
 std::array<float, 2> value_range(const Volume& volume);
 
-/// Returns a phrase of the range of values and, where 8 bits hold them, of what Hounsfield units
-/// need.
+/// Describes the range of values for a message; where they fit in 8 bits, also the range that
+/// Hounsfield units have.
 std::string describe_values(const Volume& volume);
 
 /// The threshold that parts the values into two classes of greatest between-class variance (Otsu,

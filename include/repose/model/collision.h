@@ -40,14 +40,11 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const scene::Collision& requested);
 
 /// Resolves contacts as the scene requests: moves are shortened, of which a warning is added, and a
-/// remark on each pair. Adds a warning for bones that end more than 1 mm inside one another. Throws
+/// remark on each pair. Adds warnings for bones that lie more than 2 mm inside one another before
+/// all moves and, where no move is shortened, for those that end more than 1 mm so. Throws
 /// InputError naming the scene and the first contact in mode stop.
 void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
                         std::vector<std::string>& remarks, std::vector<std::string>& warnings);
-
-/// Adds a warning for every two bones that lie more than 2 mm inside one another before all moves.
-void report_initial_overlaps(const std::vector<surface::Surface>& bones, const scene::Scene& scene,
-                             std::vector<std::string>& warnings);
 
 /// One line a pair, for a person.
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,

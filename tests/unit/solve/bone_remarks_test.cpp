@@ -23,13 +23,7 @@ solve::Summary move_plate(const Vec3& start, const Vec3& motion, int free = 0) {
   m.contact.bodies.push_back({"plate", 0});
   m.contact.spacing = 0.25;
   m.contact.stiffness = 0.05;
-  for (size_t i = 0; i < m.points.position.size(); ++i) {
-    if (m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
-    m.contact.pairs.body.push_back(0);
-    m.contact.pairs.binding.push_back(model::Binding::touches);
-    m.contact.pairs.area.push_back(25);
-  }
+  testing::add_touching_points(m, 25, false);
   return testing::find_rest(m, testing::settings(1e-3)).summary;
 }
 
@@ -65,13 +59,7 @@ solve::Summary push_ball(double radius, const Vec3& end, const Vec3& push) {
   });
   m.contact.bodies.push_back({"ball", -1, scene::Sphere{end - push, radius}, push});
   m.contact.stiffness = 0.05;
-  for (size_t i = 0; i < m.points.position.size(); ++i) {
-    if (m.points.set[i] != PointSet::soft_tissue || m.points.layer[i] != 0) continue;
-    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
-    m.contact.pairs.body.push_back(0);
-    m.contact.pairs.binding.push_back(model::Binding::touches);
-    m.contact.pairs.area.push_back(25);
-  }
+  testing::add_touching_points(m, 25);
   return testing::find_rest(m, testing::settings(1e-3)).summary;
 }
 

@@ -73,13 +73,7 @@ model::Model pressed(const scene::Placement& placement) {
                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   m.contact.bodies = {{.name = "piece", .bone = 0}};
   m.contact.stiffness = 0.005;
-  for (size_t i = 0; i < m.points.position.size(); ++i) {
-    if (m.points.layer[i] != 0 || m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
-    m.contact.pairs.body.push_back(0);
-    m.contact.pairs.binding.push_back(model::Binding::touches);
-    m.contact.pairs.area.push_back(20);
-  }
+  testing::add_touching_points(m, 20);
   return m;
 }
 

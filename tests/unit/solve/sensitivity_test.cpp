@@ -34,13 +34,7 @@ model::Model pressed(double push) {
   model::Model m = stretched(1.0);
   m.contact.bodies.push_back(
       {"plane", -1, scene::HalfSpace{{0, 0, 0.2}, {0, 0.05, -1}}, {0, 0, -push}});
-  for (size_t i = 0; i < m.points.position.size(); ++i) {
-    if (m.points.layer[i] != 0 || m.points.set[i] != PointSet::soft_tissue) continue;
-    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
-    m.contact.pairs.body.push_back(0);
-    m.contact.pairs.binding.push_back(model::Binding::touches);
-    m.contact.pairs.area.push_back(25);
-  }
+  testing::add_touching_points(m, 25);
   m.contact.stiffness = 0.05;
   return m;
 }

@@ -41,4 +41,16 @@ inline model::Model solid_block(int columns, int rows, int layers, double poisso
   return m;
 }
 
+/// Lets free points, or those of the skin alone, touch the first body; each stands for `area` mm².
+inline void add_touching_points(model::Model& m, double area, bool skin_alone = true) {
+  for (size_t i = 0; i < m.points.position.size(); ++i) {
+    if (m.points.set[i] != model::PointSet::soft_tissue) continue;
+    if (skin_alone && m.points.layer[i] != 0) continue;
+    m.contact.pairs.point.push_back(static_cast<int64_t>(i));
+    m.contact.pairs.body.push_back(0);
+    m.contact.pairs.binding.push_back(model::Binding::touches);
+    m.contact.pairs.area.push_back(area);
+  }
+}
+
 }  // namespace repose::testing
