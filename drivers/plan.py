@@ -147,7 +147,10 @@ class Segmentation:
         """Names of the segments of each role that a plan needs; the skin holds all that it surrounds."""
         found = {}
         for name in self.segments:
-            found.setdefault(role_of(name), []).append(name)
+            role = role_of(name)
+            if role and not self.voxels(name).any():
+                refuse(f"{self.file}: segment {name} holds no voxel: draw it, or delete it")
+            found.setdefault(role, []).append(name)
         if "teeth" in found:
             refuse(f"{self.file}: {found['teeth'][0]}: not known whether teeth of the upper or the lower jaw: part the "
                    "segment, and name its parts upper and lower teeth")
@@ -159,12 +162,15 @@ class Segmentation:
         found.pop(None, None)
         return found
 
+    def voxels(self, name):
+        layer, label = self.segments[name]
+        return self.layers[:, layer] == label
+
     def write(self, names, file):
         """A label map of the segments together, as label 1."""
         mask = np.zeros(len(self.layers), "u1")
         for name in names:
-            layer, label = self.segments[name]
-            mask |= self.layers[:, layer] == label
+            mask |= self.voxels(name)
         fields = {key: value for key, value in re.findall(r"^(space[a-z ]*): *(.*?) *$", self.header, re.M)}
         fields["space directions"] = fields["space directions"].removeprefix("none").strip()
         text = "NRRD0004\ntype: unsigned char\ndimension: 3\n"

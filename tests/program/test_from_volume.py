@@ -208,6 +208,7 @@ def test_names_of_segments_are_understood_in_other_languages(tmp_path, names, ro
     (["Mandible", "Skull", "Skin", "Upper and lower teeth"], "Upper and lower teeth: not known whether"),
     (["Mandible", "Skull", "Skin", "Zähne"], "Zähne: not known whether"),
     (["Mandible", "Skull", "Skin", "Mandible"], "two segments are named Mandible"),
+    (["A", "B", "C", "D", "E", "F", "G", "Mandible"], "segment Mandible holds no voxel"),
 ])
 def test_segments_that_are_ambiguous_are_refused(tmp_path, environment, names, words):
     volumes.write_segmentation(tmp_path / "head.seg.nrrd", np.arange(8, dtype="u1").reshape(2, 2, 2), names, (0, 0, 0), 1.0)
