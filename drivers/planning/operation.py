@@ -53,7 +53,7 @@ BOUNDARIES = {",", ";", ".", "+", "and", "with", "plus", "then"}
 IGNORED = set("a an by of the to patient patient's move moves moved movement osteotomy surgery".split())
 KNOWN = ("name Le Fort I, sagittal split, genioplasty or jaw, with movements in mm (forward, back, up, down, left, "
          "right) or degrees (yaw, roll, pitch, open, close)")
-TOKEN = re.compile(r"(?P<number>((?<![^\s,;:])[-+])?((?<!\w)[.,])?[0-9]+([.,][0-9]+)*)"
+TOKEN = re.compile(r"(?P<number>((?<![^\s,;:])[-+])?(\.|(?<!\w),)?[0-9]+([.,][0-9]+)*)"
                    r"|(?P<word>[^\W\d_]+('s)?|[°,;.+])|(?P<blank>[\s:]+)|(?P<other>.)")
 
 

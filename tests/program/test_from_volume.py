@@ -97,6 +97,7 @@ def test_a_text_is_read_as_operations(text, moves):
     ("genioplasty, 5,5 mm forward", "'5,5' is not a number"),
     ("Le Fort I, 3.5.2 mm forward", "'3.5.2' is not a number"),
     ("jaw .5 mm forward", "'.5' is not a number"),
+    ("BSSO.5 mm forward", "'.5' is not a number"),
     ("Le Fort I 5.mm forward", "'mm' has no number"),
     ("jaw, 5 mm yaw", "yaw is in degrees"),
     ("jaw, 4 degrees forward", "advance is in mm"),
