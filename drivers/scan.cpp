@@ -5,12 +5,14 @@
 ///     repose-scan head.ply -cylinder -max_edge 4 -output head.vtp
 ///
 /// Cuts steps in depth, keeps colors, says how many holes are left. The mesh is in mm; a scan less
-/// than 5 units across is taken to be in meters. Exit status: 0 done, 1 bad input (nothing
-/// written), 3 internal error.
+/// than 5 units across is taken to be in meters, one of 45 or more in mm, and another is refused
+/// without -unit. Exit status: 0 done, 1 bad input (nothing written), 3 internal error.
 #include <algorithm>
 #include <cstdio>
+#include <map>
 
 #include "repose/base/agreement.h"
+#include "repose/base/error.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
 #include "repose/surface/component.h"
@@ -23,14 +25,14 @@ namespace {
 using namespace repose;
 using base::OptionKind;
 
-constexpr double smallest_in_mm = 5;  // a scan less than this across is in meters
+constexpr double largest_in_m = 5, smallest_in_mm = 45;  // units across; cm or inches between
 
 std::vector<base::Option> option_table() {
   return {{.name = "unit",
            .kind = OptionKind::choice,
            .default_text = "auto",
-           .help = "Unit of the file; auto: by its size.",
-           .choices = {"auto", "mm", "m"}},
+           .help = "Unit of the file; auto: mm or m, by its size.",
+           .choices = {"auto", "mm", "cm", "in", "m"}},
           {.name = "max_edge",
            .kind = OptionKind::number,
            .default_text = "auto",
@@ -49,19 +51,36 @@ std::vector<base::Option> option_table() {
           {"output", OptionKind::path, "scan.ply", "The mesh: .ply, .stl, .obj or .vtp."}};
 }
 
+/// The diagonal of the box between the 1st and 99th percentiles of the coordinates: a few stray
+/// points do not change it. 0 for a grid without points.
+double extent_of(const std::vector<Vec3>& points) {
+  if (points.empty()) return 0;
+  Vec3 size;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const Vec3& point : points) along.push_back(point[axis]);
+    std::sort(along.begin(), along.end());
+    const size_t cut = along.size() / 100;
+    size[axis] = along[along.size() - 1 - cut] - along[cut];
+  }
+  return size.norm();
+}
+
 /// mm per unit of the file.
 double scale_of(const base::Options& options, const tools::range_scan::RangeGrid& grid) {
+  static const std::map<std::string, double> scales = {
+      {"mm", 1}, {"cm", 10}, {"in", 25.4}, {"m", 1000}};
   const std::string unit = options.text("unit");
-  if (unit != "auto") return unit == "m" ? 1000 : 1;
-  Vec3 low = Vec3::Constant(1e300), high = -low;
-  for (const Vec3& point : grid.points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
-  const double size = (high - low).norm();
-  if (size >= smallest_in_mm) return 1;
-  std::printf("  %.3g units across: taken as meters (-unit mm says otherwise)\n", size);
-  return 1000;
+  if (unit != "auto") return scales.at(unit);
+  const double size = extent_of(grid.points);
+  if (size >= largest_in_m && size < smallest_in_mm)
+    base::refuse(
+        "{}: {:.3g} units across, expected {:g} or more in mm or less than {:g} in m; give its "
+        "unit by -unit cm, in, mm or m",
+        grid.name, size, smallest_in_mm, largest_in_m);
+  const std::string taken = size < largest_in_m ? "m" : "mm";
+  std::printf("  %.3g units across: taken as %s (-unit says otherwise)\n", size, taken.c_str());
+  return scales.at(taken);
 }
 
 void print_mesh(const std::string& file, const tools::range_scan::ScanMesh& mesh) {

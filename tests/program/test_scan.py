@@ -38,7 +38,7 @@ def test_a_real_scan_becomes_a_mesh(run, tmp_path, name, cells):
     result = run("repose-scan", DATA / f"{name}.ply")
     assert (result.returncode, result.stderr) == (0, ""), result
     assert f"512 × 400 cells, {cells} of them with a point" in result.stdout
-    assert "taken as meters" in result.stdout
+    assert "taken as m (" in result.stdout
     assert "non-manifold" not in result.stdout
     mesh = meshio.read(tmp_path / "scan.ply")
     corners = mesh.points[mesh.cells_dict["triangle"]]
@@ -64,6 +64,34 @@ def test_the_largest_component_alone(run):
     result = run("repose-scan", DATA / "bun000.ply", "-largest")
     assert result.returncode == 0
     assert "1 component" in result.stdout and "smaller components left out" in result.stdout
+
+
+def flat_scan(step, stray=None):
+    """A grid of 21 × 21 points in a square of 20 steps; the first is `stray`."""
+    points = [[x * step, y * step, 0] for y in range(21) for x in range(21)]
+    points[0] = stray or points[0]
+    text = GRID.replace("_cols 3", "_cols 21").replace("_rows 2", "_rows 21")
+    text = re.sub("(vertex|range_grid) 6", r"\1 441", text)
+    return text + "".join(f"{x} {y} {z} 9 9 9\n" for x, y, z in points) + "".join(f"1 {i}\n" for i in range(441))
+
+
+@pytest.mark.parametrize("unit, scale, options", [
+    ("m", 1000, []), ("mm", 1, []), ("m", 1000, ["-unit", "m"]), ("cm", 10, ["-unit", "cm"]),
+    ("in", 25.4, ["-unit", "in"])])
+def test_one_stray_point_does_not_change_the_unit(run, tmp_path, unit, scale, options):
+    (tmp_path / "range.ply").write_text(flat_scan(10 / scale, [10000, 0, 0]))
+    result = run("repose-scan", "range.ply", *options)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert options or f"units across: taken as {unit} (" in result.stdout
+    assert np.ptp(meshio.read(tmp_path / "scan.ply").points, axis=0)[:2] == pytest.approx(200, rel=1e-3)
+
+
+@pytest.mark.parametrize("across", [5, 10, 40])
+def test_a_scan_neither_in_mm_nor_in_m_needs_its_unit(run, tmp_path, across):
+    (tmp_path / "range.ply").write_text(flat_scan(across / 20 / 2**0.5 * 1.001))
+    result = run("repose-scan", "range.ply")
+    assert result.returncode == 1 and "-unit cm, in, mm or m" in result.stderr, result
+    assert not (tmp_path / "scan.ply").exists()
 
 
 def test_colors_are_kept(run, tmp_path):

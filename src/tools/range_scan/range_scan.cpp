@@ -66,12 +66,14 @@ Vec3 to_scanner(const std::vector<Vec3>& points, const Triangle& t, bool cylinde
   return middle.normalized();
 }
 
-/// All the same way round in the grid, so one sum tells whether they face the scanner.
+/// All the same way round in the grid, so one sum tells whether they face the scanner; it is of
+/// unit normals, which a stray point with large triangles does not outweigh.
 void face_scanner(std::vector<Triangle>& triangles, const std::vector<Vec3>& points,
                   bool cylinder) {
   double facing = 0;
   for (const Triangle& t : triangles)
-    facing += scaled_normal(base::pick(points, t)).dot(to_scanner(points, t, cylinder));
+    facing +=
+        scaled_normal(base::pick(points, t)).normalized().dot(to_scanner(points, t, cylinder));
   if (facing >= 0) return;
   for (Triangle& t : triangles) std::swap(t[1], t[2]);
 }
