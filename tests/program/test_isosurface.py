@@ -111,6 +111,25 @@ def test_bones_that_touch_are_parted_at_the_bridge_between_them(run, tmp_path):
         assert reach.min() > radius - half - 2, "nothing of the other"
 
 
+def test_points_of_both_bones_are_refused(run, tmp_path):
+    points = write_points(tmp_path / "jaw.mrk.json", [v.CENTER], "LPS")
+    result = run("repose-isosurface", v.write_meta(tmp_path / "ct.mha", v.samples()), "-level", 1000, "-apart", points,
+                 points, "-output", "bone.ply")
+    assert result.returncode == 1 and "of the first bone is 0 mm from a point of the second" in result.stderr, result
+    assert not list(tmp_path.glob("bone*"))
+
+
+def test_a_box_cuts_a_tilted_volume_along_x_y_and_z(run, tmp_path):
+    """Also the corners of the voxels' block, which reaches far beyond the box."""
+    ct, center = v.write_meta(tmp_path / "ct.mha", v.samples()), np.array(v.CENTER)
+    low, high = center - 8, center + 8
+    result = run("repose-isosurface", ct, "-level", 1000, "-box", *low, *high)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "lie outside the box and are left out" in result.stdout
+    points = meshio.read(tmp_path / "mesh.ply").points
+    assert (points > low - 0.01).all() and (points < high + 0.01).all()
+
+
 def cut(file, share=0.5):
     content = file.read_bytes()
     file.write_bytes(content[:int(share * len(content))])

@@ -95,6 +95,17 @@ class Bone {
   std::array<double, 3> area_;
 };
 
+/// Refuses points of the first bone that the second would hold.
+void check_apart(const std::string& name, const std::array<std::vector<Vec3>, 2>& points) {
+  for (const Vec3& first : points[0])
+    for (const Vec3& second : points[1])
+      if (const double distance = (first - second).norm(); distance <= part_hold[1])
+        base::refuse(
+            "{}: point {:.1f} of the first bone is {:.2g} mm from a point of the second, expected "
+            "more than {:g} mm; give each bone points of its own",
+            name, first, distance, part_hold[1]);
+}
+
 Terminals terminals_of(const Bone& bone, const Volume& volume, double level,
                        const std::array<std::vector<Vec3>, 2>& points) {
   Terminals terminals(bone.voxels().size(), 0);
@@ -115,6 +126,7 @@ Terminals terminals_of(const Bone& bone, const Volume& volume, double level,
 
 PartedBones part_bones(const Volume& volume, double level,
                        const std::array<std::vector<Vec3>, 2>& points) {
+  check_apart(volume.name, points);
   const Bone bone(volume, level);
   const Terminals terminals = terminals_of(bone, volume, level, points);
   GridGraph graph = bone.graph();

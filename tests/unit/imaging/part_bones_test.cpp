@@ -77,6 +77,8 @@ TEST(PartBones, what_is_apart_stays_and_points_beside_bone_are_refused) {
   EXPECT_NE(refused({0, 0, 15}, {0, 0, 90}).find("(0.0, 0.0, 90.0) of the second bone"),
             std::string::npos);
   EXPECT_NE(refused({0, 0, 90}, {0, 0, 5}).find("of the first bone"), std::string::npos);
+  EXPECT_NE(refused({0, 0, 15}, {0, 0, 12.5}).find("is 2.5 mm from a point of the second"),
+            std::string::npos);
 }
 
 }  // namespace part_bones_test

@@ -21,7 +21,8 @@ struct PartedBones {
 /// LPS; too few, or too far from where the bones meet, and the least cut is around them. What hangs
 /// together with neither goes to the first. The isosurfaces of the two parts are those of the
 /// volume, but where the bones touched, 0.1 voxel within each. Throws InputError where a point has
-/// no bone within part_hold. Memory: 60 bytes for each of the bones' voxels and 12 for any.
+/// no bone within part_hold, or one of the first lies where the second is held. Memory: 60 bytes
+/// for each of the bones' voxels and 12 for any.
 PartedBones part_bones(const Volume& volume, double level,
                        const std::array<std::vector<Vec3>, 2>& points);
 
