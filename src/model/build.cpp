@@ -1,6 +1,7 @@
 #include "repose/model/build.h"
 
 #include "column_layout.h"
+#include "region.h"
 #include "repose/anatomy/complete.h"
 #include "repose/base/log.h"
 #include "repose/model/collision.h"
@@ -17,6 +18,7 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   static const PetscLogEvent event = base::log_event("RpSurfaces");
   const base::Logged logged(event);
   GivenSkin given = load_skin(scene);
+  check_painted_meshes(scene.tissue, given.surface);
   Anatomy anatomy{scene, std::move(given.surface), {}, {}, {}, {}};
   Bones bones = read_bones(scene, &anatomy.skin);
   anatomy.bones = std::move(bones.surfaces);

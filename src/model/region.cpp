@@ -76,6 +76,9 @@ Contains inside(const scene::LabelRegion& region, double near) {
   };
 }
 
+constexpr double beside = 10;              // mm, of a painted mesh that is not the skin's
+constexpr double max_share_beside = 0.05;  // of its vertices that lie farther
+
 /// Which vertices are painted.
 std::vector<char> painted_vertices(const scene::PaintedRegion& region,
                                    const surface::VertexValues& mesh) {
@@ -102,20 +105,46 @@ std::vector<char> painted_vertices(const scene::PaintedRegion& region,
   return painted;
 }
 
-Contains painted(const scene::PaintedRegion& region) {
+struct Paint {
+  std::vector<Vec3> points;
+  std::vector<char> marks;  ///< [points] painted or not
+};
+
+Paint read_paint(const scene::PaintedRegion& region) {
   const surface::VertexValues mesh = surface::read_vertex_values(region.file);
-  const auto marks = std::make_shared<std::vector<char>>(painted_vertices(region, mesh));
-  if (std::count(marks->begin(), marks->end(), 1) == 0)
-    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), marks->size(),
+  std::vector<char> marks = painted_vertices(region, mesh);
+  if (std::count(marks.begin(), marks.end(), 1) == 0)
+    base::refuse("{}: none of its {} vertices is painted {}", region.file.string(), marks.size(),
                  region.property.empty()
                      ? fmt::format("{:g}", region.color)
                      : fmt::format("by {} ≥ {:g}", region.property, region.at_least));
-  const auto tree = std::make_shared<surface::TriangleTree>(surface::tree_of_points(mesh.points));
+  return {mesh.points, std::move(marks)};
+}
+
+Contains painted(const scene::PaintedRegion& region) {
+  const auto paint = std::make_shared<Paint>(read_paint(region));
+  const auto tree = std::make_shared<surface::TriangleTree>(surface::tree_of_points(paint->points));
   return [=](const Vec3& skin) {
-    constexpr double beside = 10;  // mm, where the painted mesh is another one
     const auto vertex = tree->nearest(skin);
-    return (*marks)[vertex.triangle] && std::sqrt(vertex.squared) <= beside;
+    return paint->marks[vertex.triangle] && std::sqrt(vertex.squared) <= beside;
   };
+}
+
+void check_on_skin(const scene::PaintedRegion& region, const surface::TriangleTree& skin) {
+  const Paint paint = read_paint(region);
+  size_t off = 0;
+  double farthest = 0;
+  for (const Vec3& point : paint.points) {
+    const double distance = std::sqrt(skin.nearest(point).squared);
+    off += distance > beside;
+    farthest = std::max(farthest, distance);
+  }
+  const size_t all = paint.points.size();
+  if (static_cast<double>(off) <= max_share_beside * static_cast<double>(all)) return;
+  base::refuse(
+      "{}: {} of its {} vertices lie more than {:g} mm from the skin, up to {:.3g} mm, expected at "
+      "most {:g} %; paint a mesh of the skin in the skin's coordinates",
+      region.file.string(), off, all, beside, farthest, 100 * max_share_beside);
 }
 
 }  // namespace
@@ -127,6 +156,20 @@ Contains contains_of(const scene::Region& region, double near) {
 Contains contains_of_skin(const scene::SkinRegion& region) {
   if (const auto* space = std::get_if<scene::Region>(&region)) return contains_of(*space);
   return painted(std::get<scene::PaintedRegion>(region));
+}
+
+void check_painted_meshes(const scene::Tissue& tissue, const surface::Surface& skin) {
+  std::vector<scene::SkinRegion> regions = tissue.face;
+  if (tissue.material)
+    for (const scene::MaterialRegion& region : tissue.material->regions)
+      regions.push_back(region.where);
+  std::optional<surface::TriangleTree> tree;
+  for (const scene::SkinRegion& region : regions) {
+    const auto* painted = std::get_if<scene::PaintedRegion>(&region);
+    if (!painted) continue;
+    if (!tree) tree.emplace(skin);
+    check_on_skin(*painted, *tree);
+  }
 }
 
 }  // namespace repose::model

@@ -2,6 +2,7 @@
 #include <functional>
 
 #include "repose/scene/scene.h"
+#include "repose/surface/surface.h"
 
 namespace repose::model {
 
@@ -15,5 +16,9 @@ Contains contains_of(const scene::Region& region, double near = 0);
 /// Returns a test of whether a point of the skin lies in a region of space, or the painted mesh's
 /// vertex nearest to it, within 10 mm, is painted.
 Contains contains_of_skin(const scene::SkinRegion& region);
+
+/// Refuses painted meshes of which more than 5 % of the vertices lie more than 10 mm from the skin
+/// that the scene names.
+void check_painted_meshes(const scene::Tissue& tissue, const surface::Surface& skin);
 
 }  // namespace repose::model

@@ -1,6 +1,8 @@
 """Scenes whose tissue is a solid: what is refused, one face on any way to it, and how far its mesh
 leaves it from the continuum."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -171,6 +173,21 @@ def test_a_region_painted_on_the_skin(run, tmp_path):
     near = np.linalg.norm(middle - above, axis=1) <= 4
     nearest = painted[np.linalg.norm(above[:, None] - skin[None], axis=2).argmin(1)]
     assert np.array_equal(changed, near & nearest) and changed.sum() > 10
+
+
+def test_paint_beside_the_skin_is_refused(run, tmp_path):
+    file = solve(run, tmp_path, "plain", scene(head="paper"), "-accuracy", 0.1)[0]
+    model = model_of(file)
+    skin = model["point/position"][model["point/layer"] == 0]
+    column = model["point/column"][model["skin/points"]]
+    write_painted(tmp_path / "painted.ply", skin + [0, 0, 30], column, skin[:, 1] < np.median(skin[:, 1]))
+    for tissue in (PAINTED.format("color: [255, 0, 0]"),
+                   "  edge: 4\n  face: [{painted: {mesh: painted.ply, color: [255, 0, 0]}}]"):
+        (tmp_path / "scene.yaml").write_text(scene(tissue, head="paper"))
+        result = run("repose-solve", "scene.yaml", "-dry_run")
+        assert result.returncode == 1 and result.stderr.count("\n") == 1, result
+        found = re.search(r"painted.ply: (\d+) of its (\d+) vertices lie more than 10 mm from the skin, up to (\S+) mm", result.stderr)
+        assert 0.05 * len(skin) < int(found[1]) < int(found[2]) == len(skin) and 25 < float(found[3]) <= 30
 
 
 def test_strata_regions_and_depths(run, tmp_path):
